@@ -9,7 +9,7 @@ import tomllib
 
 import gtsam
 import numpy as np
-from recordings import forward, reprojection_px, skew, tool_errors_mm
+from recordings import forward, reprojection_px, rms_px, skew, tool_errors_mm
 
 N_FOLDS = 5
 SENSORS, MOUNT = gtsam.symbol("s", 0), gtsam.symbol("m", 0)
@@ -101,6 +101,8 @@ class Bundle:
         optimizer = gtsam.LevenbergMarquardtOptimizer(self.graph, self.values, params)
         self.values = optimizer.optimize()
         self.sensors, self.mount = self.values.atVector(SENSORS), self.values.atPose3(MOUNT).matrix()
+        seen = {tag for view in self.views for tag in view.corners}
+        self.places = {tag: self.values.atPose3(tag_key(tag)).matrix() for tag in seen}
         return self
 
     def link(self, travel):
@@ -110,7 +112,7 @@ class Bundle:
         return (self.link(travel) @ np.append(self.drawing.camera_from_tool, 1.0))[:3]
 
     def held_out_px(self, view):
-        return reprojection_px(self.drawing, view, self.link(view.travel) @ self.mount)
+        return reprojection_px(self.drawing, view, self.link(view.travel) @ self.mount, self.places)
 
 
 class Comparison:
@@ -138,7 +140,7 @@ class Comparison:
                 held = Bundle(drawing, [v for k, v in enumerate(views) if k % N_FOLDS != fold], joints_err).solve()
                 pixels += [held.held_out_px(v) for k, v in enumerate(views) if k % N_FOLDS == fold]
             parameters = bundle.values.dim()
-            yield name, (tool_errors_mm(rests, bundle.tool), np.sqrt((np.concatenate(pixels) ** 2).mean()), seconds, parameters)
+            yield name, (tool_errors_mm(rests, bundle.tool), rms_px(pixels), seconds, parameters)
 
     def write(self):
         print("\nGains of the five joints before the camera (a tenth of a percent; armcal's own sigma):\n")

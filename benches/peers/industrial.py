@@ -145,7 +145,7 @@ def theirs_held_out(program, spec, views, corners):
         out += [pixels(spec, *found, views[k], corners) for k in everything if k % N_FOLDS == fold]
     fitted = their_hand_eye(program, spec, views, corners)
     inside = [pixels(spec, *fitted, view, corners) for view in views]
-    rms = lambda rows: np.sqrt((np.concatenate(rows) ** 2).mean())
+    rms = lambda rows: np.sqrt((np.concatenate(rows) ** 2).sum(axis=1).mean())
     return rms(inside), rms(out)
 
 

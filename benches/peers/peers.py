@@ -1,10 +1,11 @@
 """Everything beside the tools that one would take otherwise, on the same data, in one run -> Markdown on stdout.
 
     python3 -m venv target/oracle && target/oracle/bin/pip install -r tests/oracle/requirements.txt -r benches/peers/requirements.txt
-    target/oracle/bin/python benches/peers/peers.py ARMCAL [--data DIR] [--programs DIR] [--tagslam DIR] [--industrial DIR] [--speed FILE]
-        [--only PART ...] > peers.md
+    target/oracle/bin/python benches/peers/peers.py ARMCAL [--data DIR] [--recordings DIR] [--programs DIR] [--tagslam DIR] [--industrial DIR]
+        [--speed FILE] [--only PART ...] > peers.md
 
-ARMCAL: the program, built. DATA: recordings of real arms (arms.py says which). PROGRAMS: the built C++ of benches/peers/Makefile. TAGSLAM:
+ARMCAL: the program, built. DATA: recordings of real arms (arms.py says which). RECORDINGS: where simulated ones
+are kept, or made. PROGRAMS: the built C++ of benches/peers/Makefile. TAGSLAM:
 folder `tests` of github berndpfrommer/tagslam_test. INDUSTRIAL: a checkout of github ros-industrial/industrial_calibration, with hand_eye
 and kinematic built in it (README.md). SPEED: the built benchmark benches/speed.rs, for armcal's own step beside Pinocchio's.
 Machine, date and versions stand at the top; a part that cannot run says why, and none is left out for its result.
@@ -71,7 +72,7 @@ def arms(args, _):
 
 
 def simulated(args, folder):
-    run(sys.executable, "benches/peers/simulated.py", args.armcal, folder)
+    run(sys.executable, "benches/peers/simulated.py", args.armcal, args.recordings or folder)
 
 
 def maps(args, _):
@@ -125,6 +126,7 @@ def main():
     parser.add_argument("armcal", type=lambda text: Path(text).resolve())
     parser.add_argument("--data", type=lambda text: Path(text).resolve())
     parser.add_argument("--programs", type=lambda text: Path(text).resolve())
+    parser.add_argument("--recordings", type=lambda text: Path(text).resolve())
     parser.add_argument("--tagslam", type=lambda text: Path(text).resolve())
     parser.add_argument("--industrial", type=lambda text: Path(text).resolve())
     parser.add_argument("--speed", type=lambda text: Path(text).resolve())

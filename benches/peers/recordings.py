@@ -189,14 +189,19 @@ def located(drawing, view, start):
     return camera(found.x), rms
 
 
-def reprojection_px(drawing, view, base_from_camera):
-    """All corners of a view against the surveyed tags."""
+def reprojection_px(drawing, view, base_from_camera, places=None):
+    """All corners of a view, n x 2, against the surveyed tags, or against tags at `places`."""
     out = []
     for tag, pixels in view.corners.items():
-        place = drawing.base_from_tag(tag)
+        place = (places or {}).get(tag, drawing.base_from_tag(tag))
         points = drawing.corners(tag) @ place[:3, :3].T + place[:3, 3]
         out.append(drawing.project((points - base_from_camera[:3, 3]) @ base_from_camera[:3, :3])[0] - pixels)
-    return np.concatenate(out).ravel()
+    return np.concatenate(out)
+
+
+def rms_px(rows):
+    """Of distances in the image, corner by corner."""
+    return np.sqrt((np.concatenate(rows) ** 2).sum(axis=1).mean())
 
 
 def tool_errors_mm(rests, tool_of):

@@ -4,7 +4,8 @@
 
 FOLDER gets the recordings: routines/titan4-quickstart.toml in two worlds, the standard one and one where offsets alone are wrong, mount
 and survey as ever. All start from the drawing and the same 30 views. The tool error is that at the 14 rests after `armcal run` calibrated
-the arm, believed against true; held out: each fifth of the views in turn, pixels of all corners.
+the arm, believed against true; held out: each fifth of the views in turn, rms over the corners of their distance in the image, tags where the fit has them (FIGAROH, which
+knows none: where the survey has them).
 
 FIGAROH knows no gains: offsets, or all links, which bend a little to make up for them. It gets the pose of the camera in the base frame,
 from all tags of a view at their surveyed places, fitted to pixels; base frame and mount as drawn, or the mount free, or both. GTSAM
@@ -33,7 +34,7 @@ import arms  # noqa: E402
 import gtsam_bundle  # noqa: E402
 import pinocchio as pin  # noqa: E402
 from figaroh.calibration.calibration_tools import calc_updated_fkm  # noqa: E402
-from recordings import ROOT, Drawing, forward, located, read, reprojection_px, tool_errors_mm  # noqa: E402
+from recordings import ROOT, Drawing, forward, located, read, reprojection_px, rms_px, tool_errors_mm  # noqa: E402
 
 ROUTINE, ROBOT = "routines/titan4-quickstart.toml", "robots/titan4"
 SENSORS = "world.joint_sensors."
@@ -118,7 +119,7 @@ class Figaroh:
             held = self.fit([views[k] for k in train], [poses[k] for k in train])
             for k, at in zip(test, camera_poses(held, self.drawing, [views[k].travel for k in test])):
                 pixels.append(reprojection_px(self.drawing, views[k], at))
-        return np.sqrt((np.concatenate(pixels) ** 2).mean())
+        return rms_px(pixels)
 
 
 def recorded(armcal, folder, world, seed):
@@ -189,8 +190,8 @@ def compare(armcal, folder, world, seeds):
             starts = [forward(drawing.camera_chain, drawing.center + view.travel)[-1] for view in views]
             poses = [located(drawing, view, start)[0] for view, start in zip(views, starts)]
             sheet = lambda travel: (forward(drawing.camera_chain, drawing.center + travel)[-1] @ np.append(drawing.camera_from_tool, 1))[:3]
-            pixels = np.concatenate([reprojection_px(drawing, view, start) for view, start in zip(views, starts)])
-            table.add(("the datasheet", ""), tool_errors_mm(rests, sheet), np.sqrt((pixels ** 2).mean()), None, None)
+            pixels = rms_px([reprojection_px(drawing, view, start) for view, start in zip(views, starts)])
+            table.add(("the datasheet", ""), tool_errors_mm(rests, sheet), pixels, None, None)
             for fit in fits:
                 try:
                     with contextlib.redirect_stdout(io.StringIO()):
