@@ -185,6 +185,8 @@ def misfits_px(lenses, images, tags):
 
 def compared(armcal, tests, number, scratch):
     test = tests / f"test_{number}"
+    if not (test / "tagslam.yaml").exists():
+        raise RuntimeError("not there")
     spec = yaml.safe_load((test / "tagslam.yaml").read_text())
     moving = {name for body in spec["bodies"] for name, about in body.items() if not about.get("is_static", False)}
     cameras = yaml.safe_load((test / "cameras.yaml").read_text())
