@@ -135,7 +135,8 @@ def pixels(spec, base_from_camera, flange_from_board, view, corners):
     place = np.linalg.inv(base_from_camera) @ matrix(at) @ flange_from_board
     points = points @ place[:3, :3].T + place[:3, 3]
     k = spec["intrinsics"]
-    return np.stack([k["fx"] * points[:, 0] / points[:, 2] + k["cx"], k["fy"] * points[:, 1] / points[:, 2] + k["cy"]], 1) - np.array(list(seen.values()))
+    seen_at = np.array(list(seen.values()))
+    return points[:, :2] / points[:, 2:] * [k["fx"], k["fy"]] + [k["cx"], k["cy"]] - seen_at
 
 
 def theirs_held_out(program, spec, views, corners):

@@ -4,8 +4,8 @@
 
 FOLDER gets the recordings: routines/titan4-quickstart.toml in two worlds, the standard one and one where offsets alone are wrong, mount
 and survey as ever. All start from the drawing and the same 30 views. The tool error is that at the 14 rests after `armcal run` calibrated
-the arm, believed against true; held out: each fifth of the views in turn, rms over the corners of their distance in the image, tags where the fit has them (FIGAROH, which
-knows none: where the survey has them).
+the arm, believed against true. Held out: each fifth of the views in turn, rms over the corners of their distance in the image, tags where
+the fit has them (FIGAROH, which knows none: where the survey has them).
 
 FIGAROH knows no gains: offsets, or all links, which bend a little to make up for them. It gets the pose of the camera in the base frame,
 from all tags of a view at their surveyed places, fitted to pixels; base frame and mount as drawn, or the mount free, or both. GTSAM
