@@ -82,15 +82,26 @@ def write_inputs(folder, rows, tool, level, method):
     return folder / "config.yaml"
 
 
-def fitted(urdf, rows, tool, level, method):
+# Nobody knows where the board is, nor where the camera sits.
+FREE = {"known_baseframe": False, "known_tipframe": False}
+
+
+def fitted(urdf, tool, rows, way, settings):
+    """A fit of one way (level, method), with settings of FIGAROH beside its defaults."""
     with tempfile.TemporaryDirectory() as folder:
-        config = write_inputs(Path(folder), rows, tool, level, method)
+        config = write_inputs(Path(folder), rows, tool, *way)
         calibration = Calibration(Robot(str(urdf), package_dirs=[]), str(config))
-        # Nobody knows where the board is, nor where the camera sits.
-        calibration.calib_config.update(known_baseframe=False, known_tipframe=False)
+        calibration.calib_config.update(settings)
         calibration.initialize()
         calibration.solve(enable_logging=False)
     return calibration
+
+
+def pose_of(six):
+    """Of x, y, z and angles about the fixed axes."""
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = pin.rpy.rpyToMatrix(*six[3:]), six[:3]
+    return matrix
 
 
 def predicted(calibration, rows):
@@ -101,12 +112,7 @@ def predicted(calibration, rows):
             q[k, calibration.model.joints[joint].idx_q] = readings[calibration.model.names[joint]]
     config = dict(calibration.calib_config, NbSample=len(rows))
     flat = calc_updated_fkm(calibration.model, calibration.data, calibration.LM_result.x, q, config)
-    out = []
-    for pose in flat.reshape(6, len(rows)).T:
-        matrix = np.eye(4)
-        matrix[:3, :3], matrix[:3, 3] = pin.rpy.rpyToMatrix(*pose[3:]), pose[:3]
-        out.append(matrix)
-    return out
+    return [pose_of(column) for column in flat.reshape(6, len(rows)).T]
 
 
 def errors_mm(measured, found):
@@ -121,7 +127,7 @@ def held_out(urdf, rows, tool, level, method):
     for fold in range(N_FOLDS):
         train = [row for k, row in enumerate(rows) if k % N_FOLDS != fold]
         test = [row for k, row in enumerate(rows) if k % N_FOLDS == fold]
-        calibration = fitted(urdf, train, tool, level, method)
+        calibration = fitted(urdf, tool, train, (level, method), FREE)
         parameters = max(parameters, len(calibration.LM_result.x))
         errors += [errors_mm(row[1], found) for row, found in zip(test, predicted(calibration, test))]
     return np.array(errors), parameters

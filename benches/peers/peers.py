@@ -1,18 +1,25 @@
 """Everything beside the tools that one would take otherwise, on the same data, in one run -> Markdown on stdout.
 
     python3 -m venv target/oracle && target/oracle/bin/pip install -r tests/oracle/requirements.txt -r benches/peers/requirements.txt
-    target/oracle/bin/python benches/peers/peers.py ARMCAL [--data DIR] [--programs DIR] [--only PART ...] > peers.md
+    target/oracle/bin/python benches/peers/peers.py ARMCAL [--data DIR] [--recordings DIR] [--programs DIR] [--tagslam DIR] [--industrial DIR]
+        [--speed FILE] [--only PART ...] > peers.md
 
-ARMCAL: the program, built. DATA: recordings of real arms (arms.py says which). PROGRAMS: the built C++ of benches/peers/Makefile.
+ARMCAL: the program, built. DATA: recordings of real arms (arms.py says which). RECORDINGS: where simulated ones
+are kept, or made. PROGRAMS: the built C++ of benches/peers/Makefile. TAGSLAM:
+folder `tests` of github berndpfrommer/tagslam_test. INDUSTRIAL: a checkout of github ros-industrial/industrial_calibration, with hand_eye
+and kinematic built in it (README.md). SPEED: the built benchmark benches/speed.rs, for armcal's own step beside Pinocchio's.
 Machine, date and versions stand at the top; a part that cannot run says why, and none is left out for its result.
 
 | part | ours beside | what |
 |---|---|---|
 | arms | FIGAROH | held-out errors on recordings of real arms |
+| simulated | FIGAROH, GTSAM | tool error against the truth, on recordings of `armcal run` |
+| maps | TagSLAM | TagSLAM's own tests, with the maps that it left there |
+| industrial | industrial_calibration | its own example data |
 | solvers | Ceres, NLopt | `bundle` and minimum distance, the same numbers |
 | detectors | pupil-apriltags, OpenCV | found tags, corner errors, time on `armcal study detection`'s images; tests/golden/detectors.csv anew |
 | paths | OMPL with coal | RRT-Connect and edge checks on `armcal study edges` and `study paths` |
-| physics | MuJoCo | steps a second of the same arm |
+| physics | MuJoCo, Pinocchio | steps and accelerations a second of the same arm |
 """
 
 import argparse
@@ -26,7 +33,8 @@ from importlib import metadata
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-PACKAGES = ["figaroh", "pin", "mujoco", "ompl", "pupil-apriltags", "opencv-python-headless", "numpy", "scipy"]
+PACKAGES = ["figaroh", "gtsam", "pin", "mujoco", "ompl", "pupil-apriltags", "opencv-python-headless", "numpy",
+            "scipy"]
 
 
 def said(*words):
@@ -63,6 +71,23 @@ def arms(args, _):
     run(sys.executable, "benches/peers/arms.py", args.armcal, args.data)
 
 
+def simulated(args, folder):
+    run(sys.executable, "benches/peers/simulated.py", args.armcal, args.recordings or folder)
+
+
+def maps(args, _):
+    if not args.tagslam:
+        raise RuntimeError("no --tagslam")
+    run(sys.executable, "benches/peers/tag_maps.py", args.armcal, args.tagslam)
+
+
+def industrial(args, _):
+    if not args.industrial:
+        raise RuntimeError("no --industrial")
+    programs = [args.industrial / name for name in ("hand_eye", "kinematic")]
+    run(sys.executable, "benches/peers/industrial.py", args.armcal, args.industrial / "examples", *programs)
+
+
 def solvers(args, _):
     if not args.programs:
         raise RuntimeError("no --programs")
@@ -85,13 +110,15 @@ def paths(args, folder):
         *sorted((folder / "paths").glob("paths-*.json")))
 
 
-def physics(_, __):
+def physics(args, _):
+    run(sys.executable, "benches/peers/rigid_bodies.py", *([args.speed] if args.speed else []))
+    print(flush=True)
     print("```", flush=True)
     run(sys.executable, "tests/oracle/bench_mujoco.py", "--with-armcal")
     print("```")
 
 
-PARTS = [arms, solvers, detectors, paths, physics]
+PARTS = [arms, simulated, maps, industrial, solvers, detectors, paths, physics]
 
 
 def main():
@@ -99,6 +126,10 @@ def main():
     parser.add_argument("armcal", type=lambda text: Path(text).resolve())
     parser.add_argument("--data", type=lambda text: Path(text).resolve())
     parser.add_argument("--programs", type=lambda text: Path(text).resolve())
+    parser.add_argument("--recordings", type=lambda text: Path(text).resolve())
+    parser.add_argument("--tagslam", type=lambda text: Path(text).resolve())
+    parser.add_argument("--industrial", type=lambda text: Path(text).resolve())
+    parser.add_argument("--speed", type=lambda text: Path(text).resolve())
     parser.add_argument("--only", nargs="+", choices=[part.__name__ for part in PARTS])
     args = parser.parse_args()
     print("# Beside other tools\n")
