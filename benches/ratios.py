@@ -40,14 +40,14 @@ def record(program, folder):
     """The recordings that are read; 300 views are drawn and planned once."""
     sets = {"30": [], "300": ["--set", "capture.poses=300", "--set", "capture.criterion=random", "--set", "capture.replan_every=0"]}
     for name, words in sets.items():
-        run = [program, "--quiet", "run", QUICKSTART, "--out", f"{folder}/{name}", *words]
-        subprocess.run(run, check=True, stdout=subprocess.DEVNULL)
+        run = [program, "run", QUICKSTART, "--out", f"{folder}/{name}", *words]
+        subprocess.run(run, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
 def measured(program, words):
     """Processor s, clock s, most memory MB."""
     with tempfile.TemporaryDirectory() as out:
-        call = [program, "--quiet", *(word.replace("{out}", out) for word in words)]
+        call = [program, *(word.replace("{out}", out) for word in words)]
         began = time.monotonic()
         process = subprocess.Popen(call, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
         said = process.stderr.read()

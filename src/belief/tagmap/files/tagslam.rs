@@ -47,6 +47,9 @@ struct BodyYaml {
     max_hamming_distance: Option<i32>,
     #[serde(default)]
     ignore_tags: Vec<u32>,
+    /// In place of the noise of each tag's pose, m and rad; both or none.
+    override_tag_position_noise: Option<f64>,
+    override_tag_rotation_noise: Option<f64>,
     pose: Option<PoseYaml>,
     #[serde(default)]
     tags: Vec<TagYaml>,
@@ -153,6 +156,7 @@ fn add_body(file: &Path, out: &mut TagFile, name: &str, raw: &BodyYaml, noise: (
     if raw.odom_topic.is_some() {
         out.ignored_keys.push(key("odom_topic"));
     }
+    let first = out.tags.len();
     for tag in &raw.tags {
         let of_tag = |of: &str| key(&format!("tags: id {}: {of}", tag.id));
         let Some(size_m) = tag.size.or(raw.default_tag_size) else {
@@ -166,20 +170,36 @@ fn add_body(file: &Path, out: &mut TagFile, name: &str, raw: &BodyYaml, noise: (
         out.tags.push(TagPrior { id: tag.id, size_m, body, pose, std });
     }
     match (raw.kind.as_deref().unwrap_or("simple"), &raw.board, &raw.staggered_board) {
-        ("simple", ..) => Ok(()),
-        ("board", Some(board), _) => {
-            out.tags.extend(board_tags(file, body, &key("board"), board, Rows::Full)?);
-            Ok(())
-        }
+        ("simple", ..) => {}
+        ("board", Some(board), _) => out.tags.extend(board_tags(file, body, &key("board"), board, Rows::Full)?),
         ("staggered_board", _, Some(board)) => {
             out.tags.extend(board_tags(file, body, &key("staggered_board"), board, Rows::Staggered)?);
-            Ok(())
         }
-        ("board" | "staggered_board", ..) => Err(FileIssue::new(file, key("board"), "is missing").into()),
+        ("board" | "staggered_board", ..) => return Err(FileIssue::new(file, key("board"), "is missing").into()),
         (other, ..) => {
             let problem = format!("`{other}` is not supported; use simple, board or staggered_board");
-            Err(FileIssue::new(file, key("type"), problem).into())
+            return Err(FileIssue::new(file, key("type"), problem).into());
         }
+    }
+    if let Some(std) = raw.overriding_std(file, &key)? {
+        out.tags[first..].iter_mut().filter(|tag| tag.pose.is_some()).for_each(|tag| tag.std = Some(std));
+    }
+    Ok(())
+}
+
+impl BodyYaml {
+    /// What TagSLAM gives every tag of the body whose pose is known, where both are above zero.
+    fn overriding_std(&self, file: &Path, key: &dyn Fn(&str) -> String) -> Result<Option<[f64; 6]>, RobotError> {
+        let noises = [
+            ("override_tag_position_noise", self.override_tag_position_noise),
+            ("override_tag_rotation_noise", self.override_tag_rotation_noise),
+        ];
+        for (name, noise) in noises {
+            // -1 is TagSLAM's own word for none.
+            FileIssue::check_range(file, &key(name), noise.unwrap_or(-1.0), -1.0..=1e6)?;
+        }
+        let [position, rotation] = noises.map(|(_, noise)| noise.filter(|noise| *noise > 0.0));
+        Ok(position.zip(rotation).map(|(p, r)| [p, p, p, r, r, r]))
     }
 }
 

@@ -106,6 +106,23 @@ fn a_tagslam_file_is_read_with_bodies_boards_and_rules() {
     assert_eq!(file.ignored_keys, ["bodies.rig.odom_topic", "plane_measurements"]);
 }
 
+/// As TagSLAM has it: both above zero, and tags without a pose stay without one.
+#[test]
+fn a_body_of_a_tagslam_file_may_replace_the_noise_of_its_tags() {
+    let stds = |keys: &str| {
+        let file = tags("tagslam.yaml", &TAGSLAM.replacen("     ignore_tags", &format!("{keys}     ignore_tags"), 1));
+        [2, 3, 24].map(|id| file.tags.iter().find(|tag| tag.id == id).unwrap().std)
+    };
+    let position = "     override_tag_position_noise: 0.5\n";
+    let both = format!("{position}     override_tag_rotation_noise: 0.1\n");
+    let [own, _, of_board] = stds("");
+    assert_eq!(stds(&both), [Some([0.5, 0.5, 0.5, 0.1, 0.1, 0.1]), None, of_board]);
+    assert_eq!(stds(position)[0], own);
+    assert_eq!(stds(&both.replace("0.1", "-1"))[0], own);
+    let wrong = TAGSLAM.replacen("     ignore_tags", "     override_tag_position_noise: -3\n     ignore_tags", 1);
+    assert!(refusal("tagslam.yaml", &wrong).contains("bodies.hall.override_tag_position_noise: -3 is outside -1 .."));
+}
+
 #[test]
 fn what_is_wrong_with_a_tag_file_is_said_with_file_key_and_range() {
     let with = |from: &str, to: &str| {
