@@ -1,9 +1,14 @@
 //! Calibrations of an arm: many views, and many tags.
 
+use armcal::calib::TagMeasurement;
 use armcal::calib::bundle::{HyperparameterMode, estimate, least_squares};
+use armcal::joints::JointAngles;
 use armcal::robot::Robot;
+use armcal::sensor::ArmSensors;
 use armcal::spatial::{Pose, exp};
 use armcal::stats::stream_rng;
+use armcal::streams::{CaptureSet, JointSensorSample, Mark, MarkKind, Message, TagDetection, TagDetections};
+use armcal::{Method, Recording, Status, calibrate};
 use nalgebra::Vector6;
 use rand::RngExt;
 
@@ -58,6 +63,42 @@ pub fn estimated(n_views: usize, n_tags: usize) -> Row {
         found.iterations
     });
     row(&problem, steps, cost)
+}
+
+/// All of `armcal calibrate` on a recording of the views that was read: from messages to the verdict.
+pub fn calibrated(n_views: usize, n_tags: usize) -> Row {
+    let problem = problem(n_views, n_tags);
+    let recording = recorded(&problem);
+    let (steps, cost) = measured(|| {
+        let found = calibrate(&recording, &problem.robot, Method::Bundle).expect("the recording can be calibrated");
+        assert_eq!(found.status, Status::Accepted, "{:?}", found.refusal);
+        found.fit.evaluations
+    });
+    row(&problem, steps, cost)
+}
+
+/// Every fifth view held out.
+fn recorded(problem: &Problem) -> Recording {
+    let sensors = ArmSensors::nominal(&problem.robot);
+    let mut messages = Vec::new();
+    for view in &problem.views {
+        let end = view.end;
+        let (start, middle) = (end.plus_s(-1.0), end.plus_s(-0.5));
+        let travel_rad = |j: usize| problem.robot.sensors[j].center_rad + view.travel_rad[j];
+        let counts = sensors.counts(&JointAngles::from_fn(problem.robot.n_joints(), travel_rad));
+        messages.push((middle, Message::JointSensors(JointSensorSample { stamp: middle, counts })));
+        let tags = view.tags.iter().filter_map(|tag| match &tag.measured {
+            TagMeasurement::Corners(seen) => {
+                Some(TagDetection { id: tag.id, corners_px: seen.corners_px, decision_margin: 60.0 })
+            }
+            _ => None,
+        });
+        messages.push((middle, Message::Detections(TagDetections { stamp: middle, tags: tags.collect() })));
+        let set = if view.pose_idx % 5 == 4 { CaptureSet::HeldOut } else { CaptureSet::Fit };
+        let kind = MarkKind::Capture { set, pose_idx: view.pose_idx };
+        messages.push((end, Message::Mark(Mark { start, end, kind })));
+    }
+    Recording { messages, joint_names: problem.robot.joint_names(), ..Recording::default() }
 }
 
 fn row(problem: &Problem, steps: usize, cost: crate::measure::Cost) -> Row {

@@ -68,9 +68,10 @@ fn corridor(n_views: usize, n_tags: usize) -> Corridor {
     let camera: CameraModel =
         Radtan::new([800.0, 800.0], [640.0, 512.0], [-0.23, 0.06, 1e-4, -1e-4, 0.0], [1280, 1024]).into();
     let truth: Vec<_> = (0..n_tags).map(|id| tag(id, &mut rng)).collect();
-    let length_m = PITCH_M * n_tags as f64;
+    // From where the first tags are seen to where the last ones are no more.
+    let (first_m, last_m) = (-2.5, PITCH_M * n_tags as f64 - 1.0);
     let views = (0..n_views).map(|k| {
-        let x = length_m * (k as f64 + 0.5) / n_views as f64 - 0.5;
+        let x = first_m + (last_m - first_m) * k as f64 / n_views as f64;
         let pose = camera_at(x, &mut rng);
         let stamp = Stamp { nanos: 50_000_000 * k as i64 };
         MapView { camera: 0, stamp, tags: look(&camera, &pose, &truth, &mut rng), attitude: None }

@@ -27,7 +27,7 @@ const ENOUGH_S: f64 = 30.0;
 /// What is measured: name, views, tags.
 type Case = (&'static str, usize, usize);
 
-const CASES: [Case; 25] = [
+const CASES: [Case; 31] = [
     ("least_squares", 30, 8),
     ("least_squares", 100, 8),
     ("least_squares", 300, 8),
@@ -40,6 +40,12 @@ const CASES: [Case; 25] = [
     ("estimate", 1_000, 8),
     ("estimate", 3_000, 8),
     ("estimate", 10_000, 8),
+    ("calibrate", 30, 8),
+    ("calibrate", 100, 8),
+    ("calibrate", 300, 8),
+    ("calibrate", 1_000, 8),
+    ("calibrate", 3_000, 8),
+    ("calibrate", 10_000, 8),
     ("estimate_by_tags", 300, 4),
     ("estimate_by_tags", 300, 8),
     ("estimate_by_tags", 300, 16),
@@ -76,6 +82,7 @@ fn row(name: &str, n_views: usize, n_tags: usize) -> Row {
     match name {
         "least_squares" => arms::solved(n_views, n_tags),
         "estimate" | "estimate_by_tags" => arms::estimated(n_views, n_tags),
+        "calibrate" => arms::calibrated(n_views, n_tags),
         "tag_map" => corridor::mapped(n_views, n_tags),
         _ => panic!("no measurement is called {name}"),
     }
