@@ -9,7 +9,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::measure::{FarEnd, Row, measured};
+use crate::measure::{Cost, FarEnd, Row, measured};
 
 const HALF_WIDTH_M: f64 = 1.25;
 /// From tag to tag along the corridor, which are on the left and on the right by turns.
@@ -23,6 +23,7 @@ const CORNER_STD_PX: f64 = 0.3;
 /// The camera swings from wall to wall as it goes.
 const SWING_RAD: f64 = 0.6;
 const SWING_EVERY_M: f64 = 1.7;
+const N_SEEDS: u64 = 20;
 
 struct Corridor {
     camera: CameraModel,
@@ -36,7 +37,32 @@ fn normal(rng: &mut ChaCha8Rng) -> f64 {
 
 /// A map of the corridor from all of its images.
 pub fn mapped(n_views: usize, n_tags: usize) -> Row {
-    let Corridor { camera, truth, views } = corridor(n_views, n_tags);
+    mapped_by_seed(n_views, n_tags, 1)
+}
+
+/// The sum over seeds; errors and standard deviations as root mean squares, distances as their mean.
+pub fn mapped_over_seeds(n_views: usize, n_tags: usize) -> Row {
+    let rows: Vec<Row> = (1..=N_SEEDS).map(|seed| mapped_by_seed(n_views, n_tags, seed)).collect();
+    let ends: Vec<&FarEnd> = rows.iter().filter_map(|row| row.far_end.as_ref()).collect();
+    let rms =
+        |of: &dyn Fn(&FarEnd) -> f64| (ends.iter().map(|end| of(end).powi(2)).sum::<f64>() / ends.len() as f64).sqrt();
+    let far_end = FarEnd {
+        along_mm: [0, 1].map(|k| rms(&|end| end.along_mm[k])),
+        across_mm: [0, 1].map(|k| rms(&|end| end.across_mm[k])),
+        squared_distance: ends.iter().map(|end| end.squared_distance).sum::<f64>() / ends.len() as f64,
+    };
+    let cpu_s = rows.iter().map(|row| row.cost.cpu_s).sum();
+    let memory_mb = rows.iter().map(|row| row.cost.memory_mb).fold(0.0, f64::max);
+    Row {
+        n_detections: rows.iter().map(|row| row.n_detections).sum(),
+        steps: rows.iter().map(|row| row.steps).sum(),
+        cost: Cost { cpu_s, memory_mb },
+        far_end: Some(far_end),
+    }
+}
+
+fn mapped_by_seed(n_views: usize, n_tags: usize, seed: u64) -> Row {
+    let Corridor { camera, truth, views } = corridor(n_views, n_tags, seed);
     let bodies = [Body { name: "corridor".to_owned(), is_static: true, pose: None }];
     let prior = |(id, pose): (usize, &Isometry3<f64>)| {
         let pose = (id == 0).then_some(*pose);
@@ -63,8 +89,8 @@ fn far_end(map: &TagMap, truth: &[Isometry3<f64>]) -> FarEnd {
     }
 }
 
-fn corridor(n_views: usize, n_tags: usize) -> Corridor {
-    let mut rng = stream_rng(1, "corridor of the growth");
+fn corridor(n_views: usize, n_tags: usize, seed: u64) -> Corridor {
+    let mut rng = stream_rng(seed, "corridor of the growth");
     let camera: CameraModel =
         Radtan::new([800.0, 800.0], [640.0, 512.0], [-0.23, 0.06, 1e-4, -1e-4, 0.0], [1280, 1024]).into();
     let truth: Vec<_> = (0..n_tags).map(|id| tag(id, &mut rng)).collect();

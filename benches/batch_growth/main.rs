@@ -27,7 +27,7 @@ const ENOUGH_S: f64 = 30.0;
 /// What is measured: name, views, tags.
 type Case = (&'static str, usize, usize);
 
-const CASES: [Case; 31] = [
+const CASES: [Case; 32] = [
     ("least_squares", 30, 8),
     ("least_squares", 100, 8),
     ("least_squares", 300, 8),
@@ -59,6 +59,7 @@ const CASES: [Case; 31] = [
     ("tag_map", 6_000, 300),
     ("tag_map", 12_000, 600),
     ("tag_map", 20_000, 1_000),
+    ("tag_map_20_seeds", 2_000, 100),
 ];
 
 fn main() {
@@ -84,6 +85,7 @@ fn row(name: &str, n_views: usize, n_tags: usize) -> Row {
         "estimate" | "estimate_by_tags" => arms::estimated(n_views, n_tags),
         "calibrate" => arms::calibrated(n_views, n_tags),
         "tag_map" => corridor::mapped(n_views, n_tags),
+        "tag_map_20_seeds" => corridor::mapped_over_seeds(n_views, n_tags),
         _ => panic!("no measurement is called {name}"),
     }
 }

@@ -288,6 +288,19 @@ mod tests {
         }
     }
 
+    /// A corridor: each node shares a block with the six before it, and the numbers say nothing of their order.
+    #[test]
+    fn a_chain_has_as_many_blocks_as_it_is_long() {
+        const N: usize = 1000;
+        // 389 and 1000 have no common factor.
+        let number = |k: usize| k * 389 % N;
+        let edges =
+            (0..N).flat_map(|k| (1..=6).filter(move |back| *back <= k).map(move |back| (number(k), number(k - back))));
+        let n_announced = edges.clone().count();
+        let pattern = Pattern::new(N, edges);
+        assert!(pattern.start[N] <= n_announced + 10, "{} of {n_announced}", pattern.start[N]);
+    }
+
     #[test]
     fn what_is_not_positive_definite_has_no_factor() {
         let mut system = System::zeros(&Arc::new(Pattern::new(1, [])));
