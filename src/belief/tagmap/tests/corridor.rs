@@ -1,14 +1,14 @@
 //! A corridor of tags on two walls, seen piece by piece: how far off is its end?
 
 use crate::tagmap::tests::distances;
-use crate::tagmap::tests::fixture::{Scene, body, look, looking, normal, pinhole, settings};
+use crate::tagmap::tests::fixture::{Scene, body, fisheye, look, looking, normal, settings};
 use crate::tagmap::{MapView, TagPrior, solve};
 use armcal_core::stats::stream_rng;
 use armcal_core::time::Stamp;
 use nalgebra::{Isometry3, Vector3};
 
 const N_TAGS: u32 = 40;
-const N_VIEWS: usize = 300;
+const N_VIEWS: usize = 200;
 const PITCH_M: f64 = 0.25;
 const SIZE_M: f64 = 0.2;
 const NOISE_PX: f64 = 0.3;
@@ -30,8 +30,8 @@ fn corridor(seed: u64) -> Scene {
         let at = Vector3::new(x, 0.1 * normal(&mut rng), 0.1 * normal(&mut rng));
         // From wall to wall as it goes.
         let pose = looking(at, at + Vector3::new(1.0, 0.5 * (4.0 * x).sin(), 0.0), 0.1 * normal(&mut rng));
-        let near: Vec<_> = tags.iter().filter(|tag| (0.0..3.0).contains(&(tag.2.translation.x - x))).copied().collect();
-        let tags = look(&pinhole(), &pose, &near, NOISE_PX, &mut rng);
+        let near: Vec<_> = tags.iter().filter(|tag| (0.0..2.5).contains(&(tag.2.translation.x - x))).copied().collect();
+        let tags = look(&fisheye(), &pose, &near, NOISE_PX, &mut rng);
         views.push(MapView { camera: 0, stamp: Stamp { nanos: k as i64 }, tags, attitude: None });
         cameras_at.push(pose);
     }
@@ -40,7 +40,7 @@ fn corridor(seed: u64) -> Scene {
         TagPrior { id: *id, size_m: *size_m, body: 0, pose, std: None }
     };
     let priors = tags.iter().map(prior).collect();
-    Scene { cameras: vec![pinhole()], bodies: vec![body("base")], priors, truth, views, cameras_at }
+    Scene { cameras: vec![fisheye()], bodies: vec![body("base")], priors, truth, views, cameras_at }
 }
 
 /// Of the last tag, over seeds: chi-square of three numbers each. Beyond 99.9 % of both sides it is another model.
