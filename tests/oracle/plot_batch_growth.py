@@ -31,9 +31,8 @@ def exponent(x, y, least):
 
 def draw(axes, x, y, label, least):
     power = exponent(x, y, least)
-    (line,) = axes.loglog(x, y, "o-", markersize=4, label=f"{label}: power {power:.2f}")
+    axes.loglog(x, y, "o-", markersize=4, label=f"{label}: power {power:.2f}")
     print(f"{label} ({axes.get_ylabel()}): {power:.2f} from {least} on")
-    return line.get_color()
 
 
 def calibrations():
