@@ -65,7 +65,7 @@ fn normal(rng: &mut ChaCha8Rng) -> f64 {
 }
 
 /// A robot whose readings have no noise of their own: a view then has no parameters of its own.
-fn robot() -> Robot {
+pub fn robot() -> Robot {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/titan4");
     let mut robot = load(&folder).expect("the robot is part of the repository");
     for sensor in &mut robot.sensors {
@@ -107,9 +107,25 @@ fn moved(pose: &Isometry3<f64>, std_m: f64, std_rad: f64, rng: &mut ChaCha8Rng) 
     pose * exp(&Vector6::from_fn(|k, _| normal(rng) * if k < 3 { std_m } else { std_rad }))
 }
 
+/// What views show.
+#[derive(Clone, Copy)]
+pub struct Sight {
+    /// Errors of the joints from view to view.
+    pub joint_std_rad: f64,
+    /// Tags of a view: those nearest to its axis. As many as there are: a view that misses one is none.
+    pub n_tags: usize,
+}
+
 /// `n_views` views that see all tags, by their corners.
 pub fn corners(n_views: u32, joint_std_rad: f64) -> Problem {
     let robot = robot();
+    let n_tags = robot.tags.len();
+    corners_of(robot, n_views, Sight { joint_std_rad, n_tags })
+}
+
+/// `n_views` views by the corners of some of a robot's tags.
+pub fn corners_of(robot: Robot, n_views: u32, sight: Sight) -> Problem {
+    let joint_std_rad = sight.joint_std_rad;
     let model = model(&robot);
     let mut scales = Hyperparameters::datasheet(&robot);
     scales.joint_std_rad = [joint_std_rad; MAX_JOINTS];
@@ -118,7 +134,7 @@ pub fn corners(n_views: u32, joint_std_rad: f64) -> Problem {
     let truth = draw(&problem, &mut rng);
     while (problem.views.len() as u32) < n_views {
         let idx = problem.views.len() as u32;
-        if let Some(view) = view(&problem.robot, &truth, joint_std_rad, idx, &mut rng) {
+        if let Some(view) = view(&problem.robot, &truth, sight, idx, &mut rng) {
             problem.views.push(view);
         }
     }
@@ -139,34 +155,56 @@ fn draw(problem: &Problem, rng: &mut ChaCha8Rng) -> Truth {
     Truth { parameters, mount, tags }
 }
 
-/// A view at a random pose; `None` where it does not see all tags.
-fn view(robot: &Robot, truth: &Truth, joint_std_rad: f64, idx: u32, rng: &mut ChaCha8Rng) -> Option<View> {
+/// A view at a random pose; `None` where it does not see the tags wanted.
+fn view(robot: &Robot, truth: &Truth, sight: Sight, idx: u32, rng: &mut ChaCha8Rng) -> Option<View> {
     let travel_rad =
         JointAngles::from_fn(robot.n_joints(), |j| rng.random_range(-0.9..0.9) * robot.sensors[j].half_range_rad);
     let angles = JointAngles::from_fn(robot.n_joints(), |j| {
         let spec = &robot.sensors[j];
         let angle_rad = truth.parameters.correction(j).angle_rad(spec, travel_rad[j], &ConditionChange::default(), 0.0);
-        angle_rad + joint_std_rad * normal(rng)
+        angle_rad + sight.joint_std_rad * normal(rng)
     });
     let camera_from_base = (robot.chain.link_poses(&angles).link(robot.camera.mount.n_joints) * truth.mount).inverse();
     let mut view = View::of_reading(idx, SIMULATION_EPOCH.plus_s(20.0 * f64::from(idx)), travel_rad);
     for (tag_idx, tag) in robot.tags.iter().enumerate() {
         let camera_from_tag = camera_from_base * truth.tags[tag_idx];
-        let center = camera_from_tag.translation.vector;
-        let mut corners_px = [[0.0; 2]; 4];
-        for (pixel, corner) in corners_px.iter_mut().zip(square_corners(tag.size_m)) {
-            let point = (camera_from_tag * corner).coords;
-            let angle_rad = point.x.hypot(point.y).atan2(point.z);
-            if angle_rad > MAX_VIEW_ANGLE_RAD || center.norm() < MIN_RANGE_M {
-                return None;
+        let Some(corners_px) = corners_px(robot, tag.size_m, &camera_from_tag, rng) else {
+            if sight.n_tags < robot.tags.len() {
+                continue;
             }
-            let seen = robot.camera.lens.project(&point)?;
-            *pixel = [seen.x + CORNER_STD_PX * normal(rng), seen.y + CORNER_STD_PX * normal(rng)];
-        }
+            return None;
+        };
+        let center_in_camera_m = camera_from_tag.translation.vector;
         let measured = TagMeasurement::Corners(MeanCorners { corners_px, n_frames: 1, scatter_px2: 0.0 });
-        view.tags.push(TagObservation { id: tag.id, tag_idx, center_in_camera_m: center, measured });
+        view.tags.push(TagObservation { id: tag.id, tag_idx, center_in_camera_m, measured });
     }
-    Some(view)
+    let off_axis = |tag: &TagObservation| -tag.center_in_camera_m.z / tag.center_in_camera_m.norm();
+    if view.tags.len() > sight.n_tags {
+        view.tags.sort_by(|a, b| off_axis(a).total_cmp(&off_axis(b)));
+        view.tags.truncate(sight.n_tags);
+        view.tags.sort_by_key(|tag| tag.tag_idx);
+    }
+    (view.tags.len() == sight.n_tags).then_some(view)
+}
+
+/// What is measured of a tag; `None` where a corner is too far off the axis, or the tag too near.
+fn corners_px(
+    robot: &Robot,
+    size_m: f64,
+    camera_from_tag: &Isometry3<f64>,
+    rng: &mut ChaCha8Rng,
+) -> Option<[[f64; 2]; 4]> {
+    let mut corners_px = [[0.0; 2]; 4];
+    for (pixel, corner) in corners_px.iter_mut().zip(square_corners(size_m)) {
+        let point = (camera_from_tag * corner).coords;
+        let angle_rad = point.x.hypot(point.y).atan2(point.z);
+        if angle_rad > MAX_VIEW_ANGLE_RAD || camera_from_tag.translation.vector.norm() < MIN_RANGE_M {
+            return None;
+        }
+        let seen = robot.camera.lens.project(&point)?;
+        *pixel = [seen.x + CORNER_STD_PX * normal(rng), seen.y + CORNER_STD_PX * normal(rng)];
+    }
+    Some(corners_px)
 }
 
 /// `n_views` views of the positions of `n_tags` tags, 1 cm of noise on each coordinate; sensors are straight.

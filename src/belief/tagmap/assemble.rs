@@ -4,14 +4,14 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Isometry3, Matrix6};
 
-use crate::tagmap::adjust::degrees_of_freedom;
+use crate::tagmap::adjust::{MAX_STEPS, degrees_of_freedom};
 use crate::tagmap::groups::Group;
 use crate::tagmap::linearize::cost;
 use crate::tagmap::normal_equations::NormalEquations;
 use crate::tagmap::problem::MapProblem;
 use crate::tagmap::result::{MapGroup, MappedTag, RelativeBodyPose, TagMap};
 use crate::tagmap::screen::Screened;
-use crate::tagmap::sparse::Factor;
+use crate::tagmap::sparse::{Factor, SelectedInverse};
 use crate::tagmap::types::{MapInput, MapRejection, RejectedDetection};
 use armcal_core::numeric::Loss;
 use armcal_core::spatial::adjoint;
@@ -32,6 +32,7 @@ pub(super) fn assemble(
         Some(reduced) => (reduced.system.factorize(), reduced.inverses),
         None => (None, vec![Matrix6::zeros(); problem.blocks.len()]),
     };
+    let inverse = factor.as_ref().map(Factor::selected_inverse);
     let mut warnings = Vec::new();
     if factor.is_none() {
         warnings.push("the views do not determine every tag: no covariances".to_owned());
@@ -52,8 +53,8 @@ pub(super) fn assemble(
     rejected.sort_by_key(|rejected| (rejected.view, rejected.id, rejected.reason));
     TagMap {
         groups: groups.iter().enumerate().map(|(idx, group)| map_group(problem, idx, group)).collect(),
-        tags: mapped(problem, &pixels, factor.as_ref()),
-        relative: relative(problem, screened, &normal, &inverses, factor.as_ref()),
+        tags: mapped(problem, &pixels, inverse.as_ref()),
+        relative: relative(problem, screened, &normal, &inverses, inverse.as_ref()),
         views,
         n_detections: screened.n_detections,
         n_used: problem.observations.iter().filter(|seen| seen.is_used).count(),
@@ -67,6 +68,7 @@ pub(super) fn assemble(
         scale_warnings: Vec::new(),
         warnings,
         has_converged: false,
+        n_steps: MAX_STEPS - problem.steps_left,
         factor,
     }
 }
@@ -74,7 +76,13 @@ pub(super) fn assemble(
 /// Tags whose known place disagrees with the views, and tags most of whose detections were rejected.
 fn doubts(problem: &MapProblem<'_>) -> Vec<String> {
     let mut out = Vec::new();
-    for (idx, tag) in problem.tags.iter().enumerate() {
+    let mut counts = vec![(0_usize, 0_usize); problem.tags.len()];
+    for seen in &problem.observations {
+        let (n, used) = &mut counts[seen.tag];
+        *n += 1;
+        *used += usize::from(seen.is_used);
+    }
+    for (tag, (n, used)) in problem.tags.iter().zip(counts) {
         let id = tag.id;
         if let (Some(prior), Some(_)) = (&tag.prior, tag.node) {
             let owner = prior.owner.map_or_else(Isometry3::identity, |owner| problem.extras[owner].pose);
@@ -87,8 +95,6 @@ fn doubts(problem: &MapProblem<'_>) -> Vec<String> {
                 ));
             }
         }
-        let of_tag = || problem.observations.iter().filter(|seen| seen.tag == idx);
-        let (n, used) = (of_tag().count(), of_tag().filter(|seen| seen.is_used).count());
         if 2 * used < n {
             out.push(format!(
                 "tag {id}: {} of {n} detections disagree with the map; is it where and what it was said to be?",
@@ -147,12 +153,12 @@ fn map_group(problem: &MapProblem<'_>, idx: usize, group: &Group) -> MapGroup {
     }
 }
 
-fn mapped(problem: &MapProblem<'_>, pixels: &Pixels, factor: Option<&Factor>) -> Vec<MappedTag> {
+fn mapped(problem: &MapProblem<'_>, pixels: &Pixels, inverse: Option<&SelectedInverse>) -> Vec<MappedTag> {
     let with_group = problem.tags.iter().enumerate().filter(|(_, tag)| tag.group != usize::MAX);
     with_group
         .map(|(idx, tag)| {
-            let covariance = match (factor, tag.node) {
-                (Some(factor), Some(node)) => factor.inverse_column(node)[node],
+            let covariance = match (inverse, tag.node) {
+                (Some(inverse), Some(node)) => inverse.block(node, node),
                 _ => Matrix6::zeros(),
             };
             MappedTag {
@@ -176,11 +182,10 @@ fn relative(
     screened: &Screened,
     normal: &NormalEquations,
     inverses: &[Matrix6<f64>],
-    factor: Option<&Factor>,
+    inverse: Option<&SelectedInverse>,
 ) -> Vec<RelativeBodyPose> {
     let mut out = Vec::new();
-    let Some(factor) = factor else { return out };
-    let mut columns = InverseColumns { factor, of_node: BTreeMap::new() };
+    let Some(inverse) = inverse else { return out };
     let used: Vec<usize> =
         (0..problem.blocks.len()).filter(|idx| is_used(problem, problem.blocks[*idx].range.clone())).collect();
     for of_view in used.chunk_by(|a, b| problem.blocks[*a].view == problem.blocks[*b].view) {
@@ -189,11 +194,11 @@ fn relative(
             let (a, b) = (&problem.blocks[first], &problem.blocks[second]);
             let difference = match (a.node, b.node) {
                 (Some(a), Some(b)) => {
-                    let (of_a, of_b) = (factor.inverse_column(a), factor.inverse_column(b));
-                    of_a[a] + of_b[b] - of_a[b] - of_a[b].transpose()
+                    let both = inverse.block(a, b);
+                    inverse.block(a, a) + inverse.block(b, b) - both - both.transpose()
                 }
                 _ => [first, second]
-                    .map(|idx| block_covariance(problem, normal, &inverses[idx], idx, &mut columns))
+                    .map(|idx| block_covariance(problem, normal, &inverses[idx], idx, inverse))
                     .into_iter()
                     .sum(),
             };
@@ -211,29 +216,17 @@ fn relative(
     out
 }
 
-/// Columns of the covariance, each computed once.
-struct InverseColumns<'a> {
-    factor: &'a Factor,
-    of_node: BTreeMap<usize, Vec<Matrix6<f64>>>,
-}
-
-impl InverseColumns<'_> {
-    fn of(&mut self, node: usize) -> &[Matrix6<f64>] {
-        self.of_node.entry(node).or_insert_with(|| self.factor.inverse_column(node))
-    }
-}
-
 /// Covariance of a camera's pose: its own part plus that of its tags.
 fn block_covariance(
     problem: &MapProblem<'_>,
     normal: &NormalEquations,
-    inverse: &Matrix6<f64>,
+    own: &Matrix6<f64>,
     idx: usize,
-    columns: &mut InverseColumns<'_>,
+    inverse: &SelectedInverse,
 ) -> Matrix6<f64> {
     let block = &problem.blocks[idx];
     if let Some(node) = block.node {
-        return columns.factor.inverse_column(node)[node];
+        return inverse.block(node, node);
     }
     let nodes: Vec<(usize, usize)> = block
         .range
@@ -241,12 +234,11 @@ fn block_covariance(
         .filter(|at| problem.observations[*at].is_used)
         .filter_map(|at| problem.tags[problem.observations[at].tag].node.map(|node| (at, node)))
         .collect();
-    let mut covariance = *inverse;
+    let mut covariance = *own;
     for (at, node) in &nodes {
-        let column = columns.of(*node);
-        let right = normal.cross[*at].transpose() * inverse;
+        let right = normal.cross[*at].transpose() * own;
         for (other, other_node) in &nodes {
-            covariance += inverse * normal.cross[*other] * column[*other_node] * right;
+            covariance += own * normal.cross[*other] * inverse.block(*other_node, *node) * right;
         }
     }
     covariance

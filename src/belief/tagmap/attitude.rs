@@ -73,8 +73,9 @@ pub(super) struct Wanted {
 
 /// Ties the blocks; gives them and the world's turn their nodes.
 pub(super) fn link(problem: &mut MapProblem<'_>, attitudes: &[Option<UnitQuaternion<f64>>], wanted: &Wanted) {
+    // Blocks are in the order of views and groups.
     let find = |blocks: &[Block], view: usize, group: usize| {
-        blocks.iter().position(|block| block.view == view && block.group == group)
+        blocks.binary_search_by_key(&(view, group), |block| (block.view, block.group)).ok()
     };
     let mut pairs = Vec::new();
     for (view, attitude) in attitudes.iter().enumerate() {

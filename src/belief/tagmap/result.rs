@@ -126,6 +126,8 @@ pub struct TagMap {
     pub warnings: Vec<String>,
     /// Whether the last fit found a minimum.
     pub has_converged: bool,
+    /// Steps of all fits.
+    pub n_steps: usize,
     pub(super) factor: Option<Factor>,
 }
 

@@ -94,6 +94,15 @@ impl System {
         }
     }
 
+    /// By places.
+    fn at(&self, row: usize, column: usize) -> Matrix6<f64> {
+        match row.cmp(&column) {
+            std::cmp::Ordering::Equal => self.diagonal[row],
+            std::cmp::Ordering::Greater => self.lower[self.pattern.slot(row, column)],
+            std::cmp::Ordering::Less => self.lower[self.pattern.slot(column, row)].transpose(),
+        }
+    }
+
     /// L of L L^T; `None` if the matrix is not positive definite.
     pub(super) fn factorize(mut self) -> Option<Factor> {
         let pattern = Arc::clone(&self.pattern);
@@ -158,6 +167,31 @@ impl Factor {
         pattern.place.iter().map(|&place| x[place]).collect()
     }
 
+    /// The blocks of the inverse that the matrix has, and those that the factor has besides: of `L` and the inverse `Z`,
+    /// with `U = L_kj L_jj^-1`, `Z_ij = -sum_k Z_ik U_kj` over the rows k of column j, all of them in the pattern
+    /// (Takahashi 1973; Erisman and Tinney 1975). As much work as to factorize.
+    pub(super) fn selected_inverse(&self) -> SelectedInverse {
+        let pattern = Arc::clone(&self.pattern);
+        let mut inverse = System::zeros(&pattern);
+        for column in (0..pattern.rows.len()).rev() {
+            let mut pivot = Matrix6::identity();
+            self.diagonal[column].solve_lower_triangular_mut(&mut pivot);
+            let (from, rows) = (pattern.start[column], &pattern.rows[column]);
+            let scaled: Vec<Matrix6<f64>> = (from..from + rows.len()).map(|at| self.lower[at] * pivot).collect();
+            let mut own = pivot.tr_mul(&pivot);
+            for (i, &row) in rows.iter().enumerate() {
+                let mut block = Matrix6::zeros();
+                for (k, &other) in rows.iter().enumerate() {
+                    block -= inverse.at(row, other) * scaled[k];
+                }
+                own -= scaled[i].tr_mul(&block);
+                inverse.lower[from + i] = block;
+            }
+            inverse.diagonal[column] = 0.5 * (own + own.transpose());
+        }
+        SelectedInverse { inverse }
+    }
+
     /// The six columns of the inverse that belong to `node`, by nodes.
     pub(super) fn inverse_column(&self, node: usize) -> Vec<Matrix6<f64>> {
         let pattern = &*self.pattern;
@@ -184,6 +218,19 @@ impl Factor {
     }
 }
 
+/// Blocks of the inverse of a [`System`].
+pub(super) struct SelectedInverse {
+    inverse: System,
+}
+
+impl SelectedInverse {
+    /// Of two nodes that share a block of the matrix, or of one.
+    pub(super) fn block(&self, a: usize, b: usize) -> Matrix6<f64> {
+        let place = &self.inverse.pattern.place;
+        self.inverse.at(place[a], place[b])
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -191,8 +238,8 @@ mod tests {
     use nalgebra::{DMatrix, DVector};
     use rand::RngExt;
 
-    /// A random sparse positive definite matrix, both ways.
-    fn random(n: usize, seed: u64) -> (System, DMatrix<f64>) {
+    /// A random sparse positive definite matrix, both ways, and its pairs of nodes.
+    fn random(n: usize, seed: u64) -> (System, DMatrix<f64>, Vec<(usize, usize)>) {
         let mut rng = stream_rng(seed, "blocks");
         let edges: Vec<(usize, usize)> =
             (0..2 * n).map(|_| (rng.random_range(0..n), rng.random_range(0..n))).filter(|(a, b)| a != b).collect();
@@ -207,20 +254,20 @@ mod tests {
                 at += block.transpose();
             }
         };
-        for (a, b) in edges {
+        for (a, b) in edges.iter().copied() {
             let block = Matrix6::from_fn(|_, _| rng.random_range(-1.0..1.0));
             add(a, b, &block);
         }
         for a in 0..n {
             add(a, a, &(Matrix6::identity() * 80.0));
         }
-        (system, dense)
+        (system, dense, edges)
     }
 
     #[test]
     fn solutions_and_inverses_are_those_of_the_dense_matrix() {
         for (n, seed) in [(1, 1), (2, 2), (7, 3), (30, 4)] {
-            let (system, dense) = random(n, seed);
+            let (system, dense, edges) = random(n, seed);
             let factor = system.factorize().expect("diagonally dominant");
             let right: Vec<Vector6<f64>> = (0..n).map(|k| Vector6::repeat(1.0 + k as f64)).collect();
             let solved = factor.solve(&right);
@@ -234,7 +281,24 @@ mod tests {
                     assert!((block - inverse.fixed_view::<6, 6>(6 * b, 6 * a)).norm() < 1e-12);
                 }
             }
+            let selected = factor.selected_inverse();
+            for (a, b) in edges.into_iter().chain((0..n).map(|a| (a, a))) {
+                assert!((selected.block(a, b) - inverse.fixed_view::<6, 6>(6 * a, 6 * b)).norm() < 1e-12);
+            }
         }
+    }
+
+    /// A corridor: each node shares a block with the six before it, and the numbers say nothing of their order.
+    #[test]
+    fn a_chain_has_as_many_blocks_as_it_is_long() {
+        const N: usize = 1000;
+        // 389 and 1000 have no common factor.
+        let number = |k: usize| k * 389 % N;
+        let edges =
+            (0..N).flat_map(|k| (1..=6).filter(move |back| *back <= k).map(move |back| (number(k), number(k - back))));
+        let n_announced = edges.clone().count();
+        let pattern = Pattern::new(N, edges);
+        assert!(pattern.start[N] <= n_announced + 10, "{} of {n_announced}", pattern.start[N]);
     }
 
     #[test]

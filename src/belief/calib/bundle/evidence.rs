@@ -4,7 +4,7 @@
 //! are told by the data, and `s^2 = (sum x^2 + nu s0^2) / (gamma + nu)` (MacKay 1992, eq. 4.9), with nu
 //! pseudo-observations of the datasheet's s0. The noise: `(sum chi^2 + nu) / (N - gamma_all + nu)`.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Vector6};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector6};
 
 use crate::calib::bundle::linearize::NormalEquations;
 use crate::calib::bundle::model::{Hyperparameters, SHAPE_LENGTH};
@@ -55,6 +55,7 @@ impl Posterior {
     /// `None` where the normal equations have no inverse.
     pub(crate) fn of(problem: &BundleProblem<'_>, normal: &NormalEquations) -> Option<Self> {
         let factor = Cholesky::new(normal.matrix.clone())?;
+        let covariance = factor.inverse();
         let mut own = vec![[0.0; N_VIEW_PARAMETERS]; problem.views.len()];
         let mut by_common = own.clone();
         let mut groups = normal.eliminated.iter();
@@ -63,16 +64,30 @@ impl Posterior {
                 let by_columns = group.inverse * group.own_by_columns(problem, &normal.by_tag, view_idx);
                 let used: Vec<usize> =
                     (0..N_VIEW_PARAMETERS).filter(|&row| group.twists.column(row).iter().any(|v| *v != 0.0)).collect();
-                let mut right = DMatrix::from_fn(problem.layout.n, used.len(), |k, row| by_columns[(used[row], k)]);
-                factor.l_dirty().solve_lower_triangular_mut(&mut right);
-                for (k, &row) in used.iter().enumerate() {
-                    by_common[view_idx][row] = right.column(k).norm_squared();
-                    own[view_idx][row] = group.inverse[(row, row)] + by_common[view_idx][row];
+                let right = DMatrix::from_fn(problem.layout.n, used.len(), |k, row| by_columns[(used[row], k)]);
+                for (variance, &row) in squares_over(&factor, &covariance, right).into_iter().zip(&used) {
+                    by_common[view_idx][row] = variance;
+                    own[view_idx][row] = group.inverse[(row, row)] + variance;
                 }
             }
         }
-        Some(Self { covariance: factor.inverse(), own, by_common })
+        Some(Self { covariance, own, by_common })
     }
+}
+
+/// A column with less than one entry in so many goes by its entries alone: a view sees few of many tags.
+const FEW: usize = 4;
+
+/// `b^T N^-1 b` of each column b of `right`, by the factor of N or by its inverse, the covariance.
+fn squares_over(factor: &Cholesky<f64, Dyn>, covariance: &DMatrix<f64>, mut right: DMatrix<f64>) -> Vec<f64> {
+    let touched: Vec<usize> = (0..right.nrows()).filter(|&k| right.row(k).iter().any(|v| *v != 0.0)).collect();
+    if FEW * touched.len() < right.nrows() {
+        let rows = right.select_rows(&touched);
+        let among = DMatrix::from_fn(touched.len(), touched.len(), |a, b| covariance[(touched[a], touched[b])]);
+        return rows.column_iter().map(|column| column.dot(&(&among * column))).collect();
+    }
+    factor.l_dirty().solve_lower_triangular_mut(&mut right);
+    right.column_iter().map(|column| column.norm_squared()).collect()
 }
 
 /// Sums over one group of parameters with a common prior size.
@@ -503,4 +518,31 @@ pub(crate) fn change(a: &Hyperparameters, b: &Hyperparameters) -> f64 {
         all
     };
     numbers(a).iter().zip(numbers(b)).map(|(a, b)| (a / b).ln().abs()).fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use armcal_core::stats::stream_rng;
+    use rand::RngExt;
+
+    #[test]
+    fn columns_with_few_entries_have_the_squares_of_any() {
+        let n = 120;
+        let mut rng = stream_rng(1, "few entries");
+        let mixed = DMatrix::from_fn(n, n, |_, _| rng.random_range(-1.0..1.0));
+        let normal = &mixed * mixed.transpose() + DMatrix::identity(n, n);
+        let factor = Cholesky::new(normal).expect("positive definite");
+        let covariance = factor.inverse();
+        for n_entries in [20, 100] {
+            let right = DMatrix::from_fn(n, 3, |k, _| {
+                let value = rng.random_range(-1.0..1.0);
+                if k < n_entries { value } else { 0.0 }
+            });
+            let expected: Vec<f64> = right.column_iter().map(|b| b.dot(&factor.solve(&b.into_owned()))).collect();
+            for (found, expected) in squares_over(&factor, &covariance, right).into_iter().zip(expected) {
+                assert!((found / expected - 1.0).abs() < 1e-9, "{n_entries}: {found} for {expected}");
+            }
+        }
+    }
 }

@@ -2,6 +2,7 @@
 
 mod bodies;
 mod bound;
+mod corridor;
 mod data;
 mod fixture;
 mod statistics;

@@ -8,6 +8,7 @@ pub(crate) mod data;
 mod drawing;
 mod equations;
 mod failures;
+mod growth;
 mod lenses;
 mod moved_tags;
 mod reservations;
