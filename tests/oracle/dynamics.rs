@@ -228,7 +228,8 @@ pub(super) fn accelerations(equations: &Equations, tau: &[f64]) -> Vec<f64> {
     let drive = |i: usize| if i < equations.first_joint { 0.0 } else { tau[i - equations.first_joint] };
     let net: Coordinates = std::array::from_fn(|i| if i < n { drive(i) - equations.bias[i] } else { 0.0 });
     assert!(n <= MAX_DOF);
-    equations.inertia.solve(&net)[..n].to_vec()
+    let mut inertia = equations.inertia;
+    inertia.solve(&net)[..n].to_vec()
 }
 
 /// Norm of the difference over the norm of what is expected.
