@@ -1,8 +1,8 @@
 //! How calibrations of an arm and maps of tags grow: processor time and memory over views and tags.
 //!
 //! `cargo bench --no-default-features --bench batch_growth > batch-growth.csv`, then
-//! `tests/oracle/plot_batch_growth.py batch-growth.csv`. Each figure is that of a process of its own, the time the least
-//! of a few. `ARMCAL_MOST_VIEWS` leaves out what has more.
+//! `tests/oracle/plot_batch_growth.py batch-growth.csv`. Each figure is that of a process of its own, the time the
+//! least of a few. `ARMCAL_MOST_VIEWS` leaves out what has more.
 
 #![allow(clippy::print_stdout, reason = "its table is what it is for")]
 

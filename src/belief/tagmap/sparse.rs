@@ -167,8 +167,8 @@ impl Factor {
         pattern.place.iter().map(|&place| x[place]).collect()
     }
 
-    /// The blocks of the inverse that the matrix has, and those that the factor has besides: of `L` and the inverse `Z`,
-    /// with `U = L_kj L_jj^-1`, `Z_ij = -sum_k Z_ik U_kj` over the rows k of column j, all of them in the pattern
+    /// The blocks of the inverse that the matrix has, and those that the factor has besides: of `L` and the inverse
+    /// `Z`, with `U = L_kj L_jj^-1`, `Z_ij = -sum_k Z_ik U_kj` over the rows k of column j, all of them in the pattern
     /// (Takahashi 1973; Erisman and Tinney 1975). As much work as to factorize.
     pub(super) fn selected_inverse(&self) -> SelectedInverse {
         let pattern = Arc::clone(&self.pattern);

@@ -1,9 +1,9 @@
 //! The nearest approach of all runs: what a path keeps clear of shows in the few runs that come near anything.
 //!
-//! The required clearance is a floor that most runs never come near, so that less of it moves the typical run little and
-//! the nearest runs by its whole size. The test is that of precedence (Nelson, *Tables for a precedence life test*,
-//! Technometrics 5, 1963), for pairs: where an unchanged program's two sides differ by chance alone, either run of a pair
-//! is as likely the nearer one, and the k nearest runs of all are all new ones in one case of 2^k at most.
+//! The required clearance is a floor that most runs never come near, so that less of it moves the typical run little
+//! and the nearest runs by its whole size. The test is that of precedence (Nelson, *Tables for a precedence life test*,
+//! Technometrics 5, 1963), for pairs: where an unchanged program's two sides differ by chance alone, either run of a
+//! pair is as likely the nearer one, and the k nearest runs of all are all new ones in one case of 2^k at most.
 
 use super::{Check, Judge, Pair, Verdict};
 use crate::campaign::Metric;
