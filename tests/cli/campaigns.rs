@@ -220,7 +220,7 @@ fn a_baseline_of_something_else_is_refused_and_builds_get_their_files() {
     let told = regress(&["--json", "--junit", &junit, "--markdown", &markdown, "--baseline"]);
     told.expect("itself", 0, &["\"verdict\": \"not_worse\"", "s of the arm's time each: about"]);
     serde_json::from_str::<serde_json::Value>(&told.stdout).expect("JSON alone on stdout");
-    assert!(read(Path::new(&junit)).contains("tests=\"12\" skipped=\"0\" failures=\"0\" errors=\"0\""));
+    assert!(read(Path::new(&junit)).contains("tests=\"13\" skipped=\"0\" failures=\"0\" errors=\"0\""));
     assert!(read(Path::new(&markdown)).contains("| tool error"));
 
     let refused = |what: &str, words: &[&str]| {
