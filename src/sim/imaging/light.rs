@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
-use crate::imaging::math::{Rgb, Vec3, exp, exp2, max};
+use crate::imaging::math::{Lanes, Rgb, Vec3, exp, exp2, max};
 
 /// A white lamp in the base frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,39 +41,57 @@ impl Lamp {
         }
     }
 
-    /// Light through a unit area across the ray at `point`, lx, without the water's losses, the way's length, and the
-    /// unit vector towards the lamp.
+    /// Light through a unit area across the rays at `points`, lx, without the water's losses, the ways' lengths, and the
+    /// unit vectors towards the lamp.
     #[inline]
-    fn arriving(&self, point: &Vec3) -> (f32, f32, Vec3) {
+    fn arriving<const N: usize>(&self, points: &Lanes<N>) -> ([f32; N], [f32; N], Lanes<N>) {
         /// Nearer than this a lamp is no point.
         const SIZE_M2: f32 = 0.0025;
-        let to_lamp = self.position - point;
-        let square = max(to_lamp.norm_squared(), SIZE_M2);
-        let way_m = square.sqrt();
-        let towards = to_lamp / way_m;
-        let cos = -towards.dot(&self.direction);
-        (self.intensity_cd / square * exp2((cos - 1.0) * self.narrowness), way_m, towards)
+        let (mut lux, mut way_m, mut towards) = ([0.0; N], [0.0; N], [[0.0; N]; 3]);
+        let [ax, ay, az]: [f32; 3] = self.direction.into();
+        for k in 0..N {
+            let [x, y, z]: [f32; 3] = std::array::from_fn(|axis| self.position[axis] - points[axis][k]);
+            let square = max(x * x + y * y + z * z, SIZE_M2);
+            way_m[k] = square.sqrt();
+            let [x, y, z] = [x / way_m[k], y / way_m[k], z / way_m[k]];
+            let cos = -(x * ax + y * ay + z * az);
+            lux[k] = self.intensity_cd / square * exp2((cos - 1.0) * self.narrowness);
+            (towards[0][k], towards[1][k], towards[2][k]) = (x, y, z);
+        }
+        (lux, way_m, towards)
     }
 
-    /// Illuminance of a surface of unit normal `normal` at `point`, lx, added to `sum`.
+    /// Illuminance of surfaces of unit normals `normals` at `points`, lx, added to `sum`, colour by colour.
     #[inline]
-    pub(super) fn light_up(&self, point: &Vec3, normal: &Vec3, per_m: &Rgb, sum: &mut Rgb) {
-        let (lux, way_m, towards) = self.arriving(point);
-        let across = towards.dot(normal);
-        if across <= 0.0 {
-            return;
+    pub(super) fn light_up<const N: usize>(
+        &self,
+        points: &Lanes<N>,
+        normals: &Lanes<N>,
+        per_m: &Rgb,
+        sum: &mut Lanes<N>,
+    ) {
+        let (mut lux, way_m, towards) = self.arriving(points);
+        for k in 0..N {
+            let across = towards[0][k] * normals[0][k] + towards[1][k] * normals[1][k] + towards[2][k] * normals[2][k];
+            lux[k] *= max(across, 0.0);
         }
-        for (sum, per_m) in sum.iter_mut().zip(per_m) {
-            *sum += lux * across * exp(-per_m * way_m);
-        }
+        add_attenuated(&lux, &way_m, per_m, sum);
     }
 
-    /// Illuminance of a particle at `point`, lx, added to `sum`.
+    /// Illuminance of particles at `points`, lx, added to `sum`, colour by colour.
     #[inline]
-    pub(super) fn light_up_all_sides(&self, point: &Vec3, per_m: &Rgb, sum: &mut Rgb) {
-        let (lux, way_m, _) = self.arriving(point);
-        for (sum, per_m) in sum.iter_mut().zip(per_m) {
-            *sum += lux * exp(-per_m * way_m);
+    pub(super) fn light_up_all_sides<const N: usize>(&self, points: &Lanes<N>, per_m: &Rgb, sum: &mut Lanes<N>) {
+        let (lux, way_m, _) = self.arriving(points);
+        add_attenuated(&lux, &way_m, per_m, sum);
+    }
+}
+
+/// Adds what the water leaves of `lux` after `way_m`.
+#[inline]
+fn add_attenuated<const N: usize>(lux: &[f32; N], way_m: &[f32; N], per_m: &Rgb, sum: &mut Lanes<N>) {
+    for (sum, per_m) in sum.iter_mut().zip(per_m) {
+        for k in 0..N {
+            sum[k] += lux[k] * exp(-per_m * way_m[k]);
         }
     }
 }

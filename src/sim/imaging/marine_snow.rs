@@ -6,7 +6,7 @@
 
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
-use crate::imaging::math::{Vec3, exp, hash, unit};
+use crate::imaging::math::{Vec3, exp, hash, lanes, unit};
 use crate::imaging::rays::Rays;
 use crate::imaging::shader::Shader;
 use crate::spec::ImageSpec;
@@ -51,13 +51,13 @@ pub(super) fn fall(spec: &ImageSpec, lens: &CameraModel, shader: &Shader, key: u
         let focal_px = lens.focal_px()[0] as f32;
         let radius_px = focal_px * radius_m / range_m;
         let sigma_px = (0.25 * radius_px * radius_px + 0.16).sqrt().min(LARGEST_PX);
-        let mut lux = [0.5 * spec.ambient_lux as f32; 3];
+        let mut lux = [[0.5 * spec.ambient_lux as f32]; 3];
         for lamp in &shader.lamps {
-            lamp.light_up_all_sides(&point, &shader.water.direct_per_m, &mut lux);
+            lamp.light_up_all_sides(&lanes(&[point]), &shader.water.direct_per_m, &mut lux);
         }
         let area_px = PI * radius_px * radius_px;
         let share = ALBEDO * FRAC_1_PI * area_px / (TAU * sigma_px * sigma_px);
-        let peak = std::array::from_fn(|c| lux[c] * share * exp(-shader.water.direct_per_m[c] * range_m));
+        let peak = std::array::from_fn(|c| lux[c][0] * share * exp(-shader.water.direct_per_m[c] * range_m));
         out.push(Flake { column: pixel.x as f32, row: pixel.y as f32, sigma_px, range_m, peak });
     }
 }

@@ -4,6 +4,14 @@
 pub(super) type Vec3 = nalgebra::Vector3<f32>;
 /// Red, green, blue.
 pub(super) type Rgb = [f32; 3];
+/// Several vectors, or colours, component by component: loops over them become vector instructions.
+pub(super) type Lanes<const N: usize> = [[f32; N]; 3];
+
+/// Vectors as lanes.
+#[inline]
+pub(super) fn lanes<const N: usize>(vectors: &[Vec3; N]) -> Lanes<N> {
+    std::array::from_fn(|axis| std::array::from_fn(|k| vectors[k][axis]))
+}
 
 /// `exp(x)` for x <= 0 to a relative error of 1e-6 and of the bits of x; 0 below -87.
 #[inline]
@@ -14,7 +22,9 @@ pub(super) fn exp(x: f32) -> f32 {
 /// `2^x` for x <= 0: the whole part goes into the exponent, the rest through its Taylor polynomial of degree 6.
 #[inline]
 pub(super) fn exp2(x: f32) -> f32 {
-    let x = if x < -126.0 { return 0.0 } else { x };
+    // Without a branch, so that a loop of these can become vector instructions.
+    let is_some = x >= -126.0;
+    let x = if is_some { x } else { 0.0 };
     let whole = (x - 0.5) as i32;
     let rest = (x - whole as f32) * std::f32::consts::LN_2;
     let polynomial = 1.0
@@ -22,7 +32,8 @@ pub(super) fn exp2(x: f32) -> f32 {
             * (1.0
                 + rest
                     * (0.5 + rest * (1.0 / 6.0 + rest * (1.0 / 24.0 + rest * (1.0 / 120.0 + rest * (1.0 / 720.0))))));
-    f32::from_bits(((whole + 127) as u32) << 23) * polynomial
+    let value = f32::from_bits(((whole + 127) as u32) << 23) * polynomial;
+    if is_some { value } else { 0.0 }
 }
 
 /// The smaller one, without a care for NaN: one instruction.

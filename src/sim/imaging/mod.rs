@@ -3,8 +3,8 @@
 //!
 //! Rays (`rays`) are intersected with objects (`tracer`, `scene`, `shape`, `tag_board`). Blocks of pixels on one face
 //! share its shading (`shading`, `shader`, `light`, `water`); pixels on `edges` are means over 32 samples
-//! (`supersampling`). `marine_snow`, `auto_exposure` and the `sensor` follow. No thread changes the order of the
-//! arithmetic.
+//! (`supersampling`). `marine_snow`, `auto_exposure` and the `sensor` follow. Loops over `Lanes` become vector
+//! instructions. Neither these nor threads change the order of the arithmetic.
 
 mod auto_exposure;
 mod canvas;

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::imaging::math::Vec3;
+use crate::imaging::math::{Lanes, Vec3};
 use armcal_core::optics::CameraModel;
 
 /// Unit vectors in the camera's frame, pixel by pixel, rows from the top. Beyond the lens's field of view they are
@@ -55,6 +55,12 @@ impl Rays {
         Vec3::new(self.x[i], self.y[i], self.z[i])
     }
 
+    /// Those of pixels in a row, from the `i`th pixel on.
+    #[inline]
+    pub(super) fn several<const N: usize>(&self, i: usize) -> Lanes<N> {
+        [first_of(&self.x[i..]), first_of(&self.y[i..]), first_of(&self.z[i..])]
+    }
+
     #[inline]
     pub(super) fn sees(&self, column: usize, row: usize) -> bool {
         (self.spans[row][0]..self.spans[row][1]).contains(&column)
@@ -77,4 +83,15 @@ impl Rays {
         let down = slope(look(column, row.wrapping_sub(1)), look(column, row + 1));
         (here, across, down)
     }
+}
+
+/// The first few values; zero where there are no more.
+#[inline(always)]
+pub(super) fn first_of<const N: usize>(values: &[f32]) -> [f32; N] {
+    if let Some(whole) = values.first_chunk() {
+        return *whole;
+    }
+    let mut some = [0.0; N];
+    some[..values.len()].copy_from_slice(values);
+    some
 }

@@ -2,9 +2,9 @@
 
 use nalgebra::{Isometry3, Point3};
 
-use crate::imaging::math::{Rgb, Vec3, max};
+use crate::imaging::math::{Lanes, Rgb, Vec3, max};
 use crate::imaging::rays::Rays;
-use crate::imaging::shape::{Form, Lanes, Place};
+use crate::imaging::shape::{Form, Place};
 use armcal_core::spatial::{exp, log};
 
 /// Samples of place and time on a pixel that an edge crosses.
@@ -148,7 +148,44 @@ pub(super) fn candidates(objects: &[Object], rays: &Rays, column: usize, row: us
     found
 }
 
+/// Those of a tile's candidates that the rays of a small block of it may meet, in the same order. The block is left,
+/// top, right, bottom; the last two are behind it.
+pub(super) fn narrow(
+    objects: &[Object],
+    rays: &Rays,
+    found: &[(f32, u16)],
+    block: [usize; 4],
+    out: &mut Vec<(f32, u16)>,
+) {
+    out.clear();
+    match Cone::of_block(rays, block) {
+        None => out.extend_from_slice(found),
+        Some(cone) => {
+            let is_near =
+                |(_, n): &&(f32, u16)| objects[usize::from(*n)].bounds.iter().any(|bound| cone.touches(bound));
+            out.extend(found.iter().filter(is_near));
+        }
+    }
+}
+
 impl Cone {
+    /// `None` where a corner sees nothing.
+    fn of_block(rays: &Rays, [left, top, right, bottom]: [usize; 4]) -> Option<Self> {
+        /// Rounding, and rays between the corners that are farther from the axis.
+        const MARGIN_PX: f32 = 2.0;
+        let corners = [(left, top), (right - 1, top), (left, bottom - 1), (right - 1, bottom - 1)];
+        if !corners.iter().all(|&(x, y)| rays.sees(x, y)) {
+            return None;
+        }
+        let corners = corners.map(|(x, y)| rays.at(x, y));
+        let axis = corners.iter().sum::<Vec3>().try_normalize(1e-6)?;
+        let cos = corners.iter().map(|ray| ray.dot(&axis)).fold(1.0, f32::min);
+        let sin = max(1.0 - cos * cos, 0.0).sqrt();
+        let margin_sin = MARGIN_PX / rays.focal_px;
+        let margin_cos = (1.0 - margin_sin * margin_sin).sqrt();
+        Some(Self { axis, cos: cos * margin_cos - sin * margin_sin, sin: sin * margin_cos + cos * margin_sin })
+    }
+
     /// `None` for a tile that sees nothing.
     fn new(rays: &Rays, column: usize, row: usize) -> Option<Self> {
         /// Rays on the rim that are looked at.
@@ -231,4 +268,57 @@ pub(super) fn first_met<const N: usize>(
         }
     }
     (range, number)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use armcal_core::optics::fixture::lens;
+    use armcal_core::robot::Shape;
+    use armcal_core::stats::stream_rng;
+    use nalgebra::Vector3;
+    use rand::RngExt;
+
+    /// Every pixel of every block meets what it meets where all objects are tried, at the same range.
+    #[test]
+    fn narrowed_candidates_lack_nothing_that_a_ray_meets() {
+        let shapes = [
+            Shape::Box { size_m: [0.02, 0.03, 1.2] },
+            Shape::Cylinder { radius_m: 0.05, length_m: 0.6 },
+            Shape::Capsule { radius_m: 0.03, length_m: 0.5 },
+            Shape::Sphere { radius_m: 0.01 },
+        ];
+        let forms = shapes.map(|shape| Form::of_shape(&shape));
+        let mut rng = stream_rng(5, "narrow");
+        let mut draw = |span: f64| rng.random_range(-span..span);
+        let objects: Vec<Object> = (0..60)
+            .map(|n| {
+                let place = Vector3::new(draw(2.0), draw(2.0), 1.0 + draw(0.9));
+                let base_from_object = Isometry3::new(place, Vector3::new(draw(3.0), draw(3.0), draw(3.0)));
+                let look = Appearance::Plain([0.5; 3]);
+                Object::new(&forms[n % 4], look, &[base_from_object; 3], &[Isometry3::identity(); 3], 400.0)
+            })
+            .collect();
+        let all: Vec<(f32, u16)> = (0..60).map(|n| (0.0, n)).collect();
+        let rays = Rays::new(&lens());
+        let (mut near, mut n_met, mut n_left) = (Vec::new(), 0, 0);
+        for row in (0..rays.height).step_by(8) {
+            for column in (0..rays.width).step_by(8) {
+                let (right, bottom) = ((column + 8).min(rays.width), (row + 8).min(rays.height));
+                let tile = candidates(&objects, &rays, column / TILE_PX * TILE_PX, row / TILE_PX * TILE_PX);
+                narrow(&objects, &rays, &tile, [column, row, right, bottom], &mut near);
+                n_left += tile.len() - near.len();
+                for y in row..bottom {
+                    let ray: Lanes<8> = rays.several(y * rays.width + column);
+                    let sees = (0..right - column).filter(|k| rays.sees(column + k, y));
+                    let (narrowed, whole) = (first_met(&objects, &near, &ray), first_met(&objects, &all, &ray));
+                    for k in sees {
+                        assert_eq!((narrowed.0[k], narrowed.1[k]), (whole.0[k], whole.1[k]), "{} {y}", column + k);
+                        n_met += usize::from(whole.1[k] > 0);
+                    }
+                }
+            }
+        }
+        assert!(n_met > 50_000 && n_left > 5_000, "{n_met} met, {n_left} left out");
+    }
 }

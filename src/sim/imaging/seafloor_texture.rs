@@ -49,7 +49,7 @@ impl Texture {
         // Whole periods more, so that the cast rounds down.
         let away = (side << 12) as f32;
         let (x, y) = (x_m * scale + away, y_m * scale + away);
-        let (i, j) = (x as usize, y as usize);
+        let (i, j) = (x as i32 as usize, y as i32 as usize);
         let (u, v) = (x - i as f32, y - j as f32);
         let mask = side - 1;
         let at = |dx: usize, dy: usize| texels[((j + dy) & mask) * side + ((i + dx) & mask)];

@@ -7,13 +7,15 @@
 use rayon::prelude::*;
 
 use crate::imaging::auto_exposure::Exposure;
-use crate::imaging::math::{hash, image_key, max};
-use crate::imaging::rays::Rays;
+use crate::imaging::math::{Lanes, hash, image_key, max, min};
+use crate::imaging::rays::{Rays, first_of};
 use crate::spec::ImageSpec;
 
 /// Rows that one thread works on.
 pub(super) const BAND_ROWS: usize = 32;
 const NORMALS: usize = 4096;
+/// Pixels that are read out together.
+const LANES: usize = 8;
 
 /// The sensor and what it needs for every image.
 #[derive(Clone, Debug)]
@@ -21,7 +23,7 @@ pub(super) struct Sensor {
     /// Half of a symmetric kernel, its middle first; empty without blur.
     kernel: Vec<f32>,
     /// Quantiles of the normal distribution, scaled to unit variance.
-    normals: Vec<f32>,
+    normals: Box<[f32; NORMALS]>,
     spare: Vec<f32>,
     seed: u64,
 }
@@ -70,11 +72,11 @@ pub(super) struct Readout<'a> {
     vignetting: f32,
     center_px: [f32; 2],
     key: u64,
-    normals: &'a [f32],
+    normals: &'a [f32; NORMALS],
 }
 
 impl<'a> Readout<'a> {
-    fn new(spec: &ImageSpec, exposure: Exposure, rays: &Rays, key: u64, normals: &'a [f32]) -> Self {
+    fn new(spec: &ImageSpec, exposure: Exposure, rays: &Rays, key: u64, normals: &'a [f32; NORMALS]) -> Self {
         let (read, shot) = (spec.read_noise_electrons as f32, spec.shot_noise as f32);
         let half_diagonal_px = 0.5 * (rays.width as f32).hypot(rays.height as f32);
         Self {
@@ -102,23 +104,55 @@ impl<'a> Readout<'a> {
     }
 
     fn line(&self, row: usize, planes: [&[f32]; 3], out: &mut [u8]) {
-        let dy = row as f32 - self.center_px[1];
-        let pixels = planes[0].iter().zip(planes[1]).zip(planes[2]).zip(out.as_chunks_mut::<3>().0);
-        let first = self.key.wrapping_add((row as u64) << 32);
-        for (column, (((red, green), blue), out)) in pixels.enumerate() {
-            let dx = column as f32 - self.center_px[0];
-            let kept = max(1.0 - self.vignetting * (dx * dx + dy * dy), 0.0) * self.electrons_per_cd_m2;
-            let bits = if self.is_noisy { hash(first.wrapping_add(column as u64)) } else { 0 };
-            for (k, (out, radiance)) in out.iter_mut().zip([red, green, blue]).enumerate() {
-                let mut electrons = kept * radiance;
-                if self.is_noisy {
-                    let normal = self.normals[(bits >> (20 * k)) as usize & (NORMALS - 1)];
-                    electrons += normal * (self.read_variance + self.shot_variance * electrons).sqrt();
-                }
-                // The cast clamps.
-                *out = (electrons * self.counts_per_electron + 0.5) as u8;
+        for (n, out) in out.chunks_mut(3 * LANES).enumerate() {
+            let (first, n_pixels) = (n * LANES, out.len() / 3);
+            // The last few of a row get company.
+            let of = first..first + n_pixels;
+            let [red, green, blue] = planes;
+            let radiance = [first_of(&red[of.clone()]), first_of(&green[of.clone()]), first_of(&blue[of])];
+            let rgb = self.pixels(row, first, &radiance);
+            for (k, out) in out.as_chunks_mut::<3>().0.iter_mut().enumerate() {
+                *out = [rgb[0][k], rgb[1][k], rgb[2][k]];
             }
         }
+    }
+
+    /// Some pixels in a row from column `first` on.
+    #[inline]
+    fn pixels(&self, row: usize, first: usize, radiance: &Lanes<LANES>) -> [[u8; LANES]; 3] {
+        let dy = row as f32 - self.center_px[1];
+        let mut kept = [0.0; LANES];
+        for (k, kept) in kept.iter_mut().enumerate() {
+            let dx = (first + k) as f32 - self.center_px[0];
+            *kept = max(1.0 - self.vignetting * (dx * dx + dy * dy), 0.0) * self.electrons_per_cd_m2;
+        }
+        let key = self.key.wrapping_add((row as u64) << 32);
+        let mut bits = [0; LANES];
+        if self.is_noisy {
+            for (k, bits) in bits.iter_mut().enumerate() {
+                *bits = hash(key.wrapping_add((first + k) as u64));
+            }
+        }
+        let mut out = [[0; LANES]; 3];
+        for (c, out) in out.iter_mut().enumerate() {
+            let mut electrons = [0.0; LANES];
+            for k in 0..LANES {
+                electrons[k] = kept[k] * radiance[c][k];
+            }
+            if self.is_noisy {
+                let mut normals = [0.0; LANES];
+                for k in 0..LANES {
+                    normals[k] = self.normals[(bits[k] >> (20 * c)) as usize & (NORMALS - 1)];
+                }
+                for k in 0..LANES {
+                    electrons[k] += normals[k] * (self.read_variance + self.shot_variance * electrons[k]).sqrt();
+                }
+            }
+            for k in 0..LANES {
+                out[k] = min(max(electrons[k] * self.counts_per_electron + 0.5, 0.0), 255.0) as i32 as u8;
+            }
+        }
+        out
     }
 }
 
@@ -159,7 +193,7 @@ fn gaussian(sigma_px: f64) -> Vec<f32> {
 
 /// The normal distribution's quantiles at the middles of even shares, by bisection of its distribution function (the
 /// series of Marsaglia 2004), scaled to a variance of one.
-fn normals() -> Vec<f32> {
+fn normals() -> Box<[f32; NORMALS]> {
     let below = |x: f64| {
         let (mut sum, mut term, mut n) = (x, x, 1.0);
         while f64::abs(term) > 1e-17 {
@@ -179,5 +213,9 @@ fn normals() -> Vec<f32> {
     };
     let half: Vec<f64> = (0..NORMALS / 2).map(|k| -quantile((k as f64 + 0.5) / NORMALS as f64)).collect();
     let variance = half.iter().map(|x| x * x).sum::<f64>() / half.len() as f64;
-    half.iter().flat_map(|x| [1.0, -1.0].map(|sign| (sign * x / variance.sqrt()) as f32)).collect()
+    let mut normals = Box::new([0.0; NORMALS]);
+    for (pair, x) in normals.as_chunks_mut::<2>().0.iter_mut().zip(half) {
+        *pair = [1.0, -1.0].map(|sign| (sign * x / variance.sqrt()) as f32);
+    }
+    normals
 }

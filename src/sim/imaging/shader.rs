@@ -9,7 +9,7 @@ use std::f32::consts::{FRAC_1_PI, PI};
 use nalgebra::Isometry3;
 
 use crate::imaging::light::{Lamp, Light};
-use crate::imaging::math::{Rgb, Vec3, exp};
+use crate::imaging::math::{Lanes, Rgb, Vec3, exp, lanes};
 use crate::imaging::rays::Rays;
 use crate::imaging::water::Water;
 use crate::spec::ImageSpec;
@@ -76,6 +76,7 @@ impl Shader {
             let back = self.water.backscatter_per_m[k];
             if back > 0.0 { self.ambient_lux * self.water.scatter_per_m[k] / (4.0 * PI * back) } else { 0.0 }
         });
+        let path = BackPath::new(&self.water);
         let node = |n: usize| {
             if let Some(given) = given {
                 return given;
@@ -87,7 +88,7 @@ impl Shader {
                 // Beside the field of view the nearest ray that sees stands in.
                 let [first, behind] = rays.spans[row];
                 if first < behind {
-                    self.scattered_back(&rays.at(column.clamp(first, behind - 1), row), &mut veil);
+                    self.scattered_back(&path, &rays.at(column.clamp(first, behind - 1), row), &mut veil);
                 }
             }
             veil
@@ -96,22 +97,16 @@ impl Shader {
     }
 
     /// Adds the light of the lamps that the water on a ray sends back.
-    fn scattered_back(&self, ray: &Vec3, sum: &mut Rgb) {
-        let clearest_per_m = self.water.direct_per_m.iter().fold(f32::INFINITY, |a, b| a.min(*b));
-        let far_m = (4.0 / clearest_per_m.max(0.01)).min(12.0);
-        for step in 0..STEPS {
-            let at = |k: f32| far_m * (k / STEPS as f32).powi(2);
-            let (near_m, next_m) = (at(step as f32), at(step as f32 + 1.0));
-            let middle_m = at(step as f32 + 0.5);
-            let mut lux = [0.0; 3];
-            for lamp in &self.lamps {
-                lamp.light_up_all_sides(&(ray * middle_m), &self.water.direct_per_m, &mut lux);
-            }
-            for k in 0..3 {
-                sum[k] += self.water.in_scatter_per_m_sr[k]
-                    * lux[k]
-                    * exp(-self.water.direct_per_m[k] * middle_m)
-                    * (next_m - near_m);
+    fn scattered_back(&self, path: &BackPath, ray: &Vec3, sum: &mut Rgb) {
+        let points: Lanes<STEPS> = std::array::from_fn(|axis| path.middle_m.map(|m| ray[axis] * m));
+        let mut lux = [[0.0; STEPS]; 3];
+        for lamp in &self.lamps {
+            lamp.light_up_all_sides(&points, &self.water.direct_per_m, &mut lux);
+        }
+        for c in 0..3 {
+            let kept = self.water.in_scatter_per_m_sr[c];
+            for step in 0..STEPS {
+                sum[c] += kept * lux[c][step] * path.left[c][step] * path.length_m[step];
             }
         }
     }
@@ -134,18 +129,60 @@ impl Shader {
         Shade { factor: [0.0; 3], veil: self.veil_at(column, row) }
     }
 
-    /// A surface at `point` (camera frame) with unit normal `normal`, seen at a pixel.
-    pub(super) fn shade(&self, point: &Vec3, normal: &Vec3, column: usize, row: usize) -> Shade {
-        let sky = if self.is_even { 1.0 } else { 0.5 + 0.5 * normal.dot(&self.up) };
-        let mut lux = [self.ambient_lux * sky; 3];
+    /// Surfaces at `points` (camera frame) with unit normals `normals`, seen at pixels (column, row).
+    #[inline]
+    pub(super) fn shade<const N: usize>(
+        &self,
+        points: &[Vec3; N],
+        normals: &[Vec3; N],
+        pixels: &[[usize; 2]; N],
+    ) -> [Shade; N] {
+        let sky = normals.map(|normal| if self.is_even { 1.0 } else { 0.5 + 0.5 * normal.dot(&self.up) });
+        let mut lux: Lanes<N> = [sky.map(|sky| self.ambient_lux * sky); 3];
+        let (points, normals) = (lanes(points), lanes(normals));
         for lamp in &self.lamps {
-            lamp.light_up(point, normal, &self.water.direct_per_m, &mut lux);
+            lamp.light_up(&points, &normals, &self.water.direct_per_m, &mut lux);
         }
-        let range_m = point.norm();
-        let far = self.veil_at(column, row);
-        Shade {
-            factor: std::array::from_fn(|k| lux[k] * FRAC_1_PI * exp(-self.water.direct_per_m[k] * range_m)),
-            veil: std::array::from_fn(|k| far[k] * (1.0 - exp(-self.water.backscatter_per_m[k] * range_m))),
+        let mut range_m = [0.0; N];
+        for (k, range_m) in range_m.iter_mut().enumerate() {
+            *range_m = points.iter().map(|axis| axis[k] * axis[k]).sum::<f32>().sqrt();
+        }
+        let (mut left, mut veiled) = ([[0.0; N]; 3], [[0.0; N]; 3]);
+        for c in 0..3 {
+            let (direct, back) = (self.water.direct_per_m[c], self.water.backscatter_per_m[c]);
+            for k in 0..N {
+                left[c][k] = exp(-direct * range_m[k]);
+                veiled[c][k] = 1.0 - exp(-back * range_m[k]);
+            }
+        }
+        std::array::from_fn(|k| {
+            let far = self.veil_at(pixels[k][0], pixels[k][1]);
+            Shade {
+                factor: std::array::from_fn(|c| lux[c][k] * FRAC_1_PI * left[c][k]),
+                veil: std::array::from_fn(|c| far[c] * veiled[c][k]),
+            }
+        })
+    }
+}
+
+/// The steps of the veil's integral, the same for all rays of an image.
+struct BackPath {
+    middle_m: [f32; STEPS],
+    length_m: [f32; STEPS],
+    /// What the water leaves of light on its way back, by colour.
+    left: Lanes<STEPS>,
+}
+
+impl BackPath {
+    fn new(water: &Water) -> Self {
+        let clearest_per_m = water.direct_per_m.iter().fold(f32::INFINITY, |a, b| a.min(*b));
+        let far_m = (4.0 / clearest_per_m.max(0.01)).min(12.0);
+        let at = |k: f32| far_m * (k / STEPS as f32).powi(2);
+        let middle_m: [f32; STEPS] = std::array::from_fn(|step| at(step as f32 + 0.5));
+        Self {
+            middle_m,
+            length_m: std::array::from_fn(|step| at(step as f32 + 1.0) - at(step as f32)),
+            left: water.direct_per_m.map(|per_m| middle_m.map(|m| exp(-per_m * m))),
         }
     }
 }

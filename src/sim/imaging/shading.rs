@@ -4,7 +4,8 @@
 //! neighbourhood, or swept by one while the shutter is open, is the mean of `SAMPLES` rays.
 
 use crate::imaging::edges::has_other_face;
-use crate::imaging::math::{Rgb, Vec3};
+use crate::imaging::math::{Rgb, Vec3, lanes};
+use crate::imaging::rays::first_of;
 use crate::imaging::scene::{Appearance, FACE_BITS, Object, TILE_PX};
 use crate::imaging::shader::Shade;
 use crate::imaging::tag_board;
@@ -57,15 +58,25 @@ impl ShadeCache {
 }
 
 impl Tracer<'_> {
-    /// The shade of a face that is known to lie on a pixel's ray at `range_m`, and its reflectance there.
-    fn surface(&self, face: u16, range_m: f32, at: [usize; 2]) -> (Shade, Rgb) {
-        let [column, row] = at;
-        let Some(n) = object_of(face) else { return (self.shader.open(column, row), [0.0; 3]) };
+    /// The shades of a face that is known to lie on the rays of some pixels at `range_m`, and where it is met.
+    fn surface<const N: usize>(
+        &self,
+        face: u16,
+        range_m: [f32; N],
+        pixels: &[[usize; 2]; N],
+    ) -> ([Shade; N], Option<[Intersection; N]>) {
+        let Some(n) = object_of(face) else {
+            return (pixels.map(|[column, row]| self.shader.open(column, row)), None);
+        };
         let object = &self.objects[n];
-        let ray = self.rays.at(column, row);
-        let (_, _, normal) = object.form.meet(&object.place, &ray, range_m);
-        let shade = self.shader.shade(&(ray * range_m), &normal, column, row);
-        (shade, self.albedo(object, &Intersection { ray, range_m, face, normal }))
+        let met: [Intersection; N] = std::array::from_fn(|k| {
+            let ray = self.rays.at(pixels[k][0], pixels[k][1]);
+            let (_, _, normal) = object.form.meet(&object.place, &ray, range_m[k]);
+            Intersection { ray, range_m: range_m[k], face, normal }
+        });
+        let points = std::array::from_fn(|k| met[k].ray * met[k].range_m);
+        let normals = std::array::from_fn(|k| met[k].normal);
+        (self.shader.shade(&points, &normals, pixels), Some(met))
     }
 
     #[inline]
@@ -74,8 +85,8 @@ impl Tracer<'_> {
             Appearance::Tag => tag_board::albedo(at.face & ((1 << FACE_BITS) - 1)),
             Appearance::Plain(albedo) => albedo,
             Appearance::Ground => {
-                let place = object.place.point(&at.ray, at.range_m);
-                self.texture.albedo(place.x, place.y, self.ground_level(&at.ray, at.range_m, &at.normal))
+                let [[x_m], [y_m], _] = object.place.points(&lanes(&[at.ray]), &[at.range_m]);
+                self.texture.albedo(x_m, y_m, self.ground_level(&at.ray, at.range_m, &at.normal))
             }
         }
     }
@@ -146,10 +157,14 @@ impl Band<'_> {
         if object.look == Appearance::Tag {
             let tracer = self.tracer;
             let key = self.faces[i] & !((1 << FACE_BITS) - 1);
-            let shade = known.shade(key, object, || tracer.surface(self.faces[i], self.ranges[i], [x, row]).0);
+            let shade = known.shade(key, object, || {
+                let ([shade], _) = tracer.surface(self.faces[i], [self.ranges[i]], &[[x, row]]);
+                shade
+            });
             return shade.radiance(&tag_board::albedo(self.faces[i] & ((1 << FACE_BITS) - 1)));
         }
-        let (shade, albedo) = self.tracer.surface(self.faces[i], self.ranges[i], [x, row]);
+        let ([shade], met) = self.tracer.surface(self.faces[i], [self.ranges[i]], &[[x, row]]);
+        let albedo = met.map_or([0.0; 3], |[at]| self.tracer.albedo(object, &at));
         shade.radiance(&albedo)
     }
 
@@ -191,17 +206,18 @@ impl Band<'_> {
         let [left, top, right, bottom] = block;
         let width = self.tracer.rays.width;
         let face = self.faces[(self.top + top) * width + left];
-        let corner = |x: usize, y: usize| {
-            let range_m = self.ranges[(self.top + y) * width + x];
-            self.tracer.surface(face, range_m, [x, self.top + y])
-        };
-        let corners =
-            [corner(left, top), corner(right - 1, top), corner(left, bottom - 1), corner(right - 1, bottom - 1)];
+        let (above, below) = (self.top + top, self.top + bottom - 1);
+        let corners = [[left, above], [right - 1, above], [left, below], [right - 1, below]];
+        let range_m = corners.map(|[x, y]| self.ranges[y * width + x]);
+        let (shades, met) = self.tracer.surface(face, range_m, &corners);
         let object = object_of(face).map(|n| &self.tracer.objects[n]);
-        if let Some(object) = object.filter(|object| object.look == Appearance::Ground) {
-            return self.fill_ground(block, object, &corners.map(|(shade, _)| shade));
-        }
-        let radiance = corners.map(|(shade, albedo)| shade.radiance(&albedo));
+        let radiance = match object.zip(met) {
+            None => shades.map(|shade| shade.veil),
+            Some((object, met)) if object.look == Appearance::Ground => {
+                return self.fill_ground(block, object, &met[0], &shades);
+            }
+            Some((object, met)) => std::array::from_fn(|k| shades[k].radiance(&self.tracer.albedo(object, &met[k]))),
+        };
         for y in top..bottom {
             for channel in 0..3 {
                 let corner = radiance.map(|rgb| rgb[channel]);
@@ -212,24 +228,27 @@ impl Band<'_> {
         }
     }
 
-    /// Light is linear in a block, the texture is not.
-    fn fill_ground(&mut self, [left, top, right, bottom]: [usize; 4], object: &Object, corners: &[Shade; 4]) {
+    /// Light is linear in a block, the texture is not. `first` is the pixel at the top left.
+    fn fill_ground(
+        &mut self,
+        [left, top, right, bottom]: [usize; 4],
+        object: &Object,
+        first: &Intersection,
+        corners: &[Shade; 4],
+    ) {
         let Tracer { rays, texture, .. } = self.tracer;
-        let first = rays.at(left, self.top + top);
-        let first_m = self.ranges[(self.top + top) * rays.width + left];
-        let (_, _, normal) = object.form.meet(&object.place, &first, first_m);
-        let level = self.tracer.ground_level(&first, first_m, &normal);
+        let level = self.tracer.ground_level(&first.ray, first.range_m, &first.normal);
         for y in top..bottom {
-            let of =
-                |pick: &dyn Fn(&Shade) -> f32| line(&corners.map(|c| pick(&c)), y - top, bottom - top, right - left);
-            let factor: [_; 3] = std::array::from_fn(|k| of(&|c| c.factor[k]));
-            let veil: [_; 3] = std::array::from_fn(|k| of(&|c| c.veil[k]));
-            for x in left..right {
-                let range_m = self.ranges[(self.top + y) * rays.width + x];
-                let place = object.place.point(&rays.at(x, self.top + y), range_m);
-                let albedo = texture.albedo(place.x, place.y, level);
-                let at = |(start, step): (f32, f32)| start + step * (x - left) as f32;
-                self.set(x, y, std::array::from_fn(|k| at(factor[k]) * albedo[k] + at(veil[k])));
+            let (row, rows, columns) = (y - top, bottom - top, right - left);
+            let factor: [_; 3] = std::array::from_fn(|c| line(&corners.map(|s| s.factor[c]), row, rows, columns));
+            let veil: [_; 3] = std::array::from_fn(|c| line(&corners.map(|s| s.veil[c]), row, rows, columns));
+            let i = (self.top + y) * rays.width + left;
+            let range_m = first_of(&self.ranges[i..]);
+            let [x_m, y_m, _] = object.place.points::<{ BLOCKS_PX[0] }>(&rays.several(i), &range_m);
+            for k in 0..columns {
+                let albedo = texture.albedo(x_m[k], y_m[k], level);
+                let at = |(start, step): (f32, f32)| start + step * k as f32;
+                self.set(left + k, y, std::array::from_fn(|c| at(factor[c]) * albedo[c] + at(veil[c])));
             }
         }
     }

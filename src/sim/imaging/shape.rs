@@ -1,7 +1,8 @@
 //! Intersection of rays with convex shapes, several at a time. A shape around the camera is invisible.
 
-use crate::imaging::math::{Vec3, max, min};
-use crate::imaging::tag_board::Board;
+use crate::imaging::math::{Lanes, Vec3, lanes, max, min};
+use crate::imaging::scene::FACE_BITS;
+use crate::imaging::tag_board::{self, Board};
 use armcal_core::robot::Shape;
 
 /// Form of an object in its own frame; lengths in m.
@@ -39,9 +40,6 @@ pub(super) struct Place {
     eye: [f32; 3],
 }
 
-/// Directions of several rays, camera frame, unit vectors.
-pub(super) type Lanes<const N: usize> = [[f32; N]; 3];
-
 impl Place {
     pub(super) fn new(object_from_camera: &nalgebra::Isometry3<f64>) -> Self {
         let rotation = object_from_camera.rotation.to_rotation_matrix();
@@ -59,11 +57,16 @@ impl Place {
         })
     }
 
-    /// A point on a ray, object frame.
+    /// Points on rays, object frame.
     #[inline]
-    pub(super) fn point(&self, ray: &Vec3, range_m: f32) -> Vec3 {
-        let turned = self.turn(&[[ray.x], [ray.y], [ray.z]]);
-        Vec3::from_fn(|i, _| self.eye[i] + range_m * turned[i][0])
+    pub(super) fn points<const N: usize>(&self, rays: &Lanes<N>, range_m: &[f32; N]) -> Lanes<N> {
+        let mut points = self.turn(rays);
+        for (points, eye) in points.iter_mut().zip(self.eye) {
+            for k in 0..N {
+                points[k] = eye + range_m[k] * points[k];
+            }
+        }
+        points
     }
 
     /// Intersection of a ray with the plane z = 0, x and y in the object's frame, m.
@@ -118,18 +121,27 @@ impl Form {
         }
     }
 
-    /// The face that a ray meets, which enters at `range_m`.
+    /// Faces and true ranges of what rays meet that enter at `range_m`: a tag's counts as nearer.
     #[inline]
-    pub(super) fn face(&self, place: &Place, ray: &Vec3, range_m: f32) -> u16 {
-        match self {
-            Self::Tag(board) if place.eye[2] > 0.0 => {
-                let [x, y] = place.on_plane([ray.x, ray.y, ray.z]);
-                board.face(x, y)
+    pub(super) fn faces<const N: usize>(
+        &self,
+        place: &Place,
+        rays: &Lanes<N>,
+        range_m: &[f32; N],
+    ) -> ([u16; N], [f32; N]) {
+        let Self::Tag(board) = self else {
+            let parts = self.parts(&place.points(rays, range_m));
+            return (parts.map(face_of), *range_m);
+        };
+        let d = place.turn(rays);
+        let true_m: [f32; N] = std::array::from_fn(|k| -place.eye[2] / d[2][k]);
+        let mut faces = [tag_board::FACE_BACK; N];
+        if place.eye[2] > 0.0 {
+            for (k, face) in faces.iter_mut().enumerate() {
+                *face = board.face(place.eye[0] + true_m[k] * d[0][k], place.eye[1] + true_m[k] * d[1][k]);
             }
-            Self::Tag(_) => crate::imaging::tag_board::FACE_BACK,
-            Self::Capsule { .. } | Self::Sphere { .. } => 0,
-            _ => self.normal(&place.point(ray, range_m)).0,
         }
+        (faces, true_m)
     }
 
     /// Whether each face has one normal.
@@ -138,69 +150,88 @@ impl Form {
         matches!(self, Self::Tag(_) | Self::Box { .. })
     }
 
-    /// The true range of what enters at `range_m`: a tag's counts as nearer.
-    #[inline]
-    pub(super) fn true_range(&self, place: &Place, ray: &Vec3, range_m: f32) -> f32 {
-        let is_tag = matches!(self, Self::Tag(_));
-        if is_tag { -place.eye[2] / Vec3::from(place.rows[2]).dot(ray) } else { range_m }
-    }
-
     /// Surface where a ray enters at `range_m`: true range, face and outer normal (camera frame).
     pub(super) fn meet(&self, place: &Place, ray: &Vec3, range_m: f32) -> (f32, u16, Vec3) {
-        if let Self::Tag(board) = self {
-            let range_m = self.true_range(place, ray, range_m);
-            let point = place.point(ray, range_m);
-            let is_front = place.eye[2] > 0.0;
-            let face = if is_front { board.face(point.x, point.y) } else { crate::imaging::tag_board::FACE_BACK };
-            let normal = Vec3::from(place.rows[2]) * if is_front { 1.0 } else { -1.0 };
-            return (range_m, face, normal);
+        let rays = lanes(&[*ray]);
+        if matches!(self, Self::Tag(_)) {
+            let ([face], [range_m]) = self.faces(place, &rays, &[range_m]);
+            let towards = if place.eye[2] > 0.0 { 1.0 } else { -1.0 };
+            return (range_m, face, Vec3::from(place.rows[2]) * towards);
         }
-        let point = place.point(ray, range_m);
-        let (face, normal) = self.normal(&point);
-        (range_m, face, place.back(&normal))
+        let points = place.points(&rays, &[range_m]);
+        let [part] = self.parts(&points);
+        let normal = self.normal(part, &Vec3::from(points.map(|[axis]| axis)));
+        (range_m, face_of(part), place.back(&normal))
     }
 
-    /// Face and outer normal at a point of the surface, own frame.
-    fn normal(&self, p: &Vec3) -> (u16, Vec3) {
+    /// The part of the surface that points of it lie on: a box's axis, a cylinder's side (0) or ends (1), a hull's
+    /// plane.
+    #[inline]
+    fn parts<const N: usize>(&self, p: &Lanes<N>) -> [u16; N] {
+        let mut parts = [0; N];
         match self {
-            Self::Tag(_) => (0, Vec3::z()),
+            Self::Tag(_) | Self::Capsule { .. } | Self::Sphere { .. } => {}
             Self::Box { half } => {
-                let excess: [f32; 3] = std::array::from_fn(|i| p[i].abs() - half[i]);
-                let axis = (0..3).fold(0, |best, i| if excess[i] > excess[best] { i } else { best });
-                let mut normal = Vec3::zeros();
-                normal[axis] = p[axis].signum();
-                (axis as u16, normal)
-            }
-            Self::Cylinder { radius, half } => {
-                let aside = p.x.hypot(p.y);
-                if p.z.abs() - half > aside - radius {
-                    (1, Vec3::new(0.0, 0.0, p.z.signum()))
-                } else {
-                    (0, Vec3::new(p.x, p.y, 0.0) / aside.max(1e-9))
+                for k in 0..N {
+                    let excess: [f32; 3] = std::array::from_fn(|i| p[i][k].abs() - half[i]);
+                    let (best, most) = if excess[1] > excess[0] { (1, excess[1]) } else { (0, excess[0]) };
+                    parts[k] = if excess[2] > most { 2 } else { best };
                 }
             }
+            Self::Cylinder { radius, half } => {
+                for k in 0..N {
+                    parts[k] = u16::from(p[2][k].abs() - half > p[0][k].hypot(p[1][k]) - radius);
+                }
+            }
+            Self::Hull { planes, .. } => {
+                let mut most = [f32::NEG_INFINITY; N];
+                for (n, [a, b, c, d]) in planes.iter().enumerate() {
+                    for k in 0..N {
+                        let out = a * p[0][k] + b * p[1][k] + c * p[2][k] - d;
+                        if out > most[k] {
+                            (most[k], parts[k]) = (out, n as u16);
+                        }
+                    }
+                }
+            }
+        }
+        parts
+    }
+
+    /// Outer normal of a part at a point of it, own frame.
+    fn normal(&self, part: u16, p: &Vec3) -> Vec3 {
+        match self {
+            Self::Tag(_) => Vec3::z(),
+            Self::Box { .. } => {
+                let axis = usize::from(part);
+                let mut normal = Vec3::zeros();
+                normal[axis] = p[axis].signum();
+                normal
+            }
+            Self::Cylinder { .. } if part == 1 => Vec3::new(0.0, 0.0, p.z.signum()),
+            Self::Cylinder { .. } => Vec3::new(p.x, p.y, 0.0) / p.x.hypot(p.y).max(1e-9),
             Self::Capsule { half, .. } => {
                 let from_axis = Vec3::new(p.x, p.y, p.z - p.z.clamp(-half, *half));
-                (0, from_axis / from_axis.norm().max(1e-9))
+                from_axis / from_axis.norm().max(1e-9)
             }
-            Self::Sphere { .. } => (0, p / p.norm().max(1e-9)),
+            Self::Sphere { .. } => p / p.norm().max(1e-9),
             Self::Hull { planes, .. } => {
-                let out = |i: usize| {
-                    let [a, b, c, d] = planes[i];
-                    a * p.x + b * p.y + c * p.z - d
-                };
-                let best = (0..planes.len()).fold(0, |best, i| if out(i) > out(best) { i } else { best });
-                let [a, b, c, _] = planes[best];
-                // Few bits: neighbours seldom share them.
-                ((best % 8) as u16, Vec3::new(a, b, c))
+                let [a, b, c, _] = planes[usize::from(part)];
+                Vec3::new(a, b, c)
             }
         }
     }
 }
 
+/// Few bits: neighbours seldom share them.
+#[inline]
+fn face_of(part: u16) -> u16 {
+    part % (1 << FACE_BITS)
+}
+
 #[inline]
 fn enter_board<const N: usize>(half: f32, e: &[f32; 3], d: &Lanes<N>) -> [f32; N] {
-    let lift = if e[2] > 0.0 { crate::imaging::tag_board::CLEAR_OF_BACKING_M } else { 0.0 };
+    let lift = if e[2] > 0.0 { tag_board::CLEAR_OF_BACKING_M } else { 0.0 };
     std::array::from_fn(|k| {
         let inverse = 1.0 / d[2][k];
         let range = -e[2] * inverse;

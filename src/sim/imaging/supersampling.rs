@@ -1,10 +1,10 @@
 //! Radiance of a pixel on an edge: the mean over samples of position and time.
 
-use crate::imaging::math::{Rgb, Vec3};
+use crate::imaging::math::{Lanes, Rgb, Vec3};
 use crate::imaging::scene::{Appearance, FACE_BITS, Object, SAMPLES, farthest, first_met, offset};
 use crate::imaging::shader::Shade;
 use crate::imaging::shading::{Intersection, ShadeCache};
-use crate::imaging::shape::{Form, Lanes};
+use crate::imaging::shape::Form;
 use crate::imaging::tag_board;
 use crate::imaging::tracer::Tracer;
 
@@ -86,7 +86,10 @@ impl Tracer<'_> {
             let (range_m, face, normal) = object.form.meet(object.place_at(k), &ray, samples.range[k]);
             // All of a tag's front is one plane.
             let key = (n + 1) << FACE_BITS | if is_tag { 0 } else { face };
-            let shade = known.shade(key, object, || self.shader.shade(&(ray * range_m), &normal, column, row));
+            let shade = known.shade(key, object, || {
+                let [shade] = self.shader.shade(&[ray * range_m], &[normal], &[[column, row]]);
+                shade
+            });
             let radiance = if is_tag {
                 printed(object, mine, samples, &shade, face)
             } else {

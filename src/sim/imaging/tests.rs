@@ -6,7 +6,6 @@ use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector2, V
 use rand::RngExt;
 
 use crate::imaging::light::Lamp;
-use crate::imaging::math::Vec3;
 use crate::imaging::shape::{Form, Place};
 use crate::imaging::*;
 use armcal_core::optics::{TagFamily, fixture::lens, square_corners};
@@ -194,13 +193,9 @@ fn lamps_fall_off_with_the_square_and_keep_their_flux() {
         let flux: f64 = (0..2000)
             .map(|i| {
                 let cos = -1.0 + (f64::from(i) + 0.5) / 1000.0;
-                let mut lux = [0.0; 3];
-                lamp.light_up_all_sides(
-                    &Vec3::new((1.0 - cos * cos).sqrt() as f32, 0.0, cos as f32),
-                    &[0.0; 3],
-                    &mut lux,
-                );
-                f64::from(lux[0]) * TAU / 1000.0
+                let mut lux = [[0.0]; 3];
+                lamp.light_up_all_sides(&[[(1.0 - cos * cos).sqrt() as f32], [0.0], [cos as f32]], &[0.0; 3], &mut lux);
+                f64::from(lux[0][0]) * TAU / 1000.0
             })
             .sum();
         assert!((flux / 100.0 - 1.0).abs() < 2e-3, "{half_angle_rad}: {flux}");

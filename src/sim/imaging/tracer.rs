@@ -1,11 +1,10 @@
 //! Intersection of rays with objects, in tiles of the image.
 
-use crate::imaging::math::Vec3;
+use crate::imaging::math::Lanes;
 use crate::imaging::rays::Rays;
-use crate::imaging::scene::{FACE_BITS, Object, TILE_PX, candidates, first_met};
+use crate::imaging::scene::{FACE_BITS, Object, TILE_PX, candidates, first_met, narrow};
 use crate::imaging::seafloor_texture::Texture;
 use crate::imaging::shader::Shader;
-use crate::imaging::shape::Lanes;
 
 /// Rays traced together.
 const LANES: usize = 8;
@@ -31,16 +30,20 @@ pub(super) fn object_of(face: u16) -> Option<usize> {
 impl Tracer<'_> {
     pub(super) fn meet_band(&self, top: usize, faces: &mut [u16], ranges: &mut [f32]) -> Vec<Candidates> {
         let rays = self.rays;
+        let rows = faces.len() / rays.width;
+        let mut near = Candidates::new();
         let tile = |column: usize| {
             let found = candidates(self.objects, rays, column, top);
             let behind = (column + TILE_PX).min(rays.width);
-            for row in 0..faces.len() / rays.width {
-                let mut x = column;
-                while x < behind {
-                    let n = LANES.min(behind - x);
-                    let out = row * rays.width + x..row * rays.width + x + n;
-                    self.meet(&found, top * rays.width + out.start, &mut faces[out.clone()], &mut ranges[out]);
-                    x += n;
+            for y in (0..rows).step_by(LANES) {
+                let below = (y + LANES).min(rows);
+                for x in (column..behind).step_by(LANES) {
+                    let right = (x + LANES).min(behind);
+                    narrow(self.objects, rays, &found, [x, top + y, right, top + below], &mut near);
+                    for row in y..below {
+                        let out = row * rays.width + x..row * rays.width + right;
+                        self.meet(&near, top * rays.width + out.start, &mut faces[out.clone()], &mut ranges[out]);
+                    }
                 }
             }
             found
@@ -55,24 +58,38 @@ impl Tracer<'_> {
         if found.is_empty() {
             return;
         }
-        let n = faces.len();
-        let lanes: Lanes<LANES> =
-            [&self.rays.x, &self.rays.y, &self.rays.z].map(|plane| match plane[i..].first_chunk() {
-                Some(whole) => *whole,
-                None => std::array::from_fn(|k| plane.get(i + k).copied().unwrap_or(0.0)),
-            });
-        let (range, number) = first_met(self.objects, found, &lanes);
-        for k in 0..n {
-            let ray = Vec3::new(lanes[0][k], lanes[1][k], lanes[2][k]);
-            // A ray beyond the field of view is zero and meets nothing that counts.
-            if number[k] > 0 && ray != Vec3::zeros() {
-                let object = &self.objects[usize::from(number[k] - 1)];
-                // Neighbours on a fine pattern always differ.
-                let face =
-                    if object.is_fine { ((i + k) & 1) as u16 } else { object.form.face(&object.place, &ray, range[k]) };
-                ranges[k] = object.form.true_range(&object.place, &ray, range[k]);
-                faces[k] = number[k] << FACE_BITS | face;
+        let lanes: Lanes<LANES> = self.rays.several(i);
+        let (range_m, number) = first_met(self.objects, found, &lanes);
+        // A ray beyond the field of view is zero and meets nothing that counts.
+        let sees = |k: usize| lanes.iter().any(|axis| axis[k] != 0.0);
+        if number[0] > 0 && number == [number[0]; LANES] && (0..LANES).all(sees) {
+            return self.mark(number[0], &lanes, &range_m, i, (faces, ranges));
+        }
+        for k in 0..faces.len() {
+            if number[k] > 0 && sees(k) {
+                let out = (&mut faces[k..=k], &mut ranges[k..=k]);
+                self.mark(number[k], &lanes.map(|axis| [axis[k]]), &[range_m[k]], i + k, out);
             }
+        }
+    }
+
+    /// Faces and ranges of rays that all meet object `number` less one.
+    #[inline]
+    fn mark<const N: usize>(
+        &self,
+        number: u16,
+        rays: &Lanes<N>,
+        range_m: &[f32; N],
+        i: usize,
+        (faces, ranges): (&mut [u16], &mut [f32]),
+    ) {
+        let object = &self.objects[usize::from(number - 1)];
+        let (met, true_m) = object.form.faces(&object.place, rays, range_m);
+        ranges.copy_from_slice(&true_m[..ranges.len()]);
+        for (k, face) in faces.iter_mut().enumerate() {
+            // Neighbours on a fine pattern always differ.
+            let of_pixel = if object.is_fine { ((i + k) & 1) as u16 } else { met[k] };
+            *face = number << FACE_BITS | of_pixel;
         }
     }
 }
