@@ -398,9 +398,10 @@ impl ScriptRunner<'_, '_> {
 
     /// Holds the tags that were seen against those that should have been.
     fn learn(&mut self, pose: &PlannedPose, views: &mut CaptureRun<'_>) -> Result<(), SessionError> {
-        let ids_seen = &self.driver.recorder.ids_seen;
+        let counts = self.driver.counts()?;
+        let ids_seen = &self.driver.recorder.tags_seen()?.ids;
         let seen = |&tag: &usize| ids_seen.contains(&self.robot.tags[tag].id);
-        views.taken.push((self.driver.counts()?, (0..self.robot.tags.len()).filter(seen).collect()));
+        views.taken.push((counts, (0..self.robot.tags.len()).filter(seen).collect()));
         for &(tag, probability) in &pose.tags {
             let was_seen = seen(&tag);
             views.expected[tag] += probability;

@@ -517,8 +517,7 @@ impl<'b> Driver<'b> {
     /// Stands for `seconds` and marks the span; gives how many tags were seen in it.
     pub fn dwell(&mut self, seconds: f64, kind: MarkKind) -> Result<usize, SessionError> {
         let start = self.arm.now();
-        self.recorder.tags_seen = 0;
-        self.recorder.ids_seen.clear();
+        self.recorder.begin_count()?;
         let steps = (seconds / self.arm.period_s()).ceil() as u64;
         self.arm.request_images(ImageDemand::All);
         for _ in 0..steps {
@@ -527,7 +526,7 @@ impl<'b> Driver<'b> {
         self.arm.request_images(ImageDemand::Few);
         let end = self.arm.now();
         self.record(&Message::Mark(Mark { start, end, kind }))?;
-        Ok(self.recorder.tags_seen)
+        Ok(self.recorder.tags_seen()?.n)
     }
 }
 

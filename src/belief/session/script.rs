@@ -78,6 +78,7 @@ pub fn run(
     }
     let stopped = run.steps()?;
     run.driver.phase(Phase::Done)?;
+    run.driver.recorder.settle()?;
     run.finish(stopped)
 }
 
@@ -336,6 +337,7 @@ impl ScriptRunner<'_, '_> {
         let (bounds, at, oil_c) = (self.bounds.clone(), self.driver.now(), self.driver.recorder.oil_c);
         self.fresh = Some(FreshBounds { bounds, at, oil_c });
         self.driver.believe(sensors);
+        self.driver.recorder.settle()?;
         if let Some(frames) = &mut self.driver.recorder.frames {
             frames.believe(&calibration.applied_to(self.setup.robot));
         }

@@ -33,6 +33,8 @@ pub enum LogError {
     Encode { path: PathBuf, topic: String, source: EncodeError },
     #[error("{}: topic {topic} holds {first} and cannot hold {now} as well", path.display())]
     SchemaChanged { path: PathBuf, topic: String, first: String, now: String },
+    #[error("{}: an image's messages did not come: {source}", path.display())]
+    Late { path: PathBuf, source: crate::streams::SinkError },
 }
 
 /// Why a message cannot be encoded.

@@ -189,15 +189,25 @@ impl RecordingWriter {
     }
 }
 
-impl Sink for RecordingWriter {
-    fn record(&mut self, log_time: Stamp, message: &Message) -> Result<(), SinkError> {
+impl RecordingWriter {
+    /// Adds a message.
+    ///
+    /// # Errors
+    /// [`LogError`] when it has no ROS form, or the file cannot be written.
+    pub fn write(&mut self, log_time: Stamp, message: &Message) -> Result<(), LogError> {
         let stream = Stream::of(message);
         let mut bytes = std::mem::take(&mut self.bytes);
         let encoded = encode_message(message, &self.header, &mut bytes)
             .map_err(|source| self.encode_error(stream.topic(), source));
         let written = encoded.and_then(|()| self.write_bytes(stream.topic(), stream.schema(), log_time, &bytes));
         self.bytes = bytes;
-        Ok(written?)
+        written
+    }
+}
+
+impl Sink for RecordingWriter {
+    fn record(&mut self, log_time: Stamp, message: &Message) -> Result<(), SinkError> {
+        Ok(self.write(log_time, message)?)
     }
 }
 

@@ -1,5 +1,6 @@
 //! Interfaces of the streams: the arm that sends messages, the sink that keeps them.
 
+use super::late::LateMessages;
 use super::message::Message;
 use crate::joints::JointCounts;
 use crate::time::Stamp;
@@ -9,6 +10,15 @@ pub trait Sink {
     /// # Errors
     /// When the message cannot be kept (disk full, closed stream).
     fn record(&mut self, log_time: Stamp, message: &Message) -> Result<(), SinkError>;
+
+    /// Keeps messages that are not there yet, before all that is recorded after this call. A sink that does not wait
+    /// holds those back.
+    ///
+    /// # Errors
+    /// As [`Self::record`], and where the messages do not come.
+    fn record_late(&mut self, log_time: Stamp, messages: LateMessages) -> Result<(), SinkError> {
+        messages.wait()?.iter().try_for_each(|message| self.record(log_time, message))
+    }
 }
 
 /// Why a sink did not keep a message, free of any file format.
@@ -28,8 +38,6 @@ pub enum ArmError {
     NotFinite { at_s: f64 },
     #[error("fault number {number} cannot be brought about: the arm knows {known}")]
     NoSuchFault { number: usize, known: usize },
-    #[error("the camera: {0}")]
-    Camera(#[source] Box<dyn std::error::Error + Send + Sync>),
     /// The arm, or what guards it, has stopped; it takes no further set-points.
     #[error("the arm was stopped: {why}")]
     Stopped { why: String },

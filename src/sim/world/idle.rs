@@ -61,7 +61,7 @@ impl World {
         let around = self.sensor_surroundings(STRIDE_S);
         let (angles, _) = self.shafts();
         self.measured = sample_joint_sensors(&mut self.joint_sensors, &angles, &around, STRIDE_S);
-        self.outbox.push((now, Message::JointSensors(JointSensorSample { stamp: now, counts: self.measured })));
+        self.tell(now, Message::JointSensors(JointSensorSample { stamp: now, counts: self.measured }));
         self.sample_slow_sensors(now, t_s);
     }
 }

@@ -2,14 +2,14 @@
 
 use nalgebra::Isometry3;
 
-use crate::sensors::camera::{ArmMotion, CameraShot, ScenePoses, ShutterState};
-use crate::world::simulation::World;
-use armcal_core::streams::{ArmError, CameraImage, DetectionRejects, Message};
+use crate::sensors::camera::{ArmMotion, CameraShot, ScenePoses, SeenTags, ShutterState};
+use crate::world::simulation::{Outgoing, World};
+use armcal_core::streams::Message;
 use armcal_core::time::Stamp;
 
 impl World {
     /// The shutter closes now.
-    pub(super) fn expose(&mut self) -> Result<(), ArmError> {
+    pub(super) fn expose(&mut self) {
         let links = self.place_solids();
         let shutter = ShutterState {
             poses: ScenePoses {
@@ -22,14 +22,12 @@ impl World {
             closed: self.stamp(),
             demand: self.image_demand,
         };
-        let taken = self.camera.take_image(&shutter).map_err(|error| ArmError::Camera(error.into()))?;
-        let Some(mut image) = taken else { return Ok(()) };
+        let Some(mut image) = self.camera.take_image(&shutter) else { return };
         // It never arrives before the image ahead of it.
         if let Some(ahead) = self.images.back() {
             image.arrival = image.arrival.max(ahead.arrival);
         }
         self.images.push_back(image);
-        Ok(())
     }
 
     /// Displacement of each jaw from the drawing.
@@ -40,13 +38,9 @@ impl World {
 
     /// Messages of an image.
     pub(super) fn deliver(&mut self, at: Stamp, image: CameraShot) {
-        let stamp = image.detections.stamp;
-        self.outbox.push((at, Message::Detections(image.detections)));
-        if !image.rejects.is_empty() {
-            self.outbox.push((at, Message::Rejects(DetectionRejects { stamp, rejects: image.rejects })));
-        }
-        if let Some(jpeg) = image.jpeg {
-            self.outbox.push((at, Message::Image(CameraImage { stamp, jpeg })));
+        match image.tags {
+            SeenTags::Projected(detections) => self.tell(at, Message::Detections(detections)),
+            SeenTags::Searched(late) => self.outbox.push(Outgoing::Late(at, late)),
         }
     }
 }

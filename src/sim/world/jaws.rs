@@ -41,7 +41,7 @@ impl World {
         let stamp = self.stamp();
         if let Some(jaws) = &self.gripper {
             let opening_m = (jaws.opening_m / RESOLUTION_M).round() * RESOLUTION_M;
-            self.outbox.push((stamp, Message::Gripper(GripperSample { stamp, opening_m })));
+            self.tell(stamp, Message::Gripper(GripperSample { stamp, opening_m }));
         }
     }
 }

@@ -3,7 +3,7 @@
 use crate::sensors::OilState;
 use crate::spec::CONTROL_PERIOD_S;
 use crate::world::setup::{oil_state, sample_joint_sensors};
-use crate::world::simulation::World;
+use crate::world::simulation::{Outgoing, World};
 use armcal_core::streams::{ArmError, JointSensorSample, Message, Sink, Thermometer};
 use armcal_core::time::Stamp;
 
@@ -23,11 +23,11 @@ impl World {
         let (angles, _) = self.shafts();
         self.measured = sample_joint_sensors(&mut self.joint_sensors, &angles, &around, CONTROL_PERIOD_S);
         let sample = JointSensorSample { stamp: now, counts: self.measured };
-        self.outbox.push((now, Message::JointSensors(sample)));
+        self.tell(now, Message::JointSensors(sample));
         self.move_jaws(period);
         if period.is_multiple_of(ATTITUDE_PERIODS) {
             let attitude = self.attitude.sample(&self.base, now);
-            self.outbox.push((now, Message::Attitude(attitude)));
+            self.tell(now, Message::Attitude(attitude));
         }
         if period.is_multiple_of(SLOW_PERIODS) {
             self.sample_slow_sensors(now, t_s);
@@ -52,15 +52,23 @@ impl World {
         let water = self.slow.temperature(Thermometer::Water, self.temperatures.water_c(t_s), now);
         let heave_m = self.base.world_from_vehicle.origin().vector().z;
         let pressure = self.slow.pressure(heave_m, now);
-        self.outbox.push((now, Message::Temperature(oil)));
-        self.outbox.push((now, Message::Temperature(water)));
-        self.outbox.push((now, Message::Pressure(pressure)));
+        self.tell(now, Message::Temperature(oil));
+        self.tell(now, Message::Temperature(water));
+        self.tell(now, Message::Pressure(pressure));
         self.report_gap();
     }
 
+    pub(super) fn tell(&mut self, log_time: Stamp, message: Message) {
+        self.outbox.push(Outgoing::Ready(log_time, message));
+    }
+
     pub(super) fn hand_over(&mut self, sink: &mut dyn Sink) -> Result<(), ArmError> {
-        for (log_time, message) in self.outbox.drain(..) {
-            sink.record(log_time, &message).map_err(ArmError::Sink)?;
+        for outgoing in self.outbox.drain(..) {
+            let kept = match outgoing {
+                Outgoing::Ready(log_time, message) => sink.record(log_time, &message),
+                Outgoing::Late(log_time, late) => sink.record_late(log_time, late),
+            };
+            kept.map_err(ArmError::Sink)?;
         }
         self.record_truth()
     }

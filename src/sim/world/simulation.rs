@@ -29,8 +29,14 @@ use crate::world::setup::{
     stowed_angles,
 };
 use armcal_core::robot::{Robot, Vehicle};
-use armcal_core::streams::{ArmError, ImageDemand, JointAngles, JointCounts, MAX_JOINTS, Message};
+use armcal_core::streams::{ArmError, ImageDemand, JointAngles, JointCounts, LateMessages, MAX_JOINTS, Message};
 use armcal_core::time::{SIMULATION_EPOCH, Stamp};
+
+/// What leaves the world at a log time.
+pub(super) enum Outgoing {
+    Ready(Stamp, Message),
+    Late(Stamp, LateMessages),
+}
 
 /// A simulated arm. Its sensors start at `stowed` by the datasheet, so that the arm itself is where their errors put
 /// it.
@@ -67,7 +73,7 @@ pub struct World {
     pub(super) images: VecDeque<CameraShot>,
     pub(super) image_demand: ImageDemand,
     pub(super) n_images: u64,
-    pub(super) outbox: Vec<(Stamp, Message)>,
+    pub(super) outbox: Vec<Outgoing>,
     pub(super) measured: JointCounts,
     pub(super) step: u64,
     pub(super) timeline: Timeline,
@@ -182,7 +188,7 @@ impl World {
         let next_image_s = (self.n_images + 1) as f64 / self.spec.camera.rate_hz;
         if self.time_s() >= next_image_s - 1e-9 {
             self.n_images += 1;
-            self.expose()?;
+            self.expose();
         }
         Ok(())
     }

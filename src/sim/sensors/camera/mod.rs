@@ -14,12 +14,13 @@ mod rendered_camera;
 mod scenery;
 mod tag_projection;
 mod tag_reading;
+mod tag_search;
 mod wrist_camera;
 
 pub(crate) use exposure::ArmMotion;
 pub(crate) use rendered_camera::RenderInput;
 pub(crate) use scenery::ScenePoses;
-pub(crate) use wrist_camera::{CameraInput, CameraShot, ShutterState, WristCamera};
+pub(crate) use wrist_camera::{CameraInput, CameraShot, SeenTags, ShutterState, WristCamera};
 
 #[cfg(test)]
 mod tests;

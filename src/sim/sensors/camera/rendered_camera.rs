@@ -1,20 +1,21 @@
-//! The rendered camera: images are rendered and the tag detector reads them.
+//! The rendered camera: images are rendered, and the tags are read from them.
 
 use std::fmt;
 
 use nalgebra::{Isometry3, Unit, Vector3};
 
 use crate::error::SimError;
-use crate::imaging::{Frame, Imager, Light, Shot, TagPlane};
+use crate::imaging::{Imager, Light, Shot, TagPlane};
 use crate::sensors::camera::ported_lens::PortedLens;
 use crate::sensors::camera::scenery::{ScenePoses, Scenery};
+use crate::sensors::camera::tag_search::TagSearch;
 use crate::spec::{ImageSpec, WorldSpec};
 use armcal_core::optics::TagFamily;
 use armcal_core::robot::{FileIssue, Robot, Vehicle};
 use armcal_core::routine::Scene;
-use armcal_core::streams::{DetectionReject, ImageDemand, TagDetection};
+use armcal_core::streams::{ImageDemand, LateMessages};
 use armcal_core::time::Stamp;
-use armcal_detect::{DetectError, DetectorSettings, GreyImage, TagDetector, grey_of_jpeg};
+use armcal_detect::DetectorSettings;
 
 /// Parts of a world that make a rendered camera.
 #[derive(Clone, Copy)]
@@ -29,7 +30,7 @@ pub(crate) struct RenderInput<'a> {
 pub(super) struct RenderedCamera {
     imager: Imager,
     scenery: Scenery,
-    detector: TagDetector,
+    search: TagSearch,
     family: TagFamily,
     spec: ImageSpec,
     number: u64,
@@ -44,15 +45,6 @@ pub(super) struct RenderScene<'a> {
     pub tags: &'a [TagPlane],
     pub poses: ScenePoses<'a>,
     pub is_silty: bool,
-}
-
-/// Detections of one image.
-#[derive(Clone, Debug, Default)]
-pub(super) struct DetectedImage {
-    pub tags: Vec<TagDetection>,
-    pub rejects: Vec<DetectionReject>,
-    /// The image itself, if it is to be recorded.
-    pub jpeg: Option<Vec<u8>>,
 }
 
 impl fmt::Debug for RenderedCamera {
@@ -83,12 +75,12 @@ impl RenderedCamera {
         let mut imager = Imager::new(&ported.lens, &image, &lights, seed);
         imager.set_solids(&scenery.shapes);
         // The detector knows the lens of the drawing.
-        let detector = TagDetector::new(&robot.camera.lens, DetectorSettings::of_family(robot.tag_family))
-            .map_err(|error| SimError::Detector(error.to_string()))?;
+        let settings = DetectorSettings::of_family(robot.tag_family);
+        let search = TagSearch::start(&robot.camera.lens, settings, image.jpeg_quality.round() as u8)?;
         Ok(Self {
             imager,
             scenery,
-            detector,
+            search,
             family: robot.tag_family,
             spec: image,
             number: 0,
@@ -110,12 +102,14 @@ impl RenderedCamera {
             || self.last_taken.map_or(preview_s.is_finite(), |last| now.since_s(last) >= preview_s - 1e-6)
     }
 
+    /// Takes an image; `stamp` is the camera clock's, `now` the arm's.
     pub(super) fn take_image(
         &mut self,
         scene_state: &RenderScene,
         carried: &dyn Fn(usize) -> [Isometry3<f64>; 3],
         now: Stamp,
-    ) -> Result<DetectedImage, SimError> {
+        stamp: Stamp,
+    ) -> LateMessages {
         self.scenery.place(&scene_state.poses, carried, &mut self.solids);
         let up = Unit::new_normalize(scene_state.poses.base_from_world.rotation * Vector3::z());
         let frame = self.imager.take_image(&Shot {
@@ -128,32 +122,10 @@ impl RenderedCamera {
         });
         self.number += 1;
         self.last_taken = Some(now);
-        // The camera hands out JPEG. The detector sees what the recording will hold, whether or not this one goes in.
-        let jpeg = jpeg_bytes(frame, self.spec.jpeg_quality)?;
-        let unusable = |error: DetectError| SimError::Detector(error.to_string());
-        let seen = grey_of_jpeg(&jpeg).map_err(unusable)?;
-        let image = GreyImage { width: seen.width, height: seen.height, data: &seen.data };
-        let detections = self.detector.detect(image).map_err(unusable)?;
         let is_logged = self.last_logged.is_none_or(|last| now.since_s(last) >= self.spec.log_period_s - 1e-6);
         if is_logged {
             self.last_logged = Some(now);
         }
-        Ok(DetectedImage {
-            tags: detections.tags.into_iter().map(|tag| tag.detection).collect(),
-            rejects: detections.rejects,
-            jpeg: is_logged.then_some(jpeg),
-        })
+        self.search.search(frame.clone(), stamp, is_logged)
     }
-}
-
-/// As JPEG; colours at half the resolution.
-fn jpeg_bytes(frame: &Frame, quality: f64) -> Result<Vec<u8>, SimError> {
-    use jpeg_encoder::{ColorType, Encoder, SamplingFactor};
-    let side = |n: usize| u16::try_from(n).map_err(|_| SimError::Jpeg(format!("a side of {n} pixels is too long")));
-    let mut out = Vec::with_capacity(frame.rgb.len() / 10);
-    let mut encoder = Encoder::new(&mut out, quality.round() as u8);
-    encoder.set_sampling_factor(SamplingFactor::F_2_2);
-    let (width, height) = (side(frame.width)?, side(frame.height)?);
-    encoder.encode(&frame.rgb, width, height, ColorType::Rgb).map_err(|error| SimError::Jpeg(error.to_string()))?;
-    Ok(out)
 }

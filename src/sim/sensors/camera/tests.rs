@@ -14,7 +14,7 @@ use crate::spec::{CameraMode, CameraWorldSpec, CornerNoiseKind, PortKind, WorldS
 use armcal_core::optics::{CornerNoise, square_corners};
 use armcal_core::robot::{Robot, load, load_vehicle};
 use armcal_core::routine::Scene;
-use armcal_core::streams::{ImageDemand, JointAngles, TagDetections};
+use armcal_core::streams::{ImageDemand, JointAngles, Message, TagDetections};
 use armcal_core::time::{SIMULATION_EPOCH, Stamp};
 
 mod rendered;

@@ -14,7 +14,7 @@ use crate::imaging::TagPlane;
 use crate::sensors::camera::clock::CameraClock;
 use crate::sensors::camera::exposure::{ArmMotion, Exposure};
 use crate::sensors::camera::ported_lens::PortedLens;
-use crate::sensors::camera::rendered_camera::{DetectedImage, RenderInput, RenderScene, RenderedCamera};
+use crate::sensors::camera::rendered_camera::{RenderInput, RenderScene, RenderedCamera};
 use crate::sensors::camera::scenery::ScenePoses;
 use crate::sensors::camera::tag_projection::{TagInBase, TagOnLink, TagProjector};
 use crate::sensors::camera::tag_reading::TagReader;
@@ -23,7 +23,7 @@ use crate::spec::{CameraMode, CameraWorldSpec, CornerNoiseKind, WaterKind, World
 use armcal_core::optics::CornerNoise;
 use armcal_core::robot::Robot;
 use armcal_core::stats::stream_rng;
-use armcal_core::streams::{DetectionReject, ImageDemand, TagDetection, TagDetections};
+use armcal_core::streams::{ImageDemand, LateMessages, TagDetection, TagDetections};
 use armcal_core::time::Stamp;
 
 #[derive(Debug)]
@@ -97,13 +97,19 @@ pub(crate) struct ShutterState<'a> {
     pub demand: ImageDemand,
 }
 
-/// Detections of an image as they arrive.
-#[derive(Clone, Debug)]
+/// An image's tags as they arrive.
+#[derive(Debug)]
 pub(crate) struct CameraShot {
     pub arrival: Stamp,
-    pub detections: TagDetections,
-    pub rejects: Vec<DetectionReject>,
-    pub jpeg: Option<Vec<u8>>,
+    pub tags: SeenTags,
+}
+
+/// The tags of an image.
+#[derive(Debug)]
+pub(crate) enum SeenTags {
+    Projected(TagDetections),
+    /// Searched for in a rendered image: detections, rejects, the image itself if it is to be recorded.
+    Searched(LateMessages),
 }
 
 impl WristCamera {
@@ -179,28 +185,21 @@ impl WristCamera {
     }
 
     /// Takes an image; `None` where none is due.
-    ///
-    /// # Errors
-    /// [`SimError`] when the detector or the compression fails.
-    pub(crate) fn take_image(&mut self, shutter: &ShutterState) -> Result<Option<CameraShot>, SimError> {
+    pub(crate) fn take_image(&mut self, shutter: &ShutterState) -> Option<CameraShot> {
         let closed = shutter.closed;
         let Some(mut rendered) = self.rendered.take() else {
             let (arrival, detections) = self.project_tags(shutter);
-            return Ok(Some(CameraShot { arrival, detections, rejects: Vec::new(), jpeg: None }));
+            return Some(CameraShot { arrival, tags: SeenTags::Projected(detections) });
         };
-        let image = if rendered.is_due(shutter.demand, closed) {
-            self.render_image(&mut rendered, shutter).map(Some)
-        } else {
-            Ok(None)
-        };
-        self.rendered = Some(rendered);
-        Ok(image?.map(|DetectedImage { tags, rejects, jpeg }| {
+        let shot = rendered.is_due(shutter.demand, closed).then(|| {
             let (arrival, stamp) = self.clock.stamps(closed);
-            CameraShot { arrival, detections: TagDetections { stamp, tags }, rejects, jpeg }
-        }))
+            CameraShot { arrival, tags: SeenTags::Searched(self.render_image(&mut rendered, shutter, stamp)) }
+        });
+        self.rendered = Some(rendered);
+        shot
     }
 
-    fn render_image(&self, rendered: &mut RenderedCamera, shutter: &ShutterState) -> Result<DetectedImage, SimError> {
+    fn render_image(&self, rendered: &mut RenderedCamera, shutter: &ShutterState, stamp: Stamp) -> LateMessages {
         let ShutterState { poses, motion, closed, .. } = shutter;
         let at_end = self.base_from_camera(poses.links);
         let base_from_camera = self.exposure.poses(&at_end, motion, 0);
@@ -222,7 +221,8 @@ impl WristCamera {
         };
         let tags: Vec<TagPlane> = self.tags_at(poses.links).into_iter().enumerate().filter_map(plane).collect();
         let is_silty = self.blind_until.is_some_and(|until| *closed < until);
-        rendered.take_image(&RenderScene { base_from_camera, tags: &tags, poses: *poses, is_silty }, &carried, *closed)
+        let scene = RenderScene { base_from_camera, tags: &tags, poses: *poses, is_silty };
+        rendered.take_image(&scene, &carried, *closed, stamp)
     }
 
     /// Detections by projection: the arrival of the image, late with jitter, and its tags with the stamp of the

@@ -3,9 +3,30 @@
 use crate::sensors::camera::tests::*;
 use armcal_detect::{DetectorSettings, GreyImage, TagDetector, grey_of_jpeg};
 
+/// Messages of a rendered image.
+struct Searched {
+    detections: TagDetections,
+    jpeg: Option<Vec<u8>>,
+}
+
+impl Searched {
+    fn of(shot: CameraShot) -> Self {
+        let SeenTags::Searched(late) = shot.tags else { panic!("a rendered image") };
+        let mut searched = Self { detections: TagDetections { stamp: shot.arrival, tags: Vec::new() }, jpeg: None };
+        for message in late.wait().expect("it was searched") {
+            match message {
+                Message::Detections(detections) => searched.detections = detections,
+                Message::Image(image) => searched.jpeg = Some(image.jpeg),
+                other => assert!(matches!(other, Message::Rejects(_)), "{other:?}"),
+            }
+        }
+        searched
+    }
+}
+
 impl Site {
     /// Images of a rendered camera, one a second.
-    fn rendered(&self, rates_rad_s: f64, seconds: u32, change: impl Fn(&mut WristCamera, u32)) -> Vec<CameraShot> {
+    fn rendered(&self, rates_rad_s: f64, seconds: u32, change: impl Fn(&mut WristCamera, u32)) -> Vec<Searched> {
         let root =
             Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots/vehicles/work-class-front.toml");
         let vehicle = load_vehicle(&root).expect("it reads");
@@ -25,11 +46,10 @@ impl Site {
             };
             let motion = ArmMotion { chain: &robot.chain, angles: robot.stowed, rates };
             let closed = SIMULATION_EPOCH.plus_s(f64::from(second));
-            camera
-                .take_image(&ShutterState { poses, solids, motion, closed, demand: ImageDemand::All })
-                .expect("an image")
+            camera.take_image(&ShutterState { poses, solids, motion, closed, demand: ImageDemand::All })
         };
-        (0..seconds).filter_map(take).collect()
+        let shots: Vec<CameraShot> = (0..seconds).filter_map(take).collect();
+        shots.into_iter().map(Searched::of).collect()
     }
 }
 

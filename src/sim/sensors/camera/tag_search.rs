@@ -1,0 +1,105 @@
+//! The camera's computer: a thread that compresses images and searches them for tags while the world goes on.
+
+use std::sync::mpsc::{SyncSender, sync_channel};
+use std::thread;
+
+use crate::error::SimError;
+use crate::imaging::Frame;
+use armcal_core::optics::CameraModel;
+use armcal_core::streams::{
+    CameraImage, DetectionRejects, LateMessages, LateSender, Message, SinkError, TagDetections,
+};
+use armcal_core::time::Stamp;
+use armcal_detect::{DetectError, DetectorSettings, GreyImage, TagDetector, grey_of_jpeg};
+
+/// Images that wait; a camera that is further ahead waits itself.
+const QUEUE: usize = 2;
+
+/// Hands images to the thread. It ends with the last of these.
+#[derive(Debug)]
+pub(super) struct TagSearch {
+    images: SyncSender<Job>,
+}
+
+struct Job {
+    frame: Frame,
+    stamp: Stamp,
+    is_logged: bool,
+    messages: LateSender,
+}
+
+/// What the thread works with.
+struct Searcher {
+    detector: TagDetector,
+    jpeg_quality: u8,
+}
+
+impl TagSearch {
+    /// Searches images of a lens as it is drawn.
+    ///
+    /// # Errors
+    /// [`SimError::Detector`] where the detector or the thread does not start.
+    pub(super) fn start(lens: &CameraModel, settings: DetectorSettings, jpeg_quality: u8) -> Result<Self, SimError> {
+        let (images, jobs) = sync_channel::<Job>(QUEUE);
+        let (started, has_started) = sync_channel(1);
+        let lens = *lens;
+        let failed = |error: &dyn std::fmt::Display| SimError::Detector(error.to_string());
+        let work = move || {
+            let mut searcher = match TagDetector::new(&lens, settings) {
+                Ok(detector) => Searcher { detector, jpeg_quality },
+                Err(error) => {
+                    let _ = started.send(Err(error));
+                    return;
+                }
+            };
+            let _ = started.send(Ok(()));
+            for Job { frame, stamp, is_logged, messages } in jobs {
+                // Nobody waits for the images of a world that is gone.
+                let _ = messages.send(searcher.search(&frame, stamp, is_logged));
+            }
+        };
+        thread::Builder::new().name("camera".to_owned()).spawn(work).map_err(|error| failed(&error))?;
+        has_started.recv().map_err(|error| failed(&error))?.map_err(|error| failed(&error))?;
+        Ok(Self { images })
+    }
+
+    /// Searches an image, and puts it into the recording with what was found if it `is_logged`.
+    pub(super) fn search(&self, frame: Frame, stamp: Stamp, is_logged: bool) -> LateMessages {
+        let (messages, late) = LateMessages::pair();
+        // Without a thread the sender is dropped, which `late` tells.
+        let _ = self.images.send(Job { frame, stamp, is_logged, messages });
+        late
+    }
+}
+
+impl Searcher {
+    fn search(&mut self, frame: &Frame, stamp: Stamp, is_logged: bool) -> Result<Vec<Message>, SinkError> {
+        // The camera hands out JPEG. The detector sees what the recording will hold, whether or not this one goes in.
+        let jpeg = jpeg_bytes(frame, self.jpeg_quality)?;
+        let unusable = |error: DetectError| SimError::Detector(error.to_string());
+        let seen = grey_of_jpeg(&jpeg).map_err(unusable)?;
+        let image = GreyImage { width: seen.width, height: seen.height, data: &seen.data };
+        let found = self.detector.detect(image).map_err(unusable)?;
+        let tags = found.tags.into_iter().map(|tag| tag.detection).collect();
+        let mut messages = vec![Message::Detections(TagDetections { stamp, tags })];
+        if !found.rejects.is_empty() {
+            messages.push(Message::Rejects(DetectionRejects { stamp, rejects: found.rejects }));
+        }
+        if is_logged {
+            messages.push(Message::Image(CameraImage { stamp, jpeg }));
+        }
+        Ok(messages)
+    }
+}
+
+/// As JPEG; colours at half the resolution.
+fn jpeg_bytes(frame: &Frame, quality: u8) -> Result<Vec<u8>, SimError> {
+    use jpeg_encoder::{ColorType, Encoder, SamplingFactor};
+    let side = |n: usize| u16::try_from(n).map_err(|_| SimError::Jpeg(format!("a side of {n} pixels is too long")));
+    let mut out = Vec::with_capacity(frame.rgb.len() / 10);
+    let mut encoder = Encoder::new(&mut out, quality);
+    encoder.set_sampling_factor(SamplingFactor::F_2_2);
+    let (width, height) = (side(frame.width)?, side(frame.height)?);
+    encoder.encode(&frame.rgb, width, height, ColorType::Rgb).map_err(|error| SimError::Jpeg(error.to_string()))?;
+    Ok(out)
+}
