@@ -16,93 +16,157 @@ const SIDE: f32 = 0.107;
 /// Buffers, reused.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ContrastNormalizer {
-    /// Sum and sum of squares of each column over the rows of the window.
-    sums: Vec<[u32; 2]>,
+    /// Of each column over the rows of the window.
+    columns: Sums,
+    /// Of the window about each pixel of a row.
+    windows: Sums,
+    /// Columns of the window about each pixel of a row.
+    n_columns: Vec<f32>,
+    /// Smoothed down, and across as well.
+    down: Vec<f32>,
     smooth: Vec<f32>,
+}
+
+/// Sums of grey levels and of their squares: at most `51 * 51 * 255^2`.
+#[derive(Clone, Debug, Default)]
+struct Sums {
+    levels: Vec<i32>,
+    squares: Vec<i32>,
 }
 
 impl ContrastNormalizer {
     /// Writes the normalized image into rows of `stride` bytes; both images have `width` columns.
     pub(super) fn normalize(&mut self, data: &[u8], width: usize, out: &mut [u8], stride: usize) {
         let height = data.len() / width.max(1);
-        self.sums.clear();
-        self.sums.resize(width, [0; 2]);
+        self.columns.reset(width);
+        self.windows.reset(width);
+        self.n_columns.clear();
+        self.n_columns.extend((0..width).map(|x| n_within(x, width) as f32));
         let row_of = |y: usize| &data[y * width..(y + 1) * width];
         for y in 0..REACH.min(height) {
-            add(&mut self.sums, row_of(y));
+            self.columns.add(row_of(y));
         }
         for (y, out) in out.chunks_exact_mut(stride).take(height).enumerate() {
             if y + REACH < height {
-                add(&mut self.sums, row_of(y + REACH));
+                self.columns.add(row_of(y + REACH));
             }
             if y > REACH {
-                remove(&mut self.sums, row_of(y - REACH - 1));
+                self.columns.remove(row_of(y - REACH - 1));
             }
-            let n_rows = (y + REACH + 1).min(height) - y.saturating_sub(REACH);
             let [above, below] = [row_of(y.saturating_sub(1)), row_of((y + 1).min(height - 1))];
-            smoothed(above, row_of(y), below, &mut self.smooth);
-            normalize_row(&self.sums, n_rows, &self.smooth, &mut out[..width]);
+            smoothed([above, row_of(y), below], &mut self.down, &mut self.smooth);
+            across(&self.columns.levels, &mut self.windows.levels);
+            across(&self.columns.squares, &mut self.windows.squares);
+            self.write_row(n_within(y, height) as f32, &mut out[..width]);
+        }
+    }
+
+    /// One row, by loops that become vector instructions.
+    fn write_row(&self, n_rows: f32, out: &mut [u8]) {
+        let Sums { levels, squares } = &self.windows;
+        let windows = levels.iter().zip(squares).zip(&self.n_columns);
+        for ((out, smooth), ((sum, square), n_columns)) in out.iter_mut().zip(&self.smooth).zip(windows) {
+            let n = n_rows * n_columns;
+            let mean = *sum as f32 / n;
+            let std = (*square as f32 / n - mean * mean).max(MIN_STD * MIN_STD).sqrt();
+            let level = 128.5 + TARGET_STD / std * (smooth - mean);
+            *out = whole_part(level.clamp(0.0, 255.0));
         }
     }
 }
 
-fn add(sums: &mut [[u32; 2]], row: &[u8]) {
-    for ([sum, square], value) in sums.iter_mut().zip(row) {
-        let value = u32::from(*value);
-        *sum += value;
-        *square += value * value;
+impl Sums {
+    fn reset(&mut self, n: usize) {
+        for sums in [&mut self.levels, &mut self.squares] {
+            sums.clear();
+            sums.resize(n, 0);
+        }
+    }
+
+    fn add(&mut self, row: &[u8]) {
+        for ((sum, square), value) in self.levels.iter_mut().zip(&mut self.squares).zip(row) {
+            let value = i32::from(*value);
+            *sum += value;
+            *square += value * value;
+        }
+    }
+
+    fn remove(&mut self, row: &[u8]) {
+        for ((sum, square), value) in self.levels.iter_mut().zip(&mut self.squares).zip(row) {
+            let value = i32::from(*value);
+            *sum -= value;
+            *square -= value * value;
+        }
     }
 }
 
-fn remove(sums: &mut [[u32; 2]], row: &[u8]) {
-    for ([sum, square], value) in sums.iter_mut().zip(row) {
-        let value = u32::from(*value);
-        *sum -= value;
-        *square -= value * value;
+/// Places within reach of one of `n`.
+fn n_within(at: usize, n: usize) -> usize {
+    (at + REACH + 1).min(n) - at.saturating_sub(REACH)
+}
+
+/// Sums of the columns within reach of each.
+fn across(columns: &[i32], out: &mut [i32]) {
+    let n = columns.len();
+    let mut sum: i32 = columns.iter().take(REACH).sum();
+    // Up to here no column leaves the window, from there on none enters it.
+    let (full, last) = ((REACH + 1).min(n), n.saturating_sub(REACH));
+    for x in 0..full {
+        sum += columns.get(x + REACH).copied().unwrap_or(0);
+        out[x] = sum;
+    }
+    let between = full..last.max(full);
+    let leaving = columns.iter().zip(columns.iter().skip(2 * REACH + 1));
+    for (out, (gone, new)) in out[between.clone()].iter_mut().zip(leaving) {
+        sum += new - gone;
+        *out = sum;
+    }
+    for x in between.end..n {
+        sum -= columns[x - REACH - 1];
+        out[x] = sum;
     }
 }
 
 /// Gaussian smoothing by three weights, down, then across.
-fn smoothed(above: &[u8], row: &[u8], below: &[u8], out: &mut Vec<f32>) {
-    let down = |x: usize| CENTER * f32::from(row[x]) + SIDE * (f32::from(above[x]) + f32::from(below[x]));
+fn smoothed([above, row, below]: [&[u8]; 3], down: &mut Vec<f32>, out: &mut Vec<f32>) {
+    let columns = row.iter().zip(above).zip(below);
+    down.clear();
+    down.extend(
+        columns.map(|((row, above), below)| CENTER * f32::from(*row) + SIDE * (f32::from(*above) + f32::from(*below))),
+    );
     let last = row.len() - 1;
+    let at_end = |x: usize| CENTER * down[x] + SIDE * (down[x.saturating_sub(1)] + down[(x + 1).min(last)]);
     out.clear();
-    let (mut left, mut here) = (down(0), down(0));
-    for x in 0..=last {
-        let right = if x < last { down(x + 1) } else { here };
-        out.push(CENTER * here + SIDE * (left + right));
-        (left, here) = (here, right);
+    out.push(at_end(0));
+    out.extend(down.windows(3).map(|near| CENTER * near[1] + SIDE * (near[0] + near[2])));
+    if last > 0 {
+        out.push(at_end(last));
     }
 }
 
-fn normalize_row(sums: &[[u32; 2]], n_rows: usize, smooth: &[f32], out: &mut [u8]) {
-    let width = out.len();
-    let (mut sum, mut square) = (0_u32, 0_u32);
-    for column in &sums[..REACH.min(width)] {
-        sum += column[0];
-        square += column[1];
-    }
-    for x in 0..width {
-        if x + REACH < width {
-            sum += sums[x + REACH][0];
-            square += sums[x + REACH][1];
-        }
-        if x > REACH {
-            sum -= sums[x - REACH - 1][0];
-            square -= sums[x - REACH - 1][1];
-        }
-        let n_columns = (x + REACH + 1).min(width) - x.saturating_sub(REACH);
-        let n = (n_rows * n_columns) as f32;
-        let mean = sum as f32 / n;
-        let std = (square as f32 / n - mean * mean).max(MIN_STD * MIN_STD).sqrt();
-        // The cast clamps.
-        out[x] = (128.5 + TARGET_STD / std * (smooth[x] - mean)) as u8;
-    }
+/// The whole part of 0 <= x <= 255, without the check of a cast, which no vector instruction makes.
+#[inline]
+fn whole_part(x: f32) -> u8 {
+    /// From here on a float has no fraction: its lowest bits are a whole number.
+    const NO_FRACTION: f32 = 12_582_912.0;
+    let nearest = (x + NO_FRACTION) - NO_FRACTION;
+    let whole = if nearest > x { nearest - 1.0 } else { nearest };
+    (whole + NO_FRACTION).to_bits() as u8
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_whole_part_is_that_of_a_cast() {
+        for k in 0..=255_u8 {
+            for x in [f32::from(k), f32::from(k) + 0.5, f32::from(k).next_up(), f32::from(k).next_down()] {
+                let x = x.clamp(0.0, 255.0);
+                assert_eq!(whole_part(x), x as u8, "{x}");
+            }
+        }
+    }
 
     /// Against the definition, sum by sum.
     #[test]

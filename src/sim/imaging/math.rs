@@ -13,6 +13,18 @@ pub(super) fn lanes<const N: usize>(vectors: &[Vec3; N]) -> Lanes<N> {
     std::array::from_fn(|axis| std::array::from_fn(|k| vectors[k][axis]))
 }
 
+/// From here on a float has no fraction: its lowest bits are a whole number. A cast would check its range, which no
+/// vector instruction does.
+const NO_FRACTION: f32 = 12_582_912.0;
+
+/// The whole part of 0 <= x <= 255.
+#[inline]
+pub(super) fn whole_part(x: f32) -> u8 {
+    let nearest = (x + NO_FRACTION) - NO_FRACTION;
+    let whole = if nearest > x { nearest - 1.0 } else { nearest };
+    (whole + NO_FRACTION).to_bits() as u8
+}
+
 /// `exp(x)` for x <= 0 to a relative error of 1e-6 and of the bits of x; 0 below -87.
 #[inline]
 pub(super) fn exp(x: f32) -> f32 {
@@ -25,14 +37,16 @@ pub(super) fn exp2(x: f32) -> f32 {
     // Without a branch, so that a loop of these can become vector instructions.
     let is_some = x >= -126.0;
     let x = if is_some { x } else { 0.0 };
-    let whole = (x - 0.5) as i32;
-    let rest = (x - whole as f32) * std::f32::consts::LN_2;
+    let below = x - 0.5;
+    let nearest = (below + NO_FRACTION) - NO_FRACTION;
+    let whole = if nearest < below { nearest + 1.0 } else { nearest };
+    let rest = (x - whole) * std::f32::consts::LN_2;
     let polynomial = 1.0
         + rest
             * (1.0
                 + rest
                     * (0.5 + rest * (1.0 / 6.0 + rest * (1.0 / 24.0 + rest * (1.0 / 120.0 + rest * (1.0 / 720.0))))));
-    let value = f32::from_bits(((whole + 127) as u32) << 23) * polynomial;
+    let value = f32::from_bits((whole + (NO_FRACTION + 127.0)).to_bits() << 23) * polynomial;
     if is_some { value } else { 0.0 }
 }
 

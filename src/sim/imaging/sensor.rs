@@ -7,7 +7,7 @@
 use rayon::prelude::*;
 
 use crate::imaging::auto_exposure::Exposure;
-use crate::imaging::math::{Lanes, hash, image_key, max, min};
+use crate::imaging::math::{Lanes, hash, image_key, max, min, whole_part};
 use crate::imaging::rays::{Rays, first_of};
 use crate::spec::ImageSpec;
 
@@ -149,7 +149,7 @@ impl<'a> Readout<'a> {
                 }
             }
             for k in 0..LANES {
-                out[k] = min(max(electrons[k] * self.counts_per_electron + 0.5, 0.0), 255.0) as i32 as u8;
+                out[k] = whole_part(min(max(electrons[k] * self.counts_per_electron + 0.5, 0.0), 255.0));
             }
         }
         out

@@ -53,11 +53,6 @@ impl Tracer<'_> {
 
     /// A few pixels from the `i`th on.
     fn meet(&self, found: &[(f32, u16)], i: usize, faces: &mut [u16], ranges: &mut [f32]) {
-        faces.fill(0);
-        ranges.fill(f32::INFINITY);
-        if found.is_empty() {
-            return;
-        }
         let lanes: Lanes<LANES> = self.rays.several(i);
         let (range_m, number) = first_met(self.objects, found, &lanes);
         // A ray beyond the field of view is zero and meets nothing that counts.
@@ -65,6 +60,8 @@ impl Tracer<'_> {
         if number[0] > 0 && number == [number[0]; LANES] && (0..LANES).all(sees) {
             return self.mark(number[0], &lanes, &range_m, i, (faces, ranges));
         }
+        faces.fill(0);
+        ranges.fill(f32::INFINITY);
         for k in 0..faces.len() {
             if number[k] > 0 && sees(k) {
                 let out = (&mut faces[k..=k], &mut ranges[k..=k]);
