@@ -1,6 +1,8 @@
 """Times and memory of two builds of armcal side by side, each command by turns in one run -> Markdown on stdout.
 
-    python3 benches/ratios.py BEFORE NOW [ROUNDS] [--only NAME ...]       (three rounds; from the root of the repository)
+    python3 benches/ratios.py BEFORE NOW [ROUNDS] [--only NAME ...] [--benches BEFORE NOW]
+
+Three rounds, from the root of the repository. --benches: both builds' `speed`, of which the parts in PARTS are timed.
 
 BEFORE and NOW are programs, built alike. Seconds of a processor (user and system, all threads), of the clock, and the most memory: the
 least of the rounds, for other load on the machine only adds. The recordings that both read are made by BEFORE. Unix.
@@ -9,6 +11,7 @@ least of the rounds, for other load on the machine only adds. The recordings tha
 import argparse
 import datetime
 import os
+import re
 import subprocess
 import tempfile
 import time
@@ -16,6 +19,9 @@ from pathlib import Path
 
 QUICKSTART = "routines/titan4-quickstart.toml"
 CAMPAIGN_SEEDS = "1..24"
+# Benchmarks of `speed`; the estimate of criterion's.
+PARTS = ["detect: eight tags, 1224 x 1024", "render: one image, half resolution", "dynamics: one step", "physics: one second, all effects"]
+MICROSECONDS = {"ns": 1e-3, "µs": 1.0, "ms": 1e3, "s": 1e6}
 # Refused and missed runs cost as much as others do.
 ENDINGS = (0, 3, 4)
 
@@ -58,12 +64,22 @@ def measured(program, words):
     return used.ru_utime + used.ru_stime, time.monotonic() - began, used.ru_maxrss / 1024
 
 
+def timed(bench, part):
+    """A benchmark's time, us."""
+    words = [bench, "--bench", "--warm-up-time", "1", "--measurement-time", "3", "--noplot", f"^{re.escape(part)}$"]
+    with tempfile.TemporaryDirectory() as home:
+        said = subprocess.run(words, check=True, capture_output=True, text=True, env={**os.environ, "CRITERION_HOME": home}).stdout
+    _, value, unit = re.search(r"time:\s+\[\S+ \S+ ((\S+) (\S+)) ", said).groups()
+    return float(value) * MICROSECONDS[unit]
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("before", type=lambda text: str(Path(text).resolve()))
     parser.add_argument("now", type=lambda text: str(Path(text).resolve()))
     parser.add_argument("rounds", nargs="?", type=int, default=3)
     parser.add_argument("--only", nargs="+", default=[])
+    parser.add_argument("--benches", nargs=2, default=[], type=lambda text: str(Path(text).resolve()))
     args = parser.parse_args()
     model = next((line.split(":", 1)[1].strip() for line in open("/proc/cpuinfo") if line.startswith("model name")), "")
     print(f"{datetime.date.today()}, {os.cpu_count()} cores, {model}; load {os.getloadavg()[0]:.1f} at the start.\n")
@@ -78,6 +94,12 @@ def main():
             before, now = ([min(figures) for figures in zip(*calls)] for calls in zip(*rounds))
             cells = [f"{b:.2f} | {n:.2f} | {n / b:.2f}" for b, n in zip(before[:2], now[:2])]
             print(f"| {name} | {' | '.join(cells)} | {before[2]:.0f} | {now[2]:.0f} |", flush=True)
+    if args.benches:
+        print("\n| part | us, before | now | ratio |\n|---|--:|--:|--:|", flush=True)
+    for part in PARTS if args.benches else []:
+        rounds = [[timed(bench, part) for bench in args.benches] for _ in range(args.rounds)]
+        before, now = (min(times) for times in zip(*rounds))
+        print(f"| {part} | {before:.2f} | {now:.2f} | {now / before:.2f} |", flush=True)
 
 
 if __name__ == "__main__":

@@ -111,9 +111,9 @@ fn across(columns: &[i32], out: &mut [i32]) {
     let mut sum: i32 = columns.iter().take(REACH).sum();
     // Up to here no column leaves the window, from there on none enters it.
     let (full, last) = ((REACH + 1).min(n), n.saturating_sub(REACH));
-    for x in 0..full {
+    for (x, out) in out.iter_mut().enumerate().take(full) {
         sum += columns.get(x + REACH).copied().unwrap_or(0);
-        out[x] = sum;
+        *out = sum;
     }
     let between = full..last.max(full);
     let leaving = columns.iter().zip(columns.iter().skip(2 * REACH + 1));
@@ -121,9 +121,9 @@ fn across(columns: &[i32], out: &mut [i32]) {
         sum += new - gone;
         *out = sum;
     }
-    for x in between.end..n {
+    for (x, out) in out.iter_mut().enumerate().skip(between.end) {
         sum -= columns[x - REACH - 1];
-        out[x] = sum;
+        *out = sum;
     }
 }
 
@@ -171,30 +171,36 @@ mod tests {
     /// Against the definition, sum by sum.
     #[test]
     fn normalization_agrees_with_its_definition() {
-        let (width, height, stride) = (90_usize, 70_usize, 96_usize);
-        let data: Vec<u8> = (0..width * height).map(|i| (i * i / 7 % 97 + i % 50) as u8).collect();
-        let mut out = vec![0; stride * height];
-        ContrastNormalizer::default().normalize(&data, width, &mut out, stride);
-        let at = |x: isize, y: isize| {
-            f64::from(data[y.clamp(0, height as isize - 1) as usize * width + x.clamp(0, width as isize - 1) as usize])
-        };
-        for (x, y) in [(0, 0), (89, 69), (40, 35), (5, 60), (80, 3), (26, 26)] {
-            let window: Vec<f64> = (y - 25..=y + 25_isize)
-                .flat_map(|y| (x - 25..=x + 25_isize).map(move |x| (x, y)))
-                .filter(|(x, y)| (0..width as isize).contains(x) && (0..height as isize).contains(y))
-                .map(|(x, y)| at(x, y))
-                .collect();
-            let n = window.len() as f64;
-            let mean = window.iter().sum::<f64>() / n;
-            let std = (window.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt().max(3.0);
-            let weight = |d: isize| if d == 0 { 0.786 } else { 0.107 };
-            let smooth: f64 = (-1..=1)
-                .flat_map(|i| (-1..=1).map(move |j| (i, j)))
-                .map(|(i, j)| weight(i) * weight(j) * at(x + i, y + j))
-                .sum();
-            let expected = (128.5 + 50.0 / std * (smooth - mean)).clamp(0.0, 255.0).floor();
-            let actual = f64::from(out[y as usize * stride + x as usize]);
-            assert!((actual - expected).abs() <= 1.0, "{x} {y}: {actual} {expected}");
+        // The window is larger than the last two.
+        for (width, height, stride) in [(90_usize, 70_usize, 96_usize), (40, 30, 40), (20, 9, 24)] {
+            let data: Vec<u8> = (0..width * height).map(|i| (i * i / 7 % 97 + i % 50) as u8).collect();
+            let mut out = vec![0; stride * height];
+            ContrastNormalizer::default().normalize(&data, width, &mut out, stride);
+            let at = |x: isize, y: isize| {
+                f64::from(
+                    data[y.clamp(0, height as isize - 1) as usize * width + x.clamp(0, width as isize - 1) as usize],
+                )
+            };
+            for (x, y) in [(0, 0), (89, 69), (40, 35), (5, 60), (80, 3), (26, 26)]
+                .map(|(x, y)| (x % width as isize, y % height as isize))
+            {
+                let window: Vec<f64> = (y - 25..=y + 25_isize)
+                    .flat_map(|y| (x - 25..=x + 25_isize).map(move |x| (x, y)))
+                    .filter(|(x, y)| (0..width as isize).contains(x) && (0..height as isize).contains(y))
+                    .map(|(x, y)| at(x, y))
+                    .collect();
+                let n = window.len() as f64;
+                let mean = window.iter().sum::<f64>() / n;
+                let std = (window.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt().max(3.0);
+                let weight = |d: isize| if d == 0 { 0.786 } else { 0.107 };
+                let smooth: f64 = (-1..=1)
+                    .flat_map(|i| (-1..=1).map(move |j| (i, j)))
+                    .map(|(i, j)| weight(i) * weight(j) * at(x + i, y + j))
+                    .sum();
+                let expected = (128.5 + 50.0 / std * (smooth - mean)).clamp(0.0, 255.0).floor();
+                let actual = f64::from(out[y as usize * stride + x as usize]);
+                assert!((actual - expected).abs() <= 1.0, "{x} {y}: {actual} {expected}");
+            }
         }
     }
 }

@@ -105,8 +105,8 @@ impl Shader {
         }
         for c in 0..3 {
             let kept = self.water.in_scatter_per_m_sr[c];
-            for step in 0..STEPS {
-                sum[c] += kept * lux[c][step] * path.left[c][step] * path.length_m[step];
+            for ((lux, left), length_m) in lux[c].iter().zip(&path.left[c]).zip(&path.length_m) {
+                sum[c] += kept * lux * left * length_m;
             }
         }
     }

@@ -58,35 +58,37 @@ impl Tracer<'_> {
         // A ray beyond the field of view is zero and meets nothing that counts.
         let sees = |k: usize| lanes.iter().any(|axis| axis[k] != 0.0);
         if number[0] > 0 && number == [number[0]; LANES] && (0..LANES).all(sees) {
-            return self.mark(number[0], &lanes, &range_m, i, (faces, ranges));
+            return self.mark(number[0], &Met { rays: lanes, range_m, first: i }, (faces, ranges));
         }
         faces.fill(0);
         ranges.fill(f32::INFINITY);
         for k in 0..faces.len() {
             if number[k] > 0 && sees(k) {
-                let out = (&mut faces[k..=k], &mut ranges[k..=k]);
-                self.mark(number[k], &lanes.map(|axis| [axis[k]]), &[range_m[k]], i + k, out);
+                let met = Met { rays: lanes.map(|axis| [axis[k]]), range_m: [range_m[k]], first: i + k };
+                self.mark(number[k], &met, (&mut faces[k..=k], &mut ranges[k..=k]));
             }
         }
     }
 
     /// Faces and ranges of rays that all meet object `number` less one.
     #[inline]
-    fn mark<const N: usize>(
-        &self,
-        number: u16,
-        rays: &Lanes<N>,
-        range_m: &[f32; N],
-        i: usize,
-        (faces, ranges): (&mut [u16], &mut [f32]),
-    ) {
+    fn mark<const N: usize>(&self, number: u16, met: &Met<N>, (faces, ranges): (&mut [u16], &mut [f32])) {
         let object = &self.objects[usize::from(number - 1)];
-        let (met, true_m) = object.form.faces(&object.place, rays, range_m);
+        let (of_rays, true_m) = object.form.faces(&object.place, &met.rays, &met.range_m);
         ranges.copy_from_slice(&true_m[..ranges.len()]);
         for (k, face) in faces.iter_mut().enumerate() {
             // Neighbours on a fine pattern always differ.
-            let of_pixel = if object.is_fine { ((i + k) & 1) as u16 } else { met[k] };
+            let of_pixel = if object.is_fine { ((met.first + k) & 1) as u16 } else { of_rays[k] };
             *face = number << FACE_BITS | of_pixel;
         }
     }
+}
+
+/// Rays of pixels in a row that meet one object.
+struct Met<const N: usize> {
+    rays: Lanes<N>,
+    /// As [`first_met`] has it.
+    range_m: [f32; N],
+    /// The first pixel.
+    first: usize,
 }

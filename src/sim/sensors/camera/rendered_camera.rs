@@ -8,7 +8,7 @@ use crate::error::SimError;
 use crate::imaging::{Imager, Light, Shot, TagPlane};
 use crate::sensors::camera::ported_lens::PortedLens;
 use crate::sensors::camera::scenery::{ScenePoses, Scenery};
-use crate::sensors::camera::tag_search::TagSearch;
+use crate::sensors::camera::tag_search::{Kept, TagSearch};
 use crate::spec::{ImageSpec, WorldSpec};
 use armcal_core::optics::TagFamily;
 use armcal_core::robot::{FileIssue, Robot, Vehicle};
@@ -126,6 +126,7 @@ impl RenderedCamera {
         if is_logged {
             self.last_logged = Some(now);
         }
-        self.search.search(frame.clone(), stamp, is_logged)
+        let kept = if is_logged { Kept::TagsAndImage } else { Kept::TagsAlone };
+        self.search.search(frame.clone(), stamp, kept)
     }
 }

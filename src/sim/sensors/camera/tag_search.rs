@@ -21,10 +21,17 @@ pub(super) struct TagSearch {
     images: SyncSender<Job>,
 }
 
+/// What of an image is recorded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kept {
+    TagsAlone,
+    TagsAndImage,
+}
+
 struct Job {
     frame: Frame,
     stamp: Stamp,
-    is_logged: bool,
+    kept: Kept,
     messages: LateSender,
 }
 
@@ -53,9 +60,9 @@ impl TagSearch {
                 }
             };
             let _ = started.send(Ok(()));
-            for Job { frame, stamp, is_logged, messages } in jobs {
+            for Job { frame, stamp, kept, messages } in jobs {
                 // Nobody waits for the images of a world that is gone.
-                let _ = messages.send(searcher.search(&frame, stamp, is_logged));
+                let _ = messages.send(searcher.search(&frame, stamp, kept));
             }
         };
         thread::Builder::new().name("camera".to_owned()).spawn(work).map_err(|error| failed(&error))?;
@@ -63,17 +70,17 @@ impl TagSearch {
         Ok(Self { images })
     }
 
-    /// Searches an image, and puts it into the recording with what was found if it `is_logged`.
-    pub(super) fn search(&self, frame: Frame, stamp: Stamp, is_logged: bool) -> LateMessages {
+    /// The messages of an image.
+    pub(super) fn search(&self, frame: Frame, stamp: Stamp, kept: Kept) -> LateMessages {
         let (messages, late) = LateMessages::pair();
         // Without a thread the sender is dropped, which `late` tells.
-        let _ = self.images.send(Job { frame, stamp, is_logged, messages });
+        let _ = self.images.send(Job { frame, stamp, kept, messages });
         late
     }
 }
 
 impl Searcher {
-    fn search(&mut self, frame: &Frame, stamp: Stamp, is_logged: bool) -> Result<Vec<Message>, SinkError> {
+    fn search(&mut self, frame: &Frame, stamp: Stamp, kept: Kept) -> Result<Vec<Message>, SinkError> {
         // The camera hands out JPEG. The detector sees what the recording will hold, whether or not this one goes in.
         let jpeg = jpeg_bytes(frame, self.jpeg_quality)?;
         let unusable = |error: DetectError| SimError::Detector(error.to_string());
@@ -85,7 +92,7 @@ impl Searcher {
         if !found.rejects.is_empty() {
             messages.push(Message::Rejects(DetectionRejects { stamp, rejects: found.rejects }));
         }
-        if is_logged {
+        if kept == Kept::TagsAndImage {
             messages.push(Message::Image(CameraImage { stamp, jpeg }));
         }
         Ok(messages)
