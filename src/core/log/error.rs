@@ -34,7 +34,7 @@ pub enum LogError {
     #[error("{}: topic {topic} holds {first} and cannot hold {now} as well", path.display())]
     SchemaChanged { path: PathBuf, topic: String, first: String, now: String },
     #[error("{}: an image's messages did not come: {source}", path.display())]
-    Late { path: PathBuf, source: crate::streams::SinkError },
+    Late { path: PathBuf, source: crate::streams::LateError },
 }
 
 /// Why a message cannot be encoded.

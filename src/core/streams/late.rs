@@ -2,15 +2,17 @@
 
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
-use super::arm::SinkError;
 use super::message::Message;
+
+/// Why the work came to nothing, for people.
+pub type LateError = Box<dyn std::error::Error + Send + Sync>;
 
 /// Messages that come when the work for them is done, in one go.
 #[derive(Debug)]
-pub struct LateMessages(Receiver<Result<Vec<Message>, SinkError>>);
+pub struct LateMessages(Receiver<Result<Vec<Message>, LateError>>);
 
 /// Where the work leaves its messages.
-pub type LateSender = std::sync::mpsc::Sender<Result<Vec<Message>, SinkError>>;
+pub type LateSender = std::sync::mpsc::Sender<Result<Vec<Message>, LateError>>;
 
 impl LateMessages {
     /// Both ends.
@@ -24,7 +26,7 @@ impl LateMessages {
     ///
     /// # Errors
     /// Why there are none.
-    pub fn wait(&self) -> Result<Vec<Message>, SinkError> {
+    pub fn wait(&self) -> Result<Vec<Message>, LateError> {
         self.0.recv().unwrap_or_else(|_| Err(Self::abandoned()))
     }
 
@@ -32,7 +34,7 @@ impl LateMessages {
     ///
     /// # Errors
     /// Why there are none.
-    pub fn take_finished(&self) -> Option<Result<Vec<Message>, SinkError>> {
+    pub fn take_finished(&self) -> Option<Result<Vec<Message>, LateError>> {
         match self.0.try_recv() {
             Ok(messages) => Some(messages),
             Err(TryRecvError::Empty) => None,
@@ -40,7 +42,7 @@ impl LateMessages {
         }
     }
 
-    fn abandoned() -> SinkError {
+    fn abandoned() -> LateError {
         "the work for a message ended without one".into()
     }
 }

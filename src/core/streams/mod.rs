@@ -10,7 +10,7 @@ mod survey;
 
 pub use crate::joints::{JointAngles, JointCounts, MAX_JOINTS};
 pub use arm::{Arm, ArmError, ImageDemand, Sink, SinkError};
-pub use late::{LateMessages, LateSender};
+pub use late::{LateError, LateMessages, LateSender};
 pub use message::{
     Attitude, CameraImage, CaptureSet, DetectionReject, DetectionRejects, GripperCommand, GripperSample, JointCommand,
     JointSensorSample, JointStateBelief, LogLevel, LogLine, Mark, MarkKind, Message, Phase, PressureSample,

@@ -41,7 +41,7 @@ impl Lamp {
         }
     }
 
-    /// Light through a unit area across the rays at `points`, lx, without the water's losses, the ways' lengths, and the
+    /// Light through a unit area across the rays at `points`, lx, without the water's losses; the ways' lengths; the
     /// unit vectors towards the lamp.
     #[inline]
     fn arriving<const N: usize>(&self, points: &Lanes<N>) -> ([f32; N], [f32; N], Lanes<N>) {

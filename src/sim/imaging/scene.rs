@@ -11,8 +11,6 @@ use armcal_core::spatial::{exp, log};
 pub(super) const SAMPLES: usize = 32;
 /// Side of a tile, px.
 pub(super) const TILE_PX: usize = 32;
-/// A face of an object takes its lowest bits, the object's number plus one the others; 0 is open water.
-pub(super) const FACE_BITS: u32 = 3;
 /// Smallest image motion during the exposure that counts as motion, px.
 const STILL_PX: f32 = 0.01;
 /// Cells that are narrower than this in the image are sampled everywhere, px.

@@ -6,8 +6,9 @@
 use crate::imaging::edges::has_other_face;
 use crate::imaging::math::{Rgb, Vec3, lanes};
 use crate::imaging::rays::first_of;
-use crate::imaging::scene::{Appearance, FACE_BITS, Object, TILE_PX};
+use crate::imaging::scene::{Appearance, Object, TILE_PX};
 use crate::imaging::shader::Shade;
+use crate::imaging::shape::FACE_BITS;
 use crate::imaging::tag_board;
 use crate::imaging::tracer::{Candidates, Tracer, object_of};
 

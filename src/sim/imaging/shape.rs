@@ -1,9 +1,11 @@
 //! Intersection of rays with convex shapes, several at a time. A shape around the camera is invisible.
 
 use crate::imaging::math::{Lanes, Vec3, lanes, max, min};
-use crate::imaging::scene::FACE_BITS;
 use crate::imaging::tag_board::{self, Board};
 use armcal_core::robot::Shape;
+
+/// A face of an object takes its lowest bits, the object's number plus one the others; 0 is open water.
+pub(super) const FACE_BITS: u32 = 3;
 
 /// Form of an object in its own frame; lengths in m.
 #[derive(Clone, Debug)]

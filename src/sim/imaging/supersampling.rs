@@ -1,9 +1,10 @@
 //! Radiance of a pixel on an edge: the mean over samples of position and time.
 
 use crate::imaging::math::{Lanes, Rgb, Vec3};
-use crate::imaging::scene::{Appearance, FACE_BITS, Object, SAMPLES, farthest, first_met, offset};
+use crate::imaging::scene::{Appearance, Object, SAMPLES, farthest, first_met, offset};
 use crate::imaging::shader::Shade;
 use crate::imaging::shading::{Intersection, ShadeCache};
+use crate::imaging::shape::FACE_BITS;
 use crate::imaging::shape::Form;
 use crate::imaging::tag_board;
 use crate::imaging::tracer::Tracer;

@@ -2,9 +2,10 @@
 
 use crate::imaging::math::Lanes;
 use crate::imaging::rays::Rays;
-use crate::imaging::scene::{FACE_BITS, Object, TILE_PX, candidates, first_met, narrow};
+use crate::imaging::scene::{Object, TILE_PX, candidates, first_met, narrow};
 use crate::imaging::seafloor_texture::Texture;
 use crate::imaging::shader::Shader;
+use crate::imaging::shape::FACE_BITS;
 
 /// Rays traced together.
 const LANES: usize = 8;

@@ -7,7 +7,7 @@ use crate::error::SimError;
 use crate::imaging::Frame;
 use armcal_core::optics::CameraModel;
 use armcal_core::streams::{
-    CameraImage, DetectionRejects, LateMessages, LateSender, Message, SinkError, TagDetections,
+    CameraImage, DetectionRejects, LateError, LateMessages, LateSender, Message, TagDetections,
 };
 use armcal_core::time::Stamp;
 use armcal_detect::{DetectError, DetectorSettings, GreyImage, TagDetector, grey_of_jpeg};
@@ -80,7 +80,7 @@ impl TagSearch {
 }
 
 impl Searcher {
-    fn search(&mut self, frame: &Frame, stamp: Stamp, kept: Kept) -> Result<Vec<Message>, SinkError> {
+    fn search(&mut self, frame: &Frame, stamp: Stamp, kept: Kept) -> Result<Vec<Message>, LateError> {
         // The camera hands out JPEG. The detector sees what the recording will hold, whether or not this one goes in.
         let jpeg = jpeg_bytes(frame, self.jpeg_quality)?;
         let unusable = |error: DetectError| SimError::Detector(error.to_string());
