@@ -86,10 +86,10 @@ def main():
     print("| command | processor s, before | now | ratio | clock s, before | now | ratio | memory MB, before | now |")
     print("|---|--:|--:|--:|--:|--:|--:|--:|--:|", flush=True)
     with tempfile.TemporaryDirectory() as folder:
-        record(args.before, folder)
-        for name, words in commands(folder).items():
-            if args.only and name not in args.only:
-                continue
+        chosen = {name: words for name, words in commands(folder).items() if not args.only or name in args.only}
+        if any(word.startswith(folder) for words in chosen.values() for word in words):
+            record(args.before, folder)
+        for name, words in chosen.items():
             rounds = [[measured(program, words) for program in (args.before, args.now)] for _ in range(args.rounds)]
             before, now = ([min(figures) for figures in zip(*calls)] for calls in zip(*rounds))
             cells = [f"{b:.2f} | {n:.2f} | {n / b:.2f}" for b, n in zip(before[:2], now[:2])]
