@@ -147,7 +147,7 @@ fn smoothed([above, row, below]: [&[u8]; 3], down: &mut Vec<f32>, out: &mut Vec<
 /// The whole part of 0 <= x <= 255, without the check of a cast, which no vector instruction makes.
 #[inline]
 fn whole_part(x: f32) -> u8 {
-    /// From here on a float has no fraction: its lowest bits are a whole number.
+    /// A float about this large has no fraction: its lowest bits are a whole number.
     const NO_FRACTION: f32 = 12_582_912.0;
     let nearest = (x + NO_FRACTION) - NO_FRACTION;
     let whole = if nearest > x { nearest - 1.0 } else { nearest };

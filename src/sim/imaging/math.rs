@@ -13,7 +13,7 @@ pub(super) fn lanes<const N: usize>(vectors: &[Vec3; N]) -> Lanes<N> {
     std::array::from_fn(|axis| std::array::from_fn(|k| vectors[k][axis]))
 }
 
-/// From here on a float has no fraction: its lowest bits are a whole number. A cast would check its range, which no
+/// A float about this large has no fraction: its lowest bits are a whole number. A cast would check its range, which no
 /// vector instruction does.
 const NO_FRACTION: f32 = 12_582_912.0;
 

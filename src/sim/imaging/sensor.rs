@@ -106,7 +106,7 @@ impl<'a> Readout<'a> {
     fn line(&self, row: usize, planes: [&[f32]; 3], out: &mut [u8]) {
         for (n, out) in out.chunks_mut(3 * LANES).enumerate() {
             let (first, n_pixels) = (n * LANES, out.len() / 3);
-            // The last few of a row get company.
+            // At a row's end zeros fill up; what becomes of them is not kept.
             let of = first..first + n_pixels;
             let [red, green, blue] = planes;
             let radiance = [first_of(&red[of.clone()]), first_of(&green[of.clone()]), first_of(&blue[of])];
