@@ -15,6 +15,10 @@ fn bundle(c: &mut Criterion) {
     c.bench_function("bundle: least squares, 40 views x 8 tags, 84 parameters", |b| {
         b.iter(|| least_squares(black_box(&exact.input(HyperparameterMode::Given)), 1e-10));
     });
+    let all = problems::corners_of_all(40);
+    c.bench_function("bundle: the same with links, sag and lens, 131 parameters", |b| {
+        b.iter(|| least_squares(black_box(&all.input(HyperparameterMode::Given)), 1e-10));
+    });
     let noisy = problems::corners(30, 2e-4);
     c.bench_function("bundle: estimate, sizes fitted, 30 views x 8 tags", |b| {
         b.iter(|| estimate(black_box(&noisy.input(HyperparameterMode::Fitted))));

@@ -5,8 +5,9 @@ use std::path::Path;
 use armcal::calib::bundle::{BundleInput, HyperparameterMode, Hyperparameters, Model};
 use armcal::calib::{JointParameters, MeanCorners, Parameter, ParameterKind, TagMeasurement, TagObservation, View};
 use armcal::joints::{JointAngles, MAX_JOINTS};
-use armcal::optics::square_corners;
-use armcal::robot::{Robot, load};
+use armcal::kinematics::Chain;
+use armcal::optics::{CameraModel, square_corners};
+use armcal::robot::{CameraSpec, Robot, load};
 use armcal::sensor::ConditionChange;
 use armcal::spatial::exp;
 use armcal::stats::stream_rng;
@@ -45,18 +46,10 @@ impl Problem {
         }
     }
 
-    /// Parameters of the joints in the order of their columns.
-    pub fn parameters(&self) -> Vec<Parameter> {
-        let of_joint = |(joint, kinds): (usize, &Vec<ParameterKind>)| {
-            kinds.iter().map(move |&kind| Parameter { joint, kind }).collect::<Vec<_>>()
-        };
-        self.model.joints.iter().enumerate().flat_map(of_joint).collect()
-    }
-
     /// Gains and offsets of the joints before the camera.
     pub fn straight(&self) -> Vec<Parameter> {
         let straight = |p: &Parameter| matches!(p.kind, ParameterKind::Gain | ParameterKind::Offset);
-        self.parameters().into_iter().filter(straight).collect()
+        self.model.parameters().into_iter().filter(straight).collect()
     }
 }
 
@@ -96,9 +89,11 @@ fn model(robot: &Robot) -> Model {
     }
 }
 
-/// The arm as it is: drawn from the priors.
+/// The arm as it is: drawn from the priors of what has a column.
 struct Truth {
     parameters: JointParameters,
+    chain: Chain,
+    lens: CameraModel,
     mount: Isometry3<f64>,
     tags: Vec<Isometry3<f64>>,
 }
@@ -123,10 +118,22 @@ pub fn corners(n_views: u32, joint_std_rad: f64) -> Problem {
     corners_of(robot, n_views, Sight { joint_std_rad, n_tags })
 }
 
+/// The same with columns of all that `bundle` knows of an arm: links, lens and sag, too.
+pub fn corners_of_all(n_views: u32) -> Problem {
+    let robot = robot();
+    let (n, n_tags) = (robot.camera.mount.n_joints, robot.tags.len());
+    let model = Model { n_links: n, n_compliant: n, lens: true, ..model(&robot) };
+    corners_by(robot, model, n_views, Sight { joint_std_rad: 0.0, n_tags })
+}
+
 /// `n_views` views by the corners of some of a robot's tags.
 pub fn corners_of(robot: Robot, n_views: u32, sight: Sight) -> Problem {
-    let joint_std_rad = sight.joint_std_rad;
     let model = model(&robot);
+    corners_by(robot, model, n_views, sight)
+}
+
+fn corners_by(robot: Robot, model: Model, n_views: u32, sight: Sight) -> Problem {
+    let joint_std_rad = sight.joint_std_rad;
     let mut scales = Hyperparameters::datasheet(&robot);
     scales.joint_std_rad = [joint_std_rad; MAX_JOINTS];
     let mut rng = stream_rng(1, "bench of bundle");
@@ -144,7 +151,7 @@ pub fn corners_of(robot: Robot, n_views: u32, sight: Sight) -> Problem {
 fn draw(problem: &Problem, rng: &mut ChaCha8Rng) -> Truth {
     let robot = &problem.robot;
     let mut parameters = JointParameters::default();
-    for p in problem.parameters() {
+    for p in problem.model.parameters() {
         let std = problem.scales.prior_std(&robot.sensors[p.joint], p.joint, p.kind);
         parameters.set(p, parameters.get(p) + std * normal(rng));
     }
@@ -152,7 +159,20 @@ fn draw(problem: &Problem, rng: &mut ChaCha8Rng) -> Truth {
     let mount = moved(&camera.mount.link_from_frame, camera.mount_std_m, camera.mount_std_rad, rng);
     let tags = robot.tags.iter();
     let tags = tags.map(|t| moved(t.base_from_tag.isometry(), t.position_std_m, t.rotation_std_rad, rng)).collect();
-    Truth { parameters, mount, tags }
+    let lens = if problem.model.lens { lens(&robot.camera, rng) } else { robot.camera.lens };
+    Truth { chain: robot.chain.corrected(&parameters.links), parameters, lens, mount, tags }
+}
+
+/// One sigma of a lens's eight columns: focal lengths and centre px, distortion.
+pub fn lens_std(camera: &CameraSpec) -> [f64; 8] {
+    let [fx, fy] = camera.lens.focal_px().map(|px| px * camera.lens_priors.focal_std);
+    let (center, k) = (camera.lens_priors.center_std_px, camera.lens_priors.distortion_std);
+    [fx, fy, center, center, k, k, k, k]
+}
+
+fn lens(camera: &CameraSpec, rng: &mut ChaCha8Rng) -> CameraModel {
+    let (mean, std) = (camera.lens.intrinsics(), lens_std(camera));
+    camera.lens.with_intrinsics(std::array::from_fn(|k| mean[k] + std[k] * normal(rng)))
 }
 
 /// A view at a random pose; `None` where it does not see the tags wanted.
@@ -164,11 +184,11 @@ fn view(robot: &Robot, truth: &Truth, sight: Sight, idx: u32, rng: &mut ChaCha8R
         let angle_rad = truth.parameters.correction(j).angle_rad(spec, travel_rad[j], &ConditionChange::default(), 0.0);
         angle_rad + sight.joint_std_rad * normal(rng)
     });
-    let camera_from_base = (robot.chain.link_poses(&angles).link(robot.camera.mount.n_joints) * truth.mount).inverse();
+    let camera_from_base = (truth.chain.link_poses(&angles).link(robot.camera.mount.n_joints) * truth.mount).inverse();
     let mut view = View::of_reading(idx, SIMULATION_EPOCH.plus_s(20.0 * f64::from(idx)), travel_rad);
     for (tag_idx, tag) in robot.tags.iter().enumerate() {
         let camera_from_tag = camera_from_base * truth.tags[tag_idx];
-        let Some(corners_px) = corners_px(robot, tag.size_m, &camera_from_tag, rng) else {
+        let Some(corners_px) = corners_px(&truth.lens, tag.size_m, &camera_from_tag, rng) else {
             if sight.n_tags < robot.tags.len() {
                 continue;
             }
@@ -189,7 +209,7 @@ fn view(robot: &Robot, truth: &Truth, sight: Sight, idx: u32, rng: &mut ChaCha8R
 
 /// What is measured of a tag; `None` where a corner is too far off the axis, or the tag too near.
 fn corners_px(
-    robot: &Robot,
+    lens: &CameraModel,
     size_m: f64,
     camera_from_tag: &Isometry3<f64>,
     rng: &mut ChaCha8Rng,
@@ -201,7 +221,7 @@ fn corners_px(
         if angle_rad > MAX_VIEW_ANGLE_RAD || camera_from_tag.translation.vector.norm() < MIN_RANGE_M {
             return None;
         }
-        let seen = robot.camera.lens.project(&point)?;
+        let seen = lens.project(&point)?;
         *pixel = [seen.x + CORNER_STD_PX * normal(rng), seen.y + CORNER_STD_PX * normal(rng)];
     }
     Some(corners_px)

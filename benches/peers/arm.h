@@ -124,16 +124,19 @@ class Reader {
     for (double& x : p.t) x = number();
     return p;
   }
+  Joint joint() {
+    Joint j;
+    j.parent_from_joint = pose();
+    for (double& x : j.axis) x = number();
+    j.center_rad = number();
+    j.prepare();
+    return j;
+  }
   Arm arm() {
     Arm a;
     word("joints");
     a.joints.resize(count());
-    for (Joint& j : a.joints) {
-      j.parent_from_joint = pose();
-      for (double& x : j.axis) x = number();
-      j.center_rad = number();
-      j.prepare();
-    }
+    for (Joint& j : a.joints) j = joint();
     word("mount");
     a.mount = pose();
     a.mount_std_m = number();

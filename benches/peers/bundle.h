@@ -1,4 +1,4 @@
-// The problem of bundle_ceres: what is measured, how far it is off, and the derivatives by hand.
+// The problem of bundle_ceres: what is measured, poses, and the lens.
 //
 // Poses are prior * exp(delta), delta = (translation, rotation): priors are then linear in delta.
 #pragma once
@@ -18,10 +18,33 @@ struct Parameter {
   double mean, std;
 };
 
+// Weight less buoyancy of a link, and its first moment in the link's frame.
+struct Load {
+  double weight_n;
+  std::array<double, 3> moment_nm;
+};
+
+// What the drawing says of the whole arm, where links, sag and lens are free, too; else empty.
+struct Body {
+  // Beyond the camera: their links weigh.
+  std::vector<Joint> beyond;
+  std::vector<std::vector<double>> beyond_rad;
+  std::array<double, 3> up;
+  // Base first.
+  std::vector<Load> loads;
+  // Where a load hangs: behind so many joints, and there.
+  int tool_joints;
+  std::array<double, 3> tool_m;
+  // Links joint by joint (shift, turn), each joint's compliance, the base's three, the load.
+  std::vector<double> std;
+  std::array<double, 8> lens_std;
+};
+
 struct Bundle {
   Arm arm;
-  std::array<double, 2> focal_px, center_px;
-  std::array<double, 4> distortion;
+  Body body;
+  // Focal lengths, centre, four terms of the distortion.
+  std::array<double, 8> lens;
   std::vector<Parameter> parameters;
   // First parameter of each joint, and the end.
   std::vector<int> first;
@@ -34,9 +57,7 @@ struct Bundle {
     Reader in(file);
     arm = in.arm();
     in.word("lens");
-    for (double& x : focal_px) x = in.number();
-    for (double& x : center_px) x = in.number();
-    for (double& x : distortion) x = in.number();
+    for (double& x : lens) x = in.number();
     in.word("parameters");
     parameters.resize(in.count());
     first.assign(arm.joints.size() + 1, 0);
@@ -65,7 +86,34 @@ struct Bundle {
     }
     in.word("relative_gain");
     relative_gain = in.number();
+    in.word("body");
+    if (in.count() != 0) read_body(in);
   }
+
+  void read_body(Reader& in) {
+    body.beyond.resize(in.count());
+    for (Joint& joint : body.beyond) joint = in.joint();
+    for (double& x : body.up) x = in.number();
+    body.loads.resize(in.count());
+    for (Load& load : body.loads) {
+      load.weight_n = in.number();
+      for (double& x : load.moment_nm) x = in.number();
+    }
+    body.tool_joints = in.count();
+    for (double& x : body.tool_m) x = in.number();
+    body.std.resize(in.count());
+    for (double& x : body.std) x = in.number();
+    for (double& x : body.lens_std) x = in.number();
+    body.beyond_rad.resize(basis.size());
+    for (auto& view : body.beyond_rad) {
+      view.resize(body.beyond.size());
+      for (double& x : view) x = in.number();
+    }
+  }
+
+  int n_links() const { return static_cast<int>(arm.joints.size()); }
+  int n_moving() const { return static_cast<int>(arm.joints.size() + body.beyond.size()); }
+  const Joint& joint(int j) const { return j < n_links() ? arm.joints[j] : body.beyond[j - n_links()]; }
 
   int n_joint() const { return static_cast<int>(parameters.size()); }
 
@@ -131,36 +179,47 @@ inline Matrix6 right_jacobian(const double* delta) {
 }
 
 // Equidistant fisheye with four coefficients.
-template <typename T>
-void project(const Bundle& b, const std::array<T, 3>& p, T* pixel) {
+template <typename T, typename L>
+void project(const L* lens, const std::array<T, 3>& p, T* pixel) {
   using std::atan2;
   using std::sqrt;
   const T r = sqrt(p[0] * p[0] + p[1] * p[1]);
   const T theta = atan2(r, p[2]);
   const T t2 = theta * theta;
-  const auto& k = b.distortion;
+  const L* k = lens + 4;
   const T scale = theta * (1.0 + t2 * (k[0] + t2 * (k[1] + t2 * (k[2] + t2 * k[3])))) / r;
-  for (int i = 0; i < 2; ++i) pixel[i] = b.focal_px[i] * scale * p[i] + b.center_px[i];
+  for (int i = 0; i < 2; ++i) pixel[i] = lens[i] * scale * p[i] + lens[2 + i];
 }
 
-// The same with d(pixel)/d(point).
-inline void project(const Bundle& b, const std::array<double, 3>& p, double* pixel, double by_point[2][3]) {
+// The same with d(pixel)/d(point), and with d(pixel)/d(lens) where `by_lens` is wanted.
+inline void project(const double* lens, const std::array<double, 3>& p, double* pixel, double by_point[2][3],
+                    double (*by_lens)[8]) {
   const auto [x, y, z] = p;
   const double r2 = x * x + y * y, r = std::sqrt(r2), theta = std::atan2(r, z), t2 = theta * theta, d2 = r2 + z * z;
-  const auto& k = b.distortion;
+  const double* k = lens + 4;
   const double distorted = theta * (1.0 + t2 * (k[0] + t2 * (k[1] + t2 * (k[2] + t2 * k[3]))));
   const double slope = 1.0 + t2 * (3.0 * k[0] + t2 * (5.0 * k[1] + t2 * (7.0 * k[2] + t2 * 9.0 * k[3])));
   const double ux = x / r, uy = y / r, scale = distorted / r, along = slope * z / d2, axial = -slope * r / d2;
   const double off = (along - scale) * ux * uy;
-  const double fx = b.focal_px[0], fy = b.focal_px[1];
-  pixel[0] = fx * distorted * ux + b.center_px[0];
-  pixel[1] = fy * distorted * uy + b.center_px[1];
+  const double fx = lens[0], fy = lens[1];
+  pixel[0] = fx * distorted * ux + lens[2];
+  pixel[1] = fy * distorted * uy + lens[3];
   by_point[0][0] = fx * (along * ux * ux + scale * uy * uy);
   by_point[0][1] = fx * off;
   by_point[0][2] = fx * axial * ux;
   by_point[1][0] = fy * off;
   by_point[1][1] = fy * (along * uy * uy + scale * ux * ux);
   by_point[1][2] = fy * axial * uy;
+  if (by_lens == nullptr) return;
+  const double u[2] = {ux, uy}, cubed = theta * t2;
+  const double powers[4] = {cubed, cubed * t2, cubed * t2 * t2, cubed * t2 * t2 * t2};
+  for (int i = 0; i < 2; ++i) {
+    by_lens[i][i] = distorted * u[i];
+    by_lens[i][1 - i] = 0.0;
+    by_lens[i][2 + i] = 1.0;
+    by_lens[i][3 - i] = 0.0;
+    for (int n = 0; n < 4; ++n) by_lens[i][4 + n] = lens[i] * u[i] * powers[n];
+  }
 }
 
 // Corner k of a tag, in its plane.

@@ -108,23 +108,28 @@ fn main() {
     let folder = programs.clone().unwrap_or_else(std::env::temp_dir);
     let bundle = problems::corners(40, 0.0);
     let bundle_file = write(&folder, "bundle.txt", &text::bundle(&bundle, RELATIVE_GAIN));
+    let whole = problems::corners_of_all(40);
+    let whole_file = write(&folder, "bundle_whole.txt", &text::bundle(&whole, RELATIVE_GAIN));
     let distance = problems::positions(40, 6);
     let distance_file = write(&folder, "distance.txt", &text::distance(&distance, BOX_SIGMAS, RHO));
     let straight = distance.straight();
     let views = PositionProblem::new(&distance.robot, &distance.views);
     let options = SearchOptions { rho_begin: RHO[0], rho_end: RHO[1], ..SearchOptions::default() };
 
-    let (mut of_bundle, mut of_distance) = (Contest::default(), Contest::default());
+    let (mut of_bundle, mut of_whole, mut of_distance) = (Contest::default(), Contest::default(), Contest::default());
     for _ in 0..N_ROUNDS {
         for _ in 0..RUNS_A_ROUND {
-            let (ms, solved) = timed(|| least_squares(&bundle.input(HyperparameterMode::Given), RELATIVE_GAIN));
-            of_bundle.add("bundle (ours)", ms, solved.iterations, solved.cost_final);
+            for (problem, contest) in [(&bundle, &mut of_bundle), (&whole, &mut of_whole)] {
+                let (ms, solved) = timed(|| least_squares(&problem.input(HyperparameterMode::Given), RELATIVE_GAIN));
+                contest.add("bundle (ours)", ms, solved.iterations, solved.cost_final);
+            }
             let guess = JointParameters::default();
             let (ms, solved) = timed(|| PositionMethod::MinimumDistance.solve(&views, &straight, &guess, &options));
             of_distance.add("minimum distance (ours)", ms, solved.evaluations, solved.cost_final);
         }
         if let Some(programs) = &programs {
             of_bundle.add_program(&programs.join("bundle_ceres"), &bundle_file);
+            of_whole.add_program(&programs.join("bundle_ceres"), &whole_file);
             of_distance.add_program(&programs.join("distance_nlopt"), &distance_file);
         }
     }
@@ -132,4 +137,6 @@ fn main() {
     println!("{}", of_distance.table());
     println!("Bundle, 40 views x 8 tags, 84 parameters, relative gain {RELATIVE_GAIN:e}; cost: sum of squares");
     println!("{}", of_bundle.table());
+    println!("The same with links, sag and lens, 131 parameters");
+    println!("{}", of_whole.table());
 }

@@ -1,13 +1,15 @@
-//! The problems as plain text: words and numbers with 17 digits, separated by blanks, in the order that problem.h
-//! reads.
+//! The problems as plain text: words and numbers with 17 digits, separated by blanks, in the order that arm.h,
+//! bundle.h and distance_nlopt.cpp read.
 
 use std::fmt::Write;
+use std::ops::Range;
 
-use armcal::calib::{JointParameters, TagMeasurement};
+use armcal::calib::{JointParameters, Parameter, TagMeasurement};
+use armcal::robot::Robot;
 use armcal::sensor::ConditionChange;
 use nalgebra::Isometry3;
 
-use crate::problems::Problem;
+use crate::problems::{Problem, lens_std};
 
 fn numbers(out: &mut String, values: impl IntoIterator<Item = f64>) {
     for value in values {
@@ -24,13 +26,18 @@ fn pose(out: &mut String, pose: &Isometry3<f64>) {
     numbers(out, by_row.iter().chain(pose.translation.vector.iter()).copied());
 }
 
-fn arm(out: &mut String, problem: &Problem) {
-    let (robot, mount) = (&problem.robot, &problem.robot.camera.mount);
-    let _ = writeln!(out, "joints {}", mount.n_joints);
-    for (joint, spec) in robot.chain.joints()[..mount.n_joints].iter().zip(&robot.sensors) {
+fn joints(out: &mut String, robot: &Robot, range: Range<usize>) {
+    for (joint, spec) in robot.chain.joints()[range.clone()].iter().zip(&robot.sensors[range]) {
+        assert!(!joint.kind.is_slide(), "the C++ programs know joints that turn");
         pose(out, &joint.parent_from_joint);
         numbers(out, joint.axis.iter().copied().chain([spec.center_rad]));
     }
+}
+
+fn arm(out: &mut String, problem: &Problem) {
+    let (robot, mount) = (&problem.robot, &problem.robot.camera.mount);
+    let _ = writeln!(out, "joints {}", mount.n_joints);
+    joints(out, robot, 0..mount.n_joints);
     out.push_str("mount\n");
     pose(out, &mount.link_from_frame);
     numbers(out, [robot.camera.mount_std_m, robot.camera.mount_std_rad]);
@@ -49,16 +56,17 @@ pub fn bundle(problem: &Problem, relative_gain: f64) -> String {
     let lens = &robot.camera.lens;
     out.push_str("lens\n");
     numbers(&mut out, lens.focal_px().into_iter().chain(lens.center_px()).chain(lens.distortion()));
-    let parameters = problem.parameters();
+    let (parameters, of_body): (Vec<_>, Vec<_>) =
+        problem.model.parameters().into_iter().partition(|p| !p.kind.is_of_body());
     let _ = writeln!(out, "parameters {}", parameters.len());
+    let prior_std = |p: &Parameter| problem.scales.prior_std(&robot.sensors[p.joint], p.joint, p.kind);
     for p in &parameters {
-        let std = problem.scales.prior_std(&robot.sensors[p.joint], p.joint, p.kind);
-        numbers(&mut out, [p.joint as f64, JointParameters::default().get(*p), std]);
+        numbers(&mut out, [p.joint as f64, JointParameters::default().get(*p), prior_std(p)]);
     }
     let _ = writeln!(out, "views {}", problem.views.len());
     let info = robot.camera.corner_std_px.powi(-2);
     for view in &problem.views {
-        let by = |p: &armcal::calib::Parameter| {
+        let by = |p: &Parameter| {
             let travel_rad = view.travel_rad[p.joint];
             p.kind.angle_derivative(&robot.sensors[p.joint], travel_rad, &ConditionChange::default(), 0.0)
         };
@@ -72,7 +80,36 @@ pub fn bundle(problem: &Problem, relative_gain: f64) -> String {
     }
     out.push_str("relative_gain\n");
     numbers(&mut out, [relative_gain]);
+    let _ = writeln!(out, "body {}", u8::from(!of_body.is_empty()));
+    if !of_body.is_empty() {
+        body(&mut out, problem, &of_body.iter().map(prior_std).collect::<Vec<_>>());
+    }
     out
+}
+
+/// What links, sag and lens need: the joints beyond the camera, what all links weigh, one sigma of each column.
+fn body(out: &mut String, problem: &Problem, stds: &[f64]) {
+    let robot = &problem.robot;
+    let (n, loads) = (robot.camera.mount.n_joints, robot.chain.loads());
+    let beyond = n..robot.n_joints();
+    let _ = writeln!(out, "{}", beyond.len());
+    joints(out, robot, beyond.clone());
+    numbers(out, loads.up.iter().copied());
+    let _ = writeln!(out, "{}", robot.n_joints() + 1);
+    for load in &loads.links[..=robot.n_joints()] {
+        numbers(out, [load.weight_n].into_iter().chain(load.moment_nm.iter().copied()));
+    }
+    numbers(
+        out,
+        [loads.tool.n_joints as f64].into_iter().chain(loads.tool.link_from_frame.translation.vector.iter().copied()),
+    );
+    let _ = writeln!(out, "{}", stds.len());
+    numbers(out, stds.iter().copied());
+    numbers(out, lens_std(&robot.camera));
+    for view in &problem.views {
+        let angle_rad = |joint: usize| robot.sensors[joint].center_rad + view.travel_rad[joint];
+        numbers(out, beyond.clone().map(angle_rad));
+    }
 }
 
 /// What `distance_nlopt` reads. `box_sigmas`: half-width of the box.
