@@ -206,8 +206,11 @@ impl Chain {
         corrections: &LinkCorrections,
         loads: &ArmLoads,
     ) -> LinkPoses {
-        let place = |i: usize, joint: &ChainJoint| corrections[i].applied_to(&joint.parent_from_joint);
-        self.bent_poses(angles, (&corrections.sag, loads), place)
+        let mut places = [Isometry3::identity(); MAX_JOINTS];
+        for ((place, joint), correction) in places.iter_mut().zip(&self.joints).zip(&corrections.places) {
+            *place = correction.applied_to(&joint.parent_from_joint);
+        }
+        self.bent_poses(angles, (&corrections.sag, loads), |i, _| places[i])
     }
 
     /// The chain with `corrections` of its drawing.

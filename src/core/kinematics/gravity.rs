@@ -106,10 +106,16 @@ impl ArmLoads {
         self.torques_by(poses, &self.moments(poses, 0.0, 1.0))
     }
 
-    /// How the torques change with the angle of joint `by`, N m/rad.
+    /// How the torques change with the angle of each joint, N m/rad.
     #[must_use]
-    pub fn torque_derivatives(&self, poses: &LinkPoses, tool_load_n: f64, by: usize) -> AboutAxes {
+    pub fn torque_derivatives(&self, poses: &LinkPoses, tool_load_n: f64) -> [AboutAxes; MAX_JOINTS] {
         let moments = self.moments(poses, 1.0, tool_load_n);
+        let mut out = [AboutAxes::default(); MAX_JOINTS];
+        (0..poses.n_joints()).for_each(|by| out[by] = self.derivative(poses, &moments, by));
+        out
+    }
+
+    fn derivative(&self, poses: &LinkPoses, moments: &Moments, by: usize) -> AboutAxes {
         // The second derivative of a potential is symmetric.
         let derivative = |joint: usize| {
             let (near, far) = (joint.min(by), joint.max(by));

@@ -4,10 +4,11 @@
 //! vector, so that a change of it turns the link by `J(phi)`, the left Jacobian of SO(3). They are one dense block,
 //! present only where links or sag are estimated.
 
+use nalgebra::Vector6;
+
 use crate::calib::bundle::body_twists::BodySums;
 use crate::calib::bundle::linearize::NormalEquations;
-use crate::calib::bundle::problem::Layout;
-use crate::calib::bundle::schur::{Columns, Directions, SchurBlock};
+use crate::calib::bundle::schur::{BodyTwists, Columns, Directions, N_BODY_COLUMNS, SchurBlock};
 
 impl NormalEquations {
     /// The body's own block, and what ties it to the other columns of the group.
@@ -19,39 +20,66 @@ impl NormalEquations {
         directions: &Directions,
     ) {
         let layout = columns.layout();
-        let by_q = sums.q * sums.twists;
-        for (a, at) in body_range(columns, layout) {
-            let (twist, pushed) = (sums.twists.column(a), by_q.column(a));
-            self.right[at] += twist.dot(&sums.g);
-            for (b, other) in body_range(columns, layout).take_while(|(b, _)| *b <= a) {
-                self.matrix[(at, other)] += sums.twists.column(b).dot(&pushed);
-            }
-            for direction in columns.directions() {
-                let value = directions.column(direction).dot(&pushed);
-                columns.each(direction, |column, by| self.matrix[(at.max(column), at.min(column))] += value * by);
+        let (first, n) = (layout.body().start, layout.body().len());
+        let twists = sums.twists.columns(0, n);
+        let pushed = RowsOf::new(&(sums.q * sums.twists), n);
+        for (b, twist) in twists.column_iter().enumerate() {
+            self.right[first + b] += twist.dot(&sums.g);
+            let along = pushed.dot(b, &twist.into_owned());
+            add(self.cells(first + b, first + b, n - b), &along[b..n], 1.0);
+        }
+        for direction in columns.directions() {
+            let along = pushed.dot(0, &directions.column(direction).into_owned());
+            let (column, by_columns) = columns.of(direction);
+            for (k, by) in by_columns.iter().enumerate() {
+                let column = column + k;
+                if column < first {
+                    add(self.cells(column, first, n), &along[..n], *by);
+                } else {
+                    (0..n).for_each(|a| self.matrix[(column, first + a)] += along[a] * by);
+                }
             }
         }
         for observation in own.range.clone() {
             let (u, Some(tag)) = self.by_tag[observation] else { continue };
-            let cross = if own.has_any { u - sums.m_h_sum.tr_mul(&u) } else { u };
-            for (a, at) in body_range(columns, layout) {
-                let mut cells = self.matrix.fixed_view_mut::<6, 1>(tag, at);
-                cells -= cross.tr_mul(&sums.twists.column(a));
+            let cross = if own.has_any { u - sums.m_h_sum.tr_mul(&u) } else { u }.transpose();
+            for (a, twist) in twists.column_iter().enumerate() {
+                let by = cross * twist;
+                self.few_cells::<6>(first + a, tag).iter_mut().zip(&by.data.0[0]).for_each(|(cell, by)| *cell -= by);
             }
         }
         if let Some(lens) = layout.lens {
-            let by_lens = sums.by_lens - sums.h_sum * (sums.m * sums.by_lens);
-            for (a, at) in body_range(columns, layout) {
-                let mut cells = self.matrix.fixed_view_mut::<8, 1>(lens, at);
-                cells += by_lens.tr_mul(&sums.twists.column(a));
+            let by_lens = (sums.by_lens - sums.h_sum * (sums.m * sums.by_lens)).transpose();
+            for (a, twist) in twists.column_iter().enumerate() {
+                let by = by_lens * twist;
+                self.few_cells::<8>(first + a, lens).iter_mut().zip(&by.data.0[0]).for_each(|(cell, by)| *cell += by);
             }
         }
     }
 }
 
-/// (column among the body's, column of the matrix) of the links that carry the group, and of sag.
-fn body_range(columns: &Columns<'_>, layout: &Layout) -> impl Iterator<Item = (usize, usize)> + use<> {
-    let (joints, first, n) = (columns.joints(), layout.links.start, layout.links.len());
-    let of_links = (6 * joints.start).min(n)..(6 * joints.end).min(n);
-    of_links.chain(n..n + layout.sag.len()).map(move |k| (k, first + k))
+/// A matrix of twists row by row, so that products with all its columns become vector instructions.
+struct RowsOf {
+    rows: [[f64; N_BODY_COLUMNS]; 6],
+    n: usize,
+}
+
+impl RowsOf {
+    fn new(twists: &BodyTwists, n: usize) -> Self {
+        Self { rows: std::array::from_fn(|k| std::array::from_fn(|a| twists[(k, a)])), n }
+    }
+
+    /// The product of `twist` and each column from `from` on.
+    fn dot(&self, from: usize, twist: &Vector6<f64>) -> [f64; N_BODY_COLUMNS] {
+        let mut out = [0.0; N_BODY_COLUMNS];
+        for (row, by) in self.rows.iter().zip(twist) {
+            add(&mut out[from..self.n], &row[from..self.n], *by);
+        }
+        out
+    }
+}
+
+#[inline]
+fn add(cells: &mut [f64], values: &[f64], by: f64) {
+    cells.iter_mut().zip(values).for_each(|(cell, value)| *cell += value * by);
 }

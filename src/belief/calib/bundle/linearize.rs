@@ -11,8 +11,8 @@ use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, SVector, Vector6};
 
 use crate::calib::bundle::body_twists::{BodySums, body_twists, sag_twist};
 use crate::calib::bundle::observation_term::{LensInformation, PoseInformation, right_jacobian_inverse};
-use crate::calib::bundle::problem::{BundleProblem, N_VIEW_PARAMETERS, Own, State};
-use crate::calib::bundle::schur::{BodyTwists, Columns, Directions, Group, MOUNT, N_DIRECTIONS, SchurBlock, TIME};
+use crate::calib::bundle::problem::{BundleProblem, N_VIEW_PARAMETERS, State};
+use crate::calib::bundle::schur::{Columns, Directions, Group, MOUNT, N_DIRECTIONS, SchurBlock, TIME};
 use crate::calib::bundle::time_error::TimeError;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::kinematics::LinkCorrections;
@@ -77,7 +77,7 @@ impl NormalEquations {
             matrix: DMatrix::zeros(n, n),
             right: DVector::zeros(n),
             cost: 0.0,
-            eliminated: Vec::with_capacity(n_groups),
+            eliminated: vec![SchurBlock::new(problem.layout.body().len()); n_groups],
             by_tag: vec![(Matrix6::zeros(), None); problem.observations.len()],
             chi2: vec![0.0; problem.observations.len()],
             corner_chi2: vec![[0.0; 4]; problem.observations.len()],
@@ -98,23 +98,23 @@ impl NormalEquations {
             self.right.fill(0.0);
             self.cost = 0.0;
         }
-        self.eliminated.clear();
         let at = Point { problem, state, corrections: problem.link_corrections(state), loss };
+        // Lent, and filled in place: the blocks are large.
+        let mut eliminated = std::mem::take(&mut self.eliminated);
+        let mut blocks = eliminated.iter_mut();
         for view_idx in 0..problem.views.len() {
-            self.add_view(&at, view_idx);
+            let poses = problem.corrected_link_poses(view_idx, state, &at.corrections);
+            for (group, own) in Group::of_view(problem, state, view_idx, &poses).zip(blocks.by_ref()) {
+                self.add_group(&at, &group, own);
+            }
         }
+        self.eliminated = eliminated;
         if !is_full {
             self.add_priors(problem, state);
         }
     }
 
-    fn add_view(&mut self, at: &Point<'_, '_>, view_idx: usize) {
-        let Point { problem, state, .. } = at;
-        let poses = problem.link_poses(view_idx, state);
-        Group::of_view(problem, state, view_idx, &poses).for_each(|group| self.add_group(at, &group));
-    }
-
-    fn add_group(&mut self, at: &Point<'_, '_>, group: &Group<'_>) {
+    fn add_group(&mut self, at: &Point<'_, '_>, group: &Group<'_>, own: &mut SchurBlock) {
         let problem = at.problem;
         let directions = directions(at, group);
         self.linearize_sightings(at, group);
@@ -122,7 +122,7 @@ impl NormalEquations {
         let lens_infos = std::mem::take(&mut self.lens_infos);
         let sums = Sums::of(&infos, &lens_infos);
         let (h_sum, g_sum) = (sums.h, sums.g);
-        let mut own = self.eliminate(at, group, &directions, &sums);
+        self.cost += eliminate(at, group, &directions, &sums, own);
         let (m, shift) = own.reach();
         let m_h_sum = m * h_sum;
         let q = h_sum - h_sum * m_h_sum;
@@ -130,7 +130,7 @@ impl NormalEquations {
         let along = directions.transpose();
         self.add_common(&columns, &(along * (q * directions)));
         self.add_common_right(&columns, &(along * (g_sum - h_sum * shift)));
-        self.add_tags(&columns, &infos, &directions, &Eliminated { block: &own, m, shift, m_h_sum });
+        self.add_tags(&columns, &infos, &directions, &Eliminated { block: own, m, shift, m_h_sum });
         if let Some(at) = problem.layout.lens {
             let lens = LensSums {
                 at,
@@ -147,15 +147,16 @@ impl NormalEquations {
         }
         if !problem.layout.body().is_empty() {
             let twists = body_twists(problem, group, &at.corrections);
-            own.by_body = h_sum * twists;
+            for (mut pulled, twist) in own.by_body.column_iter_mut().zip(twists.column_iter()) {
+                pulled.copy_from(&(h_sum * twist));
+            }
             let link = BodySums { twists, q, m, g: g_sum - h_sum * shift, m_h_sum, by_lens: sums.by_lens, h_sum };
-            self.add_body(&columns, &link, &own, &directions);
+            self.add_body(&columns, &link, own, &directions);
         }
         self.infos = infos;
         self.lens_infos = lens_infos;
         own.by_common = h_sum * directions;
         own.by_lens = sums.by_lens;
-        self.eliminated.push(own);
     }
 
     /// The tags' own blocks, and what ties them to the common parameters and to one another.
@@ -168,32 +169,31 @@ impl NormalEquations {
     ) {
         let Eliminated { block, m, shift, m_h_sum } = own;
         let first = block.range.start;
+        let h_sum_m = m_h_sum.transpose();
         for (k, info) in infos.iter().enumerate() {
             let u = info.h * info.adjoint;
             self.by_tag[first + k].0 = u;
             let Some(column) = self.by_tag[first + k].1 else { continue };
             let mut own_right = self.right.fixed_rows_mut::<6>(column);
             own_right -= info.adjoint.tr_mul(&(info.g - info.h * *shift));
-            self.add_block(column, column, &(info.adjoint.tr_mul(&u)));
+            self.add_block(column, column, &(info.adjoint.transpose() * u));
             // Common by tag: T^T (H_i - G M H_i)(-Ad_i).
-            let cross = if block.has_any { u - m_h_sum.tr_mul(&u) } else { u };
+            let cross = if block.has_any { u - h_sum_m * u } else { u };
             self.subtract_cross(columns, column, &cross.transpose(), directions);
             // Only what is eliminated ties a view's tags to one another.
             if !block.has_any {
                 continue;
             }
-            let m_u = *m * u;
+            let m_u_transposed = (*m * u).transpose();
             for other in 0..=k {
                 let (before, Some(at)) = &self.by_tag[first + other] else { continue };
                 let (before, at) = (*before, *at);
-                let block = -(before.tr_mul(&m_u));
-                // Rows: the other's tag.
-                if other == k {
-                    self.add_block(column, column, &block);
-                } else if at >= column {
-                    self.add_block(at, column, &block);
+                // Rows: this tag; columns: the other's.
+                let block = -(m_u_transposed * before);
+                if at < column {
+                    self.add_block(column, at, &block);
                 } else {
-                    self.add_block(column, at, &block.transpose());
+                    self.add_block(at, column, &block.transpose());
                 }
             }
         }
@@ -220,9 +220,9 @@ impl NormalEquations {
             // A further camera's lens is as robot.toml has it.
             let by_lens = self.lens_infos.last_mut().filter(|_| camera == 0);
             let lens = problem.lens_of(camera, state);
-            let mut info =
-                PoseInformation::of(&observation.data, &camera_from_tag, lens, problem.scales.noise, by_lens)
-                    .unwrap_or_else(|| PoseInformation::unseen(&observation.data));
+            let of = PoseInformation::of(&observation.data, &camera_from_tag, lens, problem.scales.noise, by_lens);
+            self.infos.push(of.unwrap_or_else(|| PoseInformation::unseen(&observation.data)));
+            let Some(info) = self.infos.last_mut() else { continue };
             (self.chi2[at], self.corner_chi2[at]) = (info.chi2, info.corner_chi2);
             self.by_tag[at].1 = column;
             let (cost, weight) = if observation.is_used {
@@ -237,61 +237,6 @@ impl NormalEquations {
                     lens.weighted(weight);
                 }
             }
-            self.infos.push(info);
-        }
-    }
-
-    fn eliminate(&mut self, at: &Point<'_, '_>, group: &Group<'_>, directions: &Directions, sums: &Sums) -> SchurBlock {
-        let Point { problem, state, .. } = at;
-        let view = &problem.views[group.view_idx];
-        let mut twists = SMatrix::<f64, 6, N_VIEW_PARAMETERS>::zeros();
-        let mut info = SVector::<f64, N_VIEW_PARAMETERS>::repeat(1.0);
-        let mut own = SVector::<f64, N_VIEW_PARAMETERS>::zeros();
-        let mut time_error = TimeError::none();
-        for joint in group.joints.clone() {
-            // An exact sensor has no error to eliminate.
-            if problem.joint_error_var(view, joint) <= 0.0 {
-                continue;
-            }
-            twists.set_column(joint, &directions.column(joint));
-            info[joint] = time_error.add(problem, view, joint);
-            own[joint] = state.joint_error[group.view_idx][joint];
-        }
-        if group.camera_error.is_none() && twists.iter().all(|v| *v == 0.0) {
-            return SchurBlock::none(group.observations.clone());
-        }
-        let mut prior_gradient = -own.component_mul(&info) + time_error.pull(&own);
-        if let (Some(error), Some([std_m, std_rad])) = (group.camera_error, problem.scales.camera_error_std) {
-            twists.fixed_view_mut::<6, 6>(0, MAX_JOINTS).fill_diagonal(1.0);
-            let d = log(error);
-            let weight = Vector6::from_fn(|k, _| if k < 3 { std_m } else { std_rad }.max(1e-9).powi(-2));
-            info.fixed_rows_mut::<6>(MAX_JOINTS).copy_from(&weight);
-            own.fixed_rows_mut::<6>(MAX_JOINTS).copy_from(&d);
-            let gradient = right_jacobian_inverse(&d).tr_mul(&d.component_mul(&weight));
-            prior_gradient.fixed_rows_mut::<6>(MAX_JOINTS).copy_from(&-gradient);
-        }
-        self.cost += own.component_mul(&own).dot(&info) - time_error.pull(&own).dot(&own);
-        let mut normal: Own = twists.tr_mul(&(sums.h * twists));
-        for k in 0..N_VIEW_PARAMETERS {
-            normal[(k, k)] += info[k];
-        }
-        time_error.loosen(&mut normal);
-        let gradient = twists.tr_mul(&sums.g) + prior_gradient;
-        // Positive definite: its diagonal has the priors. Only overflow makes it fail.
-        let factor = normal.cholesky();
-        let log_det = factor.as_ref().map_or(0.0, |f| 2.0 * f.l_dirty().diagonal().map(f64::ln).sum());
-        let inverse = factor.map_or_else(Own::zeros, |factor| factor.inverse());
-        SchurBlock {
-            twists,
-            inverse,
-            gradient,
-            by_common: SMatrix::zeros(),
-            log_ratio: info.map(f64::ln).sum() - time_error.log_det() - log_det,
-            range: group.observations.clone(),
-            by_lens: SMatrix::zeros(),
-            by_body: BodyTwists::zeros(),
-            time_error,
-            has_any: true,
         }
     }
 
@@ -303,15 +248,31 @@ impl NormalEquations {
 
     fn add_common(&mut self, columns: &Columns<'_>, block: &SMatrix<f64, N_DIRECTIONS, N_DIRECTIONS>) {
         for b in columns.directions() {
+            let (first, by_columns) = columns.of(b);
             // Directions come in the order of their columns; what falls above the diagonal is not read.
             for a in columns.directions().skip_while(|a| *a < b) {
-                let value = block[(a, b)];
-                columns.each(b, |column, by_column| {
-                    let mut cells = self.matrix.column_mut(column);
-                    columns.each(a, |row, by_row| cells[row] += value * by_column * by_row);
-                });
+                let (first_row, by_rows) = columns.of(a);
+                for (k, by_column) in by_columns.iter().enumerate() {
+                    let value = block[(a, b)] * by_column;
+                    let cells = self.cells(first + k, first_row, by_rows.len());
+                    cells.iter_mut().zip(by_rows).for_each(|(cell, by_row)| *cell += value * by_row);
+                }
             }
         }
+    }
+
+    /// Cells of a column, from a row on.
+    #[inline]
+    pub(crate) fn cells(&mut self, column: usize, first_row: usize, n: usize) -> &mut [f64] {
+        let start = column * self.matrix.nrows() + first_row;
+        &mut self.matrix.as_mut_slice()[start..start + n]
+    }
+
+    /// As many as there are in a pose, or a lens.
+    #[inline]
+    pub(crate) fn few_cells<const N: usize>(&mut self, column: usize, first_row: usize) -> &mut [f64; N] {
+        let cells = self.cells(column, first_row, N).first_chunk_mut();
+        cells.expect("as many as asked for")
     }
 
     fn add_common_right(&mut self, columns: &Columns<'_>, right: &SVector<f64, N_DIRECTIONS>) {
@@ -324,10 +285,11 @@ impl NormalEquations {
     fn subtract_cross(&mut self, columns: &Columns<'_>, tag: usize, by_twist: &Matrix6<f64>, directions: &Directions) {
         for a in columns.directions() {
             let by_direction = by_twist * directions.column(a);
-            columns.each(a, |column, by_column| {
-                let mut cells = self.matrix.fixed_view_mut::<6, 1>(tag, column);
-                cells -= by_direction * by_column;
-            });
+            let (first, by_columns) = columns.of(a);
+            for (k, by_column) in by_columns.iter().enumerate() {
+                let cells = self.few_cells::<6>(first + k, tag);
+                cells.iter_mut().zip(&by_direction.data.0[0]).for_each(|(cell, by)| *cell -= by * by_column);
+            }
         }
     }
 
@@ -360,6 +322,56 @@ impl NormalEquations {
     }
 }
 
+/// Takes the group's own parameters out; `block` becomes what is left of them. What they cost by their priors.
+fn eliminate(
+    at: &Point<'_, '_>,
+    group: &Group<'_>,
+    directions: &Directions,
+    sums: &Sums,
+    block: &mut SchurBlock,
+) -> f64 {
+    let Point { problem, state, .. } = at;
+    let view = &problem.views[group.view_idx];
+    block.range = group.observations.clone();
+    block.set_none();
+    let mut info = SVector::<f64, N_VIEW_PARAMETERS>::repeat(1.0);
+    let mut own = SVector::<f64, N_VIEW_PARAMETERS>::zeros();
+    for joint in group.joints.clone() {
+        // An exact sensor has no error to eliminate.
+        if problem.joint_error_var(view, joint) <= 0.0 {
+            continue;
+        }
+        block.twists.set_column(joint, &directions.column(joint));
+        info[joint] = block.time_error.add(problem, view, joint);
+        own[joint] = state.joint_error[group.view_idx][joint];
+    }
+    if group.camera_error.is_none() && block.twists.iter().all(|v| *v == 0.0) {
+        block.time_error = TimeError::none();
+        return 0.0;
+    }
+    block.has_any = true;
+    let mut prior_gradient = -own.component_mul(&info) + block.time_error.pull(&own);
+    if let (Some(error), Some([std_m, std_rad])) = (group.camera_error, problem.scales.camera_error_std) {
+        block.twists.fixed_view_mut::<6, 6>(0, MAX_JOINTS).fill_diagonal(1.0);
+        let d = log(error);
+        let weight = Vector6::from_fn(|k, _| if k < 3 { std_m } else { std_rad }.max(1e-9).powi(-2));
+        info.fixed_rows_mut::<6>(MAX_JOINTS).copy_from(&weight);
+        own.fixed_rows_mut::<6>(MAX_JOINTS).copy_from(&d);
+        let gradient = right_jacobian_inverse(&d).tr_mul(&d.component_mul(&weight));
+        prior_gradient.fixed_rows_mut::<6>(MAX_JOINTS).copy_from(&-gradient);
+    }
+    let cost = own.component_mul(&own).dot(&info) - block.time_error.pull(&own).dot(&own);
+    block.gradient = block.twists.tr_mul(&sums.g) + prior_gradient;
+    // Most views have no error of the camera: the rest of their matrix is one.
+    let log_det = if block.moves_camera() {
+        block.invert::<N_VIEW_PARAMETERS>(&sums.h, &info)
+    } else {
+        block.invert::<MAX_JOINTS>(&sums.h, &info)
+    };
+    block.log_ratio = info.map(f64::ln).sum() - block.time_error.log_det() - log_det;
+    cost
+}
+
 /// A group whose own parameters are eliminated, with `M`, their own motion, and `M sum H_i`.
 struct Eliminated<'a> {
     block: &'a SchurBlock,
@@ -388,15 +400,16 @@ fn directions(Point { problem, corrections, .. }: &Point<'_, '_>, group: &Group<
     let view = &problem.views[group.view_idx];
     let mut directions = Directions::zeros();
     let center = base_from_camera.translation.vector;
+    let torque_changes =
+        (!sag.is_rigid()).then(|| problem.loads(group.view_idx).torque_derivatives(poses, sag.tool_load_n));
     let mut by_time = Vector6::zeros();
     for joint in group.joints.clone() {
         let rotation = base_from_camera.rotation.inverse();
         let moved = rotation * poses.point_jacobian(joint, &center) * group.sign;
         let turned = rotation * poses.turn_jacobian(joint) * group.sign;
         let mut twist = Vector6::new(moved.x, moved.y, moved.z, turned.x, turned.y, turned.z);
-        if !sag.is_rigid() {
-            let change = problem.loads(group.view_idx).torque_derivatives(poses, sag.tool_load_n, joint);
-            twist += sag_twist(group, &sag.bend(&change));
+        if let Some(changes) = &torque_changes {
+            twist += sag_twist(group, &sag.bend(&changes[joint]));
         }
         directions.set_column(joint, &twist);
         by_time += twist * view.rate_rad_s[joint];

@@ -446,12 +446,21 @@ impl<'a> BundleProblem<'a> {
 
     /// Poses of all links in a view, in the frame of the tags.
     pub(crate) fn link_poses(&self, view_idx: usize, state: &State) -> LinkPoses {
+        self.corrected_link_poses(view_idx, state, &self.link_corrections(state))
+    }
+
+    /// The same by the corrections of that state.
+    pub(crate) fn corrected_link_poses(
+        &self,
+        view_idx: usize,
+        state: &State,
+        corrections: &LinkCorrections,
+    ) -> LinkPoses {
         let angles = self.angles(view_idx, state);
-        let corrections = self.link_corrections(state);
-        let poses = if corrections == LinkCorrections::default() {
+        let poses = if *corrections == LinkCorrections::default() {
             self.robot.chain.link_poses(&angles)
         } else {
-            self.robot.chain.corrected_link_poses_under(&angles, &corrections, &self.loads(view_idx))
+            self.robot.chain.corrected_link_poses_under(&angles, corrections, &self.loads(view_idx))
         };
         poses.in_frame(&self.robot.tag_frame)
     }

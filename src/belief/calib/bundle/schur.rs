@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use nalgebra::{Const, DMatrix, DVector, Isometry3, Matrix6, SMatrix, SVector, Vector6};
+use nalgebra::{Const, DMatrix, DVector, Isometry3, Matrix6, Matrix6xX, SMatrix, SVector, Vector6};
 
 use crate::calib::bundle::problem::{BundleProblem, Layout, N_VIEW_PARAMETERS, Own, State, ViewData};
 use crate::calib::bundle::time_error::TimeError;
@@ -37,8 +37,8 @@ pub(crate) struct SchurBlock {
     pub log_ratio: f64,
     /// The lens's part, `sum H_ic`.
     pub by_lens: SMatrix<f64, 6, 8>,
-    /// `sum H_i T` of the columns of links and sag.
-    pub by_body: BodyTwists,
+    /// `sum H_i T` of the columns of links and sag, as many as there are.
+    pub by_body: Matrix6xX<f64>,
     /// Of the view's image.
     pub time_error: TimeError,
     /// Whether the group has any parameters of its own.
@@ -120,11 +120,6 @@ impl<'a> Columns<'a> {
         self.layout
     }
 
-    /// The joints whose motion the group's observations see.
-    pub(crate) fn joints(&self) -> Range<usize> {
-        self.joints.clone()
-    }
-
     /// The directions that have columns.
     pub(crate) fn directions(&self) -> impl Iterator<Item = usize> + use<> {
         let mount = if self.mount().is_some() { MOUNT..MOUNT + 6 } else { 0..0 };
@@ -137,33 +132,80 @@ impl<'a> Columns<'a> {
         self.layout.mount_of(self.view.camera)
     }
 
+    /// The columns of a direction, which lie side by side: the first of them, and the direction's derivative by each.
+    #[inline]
+    pub(crate) fn of(&self, direction: usize) -> (usize, &'a [f64]) {
+        let one = |at: Option<usize>, k: usize| at.map_or((0, &[][..]), |at| (at + k, &[1.0][..]));
+        match direction {
+            TIME => one(self.layout.time, 0),
+            MOUNT..TIME => one(self.mount(), direction - MOUNT),
+            joint => {
+                let columns = self.layout.of_joint[joint].clone();
+                (columns.start, &self.view.basis[columns])
+            }
+        }
+    }
+
     /// Calls `f` with each column of a direction and the direction's derivative by it.
     #[inline]
     pub(crate) fn each(&self, direction: usize, mut f: impl FnMut(usize, f64)) {
-        let layout = self.layout;
-        match direction {
-            TIME => layout.time.into_iter().for_each(|at| f(at, 1.0)),
-            MOUNT..TIME => self.mount().into_iter().for_each(|at| f(at + direction - MOUNT, 1.0)),
-            joint => layout.of_joint[joint].clone().for_each(|column| f(column, self.view.basis[column])),
-        }
+        let (first, derivatives) = self.of(direction);
+        derivatives.iter().enumerate().for_each(|(k, by)| f(first + k, *by));
     }
 }
 
 impl SchurBlock {
-    /// Of a group without parameters of its own.
-    pub(crate) fn none(range: Range<usize>) -> Self {
+    /// Of a group that was not looked at yet, with room for the body's columns.
+    pub(crate) fn new(n_body: usize) -> Self {
         Self {
             twists: SMatrix::zeros(),
             inverse: Own::identity(),
             gradient: SVector::zeros(),
             by_common: SMatrix::zeros(),
-            range,
+            range: 0..0,
             log_ratio: 0.0,
             by_lens: SMatrix::zeros(),
-            by_body: BodyTwists::zeros(),
+            by_body: Matrix6xX::zeros(n_body),
             time_error: TimeError::none(),
             has_any: false,
         }
+    }
+
+    /// Of a group without parameters of its own, as a new one is.
+    pub(crate) fn set_none(&mut self) {
+        if !self.has_any {
+            return;
+        }
+        self.twists.fill(0.0);
+        self.inverse.fill_with_identity();
+        self.gradient.fill(0.0);
+        self.log_ratio = 0.0;
+        self.time_error = TimeError::none();
+        self.has_any = false;
+    }
+
+    /// Inverts `S^T G S + L` of the first `N` own parameters, where `info` is the diagonal of L but for the time error;
+    /// the logarithm of its determinant.
+    pub(crate) fn invert<const N: usize>(&mut self, g: &Matrix6<f64>, info: &SVector<f64, N_VIEW_PARAMETERS>) -> f64 {
+        let twists = self.twists.fixed_columns::<N>(0);
+        let mut normal = twists.tr_mul(&(g * twists));
+        for k in 0..N {
+            normal[(k, k)] += info[k];
+        }
+        self.time_error.loosen(&mut normal);
+        // Positive definite: its diagonal has the priors. Only overflow makes it fail.
+        let factor = normal.cholesky();
+        let log_det = factor.as_ref().map_or(0.0, |f| 2.0 * f.l_dirty().diagonal().map(f64::ln).sum());
+        match factor {
+            Some(factor) => self.inverse.fixed_view_mut::<N, N>(0, 0).copy_from(&factor.inverse()),
+            None => self.inverse.fill(0.0),
+        }
+        log_det
+    }
+
+    /// Whether the camera's own error is among the parameters.
+    pub(crate) fn moves_camera(&self) -> bool {
+        self.twists[(0, MAX_JOINTS)] != 0.0
     }
 
     /// `M`, and how far the own parameters alone would move the camera.
@@ -171,8 +213,13 @@ impl SchurBlock {
         if !self.has_any {
             return (Matrix6::zeros(), Vector6::zeros());
         }
-        let weighted = self.twists * self.inverse;
-        (weighted * self.twists.transpose(), weighted * self.gradient)
+        if self.moves_camera() {
+            let weighted = self.twists * self.inverse;
+            return (weighted * self.twists.transpose(), weighted * self.gradient);
+        }
+        let twists = self.twists.fixed_columns::<MAX_JOINTS>(0);
+        let weighted = twists * self.inverse.fixed_view::<MAX_JOINTS, MAX_JOINTS>(0, 0);
+        (weighted * twists.transpose(), weighted * self.gradient.fixed_rows::<MAX_JOINTS>(0))
     }
 
     /// `sum H_i A step`: what a step of the common parameters adds to the observations' pull on the camera's twist.

@@ -6,7 +6,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use crate::calib::bundle::problem::{BundleProblem, N_VIEW_PARAMETERS, Own, ViewData};
+use crate::calib::bundle::problem::{BundleProblem, N_VIEW_PARAMETERS, ViewData};
 
 /// Of what a joint of a moving arm is off by itself, rad^2: the inverse takes differences.
 const LEAST_OWN_VAR: f64 = 1e-14;
@@ -51,10 +51,11 @@ impl TimeError {
         self.by_sigma * (self.by_sigma.dot(own) / (1.0 + self.told))
     }
 
-    /// Takes `u u^T / (1 + s)` off.
-    pub(crate) fn loosen(&self, info: &mut Own) {
+    /// Takes `u u^T / (1 + s)` off the information on the first `N` own parameters.
+    pub(crate) fn loosen<const N: usize>(&self, info: &mut SMatrix<f64, N, N>) {
         if self.told > 0.0 {
-            info.ger(-1.0 / (1.0 + self.told), &self.by_sigma, &self.by_sigma, 1.0);
+            let by_sigma = self.by_sigma.fixed_rows::<N>(0);
+            info.ger(-1.0 / (1.0 + self.told), &by_sigma, &by_sigma, 1.0);
         }
     }
 
@@ -78,6 +79,8 @@ impl TimeError {
 #[cfg(test)]
 mod tests {
     use nalgebra::{Matrix3, Vector3};
+
+    use crate::calib::bundle::problem::Own;
 
     use super::*;
 

@@ -98,13 +98,14 @@ fn derivatives_of(robot: &Robot) {
     let loads = robot.chain.loads();
     for angles in drawn_angles(robot, "derivatives") {
         let poses = robot.chain.link_poses(&angles);
+        let derivatives = loads.torque_derivatives(&poses, -120.0);
         for by in 0..robot.n_joints() {
             let at = |by_rad: f64| {
                 let mut moved = angles;
                 moved[by] += by_rad;
                 loads.torques(&robot.chain.link_poses(&moved), -120.0)
             };
-            let (above, below, found) = (at(STEP_RAD), at(-STEP_RAD), loads.torque_derivatives(&poses, -120.0, by));
+            let (above, below, found) = (at(STEP_RAD), at(-STEP_RAD), derivatives[by]);
             for joint in 0..robot.n_joints() {
                 let slope = (above.joints[joint] - below.joints[joint]) / (2.0 * STEP_RAD);
                 assert!((found.joints[joint] - slope).abs() < 1e-4 * (1.0 + slope.abs()), "{joint} by {by}");
