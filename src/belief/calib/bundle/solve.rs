@@ -1,4 +1,8 @@
 //! Levenberg-Marquardt over the common parameters; the views' own follow by back substitution.
+//!
+//! Gauss-Newton leaves out how the residuals bend. Where that matters (a compliance times an unknown load, both small)
+//! its steps overshoot to and fro along one direction, each by the same share. So what a step gained tells the
+//! curvature along it, and the next step is as much shorter, if it only goes back (the secant's rule along a line).
 
 use nalgebra::{Cholesky, DMatrix, DVector, Vector6};
 
@@ -44,7 +48,37 @@ struct Solver<'a, 'b> {
     trial_normal: NormalEquations,
     room: DMatrix<f64>,
     step: DVector<f64>,
+    /// What the whole step saves if the problem is linear, and the share of it that is taken.
+    predicted_gain: f64,
+    share: f64,
+    last: LastStep,
 }
+
+/// The step that led here, and what it told.
+struct LastStep {
+    step: DVector<f64>,
+    /// Its square in the metric of the normal equations.
+    square: f64,
+    /// Curvature of the cost along it, over that of the linear problem; 1 where nothing is known.
+    curvature: f64,
+}
+
+impl LastStep {
+    /// The share of a step that leads to the least cost: all of it, unless it goes back along a step that overshot.
+    /// `pull`: the right side of the normal equations that `step` solves.
+    fn share(&self, step: &DVector<f64>, pull: &DVector<f64>) -> f64 {
+        if self.curvature < OVERSHOT {
+            return 1.0;
+        }
+        let cosine = pull.dot(&self.step) / (pull.dot(step) * self.square).sqrt();
+        if cosine < GOES_BACK { 1.0 / self.curvature } else { 1.0 }
+    }
+}
+
+/// From this curvature on a step has overshot: it saved less than half of what it should.
+const OVERSHOT: f64 = 1.5;
+/// Cosine of the angle between two steps, the second of which goes back along the first.
+const GOES_BACK: f64 = -0.9;
 
 impl LeastSquares for Solver<'_, '_> {
     fn cost(&self) -> f64 {
@@ -53,8 +87,12 @@ impl LeastSquares for Solver<'_, '_> {
 
     fn propose(&mut self, damping: f64) -> Option<Proposal> {
         solve_damped(&self.normal, damping, &mut self.room, &mut self.step)?;
-        let predicted_gain = self.step.dot(&self.normal.right) + own_gain(&self.normal);
-        Some(Proposal { length: f64::INFINITY, predicted_gain })
+        self.predicted_gain = self.step.dot(&self.normal.right) + own_gain(&self.normal);
+        self.share = self.last.share(&self.step, &self.normal.right);
+        if self.share < 1.0 {
+            self.step *= self.share;
+        }
+        Some(Proposal { length: f64::INFINITY, predicted_gain: self.predicted_gain })
     }
 
     fn trial_cost(&mut self) -> Option<f64> {
@@ -64,6 +102,14 @@ impl LeastSquares for Solver<'_, '_> {
     }
 
     fn accept(&mut self) {
+        // The gain of a share s of a step that should save P, under the curvature c: (2 s - s^2 c) P.
+        let (share, gain) = (self.share, self.normal.cost - self.trial_normal.cost);
+        // A gain of the sum's last digits tells nothing.
+        if self.predicted_gain > 1e2 * ROUNDING * self.normal.cost {
+            self.last.curvature = (2.0 * share - gain / self.predicted_gain) / (share * share);
+        }
+        self.last.square = share * self.step.dot(&self.normal.right);
+        std::mem::swap(&mut self.last.step, &mut self.step);
         std::mem::swap(&mut self.state, &mut self.trial);
         std::mem::swap(&mut self.normal, &mut self.trial_normal);
     }
@@ -84,6 +130,9 @@ pub(crate) fn solve(problem: &BundleProblem<'_>, state: State, loss: Loss, stop:
         trial_normal: NormalEquations::new(problem),
         room: DMatrix::zeros(n, n),
         step: DVector::zeros(n),
+        predicted_gain: 0.0,
+        share: 1.0,
+        last: LastStep { step: DVector::zeros(n), square: 0.0, curvature: 1.0 },
     };
     let report = minimize(&mut solver, &DAMPING, &stop);
     let Solver { state, normal, .. } = solver;
@@ -192,7 +241,7 @@ fn add_own(problem: &BundleProblem<'_>, own: &SchurBlock, view_idx: usize, pushe
     for joint in 0..MAX_JOINTS {
         next.joint_error[view_idx][joint] += own_step[joint];
     }
-    if problem.scales.camera_error_std.is_some() && own.twists[(0, MAX_JOINTS)] != 0.0 {
+    if problem.scales.camera_error_std.is_some() && own.moves_camera() {
         next.camera_error[view_idx] *= exp(&own_step.fixed_rows::<6>(MAX_JOINTS).into_owned());
     }
 }
