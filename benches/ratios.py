@@ -1,8 +1,9 @@
 """Times and memory of two builds of armcal side by side, each command by turns in one run -> Markdown on stdout.
 
-    python3 benches/ratios.py BEFORE NOW [ROUNDS] [--only NAME ...] [--benches BEFORE NOW]
+    python3 benches/ratios.py BEFORE NOW [ROUNDS] [--seeds 1..24] [--only NAME ...] [--benches BEFORE NOW]
 
-Three rounds, from the root of the repository. --benches: both builds' `speed`, of which the parts in PARTS are timed.
+Three rounds, from the root of the repository. --seeds: those of the campaign. --only: beginnings of commands' names. --benches: both builds'
+`speed`, of which the parts in PARTS are timed.
 
 BEFORE and NOW are programs, built alike. Seconds of a processor (user and system, all threads), of the clock, and the most memory: the
 least of the rounds, for other load on the machine only adds. The recordings that both read are made by BEFORE. Unix.
@@ -18,7 +19,6 @@ import time
 from pathlib import Path
 
 QUICKSTART = "routines/titan4-quickstart.toml"
-CAMPAIGN_SEEDS = "1..24"
 # Benchmarks of `speed`; the estimate of criterion's.
 PARTS = ["detect: eight tags, 1224 x 1024", "render: one image, half resolution", "dynamics: one step", "physics: one second, all effects"]
 MICROSECONDS = {"ns": 1e-3, "µs": 1.0, "ms": 1e3, "s": 1e6}
@@ -26,7 +26,7 @@ MICROSECONDS = {"ns": 1e-3, "µs": 1.0, "ms": 1e3, "s": 1e6}
 ENDINGS = (0, 3, 4)
 
 
-def commands(folder):
+def commands(folder, seeds):
     """The words after the program by name; {out} is a fresh folder of each call."""
     run = ["run", QUICKSTART, "--out", "{out}/run"]
     calibrate = ["--robot", "robots/titan4", "--out", "{out}/calibrated"]
@@ -34,7 +34,7 @@ def commands(folder):
         "run, rapier's multibody": run,
         "run, own equations (featherstone)": [*run, "--set", "world.physics.engine=featherstone"],
         "run, images rendered": ["run", "routines/titan4-rendered.toml", "--out", "{out}/run"],
-        f"campaign, seeds {CAMPAIGN_SEEDS}, two threads": ["campaign", QUICKSTART, "--seeds", CAMPAIGN_SEEDS, "--threads", "2", "--out", "{out}/rows.csv"],
+        f"campaign, seeds {seeds}, two threads": ["campaign", QUICKSTART, "--seeds", seeds, "--threads", "2", "--out", "{out}/rows.csv"],
         "plan": ["plan", QUICKSTART, "--out", "{out}/plan"],
         "calibrate, 30 views": ["calibrate", f"{folder}/30/run.mcap", *calibrate],
         "calibrate, 300 views": ["calibrate", f"{folder}/300/run.mcap", *calibrate],
@@ -78,7 +78,8 @@ def main():
     parser.add_argument("before", type=lambda text: str(Path(text).resolve()))
     parser.add_argument("now", type=lambda text: str(Path(text).resolve()))
     parser.add_argument("rounds", nargs="?", type=int, default=3)
-    parser.add_argument("--only", nargs="+", default=[])
+    parser.add_argument("--seeds", default="1..24")
+    parser.add_argument("--only", nargs="+", default=[""])
     parser.add_argument("--benches", nargs=2, default=[], type=lambda text: str(Path(text).resolve()))
     args = parser.parse_args()
     model = next((line.split(":", 1)[1].strip() for line in open("/proc/cpuinfo") if line.startswith("model name")), "")
@@ -86,7 +87,7 @@ def main():
     print("| command | processor s, before | now | ratio | clock s, before | now | ratio | memory MB, before | now |")
     print("|---|--:|--:|--:|--:|--:|--:|--:|--:|", flush=True)
     with tempfile.TemporaryDirectory() as folder:
-        chosen = {name: words for name, words in commands(folder).items() if not args.only or name in args.only}
+        chosen = {name: words for name, words in commands(folder, args.seeds).items() if name.startswith(tuple(args.only))}
         if any(word.startswith(folder) for words in chosen.values() for word in words):
             record(args.before, folder)
         for name, words in chosen.items():

@@ -4,6 +4,8 @@
 //! about it (a window of 51 pixels). The quad search ignores differences of a few grey levels, and a tag in haze has no
 //! more.
 
+use armcal_core::numeric::whole_part;
+
 /// Half of the window, px.
 const REACH: usize = 25;
 /// Standard deviation after normalization, and the smallest one assumed before it, grey levels.
@@ -144,29 +146,9 @@ fn smoothed([above, row, below]: [&[u8]; 3], down: &mut Vec<f32>, out: &mut Vec<
     }
 }
 
-/// The whole part of 0 <= x <= 255, without the check of a cast, which no vector instruction makes.
-#[inline]
-fn whole_part(x: f32) -> u8 {
-    /// A float about this large has no fraction: its lowest bits are a whole number.
-    const NO_FRACTION: f32 = 12_582_912.0;
-    let nearest = (x + NO_FRACTION) - NO_FRACTION;
-    let whole = if nearest > x { nearest - 1.0 } else { nearest };
-    (whole + NO_FRACTION).to_bits() as u8
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_whole_part_is_that_of_a_cast() {
-        for k in 0..=255_u8 {
-            for x in [f32::from(k), f32::from(k) + 0.5, f32::from(k).next_up(), f32::from(k).next_down()] {
-                let x = x.clamp(0.0, 255.0);
-                assert_eq!(whole_part(x), x as u8, "{x}");
-            }
-        }
-    }
 
     /// Against the definition, sum by sum.
     #[test]

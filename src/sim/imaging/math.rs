@@ -1,5 +1,7 @@
 //! Vectors, colours, and fast functions that give the same bits on every machine.
 
+use armcal_core::numeric::NO_FRACTION;
+
 /// A vector in the camera's frame or an object's, single precision.
 pub(super) type Vec3 = nalgebra::Vector3<f32>;
 /// Red, green, blue.
@@ -11,18 +13,6 @@ pub(super) type Lanes<const N: usize> = [[f32; N]; 3];
 #[inline]
 pub(super) fn lanes<const N: usize>(vectors: &[Vec3; N]) -> Lanes<N> {
     std::array::from_fn(|axis| std::array::from_fn(|k| vectors[k][axis]))
-}
-
-/// A float about this large has no fraction: its lowest bits are a whole number. A cast would check its range, which no
-/// vector instruction does.
-const NO_FRACTION: f32 = 12_582_912.0;
-
-/// The whole part of 0 <= x <= 255.
-#[inline]
-pub(super) fn whole_part(x: f32) -> u8 {
-    let nearest = (x + NO_FRACTION) - NO_FRACTION;
-    let whole = if nearest > x { nearest - 1.0 } else { nearest };
-    (whole + NO_FRACTION).to_bits() as u8
 }
 
 /// `exp(x)` for x <= 0 to a relative error of 1e-6 and of the bits of x; 0 below -87.

@@ -7,9 +7,10 @@
 use rayon::prelude::*;
 
 use crate::imaging::auto_exposure::Exposure;
-use crate::imaging::math::{Lanes, hash, image_key, max, min, whole_part};
+use crate::imaging::math::{Lanes, hash, image_key, max, min};
 use crate::imaging::rays::{Rays, first_of};
 use crate::spec::ImageSpec;
+use armcal_core::numeric::whole_part;
 
 /// Rows that one thread works on.
 pub(super) const BAND_ROWS: usize = 32;
