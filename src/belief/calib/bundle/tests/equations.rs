@@ -185,6 +185,51 @@ fn the_curvature_is_that_of_the_cost_where_nothing_is_off() {
     }
 }
 
+/// Each cell of the matrix, by how the gradient changes: sensors, links, sag, mounts, clock, lens and tags, all by all.
+#[test]
+fn every_cell_of_the_curvature_is_that_of_the_gradient() {
+    for robot in [titan_with_gripper_tag, watched_titan, titan_with_two_cameras] {
+        for camera_error_std in [None, Some([0.003, 0.004])] {
+            has_the_gradients_curvature(robot(), camera_error_std);
+        }
+    }
+}
+
+fn has_the_gradients_curvature(robot: Robot, camera_error_std: Option<[f64; 2]>) {
+    /// In units of a column's sigma with all others held.
+    const STEP: f64 = 1e-3;
+    /// Over the roots of both diagonals: residuals bend the cost a little beside Gauss and Newton's matrix.
+    const TOLERANCE: f64 = 0.01;
+    let mut case = case(robot, 7);
+    (case.scales.camera_error_std, case.scales.time_jitter_std_s) = (camera_error_std, 0.02);
+    let problem = problem(&case);
+    let guess = JointParameters { reference: reference(), ..JointParameters::default() };
+    let solved = solve(&problem, problem.start(&guess), Loss::Square, until(200, 1e-16));
+    let n = problem.layout.n;
+    let sigma = DVector::from_fn(n, |k, _| solved.normal.matrix[(k, k)].sqrt().recip());
+    let mut normal = NormalEquations::new(&problem);
+    let mut worst = (0.0, 0, 0);
+    // A load times a compliance: what that bends the cost is in no Gauss-Newton matrix.
+    let sag = problem.layout.sag.clone();
+    let is_product = |row: usize, column: usize| row != column && row + 1 == sag.end && sag.contains(&column);
+    for column in 0..n {
+        let mut right = |sign: f64| {
+            let step = DVector::from_fn(n, |k, _| if k == column { sign * STEP * sigma[k] } else { 0.0 });
+            normal.update(&problem, &stepped(&problem, &solved.state, &solved.normal, &step), Loss::Square);
+            normal.right.clone()
+        };
+        let change = (right(-1.0) - right(1.0)) / (2.0 * STEP);
+        for row in (column..n).filter(|row| !is_product(*row, column)) {
+            let off: f64 = change[row] * sigma[row] - solved.normal.matrix[(row, column)] * sigma[row] * sigma[column];
+            if off.abs() > worst.0 {
+                worst = (off.abs(), row, column);
+            }
+        }
+    }
+    println!("{n} columns, worst {worst:?}");
+    assert!(worst.0 < TOLERANCE, "{worst:?} of {n} columns");
+}
+
 /// Linearizing again takes the memory of two vectors, how far the state is from the prior's means and how hard that
 /// pulls, however many views and tags there are.
 #[test]
