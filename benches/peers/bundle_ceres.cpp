@@ -1,7 +1,8 @@
 // The problem of `bundle` by Ceres, one thread: bundle_ceres FILE RUNS prints "name, time ms, iterations, cost" of each run.
 //
-// Parameter blocks: `common` (sensors, the mount's six, and where the file says so body and lens) and six a tag. One residual block a sighting, one a prior. With
-// analytic Jacobians the poses of a view are computed once for all its tags, before the residuals (EvaluationCallback).
+// Parameter blocks: `common` (sensors, the mount's six, and where the file says so body and lens) and six a tag. One
+// residual block a sighting, one a prior. With analytic Jacobians the poses of a view are computed once for all its tags,
+// before the residuals (EvaluationCallback).
 #include <ceres/ceres.h>
 
 #include <cstdio>
@@ -129,7 +130,7 @@ class Kinematics : public ceres::EvaluationCallback {
       has_body() ? prepare_body(v, common, mount, with_jacobians) : prepare(v, common, mount, with_jacobians);
   }
 
-  const double* lens() const { return has_body() ? &*state_.common.end() - 8 : b_.lens.data(); }
+  const double* lens() const { return has_body() ? state_.common.data() + kAll - 8 : b_.lens.data(); }
 
  private:
   bool has_body() const { return state_.common.size() == kAll; }
