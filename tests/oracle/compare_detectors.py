@@ -1,16 +1,16 @@
 """Other AprilTag detectors on the images of the detection study.
 
     armcal study detection --images DIR
-    python tests/oracle/compare_detectors.py DIR [KORNIA]
+    python tests/oracle/compare_detectors.py DIR [KORNIA] [--out FILE]
 
 DIR holds truth.csv and the images. KORNIA is the program of tests/oracle/kornia, built; without it that detector is left out.
-Writes tests/golden/detectors.csv: one line for each detector, water and band of shortest sides. Errors are rms per corner
+Writes FILE, tests/golden/detectors.csv if none is given: one line for each detector, water and band of shortest sides. Errors are rms per corner
 coordinate, `common` over tags that all detectors found; times are medians an image, of one thread: processor time of the Python ones, wall time of ours and of kornia (idle machine).
 """
 
+import argparse
 import csv
 import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -123,7 +123,12 @@ def run_kornia(program, truth, folder):
 
 
 def main():
-    folder = Path(sys.argv[1])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("kornia", nargs="?")
+    parser.add_argument("--out", type=Path, default=OUT)
+    args = parser.parse_args()
+    folder = args.folder
     truth = read_truth(folder)
     detectors = {
         "pupil-apriltags, decimate 1": pupil(1.0),
@@ -134,10 +139,10 @@ def main():
     results = {"armcal": ({name: [tag["ours"] for tag in tags] for name, tags in truth.items()}, float("nan"), 0)}
     for name, detect in detectors.items():
         results[name] = run(name, detect, truth, folder)
-    if len(sys.argv) > 2:
-        results["kornia-apriltag"] = run_kornia(sys.argv[2], truth, folder)
+    if args.kornia:
+        results["kornia-apriltag"] = run_kornia(args.kornia, truth, folder)
     results["armcal"] = (results["armcal"][0], ours_ms(folder), 0)
-    write(truth, results)
+    write(truth, results, args.out)
 
 
 def ours_ms(folder):
@@ -146,7 +151,7 @@ def ours_ms(folder):
     return float(file.read_text()) if file.exists() else float("nan")
 
 
-def write(truth, results):
+def write(truth, results, out):
     rows = []
     for water in ("clear", "coastal", "turbid", "all"):
         for low, high in [*SIDES_PX, (0, 1000)]:
@@ -173,7 +178,7 @@ def write(truth, results):
                      f"{errors['own']:.4f}", len(common), f"{errors['common']:.4f}", len(both), f"{errors['both']:.4f}",
                      f"{ours_both:.4f}", n_false, f"{ms:.1f}"]
                 )
-    with open(OUT, "w", newline="") as file:
+    with open(out, "w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow("detector,water,side_from_px,side_to_px,n,found,recall,rms_px,n_common,rms_common_px,"
                         "n_both,rms_both_px,armcal_rms_both_px,wrong_ids,ms_per_image".split(","))
