@@ -89,6 +89,8 @@ def armcal_steps_s(speed):
         for file in sorted(Path(folder).rglob("new/sample.json")):
             samples, name = json.loads(file.read_text()), json.loads((file.parent / "benchmark.json").read_text())["full_id"]
             out[name] = min(1e-9 * time / iters for time, iters in zip(samples["times"], samples["iters"]))
+    if not out:
+        raise SystemExit(f"{speed}: no benchmark `{bench_mujoco.ONE_STEP}`; build it with the simulator (default features)")
     return out
 
 
