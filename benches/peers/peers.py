@@ -63,11 +63,11 @@ def header(armcal):
 
 
 def run(*words, out=None):
-    """A part's program, whose tables go where ours go. If it fails, with the last line that it said."""
-    run = subprocess.run([str(word) for word in words], cwd=ROOT, stdout=out, stderr=subprocess.PIPE, text=True)
-    if run.returncode:
-        last = run.stderr.strip().splitlines()[-1:]
-        raise RuntimeError(f"{Path(words[0]).name} {words[1]}: exit code {run.returncode}: {''.join(last)}")
+    """A part's program; its tables go where ours go. If it fails, an error with the last line that it said."""
+    ended = subprocess.run([str(word) for word in words], cwd=ROOT, stdout=out, stderr=subprocess.PIPE, text=True)
+    if ended.returncode:
+        last = "".join(ended.stderr.strip().splitlines()[-1:])
+        raise RuntimeError(f"{Path(words[0]).name} {words[1]}: exit code {ended.returncode}: {last}")
 
 
 def arms(args, _):
