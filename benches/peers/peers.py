@@ -7,7 +7,8 @@
 ARMCAL: the program, built. DATA: recordings of real arms (arms.py says which). RECORDINGS: where simulated ones
 are kept, or made. PROGRAMS: the built C++ of benches/peers/Makefile. TAGSLAM:
 folder `tests` of github berndpfrommer/tagslam_test. INDUSTRIAL: a checkout of github ros-industrial/industrial_calibration, with hand_eye
-and kinematic built in it (README.md). SPEED: the built benchmark benches/speed.rs, for armcal's own step beside Pinocchio's.
+and kinematic built in it (README.md). SPEED: the benchmark benches/speed.rs, built with
+the default features, for armcal's own step beside Pinocchio's. The part `solvers` leaves target/release/armcal built without the simulator.
 Machine, date and versions stand at the top; a part that cannot run says why, and none is left out for its result.
 
 | part | ours beside | what |

@@ -4,8 +4,9 @@
     python tests/oracle/compare_detectors.py DIR [KORNIA] [--out FILE]
 
 DIR holds truth.csv and the images. KORNIA is the program of tests/oracle/kornia, built; without it that detector is left out.
-Writes FILE, tests/golden/detectors.csv if none is given: one line for each detector, water and band of shortest sides. Errors are rms per corner
-coordinate, `common` over tags that all detectors found; times are medians an image, of one thread: processor time of the Python ones, wall time of ours and of kornia (idle machine).
+Writes FILE, tests/golden/detectors.csv if none is given: one line for each detector, water and band of shortest sides.
+Errors are rms per corner coordinate, `common` over tags that all detectors found; times are medians an image, of one
+thread: processor time of the Python ones, wall time of ours and of kornia (idle machine).
 """
 
 import argparse
