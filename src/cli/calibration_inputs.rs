@@ -1,7 +1,7 @@
 //! What `armcal calibrate` is given: recordings, and the files beside them, as the estimator takes them.
 
-#[cfg(feature = "sim")]
 use armcal_core::codes::Code;
+#[cfg(feature = "sim")]
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
