@@ -1,10 +1,12 @@
-//! The repository itself: its sources keep their structure, its pages lead somewhere and quote commands that exist.
+//! The repository itself: its sources keep their structure, its pages lead somewhere, quote commands that exist and do
+//! not grow.
 
 mod commands;
 mod links;
 mod names;
 mod readers;
 mod structure;
+mod words;
 
 use std::path::PathBuf;
 

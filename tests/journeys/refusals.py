@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Things that are wrong, one at a time, and the first line in which the program says so: docs/results/refusals.md.
+"""Makes 30 mistakes, one at a time, and checks the first line in which the program reports each.
 
     ARMCAL=target/release/armcal python3 tests/journeys/refusals.py [FOLDER]
 

@@ -7,7 +7,7 @@ use std::path::Path;
 use super::{expect_none, pages};
 
 /// A page without its code: fenced blocks and inline code.
-fn prose(page: &str) -> String {
+pub(super) fn prose(page: &str) -> String {
     let mut is_fenced = false;
     let mut text = String::new();
     for line in page.lines() {
