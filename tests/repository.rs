@@ -13,7 +13,7 @@ use crate::support::{files_below, root};
 /// All pages in Markdown.
 fn pages() -> Vec<PathBuf> {
     let mut pages = vec![root().join("README.md")];
-    for folder in ["docs", "tests", "benches", "recordings"] {
+    for folder in [".github", "docs", "tests", "benches", "recordings"] {
         pages.extend(files_below(&root().join(folder), "md"));
     }
     pages
