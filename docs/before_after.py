@@ -242,9 +242,11 @@ def main():
         svg += [f'<path d="M{tx:.1f} {ty:.1f}L{x:.1f} {y:.1f}" stroke="{color}" stroke-width="4"/>', ring(tx, ty, 9)]
         svg += [text(left, 30, f"{attempt.capitalize()} calibration", 24, color, 700),
                 text(left + SIDE, 96, f"{1e3 * median_m[attempt]:.1f} mm", 28, color, 700, "middle"),
-                text(left + SIDE, 116, "median tool error", 13, anchor="middle")]
+                text(left + SIDE, 116, "median tool error", 13, anchor="middle"),
+                text(left + SIDE, 140, f"{score[attempt]['hits']} of {score[attempt]['targets']} targets hit", 15, INK,
+                     anchor="middle")]
         dots = [on_dial(found[attempt][index][0], error) for index, error in errors[attempt].items()]
-        svg += dial(left + SIDE, 248, dots, color)
+        svg += dial(left + SIDE, 256, dots, color)
     Path(out).write_text("\n".join([*svg, "</svg>"]) + "\n")
 
 

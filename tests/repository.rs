@@ -8,7 +8,7 @@ mod structure;
 
 use std::path::PathBuf;
 
-use crate::support::{files_below, root};
+use crate::support::{files_below, read, root};
 
 /// All pages in Markdown.
 fn pages() -> Vec<PathBuf> {
@@ -23,6 +23,12 @@ fn pages() -> Vec<PathBuf> {
 fn sources() -> Vec<PathBuf> {
     let folders = ["src", "tests", "benches", "examples"].map(|folder| root().join(folder));
     folders.iter().flat_map(|folder| files_below(folder, "rs")).collect()
+}
+
+#[test]
+fn the_citation_has_the_version_of_the_program() {
+    let version = concat!("\nversion: ", env!("CARGO_PKG_VERSION"), "\n");
+    assert!(read(&root().join("CITATION.cff")).contains(version), "CITATION.cff lacks{version}");
 }
 
 /// Fails with all of `violations`, one a line.
