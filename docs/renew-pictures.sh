@@ -1,16 +1,16 @@
 #!/bin/sh
-# Renews docs/replay.png and docs/report.png from a run of the quickstart. Takes two minutes.
+# Renews docs/before-after.svg, docs/replay.png and docs/report.png from a run of the quickstart. Takes two minutes.
 #
 #   docs/renew-pictures.sh [PROGRAM]      # armcal on PATH, if left out
 #
 # Needs armcal with the viewer's files (features `sim` and `viewer`, as `cargo build --release` has them), and on PATH:
-# rerun 0.36 (pip install rerun-sdk), chromium and pngquant. No window opens; without a graphics card the viewer needs
-# a software Vulkan (mesa-vulkan-drivers).
+# python3 with numpy and rosbags, rerun 0.36 (pip install rerun-sdk), chromium and pngquant. No window opens; without a
+# graphics card the viewer needs a software Vulkan (mesa-vulkan-drivers).
 set -eu
 
 armcal=$(command -v "${1:-armcal}") || { echo "${1:-armcal} is no program" >&2; exit 2; }
 case $armcal in /*) ;; *) armcal=$PWD/$armcal ;; esac
-for tool in rerun chromium pngquant; do
+for tool in python3 rerun chromium pngquant; do
     command -v "$tool" >/dev/null || { echo "$tool is not on PATH; the first lines of $0 say what is needed" >&2; exit 2; }
 done
 cd "$(dirname "$0")/.."
@@ -19,6 +19,7 @@ viewer=
 trap 'test -z "$viewer" || kill "$viewer" 2>/dev/null; rm -rf "$work"' EXIT INT TERM
 
 "$armcal" run routines/titan4-quickstart.toml --out "$work/run" --quiet
+python3 docs/before_after.py "$work/run" robots/titan4/titan4.urdf manipulator_link 0,-0.253,0 docs/before-after.svg
 
 # One picture of the viewer: the arm at a target after calibration.
 seconds=325 port=9976
@@ -58,4 +59,4 @@ picture() { # PAGE WIDTH HEIGHT OUT: the top of a page, in light colors
 echo '<body style="margin:-26px 0 0"><img src="replay.png" width="1400"></body>' >"$work/replay.html"
 picture "$work/replay.html" 1400 849 docs/replay.png
 picture "$work/run/report.html" 1000 1330 docs/report.png
-ls -l docs/replay.png docs/report.png
+ls -l docs/before-after.svg docs/replay.png docs/report.png

@@ -10,12 +10,12 @@ mod words;
 
 use std::path::PathBuf;
 
-use crate::support::{files_below, root};
+use crate::support::{files_below, read, root};
 
 /// All pages in Markdown.
 fn pages() -> Vec<PathBuf> {
     let mut pages = vec![root().join("README.md")];
-    for folder in ["docs", "tests", "benches", "recordings"] {
+    for folder in [".github", "docs", "tests", "benches", "recordings"] {
         pages.extend(files_below(&root().join(folder), "md"));
     }
     pages
@@ -25,6 +25,12 @@ fn pages() -> Vec<PathBuf> {
 fn sources() -> Vec<PathBuf> {
     let folders = ["src", "tests", "benches", "examples"].map(|folder| root().join(folder));
     folders.iter().flat_map(|folder| files_below(folder, "rs")).collect()
+}
+
+#[test]
+fn the_citation_has_the_version_of_the_program() {
+    let version = concat!("\nversion: ", env!("CARGO_PKG_VERSION"), "\n");
+    assert!(read(&root().join("CITATION.cff")).contains(version), "CITATION.cff lacks{version}");
 }
 
 /// Fails with all of `violations`, one a line.

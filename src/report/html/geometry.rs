@@ -1,5 +1,6 @@
 //! Where camera, links and tags were found, each with its standard deviation.
 
+use armcal_core::codes::Coded;
 use maud::{Markup, html as markup};
 
 use armcal_belief::calib::{Calibration, CameraMount, Finding, FurtherCamera, LinkResult, ModelTable, SagTable};
@@ -24,7 +25,7 @@ fn findings(findings: &[Finding]) -> Markup {
             tr { th { "finding" } th { "name" } th { "size" } th { "tool error" } th { "repaired" } }
             @for finding in findings {
                 tr {
-                    td { (finding.kind.words()) }
+                    td { (finding.kind.words()) " [" (finding.code()) "]" }
                     td { (finding.name) }
                     td { (finding.size_in_words().unwrap_or_else(|| "-".to_owned())) }
                     td { (Unit::Metres.shown_if(finding.tool_error_m, 1)) }

@@ -52,7 +52,7 @@ pub fn toml_problem(error: &toml::de::Error) -> String {
 /// Reads a table of a text that was read before; the message has no line.
 ///
 /// # Errors
-/// What is wrong, as [`explained`].
+/// The problem in words, with every other key that is missing.
 pub fn from_table<T: DeserializeOwned>(table: &toml::Table) -> Result<T, String> {
     toml::Value::Table(table.clone()).try_into().map_err(|error: Error| {
         let message = toml_problem(&error);
