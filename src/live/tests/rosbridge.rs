@@ -218,8 +218,9 @@ fn a_lost_connection_ends_a_run_at_once_and_the_recording_says_so() {
     assert!(wire.send(&survey.counts, 0.02).is_err() && wire.stop().is_err());
 }
 
+/// Goes after the client's greeting: a socket that is closed before makes the client's connect fail.
 fn bridge_that_is_gone() -> RosbridgeWire {
-    Bridge::new(|_, _| ()).wire()
+    Bridge::new(|socket, _| drop(socket.read())).wire()
 }
 
 #[test]
