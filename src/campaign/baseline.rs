@@ -33,7 +33,7 @@ pub fn read_baseline(path: &Path, prepared: &Prepared) -> Result<Table, Campaign
         Some(origin) => Some(origin),
         None => read_summary(path)?.and_then(|summary| summary.origin),
     };
-    let origin = origin.ok_or_else(|| anew("does not say which routine and robot it is of".to_owned()))?;
+    let origin = origin.ok_or_else(|| anew("does not name its routine and robot".to_owned()))?;
     // The overrides are what is under test, unless the baseline was made with them.
     let (plainly, with_overrides) = (Origin::of(prepared, &[])?, Origin::of_campaign(prepared)?);
     if let (Some(difference), Some(_)) = (origin.difference(&plainly), origin.difference(&with_overrides)) {

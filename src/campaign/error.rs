@@ -32,7 +32,7 @@ pub enum CampaignError {
     #[error("{}: this campaign is not at its end; the command that began it goes on with it", path.display())]
     Unfinished { path: PathBuf },
     #[error(
-        "no table of {}: name theirs, too, or run the command of the shard again; --allow-missing leaves them out",
+        "{} has no table: name it, or run the command of the shard again; --allow-missing merges without it",
         listed(shards)
     )]
     MissingShards { shards: Vec<Shard> },

@@ -120,7 +120,7 @@ fn expect_toml(file: &Path) -> Result<()> {
         _ => return Ok(()),
     };
     let (name, kind) = (file.display(), FileKind::of(file).map_or("", FileKind::name));
-    Err(UsageError::new(Code::FileKind, format!("{name}: is {kind}, and not to be checked; {advice}")).into())
+    Err(UsageError::new(Code::FileKind, format!("{name}: is {kind}, which `check` does not read; {advice}")).into())
 }
 
 /// What a file that is neither robot nor routine holds.

@@ -42,15 +42,12 @@ pub(super) fn warn_of_losses(recording: &Recording) -> bool {
 fn warn_of_order(file: &Path, order: ChunkOrder) {
     let file = file.display();
     if order.moved > 0 {
-        warn(
-            Code::ChunksDisordered,
-            format_args!("{file}: {} chunks are not in the order of time; they were sorted", order.moved),
-        );
+        warn(Code::ChunksDisordered, format_args!("{file}: {} chunks are out of order; they were sorted", order.moved));
     }
     if order.copies > 0 {
         warn(
             Code::ChunksDisordered,
-            format_args!("{file}: {} chunks are exact copies of others; they were left out", order.copies),
+            format_args!("{file}: {} chunks are exact copies; they were skipped", order.copies),
         );
     }
 }

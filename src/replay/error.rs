@@ -28,7 +28,7 @@ pub enum ReplayError {
     Create { path: PathBuf, source: std::io::Error },
     #[error("{}: cannot be written: {source}", path.display())]
     Encode { path: PathBuf, source: EncodeError },
-    #[error("the viewer cannot be told: {0}")]
+    #[error("the viewer takes no data: {0}")]
     Live(EncodeError),
     #[error("{address} is no address of a viewer; it must be HOST:PORT, such as 127.0.0.1:9876")]
     Address { address: String },

@@ -196,7 +196,7 @@ impl<'b> Driver<'b> {
         self.record_failed(&[FailedJoint { joint, kind: FailedKind::Locked }])?;
         let what = match kind {
             FailedKind::Stuck => "its reading stands still to the count while its set-point moves",
-            FailedKind::Dead => "its reading leapt to where no joint comes so fast, and stays there",
+            FailedKind::Dead => "its reading jumped farther than a joint can move, and stayed there",
             FailedKind::Locked => "it does not leave the place where it rested",
             FailedKind::Jumps => "its readings jump",
         };

@@ -148,7 +148,7 @@ fn seen(
         return None;
     };
     if corners_px.iter().flatten().any(|value| !value.is_finite()) {
-        left_out("detections with corners that are no numbers");
+        left_out("detections whose corners are not numbers");
         out.n_unreadable += 1;
         return None;
     }

@@ -463,7 +463,7 @@ fn further(file: &Path, first: &TagsToml, raw: Vec<FurtherTagsToml>) -> Result<V
         };
         if seen.iter().any(is_same) {
             let problem =
-                "is that of another camera with the same camera_frame, or with none: nothing tells them apart";
+                "belongs to another camera with the same camera_frame, or with none, so they cannot be distinguished";
             return issue("topic", problem);
         }
         seen.push((topic.clone(), camera_frame.clone()));

@@ -137,7 +137,7 @@ impl CameraFile {
             return Ok(None);
         }
         let missing = LENS_KEYS.iter().zip(has).filter(|(_, has)| !has).map(|(key, _)| *key);
-        let problem = format!("has no {}: a lens needs them all", missing.collect::<Vec<_>>().join(", "));
+        let problem = format!("lacks {}; a lens needs all of them", missing.collect::<Vec<_>>().join(", "));
         Err(FileIssue::new(Code::KeyMissing, table.file, format!("[{}]", table.name), problem))
     }
 }

@@ -106,11 +106,11 @@ struct Line {
 }
 
 fn line(center_rad: f64, readings: &[EndStopReading]) -> Result<Line, String> {
-    let Some(first) = readings.first() else { return Err("it never stood at an end stop".to_owned()) };
+    let Some(first) = readings.first() else { return Err("it never rested at an end stop".to_owned()) };
     let apart = |r: &&EndStopReading| (r.angle_rad - first.angle_rad).abs() > SAME_STOP_RAD;
     let Some(other) = readings.iter().find(apart) else {
         return Err(format!(
-            "it stood at one end stop only, {:.4} rad; two different ones are needed",
+            "it rested at one end stop only, {:.4} rad; two different ones are needed",
             first.angle_rad
         ));
     };

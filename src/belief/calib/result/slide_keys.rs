@@ -11,7 +11,7 @@ const MARK: &str = "moves = \"prismatic\"";
 
 /// What is said of slides at the head of a file that has any.
 pub(crate) const SLIDE_HEAD: &str =
-    "# Of a slide (moves = \"prismatic\") all that is in rad is in m: keys have _m in the place of _rad.\n";
+    "# Of a slide (moves = \"prismatic\") the unit is m instead of rad: keys end in _m instead of _rad.\n";
 
 /// `text` of a calibration with the keys of slides in metres.
 pub(crate) fn in_metres(text: &str) -> String {

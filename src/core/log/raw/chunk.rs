@@ -12,7 +12,7 @@ use super::record::{ChunkHead, PREFIX_BYTES};
 pub enum ChunkError {
     #[error(transparent)]
     Mcap(#[from] McapError),
-    #[error("it unpacks to {bytes} bytes; for its size {limit} are believed")]
+    #[error("it unpacks to {bytes} bytes; its size allows {limit}")]
     Bytes { bytes: u64, limit: u64 },
     #[error("it has more than {limit} records")]
     Records { limit: u64 },

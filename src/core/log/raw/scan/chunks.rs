@@ -65,7 +65,7 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
             }
         });
         if unusable > 0 {
-            let what = format!("{unusable} records of a chunk cannot be used, their topic's declaration is lost");
+            let what = format!("{unusable} records of a chunk are unusable: the declaration of their topic is lost");
             self.pass.damage.note(at, &what);
         }
         Ok(read)
