@@ -21,8 +21,8 @@ pub(super) fn belief(follower: &Follower) -> Result<BeliefRow, UsageError> {
         None => Err(UsageError::new(
             Code::TagsNotSeen,
             format!(
-                "no view of a tag whose place is known ({unknown} have none): map them with `armcal tagmap` and give the \
-             map with --tag-map"
+                "no view of a tag whose place is known ({unknown} have none): map them with `armcal tagmap` and give \
+                 the map with --tag-map"
             ),
         )),
         Some(row) => {

@@ -219,7 +219,8 @@ fn accuracy_lines(summary: &RunSummary) -> Vec<String> {
     ));
     lines.extend(summary.calibration.predicted_tool_error_m.map(|predicted| {
         format!(
-            "predicted    tool error {} median, {} worst of the targets (one sigma, from the recording and the datasheets)",
+            "predicted    tool error {} median, {} worst of the targets (one sigma, from the recording and the \
+             datasheets)",
             Unit::Metres.shown(predicted.median, 1),
             Unit::Metres.shown(predicted.max, 1)
         )
@@ -389,7 +390,8 @@ fn held_line(held: &HeldJointSummary) -> String {
     let HeldJointSummary { joint, kind, angle_rad, bound_rad } = held;
     let (kind, [angle_deg, bound_deg]) = (kind.name(), [angle_rad, bound_rad].map(|rad| rad.to_degrees()));
     format!(
-        "held         {joint} ({kind}): it did not follow its set-points; it is at {angle_deg:.1} deg, ±{bound_deg:.2} deg"
+        "held         {joint} ({kind}): it did not follow its set-points; it is at {angle_deg:.1} deg, \
+         ±{bound_deg:.2} deg"
     )
 }
 

@@ -290,12 +290,12 @@ impl Refusal {
             }
             Self::Overfitted { .. } => "capture more views at other configurations",
             Self::PriorsBeyondTolerance { most: Some(most), .. } if most.starts_with("tag survey") => {
-                "measure the frame of the tags in the arm's base and state its sigmas in [geometry] of robot.toml, or touch \
-                 three surveyed surfaces (step `touch`)"
+                "measure the frame of the tags in the arm's base and state its sigmas in [geometry] of robot.toml, or \
+                 touch three surveyed surfaces (step `touch`)"
             }
             Self::PriorsBeyondTolerance { .. } => {
-                "put a tag on the gripper, touch three surveyed surfaces (step `touch`), or measure the arm and state its \
-                 sigmas in [geometry] of robot.toml"
+                "put a tag on the gripper, touch three surveyed surfaces (step `touch`), or measure the arm and state \
+                 its sigmas in [geometry] of robot.toml"
             }
             Self::BeyondTolerance { .. } => "capture more views, or put a tag on the gripper",
             Self::WrongInput(wrong) => wrong.remedy(),
@@ -311,7 +311,8 @@ impl Refusal {
             Self::Outliers { .. } => "check tag map, tag ids and the URDF",
             Self::Innovations { .. } => "look for what moved or warmed up during the capture",
             Self::Touch { .. } => {
-                "measure the tool point ([tool] point_m of robot.toml), the links beyond the camera and the camera mount"
+                "measure the tool point ([tool] point_m of robot.toml), the links beyond the camera and the camera \
+                 mount"
             }
             Self::PriorReused => "give a prior that was made from other views",
             Self::PriorSingular => "make the prior again",
@@ -425,8 +426,8 @@ impl Refusal {
             ),
             Self::NoBetterThanBaseline { held_out_m, baseline_m, p_value } => write!(
                 f,
-                "held-out tag error is no better than with datasheet sensors, fitted mount and fitted map: {:.1} mm against \
-                 {:.1} mm rms (p = {p_value:.2}, required below {SIGNIFICANCE})",
+                "held-out tag error is no better than with datasheet sensors, fitted mount and fitted map: {:.1} mm \
+                 against {:.1} mm rms (p = {p_value:.2}, required below {SIGNIFICANCE})",
                 mm(*held_out_m),
                 mm(*baseline_m)
             ),
@@ -440,15 +441,16 @@ impl Refusal {
                 let [predicted, tolerance] = told_apart_mm([*predicted_m, *tolerance_m]);
                 write!(
                     f,
-                    "the predicted tool error is {predicted} mm (95 % of the targets); the task tolerates {tolerance} mm"
+                    "the predicted tool error is {predicted} mm (95 % of the targets); the task tolerates {tolerance} \
+                     mm"
                 )
             }
             Self::PriorsBeyondTolerance { predicted_m, tolerance_m, most } => {
                 let [predicted, tolerance] = told_apart_mm([*predicted_m, *tolerance_m]);
                 write!(
                     f,
-                    "the predicted tool error with unobservable parameters is {predicted} mm (95 % of the targets); the task \
-                     tolerates {tolerance} mm"
+                    "the predicted tool error with unobservable parameters is {predicted} mm (95 % of the targets); \
+                     the task tolerates {tolerance} mm"
                 )?;
                 most.as_ref().map_or(Ok(()), |most| write!(f, "; the largest part: {most}"))
             }
@@ -467,13 +469,15 @@ impl Refusal {
             Self::Geometry(geometry) => write!(f, "{geometry}"),
             Self::SensorError { joint, std_rad, datasheet_std_rad, moves } => write!(
                 f,
-                "{joint} varies by {} between views; its datasheet linearity is {}: a slipping sensor or wrong link geometry",
+                "{joint} varies by {} between views; its datasheet linearity is {}: a slipping sensor or wrong link \
+                 geometry",
                 moves.unit().shown(*std_rad, 2),
                 moves.unit().shown(*datasheet_std_rad, 2)
             ),
             Self::BeyondDatasheet { parameter, sigmas } => write!(
                 f,
-                "{parameter} is {sigmas:.0} sigma from its datasheet: joint or sensor failed, or another sensor is installed"
+                "{parameter} is {sigmas:.0} sigma from its datasheet: joint or sensor failed, or another sensor is \
+                 installed"
             ),
             Self::Nonlinearity { joint, std_rad, datasheet_std_rad, moves } => write!(
                 f,
@@ -490,8 +494,8 @@ impl Refusal {
                 let mm = |m: Option<f64>| m.unwrap_or(f64::INFINITY) * 1e3;
                 write!(
                     f,
-                    "the sensor of {joint} {}, and the task needs this joint: without it the tool error is {:.0} mm, the \
-                     tolerance {:.1} mm; while the camera sees tags the error is {:.1} mm",
+                    "the sensor of {joint} {}, and the task needs this joint: without it the tool error is {:.0} mm, \
+                     the tolerance {:.1} mm; while the camera sees tags the error is {:.1} mm",
                     kind.predicate(),
                     mm(*tool_error_m),
                     tolerance_m * 1e3,
@@ -521,22 +525,22 @@ impl Refusal {
         match self {
             Self::Innovations { quantity, per_dof, limit, expected: [low, high] } => write!(
                 f,
-                "{} are less precise than predicted: chi-square per degree of freedom {per_dof:.2}, limit {limit:.2} (95 % \
-                 expected in {low:.2} to {high:.2})",
+                "{} are less precise than predicted: chi-square per degree of freedom {per_dof:.2}, limit {limit:.2} \
+                 (95 % expected in {low:.2} to {high:.2})",
                 quantity.name()
             ),
             Self::OffsetsWalk { joint, walked_rad, moves, predicted_m, tolerance_m } => write!(
                 f,
-                "the offset of {joint} walked at random by {} during the capture; after as much time again the predicted tool \
-                 error is {:.1} mm, the task tolerates {:.1} mm",
+                "the offset of {joint} walked at random by {} during the capture; after as much time again the \
+                 predicted tool error is {:.1} mm, the task tolerates {:.1} mm",
                 moves.unit().shown(*walked_rad, 2),
                 predicted_m * 1e3,
                 tolerance_m * 1e3
             ),
             Self::CornerNoise { residual_px, stated_px, limit_px } => write!(
                 f,
-                "corner residuals averaged over a view are {residual_px:.2} px rms, above {limit_px:.2} px; robot.toml states \
-                 {stated_px:.2} px for one frame"
+                "corner residuals averaged over a view are {residual_px:.2} px rms, above {limit_px:.2} px; \
+                 robot.toml states {stated_px:.2} px for one frame"
             ),
             Self::PriorReused => write!(f, "the prior was made from the same messages, which must not count twice"),
             Self::PriorSingular => write!(f, "the prior's covariance has no inverse"),

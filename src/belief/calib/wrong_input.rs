@@ -410,8 +410,8 @@ impl WrongInput {
             }
             WrongInputKind::ExchangedIds(_) => "give each of them the id that is printed there",
             WrongInputKind::OtherMap => {
-                "give the tag map of this site with --tag-map, check the tag ids, or make a map with `armcal tagmap`; if the \
-                 map is right, check the lens in [camera] of robot.toml"
+                "give the tag map of this site with --tag-map, check the tag ids, or make a map with `armcal tagmap`; \
+                 if the map is right, check the lens in [camera] of robot.toml"
             }
         }
     }
@@ -446,7 +446,8 @@ impl fmt::Display for WrongInput {
             }
             WrongInputKind::ImageSize { stated_px: [columns, rows], seen_px: [x, y] } => write!(
                 f,
-                "the lens of robot.toml belongs to an image of {columns} x {rows} px, but corners reach ({x:.0}, {y:.0}) px"
+                "the lens of robot.toml belongs to an image of {columns} x {rows} px, but corners reach ({x:.0}, \
+                 {y:.0}) px"
             ),
             WrongInputKind::ImageScale(scale) => {
                 write!(f, "the lens of robot.toml belongs to an image {scale} times the size of the recorded image: ")?;

@@ -37,7 +37,8 @@ pub(super) fn section(report: &Report<'_>) -> Markup {
             (picture("From above", report.robot, most, &postures, &above))
         }
         p { small {
-            "The same sensor readings with datasheet (grey, dashed) and calibrated sensors (blue), in the view where both "
+            "The same sensor readings with datasheet (grey, dashed) and calibrated sensors (blue), in the view where \
+             both "
             "differ most: "
             (format!("{:.0} mm", 1e3 * most.off_m())) " at the tool. Dots: the tool at each " (at)
             ", with a line to its position by the datasheet."

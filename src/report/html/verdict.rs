@@ -31,7 +31,8 @@ fn in_one_sentence(report: &Report<'_>) -> String {
     let mut words = match (calibration.predicted_tool_error_with_priors_m, calibration.predicted_tool_error_m) {
         (Some(all), _) => {
             format!(
-                "Predicted tool error, one sigma with unobservable parameters included: {} median of the targets, {} worst.",
+                "Predicted tool error, one sigma with unobservable parameters included: {} median of the targets, {} \
+                 worst.",
                 mm(all.median),
                 mm(all.max)
             )

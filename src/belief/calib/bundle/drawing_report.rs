@@ -148,8 +148,8 @@ impl Estimate<'_> {
         let ratio = lens.focal_px()[0] / drawn.focal_px()[0] - 1.0;
         let shift = [0, 1].map(|k| lens.center_px()[k] - drawn.center_px()[k]);
         let words = format!(
-            "camera: focal length {:+.2} % from robot.toml (sigma {:.2} %), centre {:.1}, {:.1} px; the estimate includes \
-             it. Measure the intrinsics again",
+            "camera: focal length {:+.2} % from robot.toml (sigma {:.2} %), centre {:.1}, {:.1} px; the estimate \
+             includes it. Measure the intrinsics again",
             100.0 * ratio,
             100.0 * std(0) / drawn.focal_px()[0],
             shift[0],
@@ -176,7 +176,8 @@ impl Estimate<'_> {
                 let (id, size_mm) = (tags[tag_idx].id, 1e3 * tags[tag_idx].size_m);
                 let percent = 100.0 * (ratio - 1.0);
                 let words = format!(
-                    "tag {id} is {size_mm:.1} mm wide, {percent:+.1} % from the survey; the estimate includes it. Measure it again"
+                    "tag {id} is {size_mm:.1} mm wide, {percent:+.1} % from the survey; the estimate includes it. \
+                     Measure it again"
                 );
                 (FindingKind::TagSize, id.to_string(), Some(ratio - 1.0), words)
             }

@@ -184,13 +184,16 @@ impl VerdictInput<'_> {
         if !is_confirmed {
             return Some(refusal);
         }
-        table.warnings.push(Warning::new(Code::SensorsUnconfirmed, format!(
-            "the views do not show that the sensors need calibration: held-out tag error {:.1} mm rms calibrated, {:.1} mm \
-             with datasheet sensors, fitted mount and fitted map (p = {:.2})",
-            1e3 * held_out_m,
-            1e3 * baseline.rms_m,
-            baseline.p_value
-        )));
+        table.warnings.push(Warning::new(
+            Code::SensorsUnconfirmed,
+            format!(
+                "the views do not show that the sensors need calibration: held-out tag error {:.1} mm rms calibrated, \
+             {:.1} mm with datasheet sensors, fitted mount and fitted map (p = {:.2})",
+                1e3 * held_out_m,
+                1e3 * baseline.rms_m,
+                baseline.p_value
+            ),
+        ));
         None
     }
 
@@ -241,12 +244,15 @@ impl VerdictInput<'_> {
             } else if walked_rad > WALKED * stated.joint_std_rad[joint] {
                 let kind = FindingKind::OffsetWalks;
                 calibration.findings.push(Finding { kind, repaired: true, ..worn(spec, walked_rad) });
-                table.warnings.push(Warning::new(Code::OffsetWalks, format!(
-                    "the offset of {} walks at random, by {} (std) during the capture; the predicted tool error includes as much \
-                     again. Calibrate again soon, or follow the estimate online",
-                    spec.joint,
-                    spec.unit().shown(walked_rad, 2)
-                )));
+                table.warnings.push(Warning::new(
+                    Code::OffsetWalks,
+                    format!(
+                        "the offset of {} walks at random, by {} (std) during the capture; the predicted tool error \
+                     includes as much again. Calibrate again soon, or follow the estimate online",
+                        spec.joint,
+                        spec.unit().shown(walked_rad, 2)
+                    ),
+                ));
             }
             table.checks.push(check);
         }
@@ -303,9 +309,13 @@ impl VerdictInput<'_> {
         let noise = self.found.scales().noise;
         let check = Check::at_most("corners: noise over what frames and robot.toml say", noise, NOISY);
         if !check.holds {
-            table.warnings.push(Warning::new(Code::CornersNoisy, format!(
-                "corner noise is {noise:.1} times the stated {stated_px:.2} px: check lens, tag sizes, map and corner_std_px"
-            )));
+            table.warnings.push(Warning::new(
+                Code::CornersNoisy,
+                format!(
+                    "corner noise is {noise:.1} times the stated {stated_px:.2} px: check lens, tag sizes, map and \
+                 corner_std_px"
+                ),
+            ));
         }
         table.checks.push(check);
         let limit_px = MAX_OVER_CORNER_NOISE * stated_px;
@@ -405,8 +415,8 @@ impl VerdictInput<'_> {
                 if !check.holds {
                     let name = &spec.joint;
                     table.warnings.push(Warning::new(Code::ErrorsCorrelated, format!(
-                        "{name}: errors of neighbouring views {along} are correlated ({sigmas:.1} sigma): the model lacks a \
-                         smooth effect"
+                        "{name}: errors of neighbouring views {along} are correlated ({sigmas:.1} sigma): the model \
+                         lacks a smooth effect"
                     )));
                 }
                 table.checks.push(check);
