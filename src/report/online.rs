@@ -33,7 +33,7 @@ pub(super) fn online_lines(summary: &RunSummary) -> Vec<String> {
     let errors: Vec<f64> = summary.score.iter().flat_map(|score| &score.work).map(|task| task.tool_error_m).collect();
     if let (Some(median), Some(p95)) = (quantile(&errors, 0.5), quantile(&errors, 0.95)) {
         let (median, p95) = (Unit::Metres.shown(median, 1), Unit::Metres.shown(p95, 1));
-        lines.push(format!("tasks        {}: tool error {median} median, {p95} 95 %, against the truth", errors.len()));
+        lines.push(format!("tasks        {}: tool error {median} median, {p95} 95 % (simulated truth)", errors.len()));
     }
     let (n_poses, arm_time_s) =
         online.asked.iter().fold((0, 0.0), |(n, s), asked| (n + asked.views, s + asked.arm_time_s));

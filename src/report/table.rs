@@ -105,8 +105,8 @@ const FIGURES: [Figure; 6] = [
         of: |s| s.median,
         unit: Unit::Radians,
     },
-    Figure { name: "miss at the target, median", pick: |s| s.reach_error_m, of: |s| s.median, unit: Unit::Metres },
-    Figure { name: "miss at the target, worst", pick: |s| s.reach_error_m, of: |s| s.max, unit: Unit::Metres },
+    Figure { name: "distance to target, median", pick: |s| s.reach_error_m, of: |s| s.median, unit: Unit::Metres },
+    Figure { name: "distance to target, worst", pick: |s| s.reach_error_m, of: |s| s.max, unit: Unit::Metres },
 ];
 
 /// Rows of (what, before, after, ratio); shared with the HTML report.
@@ -137,7 +137,7 @@ pub(super) fn score_rows(before: &ScoreSide, after: Option<&ScoreSide>) -> Vec<[
 
 fn score_table(before: &ScoreSide, after: Option<&ScoreSide>) -> Table {
     let mut table = Table::new();
-    table.load_preset(UTF8_FULL_CONDENSED).set_header(["reach task, against the truth", "before", "after", ""]);
+    table.load_preset(UTF8_FULL_CONDENSED).set_header(["reach task, simulated truth", "before", "after", ""]);
     for row in score_rows(before, after) {
         table.add_row(row);
     }
