@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use super::{FAULT_S, FakeWire, Fault, Log, PERIOD_S, titan4};
 use crate::{Connection, Heard, LiveArm, LiveError, NudgeProblem, Wire};
+use armcal_core::codes::Coded;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::ArmSensors;
 use armcal_core::stats::stream_rng;
@@ -155,7 +156,7 @@ fn a_joint_that_moves_otherwise_than_told_stops_the_arm() {
     ] {
         let nudged = nudge_all(&robot, driver);
         let problem = nudged.problem.as_ref().expect("it is stopped");
-        told += &format!("{driver:?}\n  {problem}\n");
+        told += &format!("{driver:?}\n  {problem} [{}]\n", problem.code());
         assert_eq!(nudged.shares.len(), n_before, "{driver:?}");
         assert_eq!(nudged.log.borrow().stops_s.len(), 1, "{driver:?}: no stop");
     }

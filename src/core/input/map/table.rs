@@ -332,7 +332,7 @@ mod tests {
             ("\"c\"]", "\"c\", \"d\"]"),
             ("rotation_form = \"fixed_xyz\"\n", ""),
             ("fixed_xyz", "rotation_matrix"),
-            ("fixed_xyz", "rotation_vector"),
+            ("\"c\"]\nrotation_form = \"fixed_xyz", "\"c\", \"d\"]\nrotation_form = \"quaternion_xyzw"),
             ("rotation = [\"a\", \"b\", \"c\"]\n", ""),
             ("child_frame = \"board\"\n", ""),
         ];
