@@ -183,12 +183,11 @@ mod tests {
     fn builds_read_which_check_failed_and_how_to_repeat_it() {
         let worse = comparison(1.5);
         let xml = regress_junit(&worse, "r", Undecided::Fails).expect("XML");
-        assert!(xml.contains("failures=\"1\"") && xml.contains("x 1.500") && xml.contains("--seed 1"), "{xml}");
-        assert!(xml.contains("name=\"tool error\" classname=\"r\""), "{xml}");
+        assert!(xml.contains("failures=\"1\""), "{xml}");
+        insta::assert_snapshot!("worse_junit", xml);
         let same = regress_junit(&comparison(1.0), "r", Undecided::Fails).expect("XML");
         assert!(same.contains("failures=\"0\""), "{same}");
-        let page = regress_markdown(&worse, "r");
-        assert!(page.contains("| tool error") && page.contains("WORSE") && page.contains("`armcal run"), "{page}");
+        insta::assert_snapshot!("worse_markdown", regress_markdown(&worse, "r"));
         let json = serde_json::to_value(&worse).expect("JSON");
         assert_eq!((&json["verdict"], &json["pairs"]), (&"worse".into(), &6.into()));
     }
@@ -198,7 +197,7 @@ mod tests {
         let mut undecided = comparison(1.0);
         undecided.checks[5].verdict = Verdict::Inconclusive;
         let fails = regress_junit(&undecided, "r", Undecided::Fails).expect("XML");
-        assert!(fails.contains("failures=\"1\"") && fails.contains("inconclusive"), "{fails}");
+        assert!(fails.contains("failures=\"1\""), "{fails}");
         let passes = regress_junit(&undecided, "r", Undecided::Passes).expect("XML");
         assert!(passes.contains("failures=\"0\"") && passes.contains("<skipped"), "{passes}");
     }

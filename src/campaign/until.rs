@@ -292,18 +292,16 @@ mod tests {
         let limit: Until = "contacts < 1e-3 at 99.9 %".parse().expect("a limit");
         assert_eq!(limit.to_string(), "contacts < 0.001 at 99.9 %");
         assert_eq!(limit.to_string().parse(), Ok(limit));
-        for (text, word) in [
-            ("contacts 1e-3 at 95 %", "`<`"),
-            ("contacts < 1e-3", "` at `"),
-            ("bumps < 1e-3 at 95 %", "not_accepted"),
-            ("contacts < 0 at 95 %", "1e-6 .. 0.9"),
-            ("contacts < nan at 95 %", "1e-6 .. 0.9"),
-            ("contacts < 0.1 at 95", "50 .. 99.999 %"),
-            ("contacts < 0.1 at 100 %", "50 .. 99.999 %"),
-        ] {
-            let problem = text.parse::<Until>().expect_err(text);
-            assert!(problem.contains(word) && problem.contains("contacts < 0.001 at 95 %"), "{problem}");
-        }
+        let texts = [
+            "contacts 1e-3 at 95 %",
+            "contacts < 1e-3",
+            "bumps < 1e-3 at 95 %",
+            "contacts < 0 at 95 %",
+            "contacts < nan at 95 %",
+            "contacts < 0.1 at 95",
+            "contacts < 0.1 at 100 %",
+        ];
+        insta::assert_snapshot!("limits", texts.map(|text| text.parse::<Until>().expect_err(text)).join("\n"));
     }
 
     /// In whatever order rows come, the campaign ends at the same seed with the same answers.
@@ -333,7 +331,7 @@ mod tests {
         assert!(!stopping.is_answered() && stopping.beyond().is_empty());
         let [result] = &stopping.results()[..] else { panic!("one") };
         assert_eq!((result.answer, result.runs), (Answer::Open, 20));
-        assert!(result.to_string().contains("more seeds are needed"), "{result}");
+        insta::assert_snapshot!("open", result);
     }
 
     /// Each of these rows has three contacts.

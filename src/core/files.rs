@@ -105,8 +105,8 @@ mod tests {
     use super::*;
     use std::os::unix::fs::symlink;
 
-    fn problem(file: &Path, kind: FileKind) -> String {
-        read_text(file, kind).expect_err("refused").to_string()
+    fn problem(file: &Path) -> ErrorKind {
+        read_text(file, FileKind::Text).expect_err("refused").kind()
     }
 
     #[test]
@@ -116,11 +116,11 @@ mod tests {
         symlink("/dev/zero", &zeros).expect("linked");
         assert!(std::process::Command::new("mkfifo").arg(&pipe).status().expect("mkfifo").success());
         for file in [&zeros, &pipe, Path::new("/dev/zero")] {
-            assert!(problem(file, FileKind::Text).contains("not a regular file"), "{}", file.display());
+            assert_eq!(problem(file), ErrorKind::InvalidInput, "{}", file.display());
             assert!(open(file).is_err());
         }
-        assert!(problem(folder.path(), FileKind::Text).contains("a folder"));
-        assert_eq!(read_text(&folder.path().join("none"), FileKind::Text).unwrap_err().kind(), ErrorKind::NotFound);
+        assert_eq!(problem(folder.path()), ErrorKind::InvalidInput);
+        assert_eq!(problem(&folder.path().join("none")), ErrorKind::NotFound);
     }
 
     #[test]
@@ -132,10 +132,10 @@ mod tests {
         assert_eq!(read_text(&file, FileKind::Text).expect("it reads").len(), bytes.len());
         bytes.push(b' ');
         std::fs::write(&file, &bytes).expect("written");
-        assert!(problem(&file, FileKind::Text).contains("more than 8388608 bytes"));
+        assert_eq!(problem(&file), ErrorKind::FileTooLarge);
         assert!(read_bytes(&file, FileKind::Table).is_ok());
         std::fs::write(&file, [0xff, 0xfe]).expect("written");
-        assert!(problem(&file, FileKind::Text).contains("not a text"));
+        assert_eq!(problem(&file), ErrorKind::InvalidData);
     }
 
     #[test]
@@ -154,8 +154,8 @@ mod tests {
             assert!(check_within(folder, &folder.join("in.urdf")).is_ok());
             assert!(check_within(folder, &folder.join("none.urdf")).is_ok());
             assert!(check_within(folder, &folder.join("../a.urdf")).is_ok(), "a path may say so");
-            let problem = check_within(folder, &folder.join("out.urdf")).expect_err("refused").to_string();
-            assert!(problem.contains("out of its folder"), "{problem}");
+            let problem = check_within(folder, &folder.join("out.urdf")).expect_err("refused");
+            assert_eq!(problem.kind(), ErrorKind::InvalidInput);
         }
     }
 }

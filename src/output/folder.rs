@@ -203,7 +203,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let first = OutputFolder::open(dir.path()).unwrap().0;
         let error = OutputFolder::open(dir.path()).unwrap_err().to_string();
-        assert!(error.contains("another run"), "{error}");
+        insta::assert_snapshot!("another_run", error.replace(&dir.path().display().to_string(), "FOLDER"));
         drop(first);
         drop(OutputFolder::open(dir.path()).unwrap().0);
         assert!(names(dir.path()).is_empty());

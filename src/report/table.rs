@@ -483,14 +483,7 @@ mod tests {
             predicted_tool_error_m: mm / 1e3,
         };
         let both: Vec<_> = [(1, 50.0), (3, 6.0), (1, 3.04), (7, 1.96)].iter().map(renewal).collect();
-        assert_eq!(
-            stop_reason_line("so", &both),
-            "stop reason  so; predicted tool error after 1, 7 views: 3.0, 2.0 mm"
-        );
-        assert_eq!(
-            stop_reason_line("so", &both[..2]),
-            "stop reason  so; predicted tool error after 1, 3 views: 50.0, 6.0 mm"
-        );
-        assert_eq!(stop_reason_line("30 poses were visited", &[]), "stop reason  30 poses were visited");
+        let lines = [&both[..], &both[..2], &[]].map(|renewals| stop_reason_line("so", renewals));
+        insta::assert_snapshot!("stop_reasons", lines.join("\n"));
     }
 }

@@ -38,7 +38,7 @@ pub use falsified::{
 };
 pub use noise_fit::{FittedNoise, fit_noise};
 pub use paths::{Belief, PathQueries, PathRow, PathSite, PathStudy, path_study, paths_csv, problem_json, queries_json};
-pub use poses::{PoseRow, PoseStudyError, pose_study, poses_csv, poses_figure, poses_table};
+pub use poses::{PoseGrid, PoseRow, PoseStudyError, pose_study, poses_csv, poses_figure, poses_table};
 pub use scenes::{Condition, TAG_SIZE_M, conditions, water_name};
 pub use sensitivity::{Sensitivity, SensitivityPoint, sensitivity};
 pub use tables::{conditions_csv, report, trials_csv, truth_csv};

@@ -10,7 +10,7 @@ use crate::cli::exit::Exit;
 use crate::cli::stdout::say;
 use crate::output;
 use armcal_sim::WorldSpec;
-use armcal_study::{pose_study, poses_csv, poses_figure, poses_table};
+use armcal_study::{PoseGrid, pose_study, poses_csv, poses_figure, poses_table};
 
 #[derive(Debug, Args)]
 pub(super) struct PosesArgs {
@@ -29,7 +29,7 @@ pub(super) fn poses(args: &PosesArgs) -> Result<Exit> {
     let routine = armcal_core::routine::load(&args.routine)?;
     let (robot, vehicle) = routine.load_arm()?;
     output::make_folder(&args.out)?;
-    let rows = pose_study(&routine, (&robot, &vehicle), &WorldSpec::default(), 0..args.seeds)?;
+    let rows = pose_study(&routine, (&robot, &vehicle), &WorldSpec::default(), PoseGrid::WHOLE, 0..args.seeds)?;
     let report = poses_table(&rows);
     let figure = poses_figure(&rows).map_err(anyhow::Error::msg)?;
     for (name, text) in [("rows.csv", &poses_csv(&rows)), ("report.md", &report), ("poses.svg", &figure)] {

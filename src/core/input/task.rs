@@ -105,19 +105,18 @@ mod tests {
         let good = "version = 1\ntolerance_m = 0.02\ntargets_m = [[0.5, 1.6, 0.3]]\n";
         let parse = |text: &str| parse_task(Path::new("task.toml"), text).map_err(|error| error.to_string());
         assert_eq!(parse(good).expect("good").targets_m, [[0.5, 1.6, 0.3]]);
-        let faults: [(&str, &str, &[&str]); 6] = [
-            ("version = 1", "version = 3", &["version", "1 .. 1"]),
-            ("0.02", "0.0", &["tolerance_m", "10"]),
-            ("1.6", "nan", &["targets_m[0]", "NaN"]),
-            ("[[0.5, 1.6, 0.3]]", "[]", &["targets_m", "poses_rad"]),
-            ("[0.5, 1.6, 0.3]", "[0.5, 1.6]", &["targets_m"]),
-            ("targets_m", "target_m", &["target_m", "unknown field"]),
+        let faults = [
+            ("version = 1", "version = 3"),
+            ("0.02", "0.0"),
+            ("1.6", "nan"),
+            ("[[0.5, 1.6, 0.3]]", "[]"),
+            ("[0.5, 1.6, 0.3]", "[0.5, 1.6]"),
+            ("targets_m", "target_m"),
         ];
-        for (from, to, words) in faults {
+        let told = faults.map(|(from, to)| {
             let problem = parse(&good.replacen(from, to, 1)).expect_err(to);
-            for word in words.iter().chain(&["task.toml"]) {
-                assert!(problem.contains(word), "{to}: no `{word}` in {problem}");
-            }
-        }
+            format!("{from:?} -> {to:?}\n  {problem}\n")
+        });
+        insta::assert_snapshot!("task", told.concat());
     }
 }

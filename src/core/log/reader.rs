@@ -370,16 +370,8 @@ mod tests {
         let recording = read_recording(&path).unwrap();
         assert_eq!(recording.messages.len(), 1);
         assert_eq!(recording.joint_names, ["a", "b"]);
-        let rejected: Vec<_> = recording.rejected.iter().map(|(key, count)| (key.as_str(), *count)).collect();
-        assert_eq!(
-            rejected,
-            [
-                ("/joint_sensors: joint names differ from those that the topic began with", 1),
-                ("/joint_sensors: position is not finite", 2),
-                ("/joint_states: joint names differ from those of the joint sensors", 1),
-                ("/marks: type is \"sensor_msgs/msg/JointState\", not \"armcal_msgs/msg/Mark\"", 1),
-            ]
-        );
+        let rejected = recording.rejected.iter().map(|(key, count)| format!("{count} x {key}\n"));
+        insta::assert_snapshot!("rejected", rejected.collect::<String>());
         assert_eq!(recording.unknown_topics, [("/elsewhere".to_string(), 1)].into());
     }
 

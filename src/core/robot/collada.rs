@@ -361,52 +361,44 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_named() {
-        for (from, to, word) in [
-            ("<COLLADA", "<!DOCTYPE x><COLLADA", "document type"),
-            ("url=\"#wedge\"", "url=\"other.dae#wedge\"", "in another file"),
-            ("url=\"#wedge\"", "url=\"#none\"", "`none`"),
-            ("meter=\"0.001\"", "meter=\"0\"", "unit of `0` m"),
-            ("1 2 3</p>", "1 2 4</p>", "corner 4 is none of 4"),
-            ("1 2 3</p>", "1 2 -3</p>", "`-3`"),
-            ("<vcount>3 3<", "<vcount>3 4<", "too few corners"),
-            ("100 0 0 0 100", "100 0 x 0 100", "`x`"),
-            ("100 0 0 0 100", "100 0 1e999 0 100", "not finite"),
-            ("stride=\"3\"", "stride=\"2\"", "positions of 2"),
-            ("offset=\"1\"", "offset=\"64\"", "offset 64"),
-            ("0 0 0 1</matrix>", "0 0 1 1</matrix>", "0 0 0 1"),
-            ("<translate>0 0", "<translate>0", "`translate` needs 3"),
-            ("<scale>2 1 1</scale>", "<skew>1</skew>", "`skew`"),
-            ("<instance_geometry url=\"#wedge\"/>", "<instance_controller url=\"#wedge\"/>", "skinned"),
-            ("<instance_geometry url=\"#wedge\"/>", "<instance_node url=\"#outer\"/>", "within each other"),
-        ] {
-            let text = SCENE.replacen(from, to, 1);
-            assert_ne!(text, SCENE, "{from}");
-            let problem = read(&text).expect_err(to);
-            assert!(problem.contains(word), "{to}: {problem}");
-        }
-        for (text, word) in [
-            ("<a/>", "root element"),
-            ("", "no element"),
-            ("<COLLADA><a>", "ends within"),
-            (&"<COLLADA>".repeat(65), "64 deep"),
-        ] {
-            assert!(read(text).unwrap_err().contains(word), "{text}");
-        }
+        let faults = [
+            ("<COLLADA", "<!DOCTYPE x><COLLADA"),
+            ("url=\"#wedge\"", "url=\"other.dae#wedge\""),
+            ("url=\"#wedge\"", "url=\"#none\""),
+            ("meter=\"0.001\"", "meter=\"0\""),
+            ("1 2 3</p>", "1 2 4</p>"),
+            ("1 2 3</p>", "1 2 -3</p>"),
+            ("<vcount>3 3<", "<vcount>3 4<"),
+            ("100 0 0 0 100", "100 0 x 0 100"),
+            ("100 0 0 0 100", "100 0 1e999 0 100"),
+            ("stride=\"3\"", "stride=\"2\""),
+            ("offset=\"1\"", "offset=\"64\""),
+            ("0 0 0 1</matrix>", "0 0 1 1</matrix>"),
+            ("<translate>0 0", "<translate>0"),
+            ("<scale>2 1 1</scale>", "<skew>1</skew>"),
+            ("<instance_geometry url=\"#wedge\"/>", "<instance_controller url=\"#wedge\"/>"),
+            ("<instance_geometry url=\"#wedge\"/>", "<instance_node url=\"#outer\"/>"),
+        ];
+        let replaced = faults.map(|(from, to)| {
+            assert!(SCENE.contains(from), "{from}");
+            format!("{from} -> {to}\n  {}\n", read(&SCENE.replacen(from, to, 1)).expect_err(to))
+        });
+        let whole = ["<a/>", "", "<COLLADA><a>", &"<COLLADA>".repeat(65), &multiplied()];
+        let whole = whole.map(|text| format!("{}\n", read(text).expect_err("refused")));
+        insta::assert_snapshot!("collada", replaced.concat() + &whole.concat());
     }
 
     /// Each node instances the next one ten times.
-    #[test]
-    fn nodes_that_multiply_are_refused() {
+    fn multiplied() -> String {
         let mut nodes = String::new();
         for level in 0..20 {
             let instances = format!("<instance_node url=\"#n{}\"/>", level + 1).repeat(10);
             nodes += &format!("<node id=\"n{level}\">{instances}</node>");
         }
-        let text = format!(
+        format!(
             "<COLLADA><library_visual_scenes><visual_scene id=\"s\">{nodes}<node id=\"n20\"/>\
                             </visual_scene></library_visual_scenes></COLLADA>"
-        );
-        assert!(read(&text).unwrap_err().contains("10000 nodes"));
+        )
     }
 
     #[test]

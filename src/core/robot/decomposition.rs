@@ -161,15 +161,15 @@ mod tests {
     #[test]
     fn faces_that_lie_upon_each_other_by_the_thousand_are_refused() {
         let error = decomposed(&angle(500, 1e-6)).map(|hulls| hulls.len()).expect_err("refused").to_string();
-        assert!(error.contains("pieces of triangles in voxels") && error.contains("simplify"), "{error}");
+        insta::assert_snapshot!("faces_upon_each_other", error);
     }
 
     #[test]
     fn what_would_take_minutes_is_refused_with_the_reason() {
-        for (n, side_m, words) in [(300, 0.99, "voxels of surface"), (20_000, 0.99, "tests of triangles")] {
+        for (n, side_m) in [(300, 0.99), (20_000, 0.99)] {
             let started = std::time::Instant::now();
             let error = decomposed(&soup(n, side_m)).map(|hulls| hulls.len()).expect_err("refused").to_string();
-            assert!(error.contains(words) && error.contains("simplify"), "{error}");
+            insta::assert_snapshot!(format!("soup_of_{n}"), error);
             assert!(started.elapsed().as_secs() < 10, "{:?}", started.elapsed());
         }
     }

@@ -196,14 +196,14 @@ mod tests {
         for length in 0..text.len() {
             let _ = stl(&text.as_bytes()[..length]);
         }
-        assert!(stl(text.replacen("vertex 0", "vertex x", 1).as_bytes()).unwrap_err().contains("line 4"));
-        assert!(stl(text.replacen("  vertex 0e0 0 0\n", "", 1).as_bytes()).unwrap_err().contains("2 corners"));
+        let ascii = |from: &str, to: &str| stl(text.replacen(from, to, 1).as_bytes()).expect_err("damaged");
+        let mut told = vec![ascii("vertex 0", "vertex x"), ascii("  vertex 0e0 0 0\n", "")];
         let mut infinite = whole;
         infinite[STL_HEADER + 12..STL_HEADER + 16].copy_from_slice(&f32::INFINITY.to_le_bytes());
-        assert!(stl(&infinite).unwrap_err().contains("not finite"));
-        for (bad, word) in [("f 1 2 9", "`9`"), ("f 1 2", "2 corners"), ("f 0 1 2", "`0`"), ("v 1 2", "line 11")] {
-            assert!(obj(format!("{OBJ}{bad}\n").as_bytes()).unwrap_err().contains(word), "{bad}");
-        }
+        told.push(stl(&infinite).expect_err("damaged"));
+        let bad = ["f 1 2 9", "f 1 2", "f 0 1 2", "v 1 2"];
+        told.extend(bad.map(|bad| obj(format!("{OBJ}{bad}\n").as_bytes()).expect_err(bad)));
+        insta::assert_snapshot!("meshes", told.join("\n"));
         assert!(obj(&[0xff, 0xfe]).is_err());
     }
 
@@ -211,7 +211,7 @@ mod tests {
     fn many_vertices_are_refused() {
         let vertices = "v 0 0 0\n".repeat(MAX_VERTICES + 1);
         assert!(obj(&vertices.as_bytes()[..8 * MAX_VERTICES]).is_ok());
-        assert!(obj(vertices.as_bytes()).unwrap_err().contains("3000000 vertices"));
+        insta::assert_snapshot!("many_vertices", obj(vertices.as_bytes()).expect_err("refused"));
     }
 
     #[test]

@@ -301,27 +301,28 @@ mod tests {
     fn what_is_wrong_with_a_mesh_is_named() {
         let at = "position_m = [0, 0, 0]\n";
         let box_at = format!("shape = \"box\"\nsize_m = [1, 1, 1]\n{at}");
-        for (text, words) in [
-            (mesh(""), &["file", "is needed"][..]),
-            (mesh("file = \"none.stl\"\n"), &["obstacle `rock`: file", "none.stl", "cannot be read"]),
-            (mesh("file = \"text.stl\"\n"), &["text.stl", "is not a mesh"]),
-            (mesh("file = \"flat.obj\"\n"), &["obstacle `rock`: file", "flat.obj", "is flat"]),
-            (mesh("file = \"flat.obj\"\nconvex = \"decomposed\"\n"), &["convex", "flat.obj", "is flat"]),
-            (mesh("file = \"angle.obj\"\nscale_m = 0.0\n"), &["scale_m", "outside"]),
-            (mesh("file = \"angle.obj\"\nscale_m = 1000\n"), &["scale_m", "outside"]),
-            (format!("{box_at}file = \"angle.obj\"\n"), &["obstacle `rock`: file", "is not a key of shape `box`"]),
-            (format!("{box_at}points_m = []\n"), &["points_m", "is not a key"]),
-            (format!("shape = \"hull\"\n{at}"), &["points_m", "is needed by shape `hull`"]),
-            (format!("shape = \"hull\"\npoints_m = [[0, 0, nan]]\n{at}"), &["points_m", "outside"]),
-            (format!("shape = \"torus\"\n{at}"), &["shape", "hull, mesh"]),
-        ] {
-            let message = parts(&text).expect_err("refused").to_string();
-            for word in words.iter().chain(&["r.toml"]) {
-                assert!(message.contains(word), "{text}\n{message}\nno `{word}`");
-            }
-        }
         let many = format!("{box_at}[[obstacle]]\nname = \"b\"\n").repeat(MAX_PARTS) + &box_at;
-        let message = parts(&many).expect_err("refused").to_string();
-        assert!(message.contains("obstacle: 257 shapes"), "{message}");
+        let told = [
+            mesh(""),
+            mesh("file = \"none.stl\"\n"),
+            mesh("file = \"text.stl\"\n"),
+            mesh("file = \"flat.obj\"\n"),
+            mesh("file = \"flat.obj\"\nconvex = \"decomposed\"\n"),
+            mesh("file = \"angle.obj\"\nscale_m = 0.0\n"),
+            mesh("file = \"angle.obj\"\nscale_m = 1000\n"),
+            format!("{box_at}file = \"angle.obj\"\n"),
+            format!("{box_at}points_m = []\n"),
+            format!("shape = \"hull\"\n{at}"),
+            format!("shape = \"hull\"\npoints_m = [[0, 0, nan]]\n{at}"),
+            format!("shape = \"torus\"\n{at}"),
+            many,
+        ]
+        .map(|text| {
+            let told = parts(&text).expect_err("refused").to_string();
+            // The folder has another name each time.
+            let words = told.split(' ').map(|word| word.rsplit_once('/').map_or(word, |(_, name)| name));
+            words.collect::<Vec<_>>().join(" ")
+        });
+        insta::assert_snapshot!("parts", told.join("\n"));
     }
 }

@@ -50,15 +50,14 @@ mod tests {
     fn lists_of_numbers_hold_no_keys() {
         let points = "[1.5, 2.5, 3.5],\n".repeat(MAX_VALUES / 4 - 1);
         assert_eq!(check_entries(&format!("points_m = [\n{points}]")), Ok(()));
-        assert!(check_entries(&format!("points_m = [\n{points}{points}]")).is_err_and(|why| why.contains("values")));
+        insta::assert_snapshot!("many_values", check_entries(&format!("points_m = [\n{points}{points}]")).unwrap_err());
     }
 
     #[test]
     fn every_way_to_write_a_key_counts() {
         for (unit, n) in [("a = 1\n", 1), ("a.b.c=1\n", 3), ("[a.b.c]\n", 2), ("[[a.b.c]]\n", 2), ("{a.b=1},", 2)] {
             assert_eq!(check_entries(&unit.repeat(MAX_KEYS / n)), Ok(()), "{unit}");
-            let refused = check_entries(&unit.repeat(MAX_KEYS / n + 1));
-            assert!(refused.is_err_and(|why| why.contains("100000 keys")), "{unit}");
+            insta::assert_snapshot!("many_keys", check_entries(&unit.repeat(MAX_KEYS / n + 1)).expect_err(unit));
         }
     }
 }

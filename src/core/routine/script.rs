@@ -518,71 +518,49 @@ mod tests {
         assert_eq!(WorkSettings { looks_rad: Vec::new(), ..work.clone() }.look_of(8), None);
     }
 
-    #[test]
-    fn a_step_is_named_with_its_line_and_the_likeliest_name() {
-        let text = format!("# a comment\n{LOOP}\n[[step]]\ndo = \"wait\"\nsecond = 3.0\n");
-        let found = problem(&text);
-        assert!(found.starts_with("r.toml: line 7: step 3 (wait): unknown field `second`"), "{found}");
-        assert!(found.ends_with("did you mean `seconds`?"), "{found}");
-        let misnamed = problem("\n[[step]]\ndo = \"captur\"");
-        assert!(misnamed.starts_with("r.toml: line 2: step 1: do: `captur` is none of"), "{misnamed}");
-        assert!(misnamed.ends_with("did you mean `capture`?"), "{misnamed}");
-        let several = problem("[[step]]\ndo = \"touch\"\npart = \"bar\"");
-        assert!(several.ends_with("missing field `point_m`; also missing: `normal`"), "{several}");
-        let order = problem(&format!("{LOOP}[[step]]\ndo = \"calibrate\""));
-        assert!(order.starts_with("r.toml: line 5: step 3 (calibrate): has no views"), "{order}");
-    }
-
+    /// Each with its line, its step, and the likeliest name.
     #[test]
     fn mistakes_are_named_by_step_key_and_what_would_be_right() {
+        let misnamed = format!("# a comment\n{LOOP}\n[[step]]\ndo = \"wait\"\nsecond = 3.0\n");
+        let again = format!("{LOOP}[[step]]\ndo = \"calibrate\"");
         let cases = [
-            ("[[step]]\ndo = \"dance\"", "step 1: do: `dance` is none of move, reach"),
-            ("[[step]]\nposes = 3", "step 1: do: is missing"),
-            ("[[step]]\ndo = 3", "step 1: do: 3 is no text"),
-            ("[[step]]\ndo = \"wait\"", "step 1 (wait): missing field `seconds`"),
-            ("[[step]]\ndo = \"wait\"\nseconds = -1.0", "step 1 (wait): seconds: -1 is outside"),
-            ("[[step]]\ndo = \"move\"", "needs either to = \"stowed\""),
-            ("[[step]]\ndo = \"reach\"\ntargets = [3]", "step 1 (reach): targets: 3 is outside 0 .. 2"),
-            ("[[step]]\ndo = \"reach\"\ntargets = []", "needs one number"),
-            ("[[step]]\ndo = \"work\"", "step 1 (work): missing field `tasks`"),
-            ("[[step]]\ndo = \"work\"\ntasks = 0", "step 1 (work): tasks: 0 is outside 1 .. 10000"),
-            ("[[step]]\ndo = \"work\"\ntasks = 2\ntargets = [7]", "step 1 (work): targets: 7 is outside 0 .. 2"),
-            ("[[step]]\ndo = \"work\"\ntasks = 2\ngaps_s = [[9.0, 4.0]]", "gaps_s (its end): 4 is outside 9 .."),
-            ("[[step]]\ndo = \"work\"\ntasks = 2\nlook_every = 0", "step 1 (work): look_every: 0 is outside"),
-            ("[[step]]\ndo = \"work\"\ntasks = 2\nbelief = \"hope\"", "unknown variant `hope`"),
-            ("[[step]]\ndo = \"work\"\ntasks = 2\nposes = 21", "step 1 (work): poses: 21 is outside 0 .. 20"),
-            ("[[step]]\ndo = \"grip\"", "step 1 (grip): missing field `opening`"),
-            ("[[step]]\ndo = \"grip\"\nopening = 1.5", "step 1 (grip): opening: 1.5 is outside 0 .. 1"),
-            ("[[step]]\ndo = \"touch\"", "step 1 (touch): missing field `part`"),
-            (
-                "[[step]]\ndo = \"touch\"\npart = \"bar\"\npoint_m = [1.0, 0.0, 0.0]\nnormal = [0.0, 0.0, 2.0]",
-                "step 1 (touch): normal: has the length 2",
-            ),
-            (
-                "[[step]]\ndo = \"touch\"\npart = \"bar\"\npoint_m = [1, 0, 0]\nnormal = [0, 0, 1]\nstd_m = 0.0",
-                "step 1 (touch): std_m: 0 is outside",
-            ),
-            ("[[step]]\ndo = \"capture\"\nposes = 1", "step 1 (capture): poses: 1 is outside"),
-            ("[[step]]\ndo = \"capture\"\npose = 30", "unknown field `pose`"),
-            ("[[step]]\ndo = \"calibrate\"", "no `capture` comes before it"),
-            ("[[step]]\ndo = \"capture\"\n[[step]]\ndo = \"recalibrate\"", "no `calibrate` comes before it"),
-            ("[[step]]\ndo = \"reach\"", "a script needs a `calibrate` step"),
-            ("[[step]]\ndo = \"assert\"\ntool_error_m = 0.01", "no `reach` comes before it"),
-            ("[[step]]\ndo = \"assert\"\nheld_out_rms_m = 0.01", "no `calibrate` comes before it"),
-            ("[[step]]\ndo = \"assert\"", "name one limit or more"),
-            ("[[step]]\ndo = \"assert\"\ntool_eror_m = 0.01", "unknown variant `tool_eror_m`"),
-            (
-                "[[step]]\ndo = \"move\"\nto = \"stowed\"\n[[step]]\ndo = \"identify\"\njoint = \"j\"",
-                "must come before",
-            ),
+            "\n[[step]]\ndo = \"captur\"",
+            &misnamed,
+            &again,
+            "[[step]]\ndo = \"touch\"\npart = \"bar\"",
+            "[[step]]\ndo = \"dance\"",
+            "[[step]]\nposes = 3",
+            "[[step]]\ndo = 3",
+            "[[step]]\ndo = \"wait\"",
+            "[[step]]\ndo = \"wait\"\nseconds = -1.0",
+            "[[step]]\ndo = \"move\"",
+            "[[step]]\ndo = \"reach\"\ntargets = [3]",
+            "[[step]]\ndo = \"reach\"\ntargets = []",
+            "[[step]]\ndo = \"work\"",
+            "[[step]]\ndo = \"work\"\ntasks = 0",
+            "[[step]]\ndo = \"work\"\ntasks = 2\ntargets = [7]",
+            "[[step]]\ndo = \"work\"\ntasks = 2\ngaps_s = [[9.0, 4.0]]",
+            "[[step]]\ndo = \"work\"\ntasks = 2\nlook_every = 0",
+            "[[step]]\ndo = \"work\"\ntasks = 2\nbelief = \"hope\"",
+            "[[step]]\ndo = \"work\"\ntasks = 2\nposes = 21",
+            "[[step]]\ndo = \"grip\"",
+            "[[step]]\ndo = \"grip\"\nopening = 1.5",
+            "[[step]]\ndo = \"touch\"",
+            "[[step]]\ndo = \"touch\"\npart = \"bar\"\npoint_m = [1.0, 0.0, 0.0]\nnormal = [0.0, 0.0, 2.0]",
+            "[[step]]\ndo = \"touch\"\npart = \"bar\"\npoint_m = [1, 0, 0]\nnormal = [0, 0, 1]\nstd_m = 0.0",
+            "[[step]]\ndo = \"capture\"\nposes = 1",
+            "[[step]]\ndo = \"capture\"\npose = 30",
+            "[[step]]\ndo = \"calibrate\"",
+            "[[step]]\ndo = \"capture\"\n[[step]]\ndo = \"recalibrate\"",
+            "[[step]]\ndo = \"reach\"",
+            "[[step]]\ndo = \"assert\"\ntool_error_m = 0.01",
+            "[[step]]\ndo = \"assert\"\nheld_out_rms_m = 0.01",
+            "[[step]]\ndo = \"assert\"",
+            "[[step]]\ndo = \"assert\"\ntool_eror_m = 0.01",
+            "[[step]]\ndo = \"move\"\nto = \"stowed\"\n[[step]]\ndo = \"identify\"\njoint = \"j\"",
         ];
-        for (text, expected) in cases {
-            let found = problem(text);
-            assert!(found.starts_with("r.toml: ") && found.contains(expected), "{found} lacks {expected}");
-        }
-        assert!(
-            problem(&format!("{LOOP}[[step]]\ndo = \"calibrate\"")).contains("between it and the last calibration")
-        );
+        let told = cases.map(|text| format!("{text:?}\n  {}\n", problem(text)));
+        insta::assert_snapshot!("script", told.concat());
         assert!(script(&format!("{LOOP}{LOOP}")).is_ok());
     }
 }

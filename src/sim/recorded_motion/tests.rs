@@ -184,35 +184,27 @@ fn with_line(number: usize, line: &str) -> String {
 
 #[test]
 fn bad_files_are_refused_with_line_column_and_range() {
-    let cases = [
-        (with_line(3, "0.5,nan,0,0,0,0,0"), "line 3, column x_m: NaN is outside -10000 .. 10000"),
-        (with_line(3, "0.5,0,0,inf,0,0,0"), "line 3, column z_m: inf is outside"),
-        (with_line(4, "1,0,0,zero,0,0,0"), "line 4, column z_m: `zero` is no number; allowed is -10000 .. 10000"),
-        (with_line(4, "1,0,0,0,0,,0"), "line 4, column pitch_rad: `` is no number"),
-        (with_line(4, "1,0,0,0,0,0"), "line 4: has 6 columns; the first line has 7"),
-        (with_line(4, "0.5,0,0,0,0,0,0"), "line 4, column time_s: 0.5 s does not come after 0.5 s"),
-        (with_line(6, "20,0,0,0,0,0,0"), "line 6, column time_s: a gap of 18.500 s since the line before; at most 1 s"),
-        (with_line(5, "1.5,40,0,0,0,0,0"), "line 5, columns x_m, y_m, z_m: a jump: it would take"),
-        (with_line(5, "1.5,0,0,0,0,0,3.0"), "line 5, columns roll_rad, pitch_rad, yaw_rad: turns by"),
-        (
-            with_line(1, "t,x,y,z,roll,pitch,yaw"),
-            "first line: has the columns `t,x,y,z,roll,pitch,yaw`; allowed are `time_s,",
-        ),
-        (HEADER.to_owned() + "0,0,0,0,0,0,0\n0.1,0,0,0,0,0,0\n", "has 2 samples; a motion needs 4 or more"),
-        (String::new(), "first line: has the columns"),
-        ("time_s,x_m,y_m,z_m,qw,qx,qy,qz\n0,0,0,0,0.5,0,0,0.5\n".to_owned(), "qw, qx, qy, qz: norm: 0.70"),
-    ];
-    for (text, expected) in cases {
-        let found = problem(&text);
-        assert!(found.starts_with("dive.csv: ") && found.contains(expected), "{found}\nnot: {expected}");
-    }
     // 0.5 rad to and fro within a tenth of a second: each turn is allowed, the acceleration is not.
     let shaken = "0,0,0,0,0,0,0\n0.05,0,0,0,0,0,0.5\n0.1,0,0,0,0,0,0\n0.15,0,0,0,0,0,0.5\n0.2,0,0,0,0,0,0\n";
-    let found = problem(&(HEADER.to_owned() + shaken));
-    assert!(found.contains("yaw_rad: a jump: it would take") && found.contains("0 .. 50 rad/s2"), "{found}");
     let close = "0,0,0,0,0,0,0\n1e-300,0,0,0,0,0,0\n2e-300,5,0,0,0,0,0\n0.2,0,0,0,0,0,0\n";
-    let found = problem(&(HEADER.to_owned() + close));
-    assert!(found.contains("z_m: a jump: it would take inf m/s2"), "{found}");
+    let texts = [
+        with_line(3, "0.5,nan,0,0,0,0,0"),
+        with_line(3, "0.5,0,0,inf,0,0,0"),
+        with_line(4, "1,0,0,zero,0,0,0"),
+        with_line(4, "1,0,0,0,0,,0"),
+        with_line(4, "1,0,0,0,0,0"),
+        with_line(4, "0.5,0,0,0,0,0,0"),
+        with_line(6, "20,0,0,0,0,0,0"),
+        with_line(5, "1.5,40,0,0,0,0,0"),
+        with_line(5, "1.5,0,0,0,0,0,3.0"),
+        with_line(1, "t,x,y,z,roll,pitch,yaw"),
+        HEADER.to_owned() + "0,0,0,0,0,0,0\n0.1,0,0,0,0,0,0\n",
+        String::new(),
+        "time_s,x_m,y_m,z_m,qw,qx,qy,qz\n0,0,0,0,0.5,0,0,0.5\n".to_owned(),
+        HEADER.to_owned() + shaken,
+        HEADER.to_owned() + close,
+    ];
+    insta::assert_snapshot!("recorded_motions", texts.map(|text| problem(&text)).join("\n"));
     let missing = RecordedMotion::read(Path::new("no/such.csv")).expect_err("refused").to_string();
     assert!(missing.contains("no/such.csv"), "{missing}");
 }

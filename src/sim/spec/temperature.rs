@@ -90,15 +90,13 @@ mod tests {
     #[test]
     fn a_profile_that_is_none_is_refused_with_the_reason() {
         let long = format!("profile_depth_m = {:?}", (0..17).map(f64::from).collect::<Vec<_>>());
-        for (text, reason) in [
-            ("profile_depth_m = [0.0, 10.0]\nprofile_c = [4.0]", "1 figures for 2"),
-            ("profile_depth_m = [10.0, 10.0]\nprofile_c = [4.0, 5.0]", "10 does not come before 10"),
-            ("profile_depth_m = [nan]\nprofile_c = [4.0]", "profile_depth_m: NaN is outside"),
-            ("profile_depth_m = [1.0]\nprofile_c = [31.0]", "profile_c: 31 is outside -2 .. 30"),
-            (&long, "17 figures; 16 at most"),
-        ] {
-            let problem = read(text).expect_err("refused");
-            assert!(problem.contains(reason), "{problem}");
-        }
+        let texts = [
+            "profile_depth_m = [0.0, 10.0]\nprofile_c = [4.0]",
+            "profile_depth_m = [10.0, 10.0]\nprofile_c = [4.0, 5.0]",
+            "profile_depth_m = [nan]\nprofile_c = [4.0]",
+            "profile_depth_m = [1.0]\nprofile_c = [31.0]",
+            &long,
+        ];
+        insta::assert_snapshot!("profiles", texts.map(|text| read(text).expect_err("refused")).join("\n"));
     }
 }

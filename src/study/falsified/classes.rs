@@ -26,23 +26,24 @@ const MIN_EIGENVALUE: f64 = 1e-3;
 
 /// One direction in which a cause can be wrong.
 #[derive(Clone, Debug)]
-struct Column {
-    cause: String,
+pub(super) struct Column {
+    pub cause: String,
     words: String,
     /// Of size one; then of the non-centrality that columns are scaled to.
     unit: Perturbation,
 }
 
 /// What the views tell of every column.
+#[derive(Clone, Debug)]
 pub struct EquivalenceClasses {
     /// Those that the views see.
     columns: Vec<Column>,
     information: DMatrix<f64>,
 }
 
-/// By the views of one capture.
-pub(super) fn equivalence_classes(oracle: &Oracle<'_>) -> EquivalenceClasses {
-    let columns: Vec<Column> = columns(oracle.robot()).into_par_iter().filter_map(|c| scaled(oracle, c)).collect();
+/// Of these columns, by the views of one capture.
+pub(super) fn equivalence_classes(oracle: &Oracle<'_>, columns: Vec<Column>) -> EquivalenceClasses {
+    let columns: Vec<Column> = columns.into_par_iter().filter_map(|c| scaled(oracle, c)).collect();
     let cost = |of: &[Perturbation]| oracle.effect(of).non_centrality;
     let own: Vec<f64> = columns.par_iter().map(|column| cost(&[column.unit])).collect();
     let n = columns.len();
@@ -70,7 +71,7 @@ fn scaled(oracle: &Oracle<'_>, column: Column) -> Option<Column> {
 }
 
 /// All directions of all causes, of size one.
-fn columns(robot: &Robot) -> Vec<Column> {
+pub(super) fn columns(robot: &Robot) -> Vec<Column> {
     use Perturbation as P;
     let mut all = Vec::new();
     let mut add = |cause: &str, words: String, unit: P| all.push(Column { cause: cause.to_owned(), words, unit });

@@ -43,7 +43,7 @@ impl OracleEffect {
 
 /// The twin of one capture.
 pub(super) struct Oracle<'a> {
-    capture: &'a Capture,
+    pub capture: &'a Capture,
     views: Vec<View>,
     model: Model,
     scales: Hyperparameters,

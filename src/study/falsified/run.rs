@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::falsified::capture::{Capture, Scene, TrueRest};
 use crate::falsified::cases::{AXES, Case, CaseKind, Element};
-use crate::falsified::classes::{EquivalenceClasses, equivalence_classes};
+use crate::falsified::classes::{EquivalenceClasses, columns, equivalence_classes};
 use crate::falsified::error::FalsifiedError;
 use crate::falsified::naming::{causes_of_finding, first_causes, right_causes};
 use crate::falsified::oracle::{Oracle, OracleEffect};
@@ -123,24 +123,17 @@ pub fn falsified_study(
     seeds: std::ops::Range<u64>,
 ) -> Result<FalsifiedStudy, FalsifiedError> {
     let scene = Scene { routine, robot, vehicle };
-    let n_touches = cases.iter().map(|case| case.n_touches).max().unwrap_or_default();
     let simulate = |seed: u64| -> Result<Capture, FalsifiedError> {
         let capture = Capture::simulate(&scene, seed)?;
-        match capture.n_touches() {
-            n if n < n_touches => Err(FalsifiedError::Touches { seed, n, n_touches }),
-            _ => Ok(capture),
-        }
+        check_touches(&capture, cases)?;
+        Ok(capture)
     };
     let first = simulate(seeds.start)?;
     let first_oracle = Oracle::new(&first)?;
-    let classes = equivalence_classes(&first_oracle);
-    let rows_of = |capture: &Capture, oracle: &Oracle<'_>| -> Vec<FalsifiedRow> {
-        cases.par_iter().map(|case| row(capture, oracle, &classes, case)).collect()
-    };
-    let mut rows = rows_of(&first, &first_oracle);
+    let classes = equivalence_classes(&first_oracle, columns(first_oracle.robot()));
+    let mut rows = rows_of(&first_oracle, &classes, cases);
     let of_seed = |seed: u64| -> Result<Vec<FalsifiedRow>, FalsifiedError> {
-        let capture = simulate(seed)?;
-        Ok(rows_of(&capture, &Oracle::new(&capture)?))
+        Ok(rows_of(&Oracle::new(&simulate(seed)?)?, &classes, cases))
     };
     let others = seeds.start + 1..seeds.end;
     let by_seed: Vec<Result<Vec<FalsifiedRow>, FalsifiedError>> = others.into_par_iter().map(of_seed).collect();
@@ -150,7 +143,20 @@ pub fn falsified_study(
     Ok(FalsifiedStudy { rows, classes })
 }
 
-fn row(capture: &Capture, oracle: &Oracle<'_>, classes: &EquivalenceClasses, case: &Case) -> FalsifiedRow {
+/// Checks that the capture has as many touches as each case takes.
+pub(super) fn check_touches(capture: &Capture, cases: &[Case]) -> Result<(), FalsifiedError> {
+    let (seed, n) = (capture.seed, capture.n_touches());
+    let n_touches = cases.iter().map(|case| case.n_touches).max().unwrap_or_default();
+    if n < n_touches { Err(FalsifiedError::Touches { seed, n, n_touches }) } else { Ok(()) }
+}
+
+/// Rows of the oracle's capture, in the order of the cases.
+pub(super) fn rows_of(oracle: &Oracle<'_>, classes: &EquivalenceClasses, cases: &[Case]) -> Vec<FalsifiedRow> {
+    cases.par_iter().map(|case| row(oracle, classes, case)).collect()
+}
+
+fn row(oracle: &Oracle<'_>, classes: &EquivalenceClasses, case: &Case) -> FalsifiedRow {
+    let capture = oracle.capture;
     let seed = capture.seed;
     let perturbations = case.perturbations(&capture.robot, seed);
     let robot = falsified_robot(&capture.robot, &perturbations);

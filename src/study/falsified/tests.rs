@@ -1,16 +1,18 @@
 //! On two seeds: falsifications are applied, seen, named and scored as they are meant to be.
 
 use std::path::Path;
-use std::sync::OnceLock;
+use std::sync::LazyLock;
 
 use nalgebra::Vector3;
 
 use crate::falsified::capture::{Capture, Scene};
 use crate::falsified::cases::{Case, CaseKind, Element, Tier, falsified_cases, touched_cases};
+use crate::falsified::classes::{Column, columns, equivalence_classes};
+use crate::falsified::error::FalsifiedError;
 use crate::falsified::naming::{causes_of_finding, right_causes};
 use crate::falsified::oracle::Oracle;
 use crate::falsified::perturbation::{Perturbation, SensorFault, WrongReading};
-use crate::falsified::run::{FalsifiedRow, FalsifiedStudy, RunStatus, falsified_study};
+use crate::falsified::run::{FalsifiedRow, FalsifiedStudy, RunStatus, check_touches, falsified_study, rows_of};
 use crate::falsified::{falsified_csv, falsified_markdown};
 use armcal_belief::calib::{Finding, FindingKind};
 use armcal_core::robot::{Robot, Vehicle};
@@ -27,19 +29,21 @@ fn scene_of(routine: &str) -> (Routine, Robot, Vehicle) {
     (routine, robot, vehicle)
 }
 
-fn study(cases: &[Case], seeds: std::ops::Range<u64>) -> FalsifiedStudy {
-    let (routine, robot, vehicle) = scene();
-    falsified_study(&routine, (&robot, &vehicle), cases, seeds).expect("a study")
-}
-
 /// The small tier on two seeds.
-fn small() -> &'static FalsifiedStudy {
-    static SMALL: OnceLock<FalsifiedStudy> = OnceLock::new();
-    SMALL.get_or_init(|| study(&falsified_cases(&scene().1, Tier::Small), 1..3))
+static SMALL: LazyLock<FalsifiedStudy> = LazyLock::new(|| {
+    let (routine, robot, vehicle) = scene();
+    falsified_study(&routine, (&robot, &vehicle), &falsified_cases(&robot, Tier::Small), 1..3).expect("a study")
+});
+
+/// The first seed of it.
+static CAPTURE: LazyLock<Capture> = LazyLock::new(|| capture_of(&scene()));
+
+fn capture_of((routine, robot, vehicle): &(Routine, Robot, Vehicle)) -> Capture {
+    Capture::simulate(&Scene { routine, robot, vehicle }, 1).expect("a capture")
 }
 
 fn of(kind: CaseKind) -> impl Iterator<Item = &'static FalsifiedRow> {
-    small().rows.iter().filter(move |row| row.case.kind == kind)
+    SMALL.rows.iter().filter(move |row| row.case.kind == kind)
 }
 
 /// 95 % of the targets, m.
@@ -58,7 +62,7 @@ fn a_good_arm_is_left_alone() {
 #[test]
 fn what_the_data_see_is_refused_or_repaired() {
     let good_m: Vec<f64> = of(CaseKind::GoodArm).map(true_p95_m).collect();
-    let seen = small().rows.iter().filter(|row| row.is_seen());
+    let seen = SMALL.rows.iter().filter(|row| row.is_seen());
     let large: Vec<&FalsifiedRow> = seen.filter(|row| row.matters(3.0, 0.0015)).collect();
     assert!(large.len() >= 10, "{}", large.len());
     for row in large {
@@ -99,11 +103,16 @@ fn what_no_view_shows_is_known_to_the_oracle() {
 /// Three touches: what no view shows is refused by name, and a good arm is left alone.
 #[test]
 fn three_touches_refuse_a_tool_point_that_no_view_shows() {
-    let (routine, robot, vehicle) = scene_of("titan4-touch");
+    let scene = scene_of("titan4-touch");
     let wanted = [CaseKind::GoodArm, CaseKind::ToolShifted];
-    let cases = touched_cases(&falsified_cases(&robot, Tier::Small));
+    let cases = touched_cases(&falsified_cases(&scene.1, Tier::Small));
     let cases: Vec<Case> = cases.into_iter().filter(|case| wanted.contains(&case.kind)).collect();
-    let study = falsified_study(&routine, (&robot, &vehicle), &cases, 1..2).expect("a study");
+    let capture = capture_of(&scene);
+    assert!(check_touches(&capture, &cases).is_ok());
+    let oracle = Oracle::new(&capture).expect("an estimate");
+    // No view shows a tool point: it is in no class.
+    let classes = equivalence_classes(&oracle, Vec::new());
+    let study = FalsifiedStudy { rows: rows_of(&oracle, &classes, &cases), classes };
     let [good, shifted] = &study.rows[..] else { panic!("{} rows", study.rows.len()) };
     assert!(good.status == RunStatus::Accepted && !good.is_wrongly_accepted(), "{good:?}");
     assert!(shifted.status == RunStatus::Refused && shifted.is_named == Some(true), "{shifted:?}");
@@ -112,14 +121,13 @@ fn three_touches_refuse_a_tool_point_that_no_view_shows() {
     assert!(table.contains("| tool point shifted, 3 touches | 1 | 0 | 1 | 0 | 0 |"), "{table}");
     assert!(falsified_csv(&study.rows).contains("1,tool point shifted with 3 touches,x,20.000,mm,refused"));
     // The quickstart touches nothing.
-    let (routine, robot, vehicle) = scene();
-    let none = falsified_study(&routine, (&robot, &vehicle), &cases, 1..2).err().expect("no study");
-    assert!(none.to_string().contains("0 touches"), "{none}");
+    let none = check_touches(&CAPTURE, &cases);
+    assert!(matches!(none, Err(FalsifiedError::Touches { seed: 1, n: 0, n_touches: 3 })), "{none:?}");
 }
 
 #[test]
 fn table_and_csv_have_every_row_and_kind() {
-    let study = small();
+    let study = &*SMALL;
     let csv = falsified_csv(&study.rows);
     assert_eq!(csv.lines().count(), study.rows.len() + 1);
     assert!(!csv.contains("/tmp"), "{csv}");
@@ -130,25 +138,30 @@ fn table_and_csv_have_every_row_and_kind() {
     assert!(table.contains("| good arm | 2 | 2 | 0 | 0 | 0 |"), "{table}");
 }
 
+/// A capture of its own, and few of the directions that the classes have.
 #[test]
 fn the_same_seed_gives_the_same_rows_on_any_number_of_threads() {
     let few = [CaseKind::GoodArm, CaseKind::SensorSlipped, CaseKind::TagMoved];
-    let cases: Vec<Case> =
-        falsified_cases(&scene().1, Tier::Small).into_iter().filter(|case| few.contains(&case.kind)).collect();
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
-    let alone = pool.install(|| study(&cases, 1..2));
-    let is_among = |row: &&FalsifiedRow| row.seed == 1 && few.contains(&row.case.kind);
-    let together: Vec<FalsifiedRow> = small().rows.iter().filter(is_among).cloned().collect();
-    assert_eq!(alone.rows, together);
-    assert_eq!(alone.classes.markdown(), small().classes.markdown());
+    let is_few = |case: &Case| few.contains(&case.kind);
+    let cases: Vec<Case> = falsified_cases(&scene().1, Tier::Small).into_iter().filter(is_few).collect();
+    let on = |threads: usize| rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+    let alone = on(1).install(|| rows_of(&Oracle::new(&CAPTURE).expect("an estimate"), &SMALL.classes, &cases));
+    let is_among = |row: &&FalsifiedRow| row.seed == 1 && is_few(&row.case);
+    let together: Vec<FalsifiedRow> = SMALL.rows.iter().filter(is_among).cloned().collect();
+    assert_eq!(alone, together);
+    let oracle = Oracle::new(&CAPTURE).expect("an estimate");
+    let pitches = |column: &Column| column.cause.ends_with("_pitch");
+    let classes_on = |threads: usize| {
+        let few = columns(oracle.robot()).into_iter().filter(pitches).collect();
+        on(threads).install(|| equivalence_classes(&oracle, few).markdown())
+    };
+    assert_eq!(classes_on(1), classes_on(3));
+    assert!(classes_on(3).contains("link:wrist_pitch"), "{}", classes_on(3));
 }
 
 #[test]
 fn the_oracle_is_a_quadratic_form_of_small_errors() {
-    let (routine, robot, vehicle) = scene();
-    let scene = Scene { routine: &routine, robot: &robot, vehicle: &vehicle };
-    let capture = Capture::simulate(&scene, 1).expect("a capture");
-    let oracle = Oracle::new(&capture).expect("an estimate");
+    let oracle = Oracle::new(&CAPTURE).expect("an estimate");
     let cost = |of: &[Perturbation]| oracle.effect(of).non_centrality;
     let none = oracle.effect(&[]);
     assert!(none.non_centrality < 1e-9 && none.tool_m < 1e-9, "{none:?}");
@@ -168,7 +181,7 @@ fn the_oracle_is_a_quadratic_form_of_small_errors() {
 
 #[test]
 fn causes_that_the_data_cannot_tell_apart_are_one_class() {
-    let classes = &small().classes;
+    let classes = &SMALL.classes;
     let slip = Perturbation::Sensor(SensorFault { joint: 2, reading: WrongReading::Slipped(1.0) });
     // A shift along the parallel axes of two pitch joints is one and the same for both.
     let of = |unit: Perturbation| classes.of(&[unit.scaled(0.01)]);

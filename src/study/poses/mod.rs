@@ -12,4 +12,4 @@ mod study;
 mod tests;
 
 pub use report::{poses_csv, poses_figure, poses_table};
-pub use study::{PoseRow, PoseStudyError, pose_study};
+pub use study::{PoseGrid, PoseRow, PoseStudyError, pose_study};

@@ -66,6 +66,19 @@ struct Scene<'a> {
     targets_m: &'a [[f64; 3]],
     task: Vec<JointAngles>,
     world: &'a WorldSpec,
+    of: PoseGrid<'a>,
+}
+
+/// Criteria and numbers of poses; each estimate is the same whatever others there are.
+#[derive(Clone, Copy, Debug)]
+pub struct PoseGrid<'a> {
+    pub criteria: &'a [PoseCriterion],
+    pub poses: &'a [usize],
+}
+
+impl PoseGrid<'static> {
+    /// All that the table has.
+    pub const WHOLE: Self = Self { criteria: &CRITERIA, poses: &POSES };
 }
 
 /// Runs `seeds` of the routine's scene; rows by seed, criterion and number of poses.
@@ -76,6 +89,7 @@ pub fn pose_study(
     routine: &Routine,
     (robot, vehicle): (&Robot, &Vehicle),
     world: &WorldSpec,
+    of: PoseGrid<'_>,
     seeds: std::ops::Range<u64>,
 ) -> Result<Vec<PoseRow>, PoseStudyError> {
     let capture = routine.steps.iter().find_map(|step| match step {
@@ -90,7 +104,7 @@ pub fn pose_study(
     let mut rng = stream_rng(routine.seed, "targets of the study of poses");
     let task = plan_targets(robot, &clearance, &bounds, &request, &mut rng);
     let task = task.into_iter().collect::<Result<Vec<_>, _>>()?;
-    let scene = Scene { robot, clearance: &clearance, bounds, capture, targets_m, task, world };
+    let scene = Scene { robot, clearance: &clearance, bounds, capture, targets_m, task, world, of };
     let of_seed: Vec<Result<Vec<PoseRow>, PoseStudyError>> =
         seeds.into_par_iter().map(|seed| scene.of_seed(seed)).collect();
     let mut rows = Vec::new();
@@ -106,10 +120,10 @@ impl Scene<'_> {
         let mut rng = stream_rng(seed, "poses of the study");
         let pool = PosePool::gather(&self.request(&visibility, &self.capture, POOL), POOL, &mut rng)?;
         let arm = TrueArm::draw(self.robot, self.clearance, self.world, seed);
-        let mut rows = Vec::with_capacity(CRITERIA.len() * POSES.len());
-        for criterion in CRITERIA {
+        let mut rows = Vec::with_capacity(self.of.criteria.len() * self.of.poses.len());
+        for &criterion in self.of.criteria {
             let capture = CaptureSettings { criterion, held_out: 0, ..self.capture };
-            for poses in POSES {
+            for &poses in self.of.poses {
                 let name = format!("{criterion:?} {poses}");
                 let request = self.request(&visibility, &capture, poses);
                 let plan = pool.choose(&request, &mut stream_rng(seed, &name))?;

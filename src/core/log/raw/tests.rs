@@ -267,8 +267,7 @@ fn empty_and_foreign_files_are_errors_that_name_the_file() {
     std::fs::write(&path, "").unwrap();
     assert!(matches!(read(&path), LogError::Empty { .. }));
     std::fs::write(&path, "hello, this is a text").unwrap();
-    let message = read(&path).to_string();
-    assert!(message.contains("notes.txt: not an MCAP recording"), "{message}");
+    assert!(matches!(read(&path), LogError::NotMcap { path: file, .. } if file == path));
     assert!(matches!(read(dir.path()), LogError::Read { .. }));
 }
 
@@ -292,7 +291,8 @@ fn chunks_in_another_order_are_sorted_and_do_not_pass_for_whole() {
     // The chunks 2, 3 and 1 lie behind chunk 4.
     assert_eq!(summary.chunk_order, ChunkOrder { moved: 3, copies: 0 });
     let Completeness::Damaged { reason, lost_messages, .. } = summary.completeness else { panic!("{summary:?}") };
-    assert!(reason.contains("checksum of all data") && lost_messages == Some(0), "{reason}");
+    assert_eq!(lost_messages, Some(0));
+    insta::assert_snapshot!("chunks_in_another_order", reason);
     // Without a checksum, or with one of that order, a writer may well have written them so.
     tail[9..13].fill(0);
     let (read_back, summary) = read(&swapped(&tail)).unwrap();
@@ -352,7 +352,8 @@ fn more_records_than_a_chunk_can_hold_are_not_read() {
     let (summary, _) = scan(Cursor::new(&bytes), |_| n += 1).unwrap();
     assert!((1_000_000..1_400_000).contains(&n), "{n}");
     let Completeness::Damaged { reason, lost_chunks, .. } = summary.completeness else { panic!("{summary:?}") };
-    assert!(reason.contains("more than") && lost_chunks == 1, "{reason}");
+    assert_eq!(lost_chunks, 1);
+    insta::assert_snapshot!("many_records", reason);
 }
 
 /// Whole and cut, and with chunks that lie in another order.
@@ -395,7 +396,7 @@ fn zeros_in_a_chunk_are_no_records() {
     assert_eq!(read_back.len(), messages.len() - PER_CHUNK);
     let Completeness::Damaged { reason, .. } = summary.completeness else { panic!("{summary:?}") };
     // The summary is no more where the footer has it; its damage is told first.
-    assert!(reason.contains("summary") || reason.contains("no record begins with 00"), "{reason}");
+    insta::assert_snapshot!("zeros_in_a_chunk", reason);
 }
 
 #[test]

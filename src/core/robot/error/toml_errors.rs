@@ -204,26 +204,14 @@ mod tests {
     }
 
     #[test]
-    fn all_missing_keys_are_named_at_once_with_their_tables() {
-        assert!(
-            problem("").ends_with("missing field `version`; also missing: `name`, `camera`, `kind`"),
-            "{}",
-            problem("")
-        );
-        let text = "version = 1\n[camera]\n[[tag]]\nid = 1\n[[tag]]\nid = 2\nsize_m = 0.1\n";
-        let told = problem(text);
-        assert!(told.contains("line 2") && told.contains("missing field `focal_px`"), "{told}");
-        let others = "also missing: `link` in [camera], `size_m` in [[tag]], `position_m` in [[tag]], `position_m` in \
-                      [[tag]], `name`, `kind`";
-        assert!(told.ends_with(others), "{told}");
-        let inline = problem("version = 1\nname = \"a\"\nkind = \"pinhole\"\ncamera = {}\n");
-        assert!(inline.ends_with("missing field `focal_px`; also missing: `link` in line 4"), "{inline}");
-    }
-
-    #[test]
-    fn another_mistake_is_told_as_it_is_and_an_unknown_key_with_the_likeliest() {
-        assert!(problem("version = \"one\"").ends_with("expected u32"), "{}", problem("version = \"one\""));
-        let told = problem("verson = 1");
-        assert!(told.contains("unknown field `verson`") && told.ends_with("; did you mean `version`?"), "{told}");
+    fn all_missing_keys_are_named_with_their_tables_and_an_unknown_one_with_the_likeliest() {
+        let texts = [
+            "",
+            "version = 1\n[camera]\n[[tag]]\nid = 1\n[[tag]]\nid = 2\nsize_m = 0.1\n",
+            "version = 1\nname = \"a\"\nkind = \"pinhole\"\ncamera = {}\n",
+            "version = \"one\"",
+            "verson = 1",
+        ];
+        insta::assert_snapshot!("toml_errors", texts.map(|text| format!("{text:?}\n{}\n", problem(text))).concat());
     }
 }
