@@ -6,9 +6,9 @@ use crate::calib::bundle::drawing::Drawing;
 use crate::calib::bundle::estimate::estimate;
 use crate::calib::bundle::tags::freed::MovedTags;
 use crate::calib::bundle::tags::identity::TagFault;
+use crate::calib::bundle::tests::arms::{Built, arm};
 use crate::calib::bundle::tests::data::titan;
-use crate::calib::bundle::tests::score_test::{input, views_of, views_of_changed, with_link};
-use armcal_core::robot::Robot;
+use crate::calib::bundle::tests::score_test::{input, views_of_changed};
 
 #[test]
 fn a_tag_that_was_knocked_aside_is_named() {
@@ -44,13 +44,9 @@ fn a_good_survey_and_a_wrong_link_are_left_alone() {
     let mut suspected = [0, 0];
     const SEEDS: u64 = 40;
     for seed in 0..SEEDS {
-        let (views, model) = views_of(&robot, &robot, seed);
-        let found = estimate(&input(&robot, &views, &model)).expect("solved");
-        suspected[0] += u64::from(found.moved_tag().is_some());
+        suspected[0] += u64::from(arm(Built::AsDrawn, seed).found.moved_tag().is_some());
         let joint = 1 + seed as usize % (robot.n_seen_joints() - 1);
-        let (views, model) = views_of(&robot, &with_link(&robot, joint, 0.01, Vector3::zeros()), seed);
-        let found = estimate(&input(&robot, &views, &model)).expect("solved");
-        suspected[1] += u64::from(found.moved_tag().is_some());
+        suspected[1] += u64::from(arm(Built::Longer(joint), seed).found.moved_tag().is_some());
     }
     println!("tags suspected: {} of {SEEDS} good arms, {} with a wrong link", suspected[0], suspected[1]);
     assert!(suspected[0] == 0 && suspected[1] <= 2, "{suspected:?} of {SEEDS}");

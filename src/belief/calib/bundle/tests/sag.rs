@@ -1,14 +1,13 @@
 //! Arms that bend under their weight.
 
-use nalgebra::Vector3;
-
 use crate::calib::bundle::drawing::Drawing;
-use crate::calib::bundle::estimate::{estimate, least_squares};
+use crate::calib::bundle::estimate::{Estimate, estimate, least_squares};
 use crate::calib::bundle::input::BundleInput;
 use crate::calib::bundle::model::Model;
+use crate::calib::bundle::tests::arms::{Built, arm, better};
 use crate::calib::bundle::tests::data::{normal, rng, titan};
 use crate::calib::bundle::tests::drawing::{Case, case_changed, tool_errors_m};
-use crate::calib::bundle::tests::score_test::{input, with_link};
+use crate::calib::bundle::tests::score_test::input;
 use crate::calib::finding::FindingKind;
 use crate::calib::views::view::View;
 use crate::calib::{Calibration, CalibrationData, CaptureData, HeldOut, Refusal, Status, calibrate_data};
@@ -20,19 +19,26 @@ use armcal_core::routine::Method;
 use armcal_core::sensor::{ArmSensors, ConditionChange};
 use armcal_core::stats::quantile;
 
-/// The drawing that explains the views best, step by step.
-pub(super) fn revised(input: &BundleInput<'_>) -> Drawing {
-    let mut drawing = Drawing::default();
-    for _ in 0..4 {
-        let mut wider = input.clone();
-        drawing.apply(&mut wider);
-        let found = estimate(&wider).expect("solved");
-        match drawing.better(&wider, &found, 0.0) {
-            Some(better) => drawing = better,
-            None => break,
-        }
+/// The drawing that explains the views best, step by step, and the estimate under it.
+pub(super) fn revised<'a>(input: &BundleInput<'a>) -> (Drawing, Estimate<'a>) {
+    revised_from(input, (Drawing::default(), estimate(input).expect("solved")), 4)
+}
+
+fn revised_from<'a>(
+    input: &BundleInput<'a>,
+    (mut drawing, mut found): (Drawing, Estimate<'a>),
+    n_steps: usize,
+) -> (Drawing, Estimate<'a>) {
+    let mut wider = input.clone();
+    drawing.apply(&mut wider);
+    for _ in 0..n_steps {
+        let Some(better) = drawing.better(&wider, &found, 0.0) else { break };
+        wider = input.clone();
+        better.apply(&mut wider);
+        found = estimate(&wider).expect("solved");
+        drawing = better;
     }
-    drawing
+    (drawing, found)
 }
 
 /// Each joint before the camera, and the base about its horizontal axes, gives by as much as `rad_per_nm`, half to one
@@ -65,17 +71,13 @@ const SEEDS: usize = 20;
 fn errors(robot: &Robot, sag: impl Fn(u64) -> Sag) -> Errors {
     let mut errors = Errors::default();
     for seed in 0..SEEDS as u64 {
-        let straight = soft_case(robot, Sag::default(), seed);
-        let found = estimate(&input(robot, &straight.views, &straight.model)).expect("solved");
-        errors.stiff.extend(tool_errors_m(robot, &straight.truth, robot, &found, seed));
+        let stiff = arm(Built::AsDrawn, seed);
+        errors.stiff.extend(tool_errors_m(robot, &stiff.case.truth, robot, &stiff.found, seed));
         let case = soft_case(robot, sag(seed), seed);
         let as_drawn = input(robot, &case.views, &case.model);
         let first = estimate(&as_drawn).expect("solved");
         errors.plain.extend(tool_errors_m(robot, &case.truth, robot, &first, seed));
-        let drawing = revised(&as_drawn);
-        let mut wider = as_drawn.clone();
-        drawing.apply(&mut wider);
-        let found = estimate(&wider).expect("solved");
+        let (drawing, found) = revised_from(&as_drawn, (Drawing::default(), first), 4);
         errors.bent.extend(tool_errors_m(robot, &case.truth, robot, &found, seed));
         errors.n_named += usize::from(drawing.sag.is_some());
         errors.n_links += usize::from(drawing.links.is_some());
@@ -128,9 +130,10 @@ fn a_link_that_is_off_is_no_sag() {
     let [mut n_sag, mut n_links] = [0; 2];
     for seed in 0..6 {
         for joint in 1..robot.n_seen_joints() {
-            let real = with_link(&robot, joint, 0.01, Vector3::new(0.006, -0.006, 0.003));
-            let case = case_changed(&robot, &real, seed, |_| {});
-            let drawing = revised(&input(&robot, &case.views, &case.model));
+            let built = Built::LongerAndTurned(joint);
+            let first = better(built, seed).cloned();
+            let drawing =
+                first.map_or_else(Drawing::default, |first| revised_from(&arm(built, seed).input(), first, 3).0);
             n_links += usize::from(drawing.links.is_some());
             n_sag += usize::from(drawing.sag.is_some());
         }
@@ -221,9 +224,7 @@ fn attitudes_of_a_leaning_base_are_used() {
         let soft = || soft(&robot, 3e-5, 0.0, seed);
         let error_m = |case: &Case, views: &[View]| {
             let as_drawn = input(&robot, views, &case.model);
-            let mut wider = as_drawn.clone();
-            revised(&as_drawn).apply(&mut wider);
-            tool_errors_m(&robot, &case.truth, &robot, &estimate(&wider).expect("solved"), seed)
+            tool_errors_m(&robot, &case.truth, &robot, &revised(&as_drawn).1, seed)
         };
         let case = soft_case(&robot, soft(), seed);
         level.extend(error_m(&case, &case.views));

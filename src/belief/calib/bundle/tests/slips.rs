@@ -15,6 +15,7 @@ use armcal_core::joints::JointAngles;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::ConditionChange;
 
+#[derive(Clone)]
 struct Case {
     robot: Robot,
     truth: Truth,
@@ -100,13 +101,15 @@ fn a_slip_is_found_with_joint_time_and_size_and_costs_hardly_anything() {
     const SEEDS: u64 = 24;
     const N_VIEWS: usize = 30;
     let (mut all_strong, mut all_named) = (0, 0);
+    let sound: Vec<Case> = (0..SEEDS).map(|seed| case(seed, N_VIEWS)).collect();
+    let clean_m = |case: &Case| with_estimate(case, &[], |found| tool_error_m(case, found));
+    let clean_m: Vec<f64> = sound.iter().map(clean_m).collect();
     for size_deg in [0.1_f64, 0.3, 1.0, 2.0] {
         let (mut strong, mut named, mut misplaced, mut others) = (0, 0, 0, 0);
         let (mut ratios, mut squares) = (Vec::new(), Vec::new());
         for seed in 0..SEEDS {
-            let mut case = case(seed, N_VIEWS);
+            let (mut case, clean_m) = (sound[seed as usize].clone(), clean_m[seed as usize]);
             let (joint, since) = (seed as usize % 5, 8 + (7 * seed as usize) % 14);
-            let clean_m = with_estimate(&case, &[], |found| tool_error_m(&case, found));
             let by_rad = size_deg.to_radians() * if seed % 2 == 0 { 1.0 } else { -1.0 };
             slip(&mut case, joint, since, by_rad);
             let is_strong = noncentrality(&case, joint, since) > 60.0;

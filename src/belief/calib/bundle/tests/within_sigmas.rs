@@ -3,7 +3,6 @@
 use nalgebra::{Isometry3, Matrix3, Vector3, Vector6};
 
 use crate::calib::bundle::drawing::Drawing;
-use crate::calib::bundle::estimate::estimate;
 use crate::calib::bundle::tests::data::{Truth, normal, rng, titan};
 use crate::calib::bundle::tests::sag::revised;
 use crate::calib::bundle::tests::score_test::{input, views_of_changed};
@@ -84,10 +83,7 @@ fn errors(robot: &Robot, seed: u64) -> Errors {
         sensors = truth.parameters;
     });
     let as_drawn = input(robot, &views, &model);
-    let drawing = revised(&as_drawn);
-    let mut wider = as_drawn.clone();
-    drawing.apply(&mut wider);
-    let found = estimate(&wider).expect("solved");
+    let (drawing, found) = revised(&as_drawn);
     let (task, believed) = (task(robot, seed), found.parameters());
     let at: Vec<JointAngles> = task.iter().map(|travel_rad| angles(robot, &believed, travel_rad)).collect();
     let known = believed.with_links(robot.clone());

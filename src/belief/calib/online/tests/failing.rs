@@ -18,7 +18,7 @@ fn a_sensor_that_fails_now_and_then_is_named() {
     let mut missed = Vec::new();
     for seed in 0..10 {
         let joint = seed as usize % 5;
-        let (mut online, mut dive) = after_an_hour(&robot, seed, Happens::Nothing);
+        let (mut online, mut dive) = after_an_hour(seed, Happens::Nothing);
         online.take_events();
         for k in 0..12 {
             let mut view = dive.view();
@@ -44,11 +44,10 @@ fn a_sensor_that_fails_now_and_then_is_named() {
 /// camera and no other sensor is blamed.
 #[test]
 fn a_reading_that_is_left_out_may_be_anything() {
-    let robot = titan();
     let mut told = Vec::new();
     for seed in 0..5 {
         let joint = seed as usize;
-        let (mut online, mut dive) = after_an_hour(&robot, seed, Happens::Nothing);
+        let (mut online, mut dive) = after_an_hour(seed, Happens::Nothing);
         online.take_events();
         online.leave_out(joint);
         for k in 0..18 {
@@ -65,7 +64,7 @@ fn a_reading_that_is_left_out_may_be_anything() {
 #[test]
 fn images_that_scatter_are_not_looked_at_where_a_sensor_failed() {
     let robot = titan();
-    let (mut online, mut dive) = after_an_hour(&robot, 1, Happens::Nothing);
+    let (mut online, mut dive) = after_an_hour(1, Happens::Nothing);
     let sees = |view: &View| view.tags.len() > 2;
     let still = std::iter::repeat_with(|| dive.view()).find(sees).expect("it ends");
     let mut creeping = still.clone();
@@ -93,7 +92,7 @@ fn a_slip_is_named_while_another_view_is_looked_into() {
     let mut missed = Vec::new();
     for (seed, n_between) in (0..10).flat_map(|seed| [(seed, 0), (seed, 4)]) {
         let joint = seed as usize % 4;
-        let (mut online, mut dive) = after_an_hour(&robot, seed, Happens::Nothing);
+        let (mut online, mut dive) = after_an_hour(seed, Happens::Nothing);
         online.take_events();
         let sees = |view: &View| view.tags.len() > 4;
         let mut view = std::iter::repeat_with(|| dive.view()).find(sees).expect("it ends");
