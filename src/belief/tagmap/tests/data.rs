@@ -172,7 +172,6 @@ fn sizes_that_are_off_by_ten_are_named() {
     assert_eq!(one.len(), 1, "{one:?}");
     assert_eq!(one[0].tags, [3]);
     assert!((one[0].factor - 0.1).abs() < 0.01, "{one:?}");
-    assert!(one[0].to_string().contains("tag 3 "), "{}", one[0]);
     let all = scene_of(&[(0, 0.1), (1, 0.1), (2, 0.1), (3, 0.1)], 4);
     assert_eq!(all.len(), 1, "{all:?}");
     assert_eq!(all[0].tags, [0, 1, 2, 3]);
@@ -199,7 +198,7 @@ fn a_known_map_is_held_and_locates_the_cameras() {
     scene.priors[2].pose = Some(Translation3::new(0.05, 0.0, 0.0) * scene.truth[2]);
     let map = solve(&scene.input(), &MapSettings { mode: MapMode::Known, ..settings() }).unwrap();
     let off = map.rejected.iter().filter(|rejected| rejected.id == 2).count();
-    assert!(map.warnings.iter().any(|warning| warning.starts_with("tag 2: ")), "{:?}", map.warnings);
+    insta::assert_snapshot!("moved_known_tag", map.warnings.join("\n"));
     assert!(off > 0 && map.rejected.iter().filter(|rejected| rejected.id != 2).count() * 4 < off, "{:?}", map.rejected);
 }
 
@@ -214,7 +213,7 @@ fn a_known_place_that_the_views_contradict_is_named() {
     scene.priors[3].pose = Some(Translation3::new(0.0, 0.08, 0.0) * scene.truth[3]);
     let warnings = named(&scene);
     assert_eq!(warnings.len(), 1, "{warnings:?}");
-    assert!(warnings[0].starts_with("tag 3: its known place disagrees"), "{warnings:?}");
+    insta::assert_snapshot!("contradicted_place", warnings[0]);
 }
 
 /// A wall of 300 tags, 30 m long: neighbours are connected by many ways, some of them long.
@@ -294,11 +293,7 @@ fn views_that_contradict_each_other_end_by_the_budget() {
     let scene = nonsense(40, 100, 0);
     let map = solve(&scene.input(), &settings()).unwrap();
     assert!(!map.has_converged);
-    assert!(
-        map.warnings.iter().any(|warning| warning.contains("contradict each other: after 250 steps")),
-        "{:?}",
-        map.warnings
-    );
+    insta::assert_snapshot!("contradicting_views", map.warnings.join("\n"));
     let again = solve(&scene.input(), &settings()).unwrap();
     let poses = |map: &TagMap| map.tags.iter().map(|tag| tag.frame_from_tag).collect::<Vec<_>>();
     assert_eq!(poses(&map), poses(&again));
