@@ -51,16 +51,17 @@ fn compared(robot: &Robot, n_seeds: u64) -> [Errors; 3] {
 
 #[test]
 fn what_two_cameras_see_of_one_pose_is_not_counted_twice() {
-    one_pose_counts_once(12, 1.7..4.5);
+    one_pose_counts_once(12, 1.7..4.5, [1.0, 0.3]);
 }
 
 #[test]
 #[ignore = "second tier: 100 seeds, XX s"]
 fn what_two_cameras_see_of_one_pose_is_not_counted_twice_over_100_seeds() {
-    one_pose_counts_once(100, 2.4..3.8);
+    one_pose_counts_once(100, 2.4..3.8, [0.97, 0.5]);
 }
 
-fn one_pose_counts_once(n_seeds: u64, limits: Range<f64>) {
+/// Limits of NEES by both, of their error over that of one camera, and of the NEES that counting twice adds.
+fn one_pose_counts_once(n_seeds: u64, limits: Range<f64>, [most_rms, least_more]: [f64; 2]) {
     for (robot, what) in [
         (stereo(), "beside each other"),
         (titan_with_two_cameras(), "on two links"),
@@ -68,8 +69,8 @@ fn one_pose_counts_once(n_seeds: u64, limits: Range<f64>) {
     ] {
         let [one, both, alone] = compared(&robot, n_seeds);
         println!("{what}: one camera {one:?}, both {both:?}, as if of other poses {alone:?}");
-        assert!(both.rms_mm < 0.97 * one.rms_mm, "{what}: {both:?} {one:?}");
+        assert!(both.rms_mm < most_rms * one.rms_mm, "{what}: {both:?} {one:?}");
         assert!(limits.contains(&both.nees), "{what}: {both:?}");
-        assert!(alone.nees > both.nees + 0.5, "{what}: {alone:?} {both:?}");
+        assert!(alone.nees > both.nees + least_more, "{what}: {alone:?} {both:?}");
     }
 }

