@@ -5,5 +5,7 @@
 pub mod calib;
 pub mod plan;
 pub mod session;
+#[cfg(test)]
+mod shared;
 pub mod tagmap;
 pub mod verify;

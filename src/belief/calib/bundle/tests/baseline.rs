@@ -10,6 +10,7 @@ use crate::calib::refusal::Refusal;
 use crate::calib::result::calibration::{Calibration, Status};
 use crate::calib::views::calibration_data::{CalibrationData, HeldOut};
 use crate::calib::views::view::{CaptureData, View};
+use crate::shared::Shared;
 use armcal_core::routine::Method;
 
 const SEEDS: std::ops::Range<u64> = 7000..7020;
@@ -18,7 +19,7 @@ const SHUFFLED_SEED: u64 = 7013;
 const N_VIEWS: usize = 25;
 
 /// What the sensors of an arm are.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Sensors {
     AsDrawn,
     /// Within the datasheet's sigmas.
@@ -29,7 +30,12 @@ enum Sensors {
     TagsMisread,
 }
 
-fn calibrated(sensors: Sensors, method: Method, seed: u64) -> Calibration {
+fn calibrated(sensors: Sensors, method: Method, seed: u64) -> &'static Calibration {
+    static CALIBRATED: Shared<(Sensors, u8, u64), Calibration> = Shared::new();
+    CALIBRATED.get((sensors, method as u8, seed), || calibrate_views(sensors, method, seed))
+}
+
+fn calibrate_views(sensors: Sensors, method: Method, seed: u64) -> Calibration {
     let robot = titan();
     let mut rng = rng(seed, "baseline");
     let scales = Hyperparameters::datasheet(&robot);
@@ -90,7 +96,7 @@ fn counts(sensors: Sensors, method: Method) -> Counts {
         counts.refused += usize::from(found.status == Status::Refused);
         counts.no_better += usize::from(found.refusals.iter().any(is_no_better));
         if found.status == Status::Refused {
-            println!("seed {seed}: {} ({baseline:?})", found.refusal.unwrap_or_default());
+            println!("seed {seed}: {} ({baseline:?})", found.refusal.as_deref().unwrap_or_default());
         }
     }
     println!("{sensors:?}, {method:?}: {counts:?} of {}", SEEDS.count());
@@ -124,7 +130,7 @@ fn misread_tags_are_in_no_held_out_figure() {
     for seed in SEEDS.take(5) {
         let clean = calibrated(Sensors::OutOfCalibration, Method::Bundle, seed);
         let misread = calibrated(Sensors::TagsMisread, Method::Bundle, seed);
-        let [clean_m, misread_m] = [&clean, &misread].map(|found| found.held_out.rms_m.expect("held-out tags"));
+        let [clean_m, misread_m] = [clean, misread].map(|found| found.held_out.rms_m.expect("held-out tags"));
         println!("seed {seed}: held out {:.2} mm, with misread tags {:.2} mm", 1e3 * clean_m, 1e3 * misread_m);
         assert!(misread.outliers.len() >= 2, "{:?}", misread.outliers);
         assert!((0.8..1.25).contains(&(misread_m / clean_m)), "{misread_m} m against {clean_m} m");

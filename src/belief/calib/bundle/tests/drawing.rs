@@ -4,10 +4,11 @@ use nalgebra::Vector3;
 
 use crate::calib::bundle::drawing::Drawing;
 use crate::calib::bundle::estimate::{Estimate, estimate};
-use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
+use crate::calib::bundle::input::HyperparameterMode;
 use crate::calib::bundle::model::Model;
+use crate::calib::bundle::tests::arms::{Built, arm, better};
 use crate::calib::bundle::tests::data::{Truth, normal, reference, rng, titan};
-use crate::calib::bundle::tests::score_test::{input, views_of_changed, with_link};
+use crate::calib::bundle::tests::score_test::{input, views_of_changed};
 use crate::calib::parameters::JointParameters;
 use crate::calib::views::view::View;
 use armcal_core::joints::JointAngles;
@@ -23,10 +24,6 @@ pub(super) struct Case {
     pub truth: JointParameters,
 }
 
-fn case(robot: &Robot, real: &Robot, seed: u64) -> Case {
-    case_changed(robot, real, seed, |_| {})
-}
-
 pub(super) fn case_changed(robot: &Robot, real: &Robot, seed: u64, change: impl FnOnce(&mut Truth)) -> Case {
     let mut truth = JointParameters::default();
     let (views, model) = views_of_changed(robot, real, seed, |drawn| {
@@ -34,15 +31,6 @@ pub(super) fn case_changed(robot: &Robot, real: &Robot, seed: u64, change: impl 
         truth = drawn.parameters;
     });
     Case { views, model, truth }
-}
-
-/// `input` with the drawing that explains the views better, if there is one.
-fn revised<'a>(input: &BundleInput<'a>) -> Option<BundleInput<'a>> {
-    let first = estimate(input).expect("solved");
-    let drawing = Drawing::default().better(input, &first, 0.0)?;
-    let mut wider = input.clone();
-    drawing.apply(&mut wider);
-    Some(wider)
 }
 
 /// Distances between the tool of `real` with the true sensors and that of `robot` as found, m, at drawn travels.
@@ -84,14 +72,11 @@ fn median(values: &[f64]) -> f64 {
 
 #[test]
 fn a_good_drawing_stays() {
-    let robot = titan();
     const SEEDS: u64 = 60;
     let mut gains = Vec::new();
     let revised = (0..SEEDS).filter(|&seed| {
-        let case = case(&robot, &robot, seed);
-        let input = input(&robot, &case.views, &case.model);
-        gains.push(estimate(&input).expect("solved").link_start().1);
-        revised(&input).is_some()
+        gains.push(arm(Built::AsDrawn, seed).found.link_start().1);
+        better(Built::AsDrawn, seed).is_some()
     });
     let n = revised.count();
     println!("{n} of {SEEDS} good drawings revised; gains foretold, sorted, nats: {:.1?}", sorted(&gains));
@@ -100,31 +85,39 @@ fn a_good_drawing_stays() {
 
 #[test]
 fn a_wrong_link_is_estimated_and_the_tool_as_good_as_with_the_right_one() {
+    wrong_links_are_estimated(1, 6.0);
+}
+
+#[test]
+#[ignore = "second tier: 24 arms, XX s"]
+fn a_wrong_link_is_estimated_over_24_arms() {
+    wrong_links_are_estimated(6, 2.5);
+}
+
+/// The tool is off by at most `most` times what it is off with the right drawing.
+fn wrong_links_are_estimated(n_seeds: u64, most: f64) {
     let robot = titan();
-    const SEEDS: u64 = 6;
     for joint in 1..robot.n_seen_joints() {
         let (mut wrong, mut right, mut drawn, mut n_named) = (Vec::new(), Vec::new(), Vec::new(), 0);
-        for seed in 0..SEEDS {
-            let real = with_link(&robot, joint, 0.01, Vector3::new(0.006, -0.006, 0.003));
-            let case = case(&robot, &real, seed);
-            let as_drawn = input(&robot, &case.views, &case.model);
-            let wider = revised(&as_drawn).unwrap_or_else(|| panic!("joint {joint}, seed {seed}: not revised"));
-            let found = estimate(&wider).expect("solved");
+        for seed in 0..n_seeds {
+            let built = Built::LongerAndTurned(joint);
+            let (real, arm) = (built.robot(), arm(built, seed));
+            let revised = better(built, seed).unwrap_or_else(|| panic!("joint {joint}, seed {seed}: not revised"));
+            let (case, found) = (arm.case, &revised.1);
             let known = estimate(&input(&real, &case.views, &case.model)).expect("solved");
-            let first = estimate(&as_drawn).expect("solved");
-            wrong.extend(tool_errors_m(&real, &case.truth, &robot, &found, seed));
+            wrong.extend(tool_errors_m(&real, &case.truth, &robot, found, seed));
             right.extend(tool_errors_m(&real, &case.truth, &real, &known, seed));
-            drawn.extend(tool_errors_m(&real, &case.truth, &robot, &first, seed));
+            drawn.extend(tool_errors_m(&real, &case.truth, &robot, &arm.found, seed));
             let links = found.parameters().links;
-            let worst = (0..wider.model.n_links).max_by(|a, b| size(&links[*a]).total_cmp(&size(&links[*b])));
+            let worst = (0..found.model.n_links).max_by(|a, b| size(&links[*a]).total_cmp(&size(&links[*b])));
             n_named += u64::from(worst == Some(joint));
         }
         let [wrong, right, drawn] = [&wrong, &right, &drawn].map(|errors| 1e3 * median(errors));
         println!(
-            "joint {joint}: {wrong:.2} mm (right drawing {right:.2}, as drawn {drawn:.2}), named {n_named} of {SEEDS}"
+            "joint {joint}: {wrong:.2} mm (right drawing {right:.2}, as drawn {drawn:.2}), named {n_named} of {n_seeds}"
         );
-        assert!(wrong < 2.5 * right && wrong < 0.5 * drawn, "joint {joint}: {wrong} mm, {right} mm, {drawn} mm");
-        assert!(n_named >= 5, "joint {joint}: named {n_named} of {SEEDS}");
+        assert!(wrong < most * right && wrong < 0.5 * drawn, "joint {joint}: {wrong} mm, {right} mm, {drawn} mm");
+        assert!(n_named + n_seeds / 6 >= n_seeds, "joint {joint}: named {n_named} of {n_seeds}");
     }
 }
 
@@ -153,8 +146,10 @@ fn links_that_are_all_a_little_off_cost_little_more_than_their_bound() {
     let (mut error2, mut bound2) = (0.0, 0.0);
     for seed in 0..SEEDS {
         let real = drawn_links(&drawn, seed).with_links(drawn.clone());
-        let case = case(&drawn, &real, seed);
-        let wider = revised(&input(&drawn, &case.views, &case.model)).expect("revised");
+        let case = case_changed(&drawn, &real, seed, |_| {});
+        let mut wider = input(&drawn, &case.views, &case.model);
+        let first = estimate(&wider).expect("solved");
+        Drawing::default().better(&wider, &first, 0.0).expect("revised").apply(&mut wider);
         let found = estimate(&wider).expect("solved");
         // The bound: the same views under the sizes that the links' errors really have.
         let mut known = wider.clone();

@@ -1,5 +1,6 @@
 //! On data of the estimator's own model: the equations against differences, the estimate against its bound.
 
+mod arms;
 mod baseline;
 mod calibration_prior;
 mod cameras;

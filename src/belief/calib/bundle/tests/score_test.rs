@@ -8,6 +8,7 @@ use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::bundle::model::model_for;
 use crate::calib::bundle::model::{Hyperparameters, Model};
 use crate::calib::bundle::observability::{Observability, observability};
+use crate::calib::bundle::tests::arms::{Arm, Built, arm};
 use crate::calib::bundle::tests::data::{Noise, Truth, reference, rng, titan, views};
 use crate::calib::bundle::{GeometryElement, ScoreTestResult};
 use crate::calib::cross_validation::{FOLDS, fold_of};
@@ -90,12 +91,9 @@ fn is_alarm(result: &ScoreTestResult, of: usize) -> bool {
 
 #[test]
 fn a_good_arm_is_suspected_no_more_often_than_by_chance() {
-    let robot = titan();
     let (mut alarms, mut low, mut high, mut all) = (0, 0, 0, 0);
     for seed in 0..50 {
-        let (views, model) = views_of(&robot, &robot, seed);
-        let found = estimate(&input(&robot, &views, &model)).expect("solved");
-        let results = score_tests(&found);
+        let results = score_tests(&arm(Built::AsDrawn, seed).found);
         alarms += usize::from(results.iter().any(|s| is_alarm(s, results.len())));
         low += results.iter().filter(|s| s.probability < 0.1).count();
         high += results.iter().filter(|s| s.probability > 0.9).count();
@@ -112,14 +110,11 @@ fn a_good_arm_is_suspected_no_more_often_than_by_chance() {
 fn a_link_one_centimetre_longer_is_found_named_and_measured() {
     let robot = titan();
     for joint in 1..robot.n_seen_joints() {
-        let real = with_link(&robot, joint, 0.01, Vector3::zeros());
         let change = robot.chain.joints()[joint].parent_from_joint.translation.vector.normalize() * 0.01;
         let (mut named, mut sizes) = (0, Vec::new());
         const SEEDS: u64 = 12;
         for seed in 0..SEEDS {
-            let (views, model) = views_of(&robot, &real, seed);
-            let found = estimate(&input(&robot, &views, &model)).expect("solved");
-            let results = score_tests(&found);
+            let results = score_tests(&arm(Built::Longer(joint), seed).found);
             let first = &results[0];
             assert!(is_alarm(first, results.len()), "joint {joint}, seed {seed}: {first:?}");
             named += u64::from(first.element == GeometryElement::Joint(joint) && first.error == ErrorKind::Shift);
@@ -160,14 +155,13 @@ fn views_that_were_left_out_are_as_far_off_as_foretold() {
     let (mut camera, mut coordinates) = ((0.0, 0), (0.0, 0));
     let (mut squares, mut n_joints, mut beyond) = (0.0, 0, 0);
     for seed in 0..SEEDS {
-        let (views, model) = views_of(&robot, &robot, seed);
-        let all = estimate(&input(&robot, &views, &model)).expect("solved");
+        let Arm { case, found: all } = arm(Built::AsDrawn, seed);
         for fold in 0..FOLDS {
-            let (fitted, left_out) = fold_of(&views, fold);
+            let (fitted, left_out) = fold_of(&case.views, fold);
             let part = BundleInput {
                 scales: all.scales().clone(),
                 evidence: HyperparameterMode::Given,
-                ..input(&robot, &fitted, &model)
+                ..input(&robot, &fitted, &case.model)
             };
             let found = estimate(&part).expect("solved");
             let places: Vec<(usize, View)> =

@@ -22,6 +22,7 @@ const RAD_PER_K: f64 = 0.02 * std::f64::consts::PI / 180.0;
 const RAD_PER_MPA: f64 = 2e-4;
 
 /// An arm under way.
+#[derive(Clone)]
 pub(super) struct Dive<'a> {
     robot: &'a Robot,
     pub truth: Truth,
