@@ -30,7 +30,6 @@ mod eye_to_hand;
 mod failed;
 mod golden;
 mod gripper_tag;
-mod image_seeds;
 mod kill;
 #[cfg(feature = "live")]
 mod live;
