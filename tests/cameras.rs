@@ -176,14 +176,12 @@ fn mount_errors(titan: &TwoCameraTitan<'_>, found: &Calibration) -> [f64; 6] {
     })
 }
 
-#[test]
-fn errors_by_two_cameras_are_as_large_as_predicted_and_smaller_than_by_one() {
-    const SEEDS: u64 = 40;
+fn expect_errors_by_two_cameras_as_predicted(seeds: u64) {
     let folder = temp();
     let robot = two_cameras(folder.path());
     let (mut parameters, mut tool, mut mount) = (0.0, 0.0, [0.0; 6]);
     let mut predicted_mm = [Vec::new(), Vec::new()];
-    for seed in 0..SEEDS {
+    for seed in 0..seeds {
         let (titan, mut rng) = TwoCameraTitan::new(&robot, seed);
         let [one, two] = [ONE.to_owned(), format!("{ONE}{FURTHER}")].map(|map| titan.calibrated(&robot, &map));
         assert_eq!(two.status, Status::Accepted, "seed {seed}: {:?}", two.refusal);
@@ -200,17 +198,28 @@ fn errors_by_two_cameras_are_as_large_as_predicted_and_smaller_than_by_one() {
     eprintln!(
         "two cameras: parameters {:.2} of 10, tool {:.2} of 3, mount {:.2?} of 1 each; {two_mm:.2} mm predicted, \
          {one_mm:.2} by one",
-        parameters / SEEDS as f64,
-        tool / SEEDS as f64,
-        mount.map(|sum| sum / SEEDS as f64)
+        parameters / seeds as f64,
+        tool / seeds as f64,
+        mount.map(|sum| sum / seeds as f64)
     );
-    let n = SEEDS as usize;
+    let n = seeds as usize;
     assert!(two_mm < 0.97 * one_mm, "{two_mm} mm, {one_mm} by one");
     assert!(by_chance(10 * n).contains(&parameters), "parameters {parameters}");
     assert!(by_chance(3 * n).contains(&tool), "tool {tool}");
     for sum in mount {
         assert!(by_chance(n).contains(&sum), "mount {sum}");
     }
+}
+
+#[test]
+fn errors_by_two_cameras_are_as_large_as_predicted_and_smaller_than_by_one() {
+    expect_errors_by_two_cameras_as_predicted(8);
+}
+
+#[test]
+#[ignore = "second tier: 40 arms by one camera and by two, 10 s"]
+fn errors_by_two_cameras_are_as_large_as_predicted_over_forty_arms() {
+    expect_errors_by_two_cameras_as_predicted(40);
 }
 
 /// A folder with robot, recording and input map of seed 0, whose elbow camera hangs `off` from where it was drawn.

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use armcal::calib::{Calibration, SagTable, covariance_file};
+use armcal::calib::{Calibration, SagTable, Status, covariance_file};
 use armcal::log::read_recording;
 use armcal::robot::{Robot, load};
 use armcal::stats::{quantile, stream_rng};
@@ -13,7 +13,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::support::external::{INPUT_MAP, Pose, write_poses};
 use crate::support::synthetic::{ToolFigures, TrueArm, normal};
-use crate::support::{Answer, FinishedRun, answer, calibrate, edit, program, read, robot_copy, root, run, temp, write};
+use crate::support::{Answer, Simulated, answer, calibrate, edit, program, read, robot_copy, root, temp, write};
 
 const N_POSES: usize = 40;
 /// Of a measured pose, one sigma per axis.
@@ -109,11 +109,10 @@ fn off(std_m: f64, std_rad: f64, rng: &mut ChaCha8Rng) -> Isometry3<f64> {
 }
 
 /// All six joints: the board hangs behind the last.
-#[test]
-fn an_arm_before_a_standing_camera_is_calibrated_to_what_is_predicted() {
+fn expect_errors_before_a_standing_camera_as_predicted(seeds: u64) {
     let given = Given::new();
     let mut figures: Vec<ToolFigures> = Vec::new();
-    for seed in 0..8 {
+    for seed in 0..seeds {
         let arm = given.record(seed);
         let said = given.calibrate();
         said.expect(&format!("seed {seed}"), 0, &["ACCEPTED", "predicted"]);
@@ -133,6 +132,17 @@ fn an_arm_before_a_standing_camera_is_calibrated_to_what_is_predicted() {
     assert!((1.0..5.0).contains(&nees), "{nees}");
 }
 
+#[test]
+fn an_arm_before_a_standing_camera_is_calibrated_to_what_is_predicted() {
+    expect_errors_before_a_standing_camera_as_predicted(3);
+}
+
+#[test]
+#[ignore = "second tier: 8 arms, 6 s"]
+fn eight_arms_before_a_standing_camera_are_calibrated_to_what_is_predicted() {
+    expect_errors_before_a_standing_camera_as_predicted(8);
+}
+
 /// m, median over the targets; without a calibration some 90 mm.
 const CLOSED_LOOP_M: f64 = 0.003;
 
@@ -140,40 +150,38 @@ const CLOSED_LOOP_M: f64 = 0.003;
 /// that the recording alone gives again.
 #[test]
 fn an_arm_before_a_standing_camera_calibrates_itself() {
-    let (folder, routine) = (temp(), root().join("routines/titan4-watched.toml"));
-    let out = folder.path().join("run");
-    run(&routine, &out).expect("the loop", 0, &["ACCEPTED"]);
-    let done = FinishedRun { routine, out };
-    let summary = done.summary();
+    let folder = temp();
+    let routine = root().join("routines/titan4-watched.toml");
+    let run = Simulated::new(&routine, None, &[], &folder.path().join("run"));
+    let (summary, calibration) = (&run.finished().summary, &run.finished().calibration);
+    assert_eq!(summary.status, Status::Accepted);
     let score = summary.score.as_ref().expect("scored");
     let after = score.after.as_ref().expect("reached again");
     let [before_m, after_m] = [score.before.tool_error_m, after.tool_error_m].map(|s| s.expect("targets").median);
     eprintln!("tool {:.1} to {:.2} mm", before_m * 1e3, after_m * 1e3);
     assert_eq!((summary.capture.collisions, after.hits), (Some(0), after.targets));
     assert!(after_m < CLOSED_LOOP_M && before_m > 10.0 * after_m, "{before_m} {after_m}");
-    let calibration = Calibration::read(&done.file("calibration.toml")).expect("it reads");
     assert!(calibration.joint.iter().all(|joint| joint.gain_estimated && joint.offset_estimated));
 
     let again = folder.path().join("again");
     let robot = root().join("robots/titan4-watched");
-    calibrate(&done.file("run.mcap"), &robot, &again).expect("the recording alone", 0, &["ACCEPTED"]);
-    assert_eq!(read(&again.join("calibration.toml")), read(&done.file("calibration.toml")));
+    let recording = folder.path().join("run.mcap");
+    std::fs::copy(run.file("run"), &recording).expect("copied");
+    calibrate(&recording, &robot, &again).expect("the recording alone", 0, &["ACCEPTED"]);
+    assert_eq!(read(&again.join("calibration.toml")), calibration.to_toml());
 }
 
 /// Which tags there are is a message, and with it which link carries them.
 #[test]
 fn some_of_the_carried_tags_are_in_the_recording_with_their_link() {
     let (folder, robot) = (temp(), load(&root().join("robots/titan4-watched")).expect("the robot reads"));
-    let routine = read(&root().join("routines/titan4-watched.toml"));
-    let file = folder.path().join("some.toml");
-    let routine = routine.replace("\"../robots/", &format!("\"{}/", root().join("robots").display()));
-    write(
-        &file,
-        &routine.replace("[site]", "[site]\ntags = [0, 1, 2, 3, 4, 5, 6]").replace("poses = 30", "poses = 12"),
-    );
-    let out = folder.path().join("run");
-    run(&file, &out).expect("the loop", 0, &["ACCEPTED"]);
-    let recording = read_recording(out.join("run.mcap")).expect("it reads");
+    let some = [
+        ("site.tags", vec![0, 1, 2, 3, 4, 5, 6].into()),
+        ("capture.poses", 12.into()),
+        ("task.targets_m", vec![vec![1.074, 0.001, -0.008]].into()),
+    ];
+    let run = Simulated::new(&root().join("routines/titan4-watched.toml"), None, &some, folder.path());
+    let recording = read_recording(run.file("run")).expect("it reads");
     let surveys: Vec<_> = recording
         .messages
         .iter()

@@ -148,27 +148,47 @@ fn recovered(method: Method, seeds: u64) -> [f64; 4] {
     figures
 }
 
+/// A normal's errors are 0.67 sigma in the median and 1.96 (95 %); the mount's prior makes the sigmas larger than needed
+/// here, because it is mounted as in the nominal model.
+#[track_caller]
+fn expect_known_errors_to_come_back(method: Method, seeds: u64) {
+    let [median, p95, ratio, refused] = recovered(method, seeds);
+    assert!((0.3..0.85).contains(&median) && p95 < 2.4, "{method}: median {median}, 95 % {p95}");
+    assert!(ratio < 0.25 && refused <= 2.0, "{method}: {ratio}, {refused}");
+}
+
 #[test]
 fn known_errors_come_back_within_what_the_result_says_of_itself() {
-    for (method, seeds) in [(Method::MinimumDistance, 24), (Method::Bundle, 12)] {
-        let [median, p95, ratio, refused] = recovered(method, seeds);
-        // A normal's are 0.67 and 1.96; the mount's prior makes the sigmas larger than needed here, where it hangs as
-        // drawn.
-        assert!((0.3..0.85).contains(&median) && p95 < 2.4, "{method}: median {median}, 95 % {p95}");
-        assert!(ratio < 0.25 && refused <= 2.0, "{method}: {ratio}, {refused}");
-    }
+    expect_known_errors_to_come_back(Method::MinimumDistance, 4);
+    expect_known_errors_to_come_back(Method::Bundle, 3);
+}
+
+#[test]
+#[ignore = "second tier: 24 arms by minimum distance, 12 by bundle, 20 s"]
+fn known_errors_of_many_arms_come_back() {
+    expect_known_errors_to_come_back(Method::MinimumDistance, 24);
+    expect_known_errors_to_come_back(Method::Bundle, 12);
+}
+
+/// Exact sensors need no calibration: how many of `seeds` were refused for that.
+fn n_refused_with_exact_sensors(seeds: u64) -> usize {
+    let is_refused = |seed: &u64| {
+        let titan = RealTitan::new(&titan(), 57, Noise { sensors: 0.0, ..AS_IN_2018 }, *seed);
+        let found = calibrate_data(prepared_titan(&titan), Method::MinimumDistance, None).expect("calibrated");
+        found.refusal.is_some_and(|why| why.contains("no better than with the datasheet"))
+    };
+    (0..seeds).filter(is_refused).count()
 }
 
 #[test]
 fn a_fit_that_does_not_beat_the_datasheet_is_refused_with_the_reason() {
-    const SEEDS: u64 = 12;
-    let mut refused = 0;
-    for seed in 0..SEEDS {
-        let titan = RealTitan::new(&titan(), 57, Noise { sensors: 0.0, ..AS_IN_2018 }, seed);
-        let found = calibrate_data(prepared_titan(&titan), Method::MinimumDistance, None).expect("calibrated");
-        refused += u64::from(found.refusal.is_some_and(|why| why.contains("no better than with the datasheet")));
-    }
-    assert!(refused + 2 >= SEEDS, "{refused} of {SEEDS}: exact sensors need no calibration");
+    assert!(n_refused_with_exact_sensors(3) >= 2);
+}
+
+#[test]
+#[ignore = "second tier: 12 arms with exact sensors, 4 s"]
+fn fits_of_many_arms_that_do_not_beat_the_datasheet_are_refused() {
+    assert!(n_refused_with_exact_sensors(12) >= 10);
 }
 
 #[test]

@@ -1,11 +1,11 @@
 //! Routines as scripts: steps in order, the world going on meanwhile, and the recording as the only thing belief has.
 
-use armcal::calib::Calibration;
+use armcal::calib::{Calibration, Status};
 use armcal::sim::truth::read_truth;
 use armcal::streams::{Mark, MarkKind, Message};
 use armcal::time::Stamp;
 
-use crate::support::{ShortRoutine, answer, calibrate, edit, finished, program, read, robot_folder, temp};
+use crate::support::{ShortRoutine, Simulated, answer, calibrate, edit, program, read, robot_folder, temp};
 
 const CAPTURE: &str = "[[step]]\ndo = \"capture\"\nposes = 11\nheld_out = 3\n";
 const REACH: &str = "[[step]]\ndo = \"reach\"\ntargets = [0, 2]\n";
@@ -26,10 +26,12 @@ fn routine(steps: &[&str]) -> ShortRoutine {
 }
 
 #[track_caller]
-fn same_from_the_recording_alone(run: &crate::support::FinishedRun) {
+fn same_from_the_recording_alone(run: &Simulated) {
     let out = temp();
-    calibrate(&run.file("run.mcap"), &robot_folder(), out.path()).expect("from the recording", 0, &["ACCEPTED"]);
-    assert!(read(&out.path().join("calibration.toml")) == read(&run.file("calibration.toml")));
+    let recording = out.path().join("run.mcap");
+    std::fs::copy(run.file("run"), &recording).expect("copied");
+    calibrate(&recording, &robot_folder(), out.path()).expect("from the recording", 0, &["ACCEPTED"]);
+    assert!(read(&out.path().join("calibration.toml")) == run.finished().calibration.to_toml());
 }
 
 /// A sensor slips after the first calibration: the next reach misses, a recalibration mends it, and the estimator finds
@@ -42,8 +44,8 @@ fn a_slipped_sensor_is_mended_by_a_recalibration() {
     let wait = "[[step]]\ndo = \"wait\"\nseconds = 120\n";
     let steps = [REACH, CAPTURE, CALIBRATE, REACH, wait, &jump(), REACH, CAPTURE, recalibrate, REACH, limits, TIMED];
     let folder = temp();
-    let run = finished(&routine(&steps), folder.path());
-    let summary = run.summary();
+    let run = Simulated::of(&routine(&steps), folder.path());
+    let summary = &run.finished().summary;
     let score = summary.score.as_ref().expect("scored");
     let median_m = |reach: usize| score.reaches[reach].side.tool_error_m.expect("reached").median;
     let medians_m: Vec<f64> = (0..4).map(median_m).collect();
@@ -59,8 +61,8 @@ fn a_slipped_sensor_is_mended_by_a_recalibration() {
     assert!((119.0..122.0).contains(&summary.waited_s.expect("known")));
     same_from_the_recording_alone(&run);
     // What broke is the truth's alone.
-    let recording = armcal::log::read_recording(run.file("run.mcap")).expect("it reads");
-    let (recorded, truth) = (run.bytes("run.mcap"), read_truth(run.file("truth.mcap")).expect("it reads"));
+    let recording = armcal::log::read_recording(run.file("run")).expect("it reads");
+    let (recorded, truth) = (run.bytes("run"), read_truth(run.file("truth")).expect("it reads"));
     assert!(truth.header.spec_toml.contains(&JUMP_RAD.to_string()));
     let holds = |needle: &[u8]| recorded.windows(needle.len()).any(|window| window == needle);
     assert!(!holds(JUMP_RAD.to_string().as_bytes()) && !holds(&JUMP_RAD.to_le_bytes()) && !holds(b"sensor_jump"));
@@ -84,30 +86,42 @@ fn a_slipped_sensor_is_mended_by_a_recalibration() {
     assert!(views(false) > 0 && views(true) == 0, "{} {}", views(false), views(true));
 }
 
-/// Twice the counts, backwards: nobody knows, and after the first step the arm does.
+/// Nobody knows of the ratio, and after the first step the arm does.
+#[track_caller]
+fn expect_a_ratio_to_be_measured(seed: u64, joint: &str, ratio: f64) {
+    let identify = format!("[[step]]\ndo = \"identify\"\njoint = {joint:?}\n");
+    let world = format!("[world.gear_ratio]\n{joint} = {ratio:?}\n");
+    let folder = temp();
+    let short = ShortRoutine { seed, ..routine(&[&identify, REACH, CAPTURE, CALIBRATE, REACH, &world]) };
+    let run = Simulated::of(&short, folder.path());
+    let (summary, calibration) = (&run.finished().summary, &run.finished().calibration);
+    assert_eq!(summary.status, Status::Accepted, "seed {seed}");
+    let result = calibration.joint.iter().find(|j| j.name == joint).expect("a joint of the arm");
+    let measured = result.identified_ratio.expect("measured");
+    let truth = read_truth(run.file("truth")).expect("it reads");
+    let built = truth.header.as_built.joints.iter().find(|j| j.name == joint).expect("a joint of the arm");
+    let true_ratio = ratio * (1.0 + built.gain_error);
+    eprintln!("seed {seed}, {joint}: {measured:.4}, truly {true_ratio:.4}");
+    // The nonlinearity bends the slope over the short excursion by up to 2.5 %.
+    assert!((measured / true_ratio - 1.0).abs() < 0.04, "{measured} {true_ratio}");
+    let after = summary.score.as_ref().and_then(|score| score.after.as_ref()).expect("reached");
+    let tool_m = after.tool_error_m.expect("reached").median;
+    assert!(tool_m < 0.012, "seed {seed}: {tool_m}");
+    assert_eq!(summary.capture.collisions, Some(0));
+    same_from_the_recording_alone(&run);
+}
+
+/// Twice the counts, backwards.
 #[test]
 fn an_unknown_gear_ratio_is_measured_with_its_sign() {
-    for (seed, joint, ratio) in [(1, "forearm_pitch", -2.0), (2, "wrist_yaw", 0.5), (3, "shoulder_yaw", -1.3)] {
-        let identify = format!("[[step]]\ndo = \"identify\"\njoint = {joint:?}\n");
-        let world = format!("[world.gear_ratio]\n{joint} = {ratio:?}\n");
-        let folder = temp();
-        let short = ShortRoutine { seed, ..routine(&[&identify, REACH, CAPTURE, CALIBRATE, REACH, &world]) };
-        let run = finished(&short, folder.path());
-        let calibration = Calibration::read(&run.file("calibration.toml")).expect("it reads");
-        let result = calibration.joint.iter().find(|j| j.name == joint).expect("a joint of the arm");
-        let measured = result.identified_ratio.expect("measured");
-        let truth = read_truth(run.file("truth.mcap")).expect("it reads");
-        let built = truth.header.as_built.joints.iter().find(|j| j.name == joint).expect("a joint of the arm");
-        let true_ratio = ratio * (1.0 + built.gain_error);
-        eprintln!("seed {seed}, {joint}: {measured:.4}, truly {true_ratio:.4}");
-        // The nonlinearity bends the slope over the short excursion by up to 2.5 %.
-        assert!((measured / true_ratio - 1.0).abs() < 0.04, "{measured} {true_ratio}");
-        let summary = run.summary();
-        let tool_m = summary.score.and_then(|s| s.after).and_then(|s| s.tool_error_m).expect("reached").median;
-        assert!(tool_m < 0.012, "seed {seed}: {tool_m}");
-        assert_eq!(summary.capture.collisions, Some(0));
-        same_from_the_recording_alone(&run);
-    }
+    expect_a_ratio_to_be_measured(1, "forearm_pitch", -2.0);
+}
+
+#[test]
+#[ignore = "second tier: 2 more joints, 4 s"]
+fn unknown_gear_ratios_of_other_joints_are_measured() {
+    expect_a_ratio_to_be_measured(2, "wrist_yaw", 0.5);
+    expect_a_ratio_to_be_measured(3, "shoulder_yaw", -1.3);
 }
 
 #[test]
@@ -145,15 +159,15 @@ fn calibrated_jaws_close_on_their_targets() {
     let touch = "[[step]]\ndo = \"reach\"\ntargets = [0, 2]\ntouch = true\n";
     let grip = "[[step]]\ndo = \"grip\"\nopening = 0.5\n";
     let folder = temp();
-    let run = finished(&routine(&[REACH, CAPTURE, CALIBRATE, touch, grip]), folder.path());
-    let summary = run.summary();
+    let run = Simulated::of(&routine(&[REACH, CAPTURE, CALIBRATE, touch, grip]), folder.path());
+    let summary = &run.finished().summary;
     let reaches = &summary.score.as_ref().expect("scored").reaches;
     assert!(reaches[0].touches.is_none(), "nobody asked");
     let touches = reaches[1].touches.expect("asked for");
     eprintln!("touched {} of {}; miss {:?}", touches.touched, touches.tried, reaches[1].side.reach_error_m);
     assert_eq!((touches.tried, touches.touched), (2, 2));
     assert_eq!((summary.capture.targets_skipped, summary.capture.collisions), (0, Some(0)));
-    let recording = armcal::log::read_recording(run.file("run.mcap")).expect("it reads");
+    let recording = armcal::log::read_recording(run.file("run")).expect("it reads");
     let mut touched = Vec::new();
     let (mut told, mut gaps) = (Vec::new(), Vec::new());
     for (_, message) in &recording.messages {
@@ -173,7 +187,7 @@ fn calibrated_jaws_close_on_their_targets() {
     assert_eq!(told, [100, 0, 100, 0, 100, 22, 50]);
     assert!((gaps[gaps.len() - 1].1 - 0.05).abs() < 0.0011, "{:?}", gaps.last());
     assert!(recording.rejected.is_empty() && recording.unknown_topics.is_empty());
-    answer(program().arg("inspect").arg(run.file("run.mcap"))).expect(
+    answer(program().arg("inspect").arg(run.file("run"))).expect(
         "inspect",
         0,
         &["/gripper_state", "gap between the jaws", "/gripper_command"],

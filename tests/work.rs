@@ -1,16 +1,15 @@
 //! Work on a dive: targets at times, tags passed by the way, and a world that changes meanwhile.
 
 use std::path::Path;
-use std::sync::OnceLock;
 
+use armcal::calib::FindingKind;
 use armcal::log::{Recording, read_recording};
 use armcal::report::RunSummary;
 use armcal::streams::{JointCommand, MarkKind, Message, ReachAttempt};
 use armcal::time::Stamp;
 
 use crate::support::{
-    FinishedRun, ShortRoutine, answer, calibrate, finished, lasting_folder, program, read, robot_folder, run, temp,
-    write,
+    FinishedRun, ShortRoutine, Simulated, answer, calibrate, program, read, robot_folder, run, shared, temp, write,
 };
 
 const EVERY_S: f64 = 120.0;
@@ -41,14 +40,10 @@ const STEPS: &str = "
 
 /// One run for all tests of this file, to be read only.
 fn worked() -> &'static FinishedRun {
-    static RUN: OnceLock<FinishedRun> = OnceLock::new();
-    RUN.get_or_init(|| {
-        let short = ShortRoutine {
-            targets_m: vec![[1.401, -1.220, 0.115], [1.375, -0.582, 0.391], [1.173, -0.947, 0.587]],
-            tail: STEPS.to_owned(),
-            ..ShortRoutine::default()
-        };
-        finished(&short, &lasting_folder())
+    shared(&ShortRoutine {
+        targets_m: vec![[1.401, -1.220, 0.115], [1.375, -0.582, 0.391], [1.173, -0.947, 0.587]],
+        tail: STEPS.to_owned(),
+        ..ShortRoutine::default()
     })
 }
 
@@ -198,6 +193,30 @@ fn calibration_poses_are_asked_for_where_a_task_would_miss() {
 fn work_by_the_calibration_asks_for_nothing() {
     let summary = worked().summary();
     assert!(summary.online.is_none() && !worked().file("belief.jsonl").exists());
+}
+
+/// A sensor that slips between tasks is named when tags are passed next, and nothing else is. The study of dives with
+/// faults is of the second tier (`online`).
+#[test]
+fn a_slip_between_tasks_is_named() {
+    const BY_RAD: f64 = 0.03;
+    let steps = STEPS
+        .replace("look_every = 2", "look_every = 1\n    belief = \"online\"")
+        .replace("pressure_offset_std_rad_per_mpa = 1e-3", "")
+        + &format!(
+            "[[world.fault]]\nat_s = 350.0\nkind = \"sensor_jump\"\njoint = \"wrist_pitch\"\nby_rad = {BY_RAD}\n"
+        );
+    let short = ShortRoutine {
+        targets_m: vec![[1.401, -1.220, 0.115], [1.375, -0.582, 0.391], [1.173, -0.947, 0.587]],
+        tail: steps,
+        ..ShortRoutine::default()
+    };
+    let folder = temp();
+    let run = Simulated::of(&short, folder.path());
+    let online = run.finished().summary.online.as_ref().expect("it was followed");
+    let [event] = &online.events[..] else { panic!("{:?}", online.events) };
+    assert_eq!((event.finding.kind, event.finding.name.as_str()), (FindingKind::SensorSlip, "wrist_pitch"));
+    assert!((event.finding.size.expect("a size").abs() - BY_RAD).abs() < 0.005, "{event:?}");
 }
 
 /// Five tasks worked by the online belief, at the fourth of which the wrist's sensor dies; `faults` are more of them.

@@ -156,15 +156,14 @@ fn cut_at_every_percent() {
     cut.expect("99 %", 3, &["state        cut: at byte", "14 for the fit, 4 held out"]);
 }
 
-#[test]
-fn flipped_bits_are_told_of_where_they_matter() {
+fn expect_flipped_bits_to_be_told_of(rounds: u32) {
     let bytes = fs::read(sample()).expect("the sample");
     let whole = look(&sample(), None).expect("it reads");
     let folder = temp();
     let path = folder.path().join("flipped.mcap");
     let mut rng = stream_rng(1, "inspect_flips");
     let mut told = 0;
-    for round in 0..300 {
+    for round in 0..rounds {
         let mut damaged = bytes.clone();
         let at = rng.random_range(8..bytes.len());
         damaged[at] ^= 1 << rng.random_range(0..8);
@@ -175,9 +174,20 @@ fn flipped_bits_are_told_of_where_they_matter() {
             assert_eq!((found.messages, &found.arm), (whole.messages, &whole.arm), "round {round}, byte {at}");
         }
     }
-    eprintln!("{told} of 300 told of");
+    eprintln!("{told} of {rounds} told of");
     // The checksum of all data covers indexes and attachments, too, which no message depends on.
-    assert!(told > 290, "{told}");
+    assert!(told * 30 > rounds * 29, "{told}");
+}
+
+#[test]
+fn flipped_bits_are_told_of_where_they_matter() {
+    expect_flipped_bits_to_be_told_of(60);
+}
+
+#[test]
+#[ignore = "second tier: 300 recordings with a flipped bit, 5 s"]
+fn three_hundred_flipped_bits_are_told_of_where_they_matter() {
+    expect_flipped_bits_to_be_told_of(300);
 }
 
 /// One change of the kinds that disks, copies and hands make.
@@ -213,7 +223,7 @@ fn mutate(bytes: &mut Vec<u8>, rng: &mut impl RngExt) {
 /// `ARMCAL_MUTATIONS=5000` for more of them.
 #[test]
 fn mutated_recordings_never_panic_and_never_pass_for_whole() {
-    let rounds: u32 = std::env::var("ARMCAL_MUTATIONS").ok().and_then(|n| n.parse().ok()).unwrap_or(150);
+    let rounds: u32 = std::env::var("ARMCAL_MUTATIONS").ok().and_then(|n| n.parse().ok()).unwrap_or(60);
     let bytes = fs::read(sample()).expect("the sample");
     let whole = look(&sample(), None).expect("it reads");
     let robot = titan();

@@ -2,6 +2,7 @@
 
 use std::net::TcpListener;
 
+use crate::determinism::elsewhere;
 use crate::support::{answer, program, robot_folder, shared_run, temp};
 
 /// A port of the loopback where nobody listens.
@@ -12,32 +13,25 @@ fn closed_address() -> String {
 
 #[test]
 fn a_run_without_a_viewer_and_one_with_a_stuck_viewer_give_the_same_recording() {
-    let out = temp();
-    let routine = &shared_run().routine;
-    let run = |address: &str, folder: &str| {
-        let live = format!("--live={address}");
-        answer(program().arg("run").arg(routine).args([&live, "--out"]).arg(out.path().join(folder)))
-    };
-    let absent = closed_address();
-    let said = run(&absent, "absent");
-    said.expect("no viewer", 0, &["ACCEPTED"]);
-    let note = format!("no viewer listened at {absent}");
-    assert_eq!(said.stderr.matches(&note).count(), 1, "{}", said.stderr);
+    let absent = elsewhere();
+    let note = format!("no viewer listened at {}", absent.viewer);
+    assert_eq!(absent.said.stderr.matches(&note).count(), 1, "{}", absent.said.stderr);
 
     // It takes the connection and reads nothing.
+    let out = temp();
     let stuck = TcpListener::bind("127.0.0.1:0").expect("a port");
-    let address = stuck.local_addr().expect("an address").to_string();
+    let live = format!("--live={}", stuck.local_addr().expect("an address"));
     let held = std::thread::spawn(move || stuck.accept().map(|(stream, _)| stream));
-    let said = run(&address, "stuck");
+    let said = answer(program().arg("run").arg(&shared_run().routine).args([&live, "--out"]).arg(out.path()));
     said.expect("a stuck viewer", 0, &["ACCEPTED"]);
     assert!(said.stderr.contains("too slow"), "{}", said.stderr);
     drop(held);
 
     for name in ["run.mcap", "truth.mcap", "run.rrd", "calibration.toml"] {
         let alone = shared_run().bytes(name);
-        for folder in ["absent", "stuck"] {
-            let shown = std::fs::read(out.path().join(folder).join(name)).expect("it reads");
-            assert!(shown == alone, "{folder}: {name} differs");
+        for folder in [&absent.out, out.path()] {
+            let shown = std::fs::read(folder.join(name)).expect("it reads");
+            assert!(shown == alone, "{}: {name} differs", folder.display());
         }
     }
 }
