@@ -148,8 +148,8 @@ fn recovered(method: Method, seeds: u64) -> [f64; 4] {
     figures
 }
 
-/// A normal's errors are 0.67 sigma in the median and 1.96 (95 %); the mount's prior makes the sigmas larger than needed
-/// here, because it is mounted as in the nominal model.
+/// A normal's errors are 0.67 sigma in the median and 1.96 (95 %). The mount's prior makes the sigmas larger than needed
+/// here, because the camera hangs as in the nominal model.
 #[track_caller]
 fn expect_known_errors_to_come_back(method: Method, seeds: u64) {
     let [median, p95, ratio, refused] = recovered(method, seeds);
