@@ -109,7 +109,7 @@ fn limits_of_hits_and_skipped_targets_fail_a_run_that_hits_few() {
                  do = \"assert\"\nhits = 5\ntargets_skipped = 0\nposes = 10\nposes_skipped = 9\n";
     let routine = ShortRoutine { tail: format!("{ROCK}{steps}"), ..ShortRoutine::default() }.write(folder.path());
     let told = crate::support::run(&routine, &folder.path().join("out"));
-    let words = ["FAILS: step 4, hits 5 against 4", "FAILS: step 4, targets_skipped 0 against 1", "4 of 5"];
+    let words = ["FAILS: step 4, hits 5, measured 4", "FAILS: step 4, targets_skipped 0, measured 1", "4 of 5"];
     told.expect("skipped", 4, &words);
     told.expect("named", 4, &["step 3, target 4", "holds: step 4, poses 10"]);
 }

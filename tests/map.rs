@@ -188,7 +188,7 @@ fn what_the_site_says_of_the_map_is_checked() {
         ("map = \"partly\"", "site.known_tags"),
         ("map = \"unknown\"\nknown_tags = [0]", "site.known_tags"),
         ("map = \"partly\"\nknown_tags = [99]", "tag 99"),
-        ("map = \"some\"", "site.map"),
+        ("map = \"some\"", "[name_unknown]"),
         ("base_tag_position_std_m = -1.0", "site.base_tag_position_std_m"),
     ] {
         let text = ShortRoutine { tail: format!("[site]\n{site}\n"), ..ShortRoutine::default() };

@@ -4,7 +4,6 @@ use std::fs;
 use std::path::Path;
 
 use crate::map::mapping_run;
-use crate::support::texts::Texts;
 use crate::support::{Answer, answer, edit, program, robot_copy, robot_folder, temp};
 
 fn follow(recording: &Path, out: &Path) -> Answer {
@@ -27,7 +26,6 @@ fn root(path: &str) -> std::path::PathBuf {
 /// The sample ends known as well as its batch says, by the same bytes each time.
 #[test]
 fn a_recording_is_followed_and_its_belief_written() {
-    let _texts = Texts::of("a_recording_is_followed_and_its_belief_written");
     let folder = temp();
     let outs = ["one", "two"].map(|name| folder.path().join(name));
     for out in &outs {
@@ -50,7 +48,6 @@ fn a_recording_is_followed_and_its_belief_written() {
 /// Where nothing drifts, views one by one come to what the batch of all makes of them.
 #[test]
 fn a_stationary_belief_ends_at_the_batch() {
-    let _texts = Texts::of("a_stationary_belief_ends_at_the_batch");
     let folder = temp();
     let mut command = program();
     command.args(["calibrate", "--online", "--stationary"]).arg(root("recordings/sample/run.mcap"));
@@ -128,7 +125,6 @@ fn a_slip_on_a_dive_is_named_as_soon_as_views_tell_it() {
 /// A sensor that is declared dead says nothing of the arm between views: not good enough, whatever the views say.
 #[test]
 fn with_a_dead_sensor_the_arm_is_not_good_enough() {
-    let _texts = Texts::of("with_a_dead_sensor_the_arm_is_not_good_enough");
     let folder = temp();
     let mut declared = program();
     declared.arg("calibrate").arg(root("recordings/sample/run.mcap")).arg("--online");

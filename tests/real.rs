@@ -194,7 +194,6 @@ fn fits_of_many_arms_that_do_not_beat_the_datasheet_are_refused() {
 
 #[test]
 fn eight_poses_are_too_few_for_ten_parameters_however_many_tags() {
-    let _texts = Texts::of("eight_poses_are_too_few_for_ten_parameters_however_many_tags");
     for (tags, seed) in [(9, 3), (1, 4)] {
         let mut titan = RealTitan::new(&titan(), 8, AS_IN_2018, seed);
         titan.poses.iter_mut().for_each(|pose| pose.tags.truncate(tags));
@@ -208,7 +207,6 @@ fn eight_poses_are_too_few_for_ten_parameters_however_many_tags() {
 
 #[test]
 fn order_of_joints_and_names_does_not_matter_and_what_hangs_behind_the_camera_may_be_absent() {
-    let _texts = Texts::of("order_of_joints_and_names_does_not_matter_and_what_hangs_behind_the_camera_may_be_absent");
     let titan = RealTitan::new(&titan(), 30, AS_IN_2018, 5);
     let given = Given::new(&titan);
     given.calibrate(&[]).expect("plain", 0, &["ACCEPTED"]);

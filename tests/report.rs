@@ -78,7 +78,6 @@ fn names_from_files_are_text_and_no_markup() {
 
 #[test]
 fn a_refusal_says_why_and_what_to_do_before_anything_else() {
-    let _texts = Texts::of("a_refusal_says_why_and_what_to_do_before_anything_else");
     let folder = temp();
     let mut refused = program();
     refused.arg("calibrate").arg(shared_run().file("run.mcap")).arg("--robot").arg(robot_folder());

@@ -130,7 +130,8 @@ fn a_limit_that_does_not_hold_gives_exit_code_4_and_says_which() {
     let _texts = Texts::of("a_limit_that_does_not_hold_gives_exit_code_4_and_says_which");
     let folder = temp();
     let limits = "[[step]]\ndo = \"assert\"\nheld_out_rms_m = 1e-6\nsimulated_s = 1e6\ntool_error_m = 1e-6\n";
-    let file = routine(&[CAPTURE, CALIBRATE, limits]).write(folder.path());
+    let reach = "[[step]]\ndo = \"reach\"\ntargets = [1]\n";
+    let file = routine(&[reach, CAPTURE, CALIBRATE, limits]).write(folder.path());
     let run = crate::support::run(&file, &folder.path().join("run"));
     run.expect(
         "limits",
@@ -142,7 +143,6 @@ fn a_limit_that_does_not_hold_gives_exit_code_4_and_says_which() {
 /// Three poses are too few for ten parameters: the verdict is no, and what then happens is the script's to say.
 #[test]
 fn a_refusal_stops_a_script_unless_it_says_otherwise() {
-    let _texts = Texts::of("a_refusal_stops_a_script_unless_it_says_otherwise");
     let few = "[[step]]\ndo = \"capture\"\nposes = 3\nheld_out = 3\n";
     let limits = "[[step]]\ndo = \"assert\"\ncontacts = 0\n";
     let folder = temp();
@@ -203,7 +203,7 @@ fn a_plan_that_fails_in_the_middle_of_a_script_keeps_the_recording() {
     let hopeless = "[[step]]\ndo = \"capture\"\nmin_tags = 100\n";
     let file = routine(&[CAPTURE, CALIBRATE, hopeless]).write(folder.path());
     let out = folder.path().join("run");
-    crate::support::run(&file, &out).expect("hopeless", 1, &["[poses_missing]", "run-cut-1.mcap"]);
+    crate::support::run(&file, &out).expect("hopeless", 1, &["[step_impossible]", "run-cut-1.mcap"]);
     let left = out.join("run-cut-1.mcap");
     calibrate(&left, &robot_folder(), &folder.path().join("left")).expect("what is left", 0, &["ACCEPTED"]);
 }

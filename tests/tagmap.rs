@@ -172,7 +172,6 @@ fn header(stamp: Stamp) -> ros::Header {
 
 #[test]
 fn another_ones_recording_is_mapped_in_the_frame_of_its_own_file() {
-    let _texts = Texts::of("another_ones_recording_is_mapped_in_the_frame_of_its_own_file");
     let hall = Hall::new();
     for name in ["map.toml", "map.yaml"] {
         let out = hall.file(name);
@@ -244,7 +243,6 @@ fn size_off_by_ten(hall: &Hall) -> String {
 /// The page says what the table says, and what is wrong first; nothing of it comes from elsewhere.
 #[test]
 fn the_page_has_the_figures_of_the_table_and_the_warnings() {
-    let _texts = Texts::of("the_page_has_the_figures_of_the_table_and_the_warnings");
     let hall = Hall::new();
     let page = hall.file("map.html");
     let said = hall.map(&["--html", page.to_str().expect("text")]);
@@ -270,7 +268,6 @@ fn the_page_has_the_figures_of_the_table_and_the_warnings() {
 /// Size ten times too large, beside a tag of known distance.
 #[test]
 fn a_size_that_is_off_by_ten_is_warned_of() {
-    let _texts = Texts::of("a_size_that_is_off_by_ten_is_warned_of");
     let hall = Hall::new();
     edit(&hall.file("tagslam.yaml"), "size: 0.1\n", &size_off_by_ten(&hall));
     let said = hall.map(&[]);

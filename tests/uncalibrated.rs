@@ -84,7 +84,8 @@ fn no_contact_on_the_way_to_a_good_calibration() {
 fn without_margins_arms_collide() {
     let off = [("capture.margins", "off".into()), ("capture.replan_every", 0.into())];
     let collides = |seed| run(Site { routine: 1, arm: 0 }, seed, &off).0.capture.collisions.expect("truth") > 0;
-    assert!((1..=4).any(collides));
+    // The fourth does on the machines that were tried.
+    assert!([4, 1, 2, 3].into_iter().any(collides));
 }
 
 /// Why there were no more views is said: the time was over, or the tolerance reached.
@@ -95,11 +96,11 @@ fn a_capture_says_why_it_ended() {
     assert!(by_error.contains("predicted"), "{by_error}");
     let short = [
         ("capture.stop_at_tool_error_m", 0.0001.into()),
-        ("capture.poses", 9.into()),
+        ("capture.poses", 6.into()),
         ("task.targets_m", vec![vec![1.074, 0.001, -0.008], vec![1.012, 0.595, 0.147]].into()),
     ];
     let by_poses = why(&run(FIRST, SEED, &short).0);
     assert!(by_poses.contains("planned"), "{by_poses}");
-    let by_time = why(&run(FIRST, SEED, &[&short[..], &[("capture.max_time_s", 60.0.into())]].concat()).0);
+    let by_time = why(&run(FIRST, SEED, &[&short[..], &[("capture.max_time_s", 40.0.into())]].concat()).0);
     assert!(by_time.contains("time"), "{by_time}");
 }

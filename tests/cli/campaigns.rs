@@ -74,7 +74,7 @@ fn threads_interrupts_and_kills_leave_the_same_files() {
     let ended = child.wait_with_output().expect("it ends");
     let said = String::from_utf8_lossy(&ended.stderr).into_owned();
     assert_eq!(ended.status.code(), Some(1), "{said}");
-    assert!(said.contains("c.csv"), "{said}");
+    assert!(said.contains(" rows "), "{said}");
     assert!(!out.exists());
 
     let before = read(&partial).lines().count();
@@ -182,30 +182,46 @@ fn a_full_disk_is_no_row_and_the_run_is_made_again() {
     answer(&mut campaign(&routine, &out, &["--seeds", "1"])).expect("with room", 0, &["1 accepted", "0 failed"]);
 }
 
-/// The gate stands open for the same program, and shuts when the camera or the controller is worse.
+/// A routine and its baseline of two seeds.
+struct Gate {
+    folder: tempfile::TempDir,
+    routine: PathBuf,
+}
+
+impl Gate {
+    fn new() -> Self {
+        let folder = temp();
+        let routine = ShortRoutine { poses: 10, ..least("") }.write(folder.path());
+        let gate = Self { folder, routine };
+        gate.regress(&["--seeds", "1..2", "--write-baseline"]).expect("baseline", 0, &["2 accepted"]);
+        gate
+    }
+
+    fn regress(&self, more: &[&str]) -> Answer {
+        let baseline = self.folder.path().join("baseline.csv");
+        answer(program().arg("regress").arg(&self.routine).args(more).arg(baseline))
+    }
+}
+
+/// The gate shuts when the camera is worse; that it stands open for the same program is of the second tier.
 #[test]
-fn a_regression_is_found_and_none_is_found_where_none_is() {
-    let _texts = Texts::of("a_regression_is_found_and_none_is_found_where_none_is");
-    let folder = temp();
-    let routine = ShortRoutine { poses: 10, ..least("") }.write(folder.path());
-    let baseline = folder.path().join("baseline.csv");
-    let regress = |more: &[&str]| {
-        let mut command = program();
-        answer(command.arg("regress").arg(&routine).args(more).arg(&baseline))
-    };
-    regress(&["--seeds", "1..2", "--write-baseline"]).expect("baseline", 0, &["2 accepted"]);
-    regress(&["--seeds", "1", "--baseline"]).expect("itself", 0, &[]);
-    let noise = regress(&["--set", "world.camera.corner_noise_px=0.45", "--baseline"]);
-    noise.expect(
-        "noise",
-        4,
-        // Half as much again in each pixel; the poses differ, for what is seen steers the choice.
-        &["┆ x 1.4", "--seed 1 --set world.camera.corner_noise_px=0.45"],
-    );
+fn a_regression_is_found() {
+    let _texts = Texts::of("a_regression_is_found");
+    let gate = Gate::new();
+    let noise = gate.regress(&["--set", "world.camera.corner_noise_px=0.45", "--baseline"]);
+    // Half as much again in each pixel; the poses differ, for what is seen steers the choice.
+    noise.expect("noise", 4, &["┆ x 1.4", "--seed 1 --set world.camera.corner_noise_px=0.45"]);
+    gate.regress(&["--seeds", "3", "--baseline"]).expect("no such seed", 2, &["baseline.csv", "seeds"]);
+}
+
+#[test]
+#[ignore = "second tier: six runs, 6 s"]
+fn a_worse_controller_is_found_and_nothing_where_nothing_is() {
+    let gate = Gate::new();
+    gate.regress(&["--baseline"]).expect("itself", 0, &[]);
     // 0.2 degrees.
-    let bias = regress(&["--set", "world.hydraulics.controller_bias_rad=0.0034907", "--baseline"]);
+    let bias = gate.regress(&["--set", "world.hydraulics.controller_bias_rad=0.0034907", "--baseline"]);
     bias.expect("bias", 4, &["--set world.hydraulics.controller_bias_rad=0.0034907"]);
-    regress(&["--seeds", "3", "--baseline"]).expect("no such seed", 2, &["baseline.csv", "seeds"]);
 }
 
 /// Pairs with another routine, robot or format say nothing; what a build reads is there, and how long it takes is said.
@@ -251,12 +267,11 @@ fn a_baseline_of_something_else_is_refused_and_builds_get_their_files() {
 /// `armcal regress routines/regression.toml --baseline routines/regression-baseline.csv`.
 #[test]
 fn the_routine_of_the_project_is_not_worse_than_its_baseline() {
-    let _texts = Texts::of("the_routine_of_the_project_is_not_worse_than_its_baseline");
     let [routine, baseline] =
         ["regression.toml", "regression-baseline.csv"].map(|name| root().join("routines").join(name));
     let mut regress = program();
-    regress.arg("regress").arg(routine).arg("--baseline").arg(baseline).args(["--seeds", "1..2"]);
-    // Two seeds cannot tell 10 % where another processor's sines draw other poses; half as much again they can.
+    regress.arg("regress").arg(routine).arg("--baseline").arg(baseline).args(["--seeds", "1"]);
+    // One seed cannot tell 10 % where another processor's sines draw other poses; half as much again they can.
     for figure in ["tool_error", "reach_error", "residual", "held_out"] {
         regress.args(["--set", &format!("regress.{figure}_ratio=1.5")]);
     }

@@ -35,7 +35,6 @@ fn the_sample_is_described() {
         "sensor_msgs/msg/JointState",
         "shoulder_yaw, shoulder_pitch",
         "water",
-        "some 50",
         "robot.toml (application/toml)",
         "determined   shoulder_yaw gain, shoulder_yaw offset",
         "enough       views",

@@ -14,7 +14,6 @@ use armcal::streams::{
 use armcal::time::{SIMULATION_EPOCH, Stamp};
 
 use crate::support::synthetic::{Shot, TrueArm, add_noise, normal};
-use crate::support::texts::Texts;
 use crate::support::{answer, program, read, robot_folder, temp, titan};
 
 /// Period of the joint sensors; other streams come every few of them.
@@ -107,7 +106,6 @@ fn measured(command: &mut Command, said: &Path) -> (u64, Duration, i32) {
 /// `ARMCAL_LONG_HOURS=10 cargo test --release --test main hours_of_readings -- --nocapture` for a longer one.
 #[test]
 fn hours_of_readings_cost_no_memory() {
-    let _texts = Texts::of("hours_of_readings_cost_no_memory");
     let hours = std::env::var("ARMCAL_LONG_HOURS").ok().and_then(|hours| hours.parse().ok()).unwrap_or(1.0);
     let folder = temp();
     let recording = folder.path().join("long.mcap");

@@ -152,7 +152,6 @@ fn data_records(bytes: &[u8]) -> (Vec<&[u8]>, &[u8]) {
 /// Sorted and read once, so that nothing of the result changes; told of, so that nobody takes the file for whole.
 #[test]
 fn chunks_swapped_or_doubled_calibrate_as_if_whole() {
-    let _texts = Texts::of("chunks_swapped_or_doubled_calibrate_as_if_whole");
     let run = shared_run();
     let bytes = run.bytes("run.mcap");
     let (records, tail) = data_records(&bytes);
@@ -209,7 +208,6 @@ fn flipped_bits_never_panic_and_never_change_the_result_silently() {
 
 #[test]
 fn a_damaged_recording_says_so_at_the_command_line() {
-    let _texts = Texts::of("a_damaged_recording_says_so_at_the_command_line");
     let mut bytes = shared_run().bytes("run.mcap");
     let folder = temp();
     // In three places: one may lie in an index of a chunk, which nobody needs.

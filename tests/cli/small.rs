@@ -89,7 +89,7 @@ fn a_refused_calibration_says_so_in_the_compact_line() {
         );
         if told.code == 4 {
             refused += 1;
-            let why = ["few_", "no_better"].map(|why| format!("armcal1 titan4 minimum_distance no:{why}"));
+            let why = ["too_few_", "no_better"].map(|why| format!("armcal1 titan4 minimum_distance no:{why}"));
             assert!(why.iter().any(|why| told.stdout.starts_with(why)), "{told:#?}");
             assert!(told.stdout.len() < 512);
         }

@@ -65,9 +65,8 @@ pub fn note_answer(command: &Command, answer: &Answer) {
     let what = format!("armcal {}: exit code {code}", words.join(" "));
     if *code == 2 || words.first().is_some_and(|first| OF_FILES_ALONE.contains(&first.as_ref())) {
         note(&what, &format!("{stderr}{stdout}"));
-    } else {
-        let errors: Vec<&str> = stderr.lines().filter(|line| line.starts_with("error: ")).collect();
-        note_without_digits(&what, &errors.join("\n"));
+    } else if let Some(error) = stderr.lines().find(|line| line.starts_with("error: ")) {
+        note_without_digits(&what, error);
     }
 }
 
