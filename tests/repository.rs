@@ -4,6 +4,7 @@
 mod commands;
 mod links;
 mod names;
+mod prose;
 mod readers;
 mod structure;
 mod words;

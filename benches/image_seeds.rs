@@ -1,22 +1,23 @@
-//! Ten rendered runs calibrated from their images alone, beside the runs' own results: docs/reference/real-arms.md.
+//! Ten rendered runs calibrated from their images only, next to the runs' own results: docs/reference/real-arms.md.
 //!
-//! `cargo test --release --test main image_seeds -- --ignored --nocapture`: an hour, and with `ARMCAL_IMAGE_ALL=1`,
-//! where images between the views count as well, two. `ARMCAL_IMAGE_SEEDS=N` does fewer seeds; runs and results stay in
-//! target/image-seeds, or in the folder `ARMCAL_IMAGE_FOLDER`, and are used again.
+//! `cargo bench --bench image_seeds` takes an hour, and two with `ARMCAL_IMAGE_ALL=1`, which uses the images between
+//! the views as well. `ARMCAL_IMAGE_SEEDS=N` runs fewer seeds. Runs and results stay in target/image-seeds, or in the
+//! folder `ARMCAL_IMAGE_FOLDER`, and are reused. It fails if the images give another result than the runs.
+
+#![allow(clippy::print_stdout, reason = "the table is what it is run for")]
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use armcal::calib::Calibration;
 use armcal::log::{Recording, TopicMap, for_each_raw, read_recording, topics};
-use armcal::robot::Robot;
+use armcal::robot::{Robot, load};
 use armcal::stats::{quantile, stream_rng};
 use armcal::streams::{MarkKind, Message};
 use armcal::time::Stamp;
 use armcal::verify::{Belief, reaches};
 use rand::RngExt;
-
-use crate::support::{answer, program, robot_folder, root, titan, write};
 
 const MAP: &str = "version = 1\n[joint_sensors]\ntopic = \"/joint_sensors\"\n[tags]\n\
     topic = \"/camera/wrist/image/compressed\"\nuse = \"corners\"\n[conditions]\n\
@@ -24,6 +25,24 @@ const MAP: &str = "version = 1\n[joint_sensors]\ntopic = \"/joint_sensors\"\n[ta
 
 fn setting(name: &str) -> Option<String> {
     std::env::var(name).ok()
+}
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn robot_folder() -> PathBuf {
+    root().join("robots/titan4")
+}
+
+fn program() -> Command {
+    Command::new(env!("CARGO_BIN_EXE_armcal"))
+}
+
+/// Runs the program to a verdict: a refusal is a result, too.
+fn verdict(command: &mut Command) {
+    let status = command.status().expect("the program starts");
+    assert!(matches!(status.code(), Some(0 | 4)), "{command:?}: {status}");
 }
 
 /// Whose images are looked at.
@@ -87,9 +106,7 @@ impl Seed {
             command.arg("run").arg(root().join("routines/titan4-rendered.toml")).arg("--seed").arg(seed.to_string());
             // Each image that the run looked at, not one a second: its views hold several.
             command.args(["--set", "world.image.log_period_s=0.0"]);
-            // A refusal is a result, too.
-            let code = answer(command.arg("--out").arg(&folder)).code;
-            assert!(matches!(code, 0 | 4), "seed {seed}: {code}");
+            verdict(command.arg("--out").arg(&folder));
         }
         Self { folder }
     }
@@ -104,11 +121,10 @@ impl Seed {
         if !result.exists() {
             let (stripped, map) = (self.folder.join("stripped.mcap"), self.folder.join("map.toml"));
             strip(&self.folder.join("run.mcap"), &stripped, images);
-            write(&map, MAP);
+            std::fs::write(&map, MAP).expect("written");
             let mut command = program();
             command.arg("calibrate").arg(&stripped).arg("--robot").arg(robot_folder()).arg("--input").arg(map);
-            let code = answer(command.arg("--out").arg(out)).code;
-            assert!(matches!(code, 0 | 4), "{}: {code}", self.folder.display());
+            verdict(command.arg("--out").arg(out));
             std::fs::remove_file(stripped).expect("removed");
         }
         Calibration::read(&result).expect("it reads")
@@ -159,12 +175,14 @@ fn ratio_interval(logs: &[f64]) -> [f64; 2] {
     [0.025, 0.975].map(|q| quantile(&means, q).expect("values").exp())
 }
 
-#[test]
-#[ignore = "an hour of rendering and detection"]
-fn ten_runs_from_their_images_alone() {
+fn main() {
+    // `cargo test --all-targets` starts benchmarks, too.
+    if !std::env::args().any(|argument| argument == "--bench") {
+        return;
+    }
     let folder = setting("ARMCAL_IMAGE_FOLDER").map_or_else(|| root().join("target/image-seeds"), PathBuf::from);
     let n_seeds: u64 = setting("ARMCAL_IMAGE_SEEDS").map_or(10, |n| n.parse().expect("a number of seeds"));
-    let robot = titan();
+    let robot = load(&robot_folder()).expect("the robot reads");
     println!(
         "| seed | images of | views | farthest parameter, sigma | which | gains, % | tool error, own, mm | images, mm |"
     );
