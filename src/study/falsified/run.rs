@@ -251,7 +251,7 @@ fn reserved_per_unit(robot: &Robot, case: &Case, calibration: &Calibration) -> O
 
 /// How a reservation about the case's element begins, and its axis.
 fn reserved_element(robot: &Robot, case: &Case) -> Option<(String, &'static str)> {
-    let place = |joint: usize| format!("the place of {}", robot.chain.joints()[joint].name);
+    let place = |joint: usize| format!("pose of {}", robot.chain.joints()[joint].name);
     let (element, axis) = match (case.kind, case.element) {
         (CaseKind::MountTurned | CaseKind::MountShifted, Element::Axis(axis)) => ("camera mount".to_owned(), axis),
         (CaseKind::ToolShifted, Element::Axis(axis)) => ("tool point".to_owned(), axis),
@@ -260,7 +260,7 @@ fn reserved_element(robot: &Robot, case: &Case) -> Option<(String, &'static str)
         _ => return None,
     };
     let way = match case.kind.unit().1 {
-        "deg" => "turn about",
+        "deg" => "rotation about",
         _ => "shift along",
     };
     Some((format!("{element}, {way} "), AXES[axis]))

@@ -146,10 +146,10 @@ impl Estimate<'_> {
         let size = Vector3::ith(axis, prior_std);
         let shifts = tool.iter().map(|at| at.shift(score, first, &size)).collect();
         let name = match element {
-            GeometryElement::Joint(joint) => format!("the place of {}", robot.chain.joints()[joint].name),
+            GeometryElement::Joint(joint) => format!("pose of {}", robot.chain.joints()[joint].name),
             GeometryElement::Mount => "camera mount".to_owned(),
         };
-        let way = if error == ErrorKind::Shift { "shift along" } else { "turn about" };
+        let way = if error == ErrorKind::Shift { "shift along" } else { "rotation about" };
         let stem = format!("{name}, {way} ");
         // The mount's prior is in the estimate, and is left there.
         let own_std = if is_estimated { 0.0 } else { prior_std };
@@ -180,7 +180,7 @@ impl Estimate<'_> {
         let priors = &self.problem.robot.geometry;
         let (way, prior_std) = match error {
             ErrorKind::Shift => ("shift along", priors.link_position_std_m),
-            ErrorKind::Turn => ("turn about", priors.link_rotation_std_rad),
+            ErrorKind::Turn => ("rotation about", priors.link_rotation_std_rad),
         };
         let size = Vector3::ith(axis, prior_std);
         HeldElement {

@@ -36,9 +36,9 @@ impl Change {
         let joint = |joint: usize| &robot.chain.joints()[joint].name;
         match self {
             Self::MountShift => format!("camera mount, shift along {}", AXES[axis]),
-            Self::MountTurn => format!("camera mount, turn about {}", AXES[axis]),
-            Self::LinkShift(at) => format!("the place of {}, shift along {}", joint(at), AXES[axis]),
-            Self::LinkTurn(at) => format!("the place of {}, turn about {}", joint(at), AXES[axis]),
+            Self::MountTurn => format!("camera mount, rotation about {}", AXES[axis]),
+            Self::LinkShift(at) => format!("pose of {}, shift along {}", joint(at), AXES[axis]),
+            Self::LinkTurn(at) => format!("pose of {}, rotation about {}", joint(at), AXES[axis]),
             Self::Tool => format!("tool point, shift along {}", AXES[axis]),
         }
     }
