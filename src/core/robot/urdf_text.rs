@@ -194,12 +194,23 @@ mod tests {
         insta::assert_snapshot!("many_namespaces", told(&of(MAX_NAMESPACES + 1)));
     }
 
+    fn told_of<const N: usize>(texts: [&str; N]) -> String {
+        texts.map(|text| format!("{text:?}\n  {}\n", told(text))).concat()
+    }
+
     #[test]
-    fn what_is_not_well_formed_is_named_with_its_line() {
+    fn document_types_and_entities_are_refused() {
         let texts = [
             "<!DOCTYPE robot [<!ENTITY a \"aaaa\">]><robot name=\"&a;\"/>",
             "<robot name=\"&a;\"/>",
             "<robot>\n&a;</robot>",
+        ];
+        insta::assert_snapshot!("entities", told_of(texts));
+    }
+
+    #[test]
+    fn what_is_not_well_formed_is_named_with_its_line() {
+        let texts = [
             "",
             "a mere text",
             "<robot>\n<link>\n</robot>",
@@ -209,6 +220,6 @@ mod tests {
             "<robot na<me=\"a\"/>",
             "<1/>",
         ];
-        insta::assert_snapshot!("urdf", texts.map(|text| format!("{text:?}\n  {}\n", told(text))).concat());
+        insta::assert_snapshot!("not_well_formed", told_of(texts));
     }
 }
