@@ -84,7 +84,9 @@ mod tests {
             }
             let said = flow.weak_pump();
             assert_eq!(said.is_some(), is_weak, "{rate_share}: {said:?}");
-            assert!(said.is_none_or(|said| said.contains("pump gives far less than the 12 L/min")));
+            if let Some(said) = said {
+                insta::assert_snapshot!("weak_pump", said);
+            }
         }
     }
 }

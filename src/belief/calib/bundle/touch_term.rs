@@ -39,6 +39,11 @@ const ALIKE_SHARE: f64 = 0.1;
 /// Directions of a cause that the touches tell less than this of, relative to the best one, are left out.
 const TOLD_SHARE: f64 = 1e-3;
 
+/// Causes of touches that are not where they should be.
+pub(crate) const TOOL_POINT: &str = "tool point or links beyond the camera";
+pub(crate) const MOUNT_TURN: &str = "the camera's turn about the last joint before it";
+pub(crate) const SURVEY_TURN: &str = "a turn of the tag survey against the base";
+
 /// What the touches tell beside the views.
 pub(crate) struct TouchUpdate {
     names: Vec<String>,
@@ -285,14 +290,14 @@ impl TouchUpdate {
         let columns: Vec<DVector<f64>> = (0..3)
             .map(|axis| self.along(|tool| tool.poses.frame(&robot.tool.mount).rotation * Vector3::ith(axis, 1.0)))
             .collect();
-        self.cause("tool point or links beyond the camera".to_owned(), &columns)
+        self.cause(TOOL_POINT.to_owned(), &columns)
     }
 
     fn mount_turn(&self) -> Cause {
         let (first, _) = columns(GeometryElement::Mount, ErrorKind::Turn);
         let columns: Vec<DVector<f64>> =
             (0..3).map(|axis| self.along(|tool| tool.shift(&self.score, first, &Vector3::ith(axis, 1.0)))).collect();
-        self.cause("the camera's turn about the last joint before it".to_owned(), &columns)
+        self.cause(MOUNT_TURN.to_owned(), &columns)
     }
 
     /// All tags together against the base, about the axes of which no view tells.
@@ -303,7 +308,7 @@ impl TouchUpdate {
         let columns: Vec<DVector<f64>> = unseen
             .map(|axis| self.along(|tool| -tool.followed(&self.score, first, &Vector3::ith(axis, 1.0))))
             .collect();
-        (!columns.is_empty()).then(|| self.cause("a turn of the tag survey against the base".to_owned(), &columns))
+        (!columns.is_empty()).then(|| self.cause(SURVEY_TURN.to_owned(), &columns))
     }
 
     fn surface(&self, k: usize) -> Cause {

@@ -184,7 +184,7 @@ fn minimum_variance_is_exactly_blind_to_the_first_offset_and_to_nothing_else() {
         }
         let (left, blind) = determined_by_variance(&problem, &all_free(), &JointParameters::default());
         assert_eq!((left.len(), blind.len()), (9, 1));
-        assert!(blind[0].parameter == first_offset() && blind[0].reason.contains("exactly blind"));
+        assert_eq!(blind[0].parameter, first_offset());
     }
 }
 
@@ -318,7 +318,7 @@ mod stops {
                 assert!((found.solution.cost_initial - expected).abs() < 1e-12 * expected);
                 // The last joint turns without end: it has no stops.
                 assert_eq!(found.left_out.len(), 2);
-                assert!(found.left_out[0].reason.contains("never stood"));
+                assert!(found.left_out.iter().all(|u| u.parameter.joint == 5));
             }
         }
     }
@@ -357,15 +357,15 @@ mod stops {
         let at = |joint, end: usize| reading(&robot, &truth, joint, stops_rad(&robot, joint)[end], 0.0);
         let guess = JointParameters::default();
         let none = fit_stops(&robot, &[], &guess).expect_err("nothing to fit");
-        assert!(none.contains("no readings at end stops"), "{none}");
         let one = fit_stops(&robot, &[at(1, 0), at(1, 0), at(2, 1)], &guess).expect_err("one stop each");
-        assert!(one.contains("shoulder_pitch: it stood at one end stop only, -2.0644 rad"), "{one}");
         let found = fit_stops(&robot, &[at(1, 0), at(1, 1), at(2, 1)], &guess).expect("one joint");
         assert_eq!(found.covariance.parameters.len(), 2);
         assert_eq!(found.solution.parameters.gain[2], 1.0);
-        assert!(found.left_out.iter().any(|u| u.parameter.joint == 2 && u.reason.contains("one end stop only")));
+        assert!(found.left_out.iter().any(|u| u.parameter.joint == 2));
         let dead = EndStopReading { travel_rad: at(3, 0).travel_rad, ..at(3, 1) };
         let dead = fit_stops(&robot, &[at(3, 0), dead], &guess).expect_err("a dead sensor");
-        assert!(dead.contains("its reading changed by 0.0000 rad only"), "{dead}");
+        let mut words = vec![none, one, dead];
+        words.extend(found.left_out.into_iter().map(|left| left.reason));
+        insta::assert_snapshot!("end_stops", words.join("\n"));
     }
 }

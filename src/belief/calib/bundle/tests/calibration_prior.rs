@@ -16,7 +16,7 @@ use crate::calib::result::bare::bare;
 use crate::calib::result::calibration::{Calibration, JointResult};
 use crate::calib::result::covariance_file::CovarianceTable;
 use crate::calib::views::view::View;
-use crate::calib::{ReferenceTable, TermsTable, ValidRange};
+use crate::calib::{ReferenceTable, Refusal, TermsTable, ValidRange};
 use armcal_core::robot::Robot;
 use armcal_core::routine::Method;
 use armcal_core::sensor::ConditionChange;
@@ -154,8 +154,9 @@ fn a_slip_of_one_degree_is_refused_and_named() {
         assert_eq!(agreement.joint, joint, "seed {seed}: {agreement:?}");
         let off = agreement.off_rad - by_rad;
         assert!(off.abs() < 0.4_f64.to_radians(), "seed {seed}: {agreement:?}");
-        let words = agreement.refusal(&case.robot).expect("beyond chance").to_string();
-        assert!(words.contains(&case.robot.sensors[joint].joint) && words.contains("deg"), "{words}");
+        let refusal = agreement.refusal(&case.robot).expect("beyond chance");
+        let Refusal::PriorContradicted { joint: named, off_rad, .. } = &refusal else { panic!("{refusal}") };
+        assert_eq!((named, *off_rad), (&case.robot.sensors[joint].joint, agreement.off_rad));
     }
 }
 

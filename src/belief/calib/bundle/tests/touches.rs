@@ -4,11 +4,13 @@ use nalgebra::{Matrix3, Translation3, UnitQuaternion, Vector3};
 use rand_chacha::ChaCha8Rng;
 
 use crate::calib::bundle::estimate::{Estimate, estimate};
+use crate::calib::bundle::model::model_for;
 use crate::calib::bundle::model::{Hyperparameters, Model};
 use crate::calib::bundle::tests::data::{Noise, Truth, normal, reference, rng, titan, views};
 use crate::calib::bundle::tests::score_test::input;
-use crate::calib::bundle::{model::model_for, touch_term::MIN_TOUCHES};
+use crate::calib::bundle::touch_term::{MIN_TOUCHES, MOUNT_TURN, SURVEY_TURN, TOOL_POINT};
 use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
+use crate::calib::refusal::Refusal;
 use crate::calib::reservation::Reservation;
 use crate::calib::views::view::{Touch, View};
 use armcal_core::joints::JointAngles;
@@ -164,13 +166,17 @@ fn touches_of_a_good_arm_are_as_foretold_and_the_tool_is_better_known() {
     assert!(after < before, "{before} m before, {after} m after");
 }
 
-/// Runs the refusal's words out of an update that does not hold.
-fn refused_for(robot: &Robot, found: &Estimate<'_>, touches: &[Touch]) -> Option<(String, Vector3<f64>)> {
+/// The causes that an update names which does not hold, and where the tool point would explain it.
+fn refused_for(robot: &Robot, found: &Estimate<'_>, touches: &[Touch]) -> Option<(Vec<String>, Vector3<f64>)> {
     let update = found.touch_update(touches)?;
     (update.chi2 > update.limit).then(|| {
-        let refusal = update.refusal(robot);
-        (refusal.to_string(), update.tool_point_m(robot))
+        let Refusal::Touch { causes, .. } = update.refusal(robot) else { panic!("of touches") };
+        (causes, update.tool_point_m(robot))
     })
+}
+
+fn is_named(cause: &str, causes: &[String]) -> bool {
+    causes.iter().any(|named| named == cause)
 }
 
 #[test]
@@ -182,8 +188,8 @@ fn a_tool_point_two_centimetres_off_is_refused_and_measured() {
         let off_m = Vector3::ith(seed as usize % 3, 0.02);
         let case = case(&robot, seed, |real, _| real.tool.mount.link_from_frame.translation.vector += off_m);
         let found = estimate(&input(&robot, &case.views, &case.model)).expect("solved");
-        let (words, shift_m) = refused_for(&robot, &found, &case.touches).expect("refused");
-        assert!(words.contains("tool point or links beyond the camera"), "{words}");
+        let (causes, shift_m) = refused_for(&robot, &found, &case.touches).expect("refused");
+        assert!(is_named(TOOL_POINT, &causes), "{causes:?}");
         worst_m = worst_m.max((shift_m - off_m).norm());
     }
     println!("tool point measured to {:.1} mm at worst", worst_m * 1e3);
@@ -193,11 +199,23 @@ fn a_tool_point_two_centimetres_off_is_refused_and_measured() {
 /// Whatever a tool point is off by: accepted only where the predicted error says so.
 #[test]
 fn no_tool_point_is_accepted_far_beyond_its_prediction() {
+    let accepted = accepted_tool_points(3);
+    assert!((1..18).contains(&accepted), "some touches must hold and some must not: {accepted}");
+}
+
+#[test]
+#[ignore = "second tier: 120 arms, XX s"]
+fn no_tool_point_of_120_is_accepted_far_beyond_its_prediction() {
+    accepted_tool_points(20);
+}
+
+/// How many of so many arms with a tool point that is off by each size are accepted.
+fn accepted_tool_points(n_seeds: u64) -> u64 {
     let robot = titan();
     let at = task(&robot);
     let (mut accepted, mut worst) = (0, 0.0_f64);
     for (k, size_m) in [0.003, 0.005, 0.007, 0.009, 0.012, 0.02].into_iter().enumerate() {
-        for seed in 0..20 {
+        for seed in 0..n_seeds {
             let off_m = Vector3::ith(seed as usize % 3, size_m);
             let case = case(&robot, 100 * k as u64 + seed, |real, _| {
                 real.tool.mount.link_from_frame.translation.vector += off_m;
@@ -215,8 +233,9 @@ fn no_tool_point_is_accepted_far_beyond_its_prediction() {
             worst = worst.max((at.iter().map(error).sum::<f64>() / predicted).sqrt());
         }
     }
-    println!("{accepted} of 120 accepted, at most {worst:.1} times the prediction");
+    println!("{accepted} of {} accepted, at most {worst:.1} times the prediction", 6 * n_seeds);
     assert!(worst < 3.0, "{worst}");
+    accepted
 }
 
 #[test]
@@ -233,9 +252,9 @@ fn a_camera_turned_about_the_last_joint_before_it_is_refused() {
             truth.mount = Translation3::identity() * turn * truth.mount;
         });
         let found = estimate(&input(&robot, &case.views, &case.model)).expect("solved");
-        let Some((words, _)) = refused_for(&robot, &found, &case.touches) else { continue };
+        let Some((causes, _)) = refused_for(&robot, &found, &case.touches) else { continue };
         refused += 1;
-        named += u32::from(words.contains("the camera's turn about the last joint before it"));
+        named += u32::from(is_named(MOUNT_TURN, &causes));
     }
     println!("{refused} refused, {named} named of {SEEDS}");
     assert!(refused == SEEDS && u64::from(named) >= SEEDS - 1, "{refused}, {named} of {SEEDS}");
@@ -253,9 +272,9 @@ fn a_survey_turned_about_the_first_axis_is_refused_with_that_among_the_causes() 
             truth.tags.iter_mut().for_each(|tag| *tag = Translation3::identity() * turn * *tag);
         });
         let found = estimate(&input(&robot, &case.views, &case.model)).expect("solved");
-        let Some((words, _)) = refused_for(&robot, &found, &case.touches) else { continue };
+        let Some((causes, _)) = refused_for(&robot, &found, &case.touches) else { continue };
         refused += 1;
-        named += u32::from(words.contains("a turn of the tag survey against the base"));
+        named += u32::from(is_named(SURVEY_TURN, &causes));
     }
     println!("{refused} refused, {named} named of {SEEDS}");
     assert!(refused >= 18 && named == refused, "{refused}, {named} of {SEEDS}");

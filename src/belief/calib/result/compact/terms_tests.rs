@@ -137,8 +137,9 @@ fn every_single_change_of_a_line_with_terms_is_noticed() {
     for (from, to, field) in cases {
         let changed = body.replacen(&from, &to, 1);
         let sum = blake3::hash(changed.as_bytes()).to_hex()[..8].to_owned();
-        let error = CompactCalibration::from_text(&format!("{changed} #{sum}")).expect_err("refused").to_string();
-        assert!(error.contains(field), "{from} -> {to}: {error}");
+        let error = CompactCalibration::from_text(&format!("{changed} #{sum}")).expect_err("refused");
+        let CompactError::Field { field: named, .. } = &error else { panic!("{from} -> {to}: {error}") };
+        assert_eq!(named, field, "{from} -> {to}: {error}");
     }
 }
 

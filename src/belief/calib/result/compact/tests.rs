@@ -219,8 +219,9 @@ fn wrong_fields_are_named() {
         let changed = body.replacen(from, to, 1);
         assert_ne!(changed, body);
         let sum = blake3::hash(changed.as_bytes()).to_hex()[..8].to_owned();
-        let error = CompactCalibration::from_text(&format!("{changed} #{sum}")).unwrap_err().to_string();
-        assert!(error.contains(field), "{from} -> {to}: {error}");
+        let error = CompactCalibration::from_text(&format!("{changed} #{sum}")).unwrap_err();
+        let CompactError::Field { field: named, .. } = &error else { panic!("{from} -> {to}: {error}") };
+        assert_eq!(named, field, "{from} -> {to}: {error}");
     }
 }
 
