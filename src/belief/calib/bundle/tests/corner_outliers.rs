@@ -1,5 +1,7 @@
 //! Single corners that do not belong, against whole observations that go for them.
 
+use std::ops::Range;
+
 use nalgebra::Matrix3;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -64,7 +66,7 @@ struct Paired {
     n_wrongly: usize,
 }
 
-fn paired(seeds: std::ops::Range<u64>, probability: f64) -> Paired {
+fn paired(seeds: Range<u64>, probability: f64) -> Paired {
     let robot = titan();
     let (mut ratios, mut sums, mut nees, n) = (Vec::new(), [0.0; 2], [0.0; 2], (seeds.end - seeds.start) as f64);
     let (mut n_soiled, mut n_named, mut n_wrongly) = (0, 0, 0);
@@ -95,15 +97,25 @@ fn paired(seeds: std::ops::Range<u64>, probability: f64) -> Paired {
 /// With one corner in twenty observations off by 5 to 30 px, and in one of three.
 #[test]
 fn a_corner_that_does_not_belong_goes_alone_and_costs_less_than_its_tag() {
+    single_corners_go_alone(12, 1.7..4.5);
+}
+
+#[test]
+#[ignore = "second tier: 60 seeds of two kinds, 8 s"]
+fn a_corner_that_does_not_belong_goes_alone_over_60_seeds() {
+    single_corners_go_alone(60, 2.4..3.8);
+}
+
+fn single_corners_go_alone(n_seeds: u64, nees_limits: Range<f64>) {
     for (probability, most) in [(0.05, 1.01), (0.33, 1.0)] {
-        let Paired { ratio, nees, n_soiled, n_named, n_wrongly } = paired(0..60, probability);
+        let Paired { ratio, nees, n_soiled, n_named, n_wrongly } = paired(0..n_seeds, probability);
         println!(
             "{n_soiled} corners off: {n_named} named, {n_wrongly} others rejected; tool error over that without their \
              tags: 5, 50, 95 % of the seeds and all {ratio:.3?}; NEES {nees:.2?}"
         );
         assert!(n_named * 100 >= n_soiled * 98 && n_wrongly * 50 <= n_soiled);
         assert!(ratio[3] < most && ratio[1] < most, "{ratio:?}");
-        assert!((2.4..3.8).contains(&nees[0]) && nees[0] < 1.05 * nees[1], "{nees:?}");
+        assert!(nees_limits.contains(&nees[0]) && nees[0] < 1.05 * nees[1], "{nees:?}");
     }
 }
 

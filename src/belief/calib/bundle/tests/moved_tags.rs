@@ -9,6 +9,7 @@ use crate::calib::bundle::tags::identity::TagFault;
 use crate::calib::bundle::tests::arms::{Built, arm};
 use crate::calib::bundle::tests::data::titan;
 use crate::calib::bundle::tests::score_test::{input, views_of_changed};
+use armcal_core::robot::Robot;
 
 #[test]
 fn a_tag_that_was_knocked_aside_is_named() {
@@ -74,15 +75,30 @@ fn moved_together(seed: u64, moved_m: f64, n: usize) -> (Vec<usize>, Vec<usize>,
 
 #[test]
 fn tags_that_were_moved_together_are_named() {
-    for (moved_m, n) in [(0.01, 2), (0.01, 3), (0.04, 3)] {
+    groups_are_named(4, &[(0.01, 2), (0.04, 3)]);
+}
+
+#[test]
+#[ignore = "second tier: 16 seeds of three kinds, 17 s"]
+fn tags_that_were_moved_together_are_named_over_16_seeds() {
+    groups_are_named(16, &[(0.01, 2), (0.01, 3), (0.04, 3)]);
+}
+
+/// Of each kind: by how much, m, and how many.
+fn groups_are_named(n_seeds: u64, kinds: &[(f64, usize)]) {
+    for &(moved_m, n) in kinds {
         // Where no tag departs, base and joints take all of it up.
-        let seen: Vec<bool> = (0..16)
+        let seen: Vec<bool> = (0..n_seeds)
             .map(|seed| moved_together(seed, moved_m, n))
             .filter_map(|(moved, named, n_departed)| (n_departed > 1).then_some(moved == named))
             .collect();
         let named = seen.iter().filter(|is_named| **is_named).count();
         println!("{n} tags by {moved_m} m: named in {named} of {}", seen.len());
-        assert!(seen.len() >= 8 && named * 10 >= seen.len() * 9, "{n} tags by {moved_m} m: {named} of {}", seen.len());
+        assert!(
+            seen.len() >= n_seeds as usize / 2 && named * 10 >= seen.len() * 9,
+            "{n} tags by {moved_m} m: {named} of {}",
+            seen.len()
+        );
     }
 }
 

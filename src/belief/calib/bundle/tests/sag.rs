@@ -66,11 +66,9 @@ struct Errors {
     n_links: usize,
 }
 
-const SEEDS: usize = 20;
-
-fn errors(robot: &Robot, sag: impl Fn(u64) -> Sag) -> Errors {
+fn errors(robot: &Robot, n_seeds: u64, sag: impl Fn(u64) -> Sag) -> Errors {
     let mut errors = Errors::default();
-    for seed in 0..SEEDS as u64 {
+    for seed in 0..n_seeds {
         let stiff = arm(Built::AsDrawn, seed);
         errors.stiff.extend(tool_errors_m(robot, &stiff.case.truth, robot, &stiff.found, seed));
         let case = soft_case(robot, sag(seed), seed);
@@ -87,20 +85,32 @@ fn errors(robot: &Robot, sag: impl Fn(u64) -> Sag) -> Errors {
 
 #[test]
 fn a_soft_arm_is_as_good_as_a_stiff_one() {
+    soft_arms_are_as_good(3, &[(1e-5, 0.0)], [1.6, 1.05]);
+}
+
+#[test]
+#[ignore = "second tier: 20 seeds of two kinds, 19 s"]
+fn a_soft_arm_is_as_good_as_a_stiff_one_over_20_seeds() {
+    soft_arms_are_as_good(20, &[(1e-5, 0.0), (3e-6, 500.0)], [1.3, 1.5]);
+}
+
+/// Of each kind: compliance, rad/(N m), and load, N. Errors of soft arms are at most `most` times those of stiff ones,
+/// and as drawn at least `least` times.
+fn soft_arms_are_as_good(n_seeds: u64, kinds: &[(f64, f64)], [most, least]: [f64; 2]) {
     let robot = titan();
-    for (rad_per_nm, load_n) in [(1e-5, 0.0), (3e-6, 500.0)] {
+    for &(rad_per_nm, load_n) in kinds {
         let Errors { stiff, plain, bent, n_named, n_links } =
-            errors(&robot, |seed| soft(&robot, rad_per_nm, load_n, seed));
+            errors(&robot, n_seeds, |seed| soft(&robot, rad_per_nm, load_n, seed));
         let of = |errors: &[f64]| [0.5, 0.95].map(|q| 1e3 * quantile(errors, q).expect("values"));
         let [stiff, plain, bent] = [&stiff, &plain, &bent].map(|errors| of(errors));
         println!(
             "{rad_per_nm:.0e} rad/(N m), {load_n} N: stiff {stiff:.2?}, soft as drawn {plain:.2?}, with sag \
              {bent:.2?} mm; \
-             sag {n_named}, links {n_links} of {SEEDS}"
+             sag {n_named}, links {n_links} of {n_seeds}"
         );
-        assert!(bent[0] < 1.3 * stiff[0] && bent[1] < 1.3 * stiff[1], "{bent:?} mm, {stiff:?} mm");
-        assert!(plain[0] > 1.5 * stiff[0], "too little to tell: {plain:?} mm");
-        assert!(n_named == SEEDS && n_links == 0, "sag {n_named}, links {n_links} of {SEEDS}");
+        assert!(bent[0] < most * stiff[0] && bent[1] < most * stiff[1], "{bent:?} mm, {stiff:?} mm");
+        assert!(plain[0] > least * stiff[0], "too little to tell: {plain:?} mm");
+        assert!(n_named == n_seeds as usize && n_links == 0, "sag {n_named}, links {n_links} of {n_seeds}");
     }
 }
 
@@ -126,9 +136,21 @@ fn steps_that_overshoot_are_shortened() {
 
 #[test]
 fn a_link_that_is_off_is_no_sag() {
+    assert_eq!(links_and_sag(1), [4, 0]);
+}
+
+#[test]
+#[ignore = "second tier: 24 arms, XX s"]
+fn a_link_that_is_off_is_no_sag_over_24_arms() {
+    let [n_links, n_sag] = links_and_sag(6);
+    assert!(n_links >= 23 && n_sag <= 1, "links {n_links}, sag {n_sag} of 24");
+}
+
+/// How many of four arms a seed, each with a link that is off, are said to have such links, and to bend.
+fn links_and_sag(n_seeds: u64) -> [usize; 2] {
     let robot = titan();
     let [mut n_sag, mut n_links] = [0; 2];
-    for seed in 0..6 {
+    for seed in 0..n_seeds {
         for joint in 1..robot.n_seen_joints() {
             let built = Built::LongerAndTurned(joint);
             let first = better(built, seed).cloned();
@@ -138,8 +160,8 @@ fn a_link_that_is_off_is_no_sag() {
             n_sag += usize::from(drawing.sag.is_some());
         }
     }
-    println!("a link off: links {n_links}, sag {n_sag} of 24");
-    assert!(n_links >= 23 && n_sag <= 1, "links {n_links}, sag {n_sag} of 24");
+    println!("a link off: links {n_links}, sag {n_sag} of {}", 4 * n_seeds);
+    [n_links, n_sag]
 }
 
 fn data(robot: &Robot, views: &[View]) -> CalibrationData {
@@ -157,10 +179,19 @@ fn data(robot: &Robot, views: &[View]) -> CalibrationData {
 /// From views to a file and back: accepted like a stiff one, the cause first, the tool within its predicted error.
 #[test]
 fn a_soft_arm_is_accepted_and_said_to_bend() {
+    soft_arms_are_accepted(2, 0);
+}
+
+#[test]
+#[ignore = "second tier: 8 seeds, 13 s"]
+fn a_soft_arm_is_accepted_and_said_to_bend_over_8_seeds() {
+    soft_arms_are_accepted(8, 1);
+}
+
+fn soft_arms_are_accepted(n_seeds: usize, most_unnamed: usize) {
     let robot = titan();
-    const SEEDS: usize = 8;
     let ([mut n_accepted, mut n_stiff, mut n_bent, mut n_named], mut nees, mut n) = ([0; 4], 0.0, 0.0);
-    for seed in 0..SEEDS as u64 {
+    for seed in 0..n_seeds as u64 {
         let case = soft_case(&robot, soft(&robot, 1e-5, 500.0, seed), seed);
         let found = calibrate_data(data(&robot, &case.views), Method::Bundle, None).expect("a result");
         n_accepted += usize::from(found.status == Status::Accepted);
@@ -192,9 +223,12 @@ fn a_soft_arm_is_accepted_and_said_to_bend() {
             n += 1.0;
         }
     }
-    println!("accepted {n_accepted} (stiff {n_stiff}), named first {n_named} of {SEEDS}; NEES {:.2}", nees / n);
+    println!("accepted {n_accepted} (stiff {n_stiff}), named first {n_named} of {n_seeds}; NEES {:.2}", nees / n);
     // Thirty views at random are few: a stiff arm's are refused as overfitted now and then, too.
-    assert!(n_accepted + 2 >= n_stiff && n_named >= SEEDS - 1, "accepted {n_accepted}, named {n_named} of {SEEDS}");
+    assert!(
+        n_accepted + 2 >= n_stiff && n_named + most_unnamed >= n_seeds,
+        "accepted {n_accepted}, named {n_named} of {n_seeds}"
+    );
     assert_eq!(n_bent, 0, "stiff arms that are said to bend");
     assert!((1.5..3.6).contains(&(nees / n)), "{}", nees / n);
 }
@@ -218,9 +252,20 @@ fn a_warm_start_knows_the_sag() {
 /// A vehicle that leans by 0.2 rad turns the weight: the attitude at each view says so.
 #[test]
 fn attitudes_of_a_leaning_base_are_used() {
+    attitudes_are_used(2, 1.6);
+}
+
+#[test]
+#[ignore = "second tier: 8 seeds, 18 s"]
+fn attitudes_of_a_leaning_base_are_used_over_8_seeds() {
+    attitudes_are_used(8, 1.3);
+}
+
+/// Errors of leaning arms are at most `most` times those of level ones, and larger without the attitudes.
+fn attitudes_are_used(n_seeds: u64, most: f64) {
     let robot = titan();
     let [mut level, mut told, mut untold] = [Vec::new(), Vec::new(), Vec::new()];
-    for seed in 0..8 {
+    for seed in 0..n_seeds {
         let soft = || soft(&robot, 3e-5, 0.0, seed);
         let error_m = |case: &Case, views: &[View]| {
             let as_drawn = input(&robot, views, &case.model);
@@ -239,6 +284,6 @@ fn attitudes_of_a_leaning_base_are_used() {
     let of = |errors: &[f64]| [0.5, 0.95].map(|q| 1e3 * quantile(errors, q).expect("values"));
     let [level, told, untold] = [&level, &told, &untold].map(|errors| of(errors));
     println!("level {level:.2?}, leaning with attitudes {told:.2?}, without {untold:.2?} mm");
-    assert!(told[0] < 1.3 * level[0] && told[1] < 1.3 * level[1], "{told:?} mm, {level:?} mm");
+    assert!(told[0] < most * level[0] && told[1] < most * level[1], "{told:?} mm, {level:?} mm");
     assert!(untold[0] > 1.3 * told[0], "too little to tell: {untold:?} mm, {told:?} mm");
 }

@@ -1,5 +1,7 @@
 //! Sensors that slip during a capture of the estimator's own model: found, named with time and size, and fitted.
 
+use std::ops::Range;
+
 use rand::RngExt;
 
 use crate::calib::bundle::drawing::Drawing;
@@ -98,16 +100,25 @@ fn with_estimate<T>(case: &Case, known: &[Failure], then: impl FnOnce(&Estimate<
 
 #[test]
 fn a_slip_is_found_with_joint_time_and_size_and_costs_hardly_anything() {
-    const SEEDS: u64 = 24;
+    slips_are_found(5, &[0.3, 2.0], 0.4..1.6);
+}
+
+#[test]
+#[ignore = "second tier: 24 seeds of four sizes, 16 s"]
+fn a_slip_is_found_with_joint_time_and_size_over_24_seeds() {
+    slips_are_found(24, &[0.1, 0.3, 1.0, 2.0], 0.5..1.4);
+}
+
+fn slips_are_found(n_seeds: u64, sizes_deg: &[f64], sigma_limits: Range<f64>) {
     const N_VIEWS: usize = 30;
     let (mut all_strong, mut all_named) = (0, 0);
-    let sound: Vec<Case> = (0..SEEDS).map(|seed| case(seed, N_VIEWS)).collect();
+    let sound: Vec<Case> = (0..n_seeds).map(|seed| case(seed, N_VIEWS)).collect();
     let clean_m = |case: &Case| with_estimate(case, &[], |found| tool_error_m(case, found));
     let clean_m: Vec<f64> = sound.iter().map(clean_m).collect();
-    for size_deg in [0.1_f64, 0.3, 1.0, 2.0] {
+    for &size_deg in sizes_deg {
         let (mut strong, mut named, mut misplaced, mut others) = (0, 0, 0, 0);
         let (mut ratios, mut squares) = (Vec::new(), Vec::new());
-        for seed in 0..SEEDS {
+        for seed in 0..n_seeds {
             let (mut case, clean_m) = (sound[seed as usize].clone(), clean_m[seed as usize]);
             let (joint, since) = (seed as usize % 5, 8 + (7 * seed as usize) % 14);
             let by_rad = size_deg.to_radians() * if seed % 2 == 0 { 1.0 } else { -1.0 };
@@ -132,27 +143,38 @@ fn a_slip_is_found_with_joint_time_and_size_and_costs_hardly_anything() {
         let quantile = |share: f64| ratios.get((share * ratios.len() as f64) as usize).copied().unwrap_or(1.0);
         let sigmas = (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt();
         println!(
-            "{size_deg} deg: non-centrality above 60 in {strong} of {SEEDS}, of these named {named}; {misplaced} \
+            "{size_deg} deg: non-centrality above 60 in {strong} of {n_seeds}, of these named {named}; {misplaced} \
              misplaced, {others} others; tool error over that without a slip: median {:.3}, 90 % {:.3}; size off by \
              {sigmas:.2} of its sigma",
             quantile(0.5),
             quantile(0.9)
         );
-        assert!(size_deg < 0.25 || strong == SEEDS, "{strong}");
+        assert!(size_deg < 0.25 || strong == n_seeds, "{strong}");
         (all_strong, all_named) = (all_strong + strong, all_named + named);
-        assert!(others == 0 && misplaced <= SEEDS / 10, "{size_deg} deg: {others} others, {misplaced} misplaced");
+        assert!(others == 0 && misplaced <= n_seeds / 10, "{size_deg} deg: {others} others, {misplaced} misplaced");
         assert!(quantile(0.5) < 1.05 && quantile(0.9) < 1.2, "{size_deg} deg: {ratios:.3?}");
-        assert!((0.5..1.4).contains(&sigmas), "{size_deg} deg: {sigmas}");
+        assert!(sigma_limits.contains(&sigmas), "{size_deg} deg: {sigmas}");
     }
     assert!(all_named as f64 >= 0.95 * all_strong as f64, "{all_named} of {all_strong}");
 }
 
+/// Which of so many good arms are said to have slipped.
+fn false_alarms(n_seeds: u64) -> Vec<u64> {
+    let slipped = |seed: &u64| !found_failures(&case(1000 + seed, 14 + (*seed as usize * 7) % 25)).is_empty();
+    let alarms: Vec<u64> = (0..n_seeds).filter(slipped).collect();
+    println!("slips of good arms: {alarms:?} of {n_seeds}");
+    alarms
+}
+
 #[test]
 fn a_good_arm_has_no_slip() {
-    let slipped = |seed: &u64| !found_failures(&case(1000 + seed, 14 + (*seed as usize * 7) % 25)).is_empty();
-    let alarms: Vec<u64> = (0..200).filter(slipped).collect();
-    println!("slips of good arms: {alarms:?} of 200");
-    assert!(alarms.len() <= 1, "{alarms:?}");
+    assert_eq!(false_alarms(24), [0; 0]);
+}
+
+#[test]
+#[ignore = "second tier: 200 seeds, 8 s"]
+fn a_good_arm_has_no_slip_over_200_seeds() {
+    assert!(false_alarms(200).len() <= 1);
 }
 
 #[test]

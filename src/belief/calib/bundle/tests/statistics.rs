@@ -11,7 +11,8 @@ use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::bundle::linearize::NormalEquations;
 use crate::calib::bundle::model::model_for;
 use crate::calib::bundle::model::{Hyperparameters, Model};
-use crate::calib::bundle::problem::State;
+use crate::calib::bundle::priors::prior;
+use crate::calib::bundle::problem::{BundleProblem, State};
 use crate::calib::bundle::tests::data::{
     Noise, Truth, reference, rng, titan, titan_with_gripper_tag, views, watched_titan,
 };
@@ -127,11 +128,12 @@ fn state_of(case: &Case<'_>, found: &Estimate<'_>) -> State {
 
 /// The Bayesian Cramer-Rao bound (van Trees): the inverse information at the truth, under the true scales.
 fn bound(case: &Case<'_>, found: &Estimate<'_>) -> DMatrix<f64> {
-    let given = estimate(&input(case, &case.views, HyperparameterMode::Given)).expect("solved");
-    let mut normal = NormalEquations::new(&given.problem);
-    normal.update(&given.problem, &state_of(case, found), Loss::Square);
-    let n = given.problem.layout.n_joint();
-    let posterior = Posterior::of(&given.problem, &normal).expect("regular");
+    let given = input(case, &case.views, HyperparameterMode::Given);
+    let problem = BundleProblem::new(&given, prior(&given, &given.scales));
+    let mut normal = NormalEquations::new(&problem);
+    normal.update(&problem, &state_of(case, found), Loss::Square);
+    let n = problem.layout.n_joint();
+    let posterior = Posterior::of(&problem, &normal).expect("regular");
     posterior.covariance.view((0, 0), (n, n)).into_owned()
 }
 
@@ -208,13 +210,20 @@ pub(super) fn assert_honest(tally: &Tally, what: &str) {
     let mean_nees = tally.nees.iter().sum::<f64>() / tally.nees.len() as f64;
     let coverage = tally.inside as f64 / tally.intervals as f64;
     println!("{what}: NEES {mean_nees:.2} of 3, {:.1} % of {} intervals", 100.0 * coverage, tally.intervals);
-    // Errors at the poses of one seed go together; over 200 seeds the mean's own sigma is 0.12.
-    assert!((2.4..3.6).contains(&mean_nees), "{what}: {mean_nees}");
-    assert!((0.93..0.97).contains(&coverage), "{what}: {coverage}");
+    // Errors of one seed go together: 1.7 is the sigma of its NEES, 0.05 that of its coverage.
+    let sigmas = 2.7 / (tally.nees.len() as f64).sqrt();
+    assert!((mean_nees - 3.0).abs() < f64::max(0.6, 1.7 * sigmas), "{what}: {mean_nees}");
+    assert!((coverage - 0.95).abs() < f64::max(0.02, 0.05 * sigmas), "{what}: {coverage}");
 }
 
 #[test]
 fn the_tool_error_is_at_the_bound_and_the_covariance_is_honest() {
+    assert_at_the_bound(&tally(&titan(), 0..20, 30), "wrist camera alone", 1.25);
+}
+
+#[test]
+#[ignore = "second tier: 200 seeds, 7 s"]
+fn the_tool_error_is_at_the_bound_and_the_covariance_is_honest_over_200_seeds() {
     assert_at_the_bound(&tally(&titan(), 0..200, 30), "wrist camera alone", 1.10);
 }
 

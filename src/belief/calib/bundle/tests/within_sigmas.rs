@@ -1,5 +1,7 @@
 //! Arms that are off their drawing by as much as robot.toml says: the error that is predicted with priors is the error.
 
+use std::ops::Range;
+
 use nalgebra::{Isometry3, Matrix3, Vector3, Vector6};
 
 use crate::calib::bundle::drawing::Drawing;
@@ -109,18 +111,27 @@ fn errors(robot: &Robot, seed: u64) -> Errors {
 
 #[test]
 fn the_error_with_priors_is_the_error() {
-    const SEEDS: u64 = 24;
+    errors_are_as_predicted(5, 1.4..4.8);
+}
+
+#[test]
+#[ignore = "second tier: 24 seeds, 12 s"]
+fn the_error_with_priors_is_the_error_over_24_seeds() {
+    errors_are_as_predicted(24, 2.2..3.8);
+}
+
+fn errors_are_as_predicted(n_seeds: u64, nees_limits: Range<f64>) {
     let robot = titan();
-    let all: Vec<Errors> = (0..SEEDS).map(|seed| errors(&robot, seed)).collect();
-    let mean = |of: &dyn Fn(&Errors) -> f64| all.iter().map(of).sum::<f64>() / SEEDS as f64;
+    let all: Vec<Errors> = (0..n_seeds).map(|seed| errors(&robot, seed)).collect();
+    let mean = |of: &dyn Fn(&Errors) -> f64| all.iter().map(of).sum::<f64>() / n_seeds as f64;
     let [by_data, with_priors] = [0, 1].map(|k| mean(&|errors| errors.nees[k]));
     let m: Vec<f64> = all.iter().flat_map(|errors| errors.squares_m2.iter().map(|m2| m2.sqrt())).collect();
     let [median, p95] = [0.5, 0.95].map(|q| 1e3 * quantile(&m, q).expect("values"));
     let n_revised = all.iter().filter(|errors| errors.is_revised).count();
     println!(
         "tool error {median:.2}, {p95:.2} mm; NEES by data {by_data:.2}, with priors {with_priors:.2}; revised \
-         {n_revised} of {SEEDS}"
+         {n_revised} of {n_seeds}"
     );
-    assert!((2.2..3.8).contains(&with_priors), "{with_priors}");
+    assert!(nees_limits.contains(&with_priors), "{with_priors}");
     assert!(by_data > 1.5 * with_priors, "{by_data}, {with_priors}");
 }

@@ -14,9 +14,21 @@ fn lines(events: &[OnlineEvent]) -> Vec<String> {
 /// Views in which a sensor is right say nothing against that it fails in others: it is named, and nothing else is.
 #[test]
 fn a_sensor_that_fails_now_and_then_is_named() {
+    assert_eq!(missed_failures(2), []);
+}
+
+#[test]
+#[ignore = "second tier: 10 seeds, XX s"]
+fn a_sensor_that_fails_now_and_then_is_named_over_10_seeds() {
+    let missed = missed_failures(10);
+    assert!(missed.len() <= 1, "{missed:?}");
+}
+
+/// Where it is not the one thing that is told: the seed, and what is told.
+fn missed_failures(n_seeds: u64) -> Vec<(u64, Vec<String>)> {
     let robot = titan();
     let mut missed = Vec::new();
-    for seed in 0..10 {
+    for seed in 0..n_seeds {
         let joint = seed as usize % 5;
         let (mut online, mut dive) = after_an_hour(seed, Happens::Nothing);
         online.take_events();
@@ -34,23 +46,33 @@ fn a_sensor_that_fails_now_and_then_is_named() {
             event.finding.kind == FindingKind::SensorFailed && event.finding.name == robot.sensors[joint].joint
         };
         if events.len() != 1 || !is_right(&events[0]) {
-            missed.push((seed, joint, lines(&events)));
+            missed.push((seed, lines(&events)));
         }
     }
-    assert!(missed.len() <= 1, "{missed:?}");
+    missed
 }
 
 /// A joint whose sensor is left out stands where the tags show it, however far from there its reading is: no tag, no
 /// camera and no other sensor is blamed.
 #[test]
 fn a_reading_that_is_left_out_may_be_anything() {
+    nothing_is_told_of_left_out_readings([1], 9);
+}
+
+#[test]
+#[ignore = "second tier: 5 joints, XX s"]
+fn a_reading_that_is_left_out_may_be_anything_of_any_joint() {
+    nothing_is_told_of_left_out_readings(0..5, 18);
+}
+
+fn nothing_is_told_of_left_out_readings(joints: impl IntoIterator<Item = usize>, n_views: usize) {
     let mut told = Vec::new();
-    for seed in 0..5 {
-        let joint = seed as usize;
+    for joint in joints {
+        let seed = joint as u64;
         let (mut online, mut dive) = after_an_hour(seed, Happens::Nothing);
         online.take_events();
         online.leave_out(joint);
-        for k in 0..18 {
+        for k in 0..n_views {
             let mut view = dive.view();
             view.travel_rad[joint] = [-3.0, 0.0, 3.0][k % 3];
             online.add_view(&view);
@@ -88,9 +110,21 @@ fn images_that_scatter_are_not_looked_at_where_a_sensor_failed() {
 /// A sensor slips while a view of a misread tag is looked into, at once or some views later: it is named.
 #[test]
 fn a_slip_is_named_while_another_view_is_looked_into() {
+    assert_eq!(missed_slips([(0, 0), (1, 4)]), []);
+}
+
+#[test]
+#[ignore = "second tier: 10 seeds, XX s"]
+fn a_slip_is_named_while_another_view_is_looked_into_over_10_seeds() {
+    let missed = missed_slips((0..10).flat_map(|seed| [(seed, 0), (seed, 4)]));
+    assert!(missed.len() <= 2, "{missed:?}");
+}
+
+/// Where it is not the one thing that is told: the seed, the number of views between, and what is told.
+fn missed_slips(cases: impl IntoIterator<Item = (u64, usize)>) -> Vec<(u64, usize, Vec<String>)> {
     let robot = titan();
     let mut missed = Vec::new();
-    for (seed, n_between) in (0..10).flat_map(|seed| [(seed, 0), (seed, 4)]) {
+    for (seed, n_between) in cases {
         let joint = seed as usize % 4;
         let (mut online, mut dive) = after_an_hour(seed, Happens::Nothing);
         online.take_events();
@@ -108,8 +142,8 @@ fn a_slip_is_named_while_another_view_is_looked_into() {
             event.finding.kind == FindingKind::SensorSlip && event.finding.name == robot.sensors[joint].joint
         };
         if events.len() != 1 || !is_right(&events[0]) {
-            missed.push((seed, n_between, joint, lines(&events)));
+            missed.push((seed, n_between, lines(&events)));
         }
     }
-    assert!(missed.len() <= 2, "{missed:?}");
+    missed
 }
