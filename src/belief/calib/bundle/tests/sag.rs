@@ -140,7 +140,7 @@ fn a_link_that_is_off_is_no_sag() {
 }
 
 #[test]
-#[ignore = "second tier: 24 arms, XX s"]
+#[ignore = "second tier: 24 arms, 12 s"]
 fn a_link_that_is_off_is_no_sag_over_24_arms() {
     let [n_links, n_sag] = links_and_sag(6);
     assert!(n_links >= 23 && n_sag <= 1, "links {n_links}, sag {n_sag} of 24");
