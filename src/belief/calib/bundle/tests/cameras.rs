@@ -55,7 +55,7 @@ fn what_two_cameras_see_of_one_pose_is_not_counted_twice() {
 }
 
 #[test]
-#[ignore = "second tier: 100 seeds, XX s"]
+#[ignore = "second tier: 100 seeds, 44 s"]
 fn what_two_cameras_see_of_one_pose_is_not_counted_twice_over_100_seeds() {
     one_pose_counts_once(100, 2.4..3.8, [0.97, 0.5]);
 }

@@ -101,7 +101,7 @@ fn a_corner_that_does_not_belong_goes_alone_and_costs_less_than_its_tag() {
 }
 
 #[test]
-#[ignore = "second tier: 60 seeds of two kinds, XX s"]
+#[ignore = "second tier: 60 seeds of two kinds, 8 s"]
 fn a_corner_that_does_not_belong_goes_alone_over_60_seeds() {
     single_corners_go_alone(60, 2.4..3.8);
 }

@@ -89,7 +89,7 @@ fn a_wrong_link_is_estimated_and_the_tool_as_good_as_with_the_right_one() {
 }
 
 #[test]
-#[ignore = "second tier: 24 arms, XX s"]
+#[ignore = "second tier: 24 arms, 14 s"]
 fn a_wrong_link_is_estimated_over_24_arms() {
     wrong_links_are_estimated(6, 2.5);
 }

@@ -260,7 +260,7 @@ fn reversed_and_rescaled_sensors_are_told_by_their_slope() {
 }
 
 #[test]
-#[ignore = "second tier: 45 arms, XX s"]
+#[ignore = "second tier: 45 arms, 10 s"]
 fn reversed_and_rescaled_sensors_are_told_by_their_slope_over_45_arms() {
     slopes_are_told(60..75);
 }
@@ -295,7 +295,7 @@ fn two_failed_sensors_are_told_apart() {
 }
 
 #[test]
-#[ignore = "second tier: 20 arms, XX s"]
+#[ignore = "second tier: 20 arms, 9 s"]
 fn two_failed_sensors_are_told_apart_over_20_arms() {
     assert!(told_apart(80..100) >= 19);
 }

@@ -79,7 +79,7 @@ fn tags_that_were_moved_together_are_named() {
 }
 
 #[test]
-#[ignore = "second tier: 16 seeds of three kinds, XX s"]
+#[ignore = "second tier: 16 seeds of three kinds, 17 s"]
 fn tags_that_were_moved_together_are_named_over_16_seeds() {
     groups_are_named(16, &[(0.01, 2), (0.01, 3), (0.04, 3)]);
 }

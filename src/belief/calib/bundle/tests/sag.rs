@@ -89,7 +89,7 @@ fn a_soft_arm_is_as_good_as_a_stiff_one() {
 }
 
 #[test]
-#[ignore = "second tier: 20 seeds of two kinds, XX s"]
+#[ignore = "second tier: 20 seeds of two kinds, 19 s"]
 fn a_soft_arm_is_as_good_as_a_stiff_one_over_20_seeds() {
     soft_arms_are_as_good(20, &[(1e-5, 0.0), (3e-6, 500.0)], [1.3, 1.5]);
 }
@@ -140,7 +140,7 @@ fn a_link_that_is_off_is_no_sag() {
 }
 
 #[test]
-#[ignore = "second tier: 24 arms, XX s"]
+#[ignore = "second tier: 24 arms, 12 s"]
 fn a_link_that_is_off_is_no_sag_over_24_arms() {
     let [n_links, n_sag] = links_and_sag(6);
     assert!(n_links >= 23 && n_sag <= 1, "links {n_links}, sag {n_sag} of 24");
@@ -183,7 +183,7 @@ fn a_soft_arm_is_accepted_and_said_to_bend() {
 }
 
 #[test]
-#[ignore = "second tier: 8 seeds, XX s"]
+#[ignore = "second tier: 8 seeds, 13 s"]
 fn a_soft_arm_is_accepted_and_said_to_bend_over_8_seeds() {
     soft_arms_are_accepted(8, 1);
 }
@@ -256,7 +256,7 @@ fn attitudes_of_a_leaning_base_are_used() {
 }
 
 #[test]
-#[ignore = "second tier: 8 seeds, XX s"]
+#[ignore = "second tier: 8 seeds, 18 s"]
 fn attitudes_of_a_leaning_base_are_used_over_8_seeds() {
     attitudes_are_used(8, 1.3);
 }

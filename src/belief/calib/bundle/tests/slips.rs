@@ -104,7 +104,7 @@ fn a_slip_is_found_with_joint_time_and_size_and_costs_hardly_anything() {
 }
 
 #[test]
-#[ignore = "second tier: 24 seeds of four sizes, XX s"]
+#[ignore = "second tier: 24 seeds of four sizes, 16 s"]
 fn a_slip_is_found_with_joint_time_and_size_over_24_seeds() {
     slips_are_found(24, &[0.1, 0.3, 1.0, 2.0], 0.5..1.4);
 }
@@ -172,7 +172,7 @@ fn a_good_arm_has_no_slip() {
 }
 
 #[test]
-#[ignore = "second tier: 200 seeds, XX s"]
+#[ignore = "second tier: 200 seeds, 8 s"]
 fn a_good_arm_has_no_slip_over_200_seeds() {
     assert!(false_alarms(200).len() <= 1);
 }

@@ -107,7 +107,7 @@ fn few_views_and_worn_sensors_are_not_too_sure_of_themselves() {
 }
 
 #[test]
-#[ignore = "second tier: 60 seeds of eight kinds, XX s"]
+#[ignore = "second tier: 60 seeds of eight kinds, 33 s"]
 fn few_views_and_worn_sensors_are_not_too_sure_of_themselves_over_60_seeds() {
     for (what, worse, limits) in [("as their datasheets", [1.0, 1.0], 2.3..3.4), ("worn", WORN, 2.4..4.2)] {
         for n_views in [10, 12, 20, 40] {

@@ -222,7 +222,7 @@ fn the_tool_error_is_at_the_bound_and_the_covariance_is_honest() {
 }
 
 #[test]
-#[ignore = "second tier: 200 seeds, XX s"]
+#[ignore = "second tier: 200 seeds, 7 s"]
 fn the_tool_error_is_at_the_bound_and_the_covariance_is_honest_over_200_seeds() {
     assert_at_the_bound(&tally(&titan(), 0..200, 30), "wrist camera alone", 1.10);
 }

@@ -115,7 +115,7 @@ fn the_error_with_priors_is_the_error() {
 }
 
 #[test]
-#[ignore = "second tier: 24 seeds, XX s"]
+#[ignore = "second tier: 24 seeds, 12 s"]
 fn the_error_with_priors_is_the_error_over_24_seeds() {
     errors_are_as_predicted(24, 2.2..3.8);
 }

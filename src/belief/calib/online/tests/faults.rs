@@ -111,7 +111,7 @@ fn faults_are_named_and_nothing_else() {
 }
 
 #[test]
-#[ignore = "second tier: 3 seeds, XX s"]
+#[ignore = "second tier: 3 seeds, 15 s"]
 fn faults_are_named_and_nothing_else_over_3_seeds() {
     faults_are_named(std::env::var("ARMCAL_DIVES").ok().and_then(|n| n.parse().ok()).unwrap_or(3));
 }
@@ -154,7 +154,7 @@ fn tags_on_one_carrier_are_named_together() {
 }
 
 #[test]
-#[ignore = "second tier: 6 seeds, XX s"]
+#[ignore = "second tier: 6 seeds, 11 s"]
 fn tags_on_one_carrier_are_named_together_over_6_seeds() {
     assert!(named_together(6) >= 5);
 }
@@ -200,7 +200,7 @@ fn one_view_tells_a_moved_tag_from_one_that_was_misread() {
 }
 
 #[test]
-#[ignore = "second tier: 6 seeds, XX s"]
+#[ignore = "second tier: 6 seeds, 15 s"]
 fn one_view_tells_a_moved_tag_from_one_that_was_misread_over_6_seeds() {
     one_view_is_enough(0..6);
 }
@@ -326,7 +326,7 @@ fn a_low_spot_is_named_by_looks_minutes_apart() {
 }
 
 #[test]
-#[ignore = "second tier: 10 seeds, XX s"]
+#[ignore = "second tier: 10 seeds, 14 s"]
 fn a_low_spot_is_named_by_looks_minutes_apart_over_10_seeds() {
     let (named, told) = named_spots(0..10);
     assert!(named >= 7 && told.len() <= 1, "{named} {told:?}");
@@ -375,7 +375,7 @@ fn a_tag_a_little_aside_is_named_by_looks_minutes_apart() {
 }
 
 #[test]
-#[ignore = "second tier: 10 seeds, XX s"]
+#[ignore = "second tier: 10 seeds, 11 s"]
 fn a_tag_a_little_aside_is_named_by_looks_minutes_apart_over_10_seeds() {
     let (named, told) = named_tags(0..10);
     assert!(named >= 6 && told.len() <= 1, "{named} {told:?}");
