@@ -11,7 +11,6 @@ use armcal::stats::Summary;
 use armcal::streams::{LogLevel, Message};
 use armcal::time::Stamp;
 
-use crate::support::texts::Texts;
 use crate::support::{
     Answer, FinishedRun, ShortRoutine, Simulated, answer, finished, program, root, shared, temp, write,
 };
@@ -103,7 +102,6 @@ fn skipped_targets_are_named(run: &FinishedRun) {
 /// "4 of 5" with a target that was skipped is no "all".
 #[test]
 fn limits_of_hits_and_skipped_targets_fail_a_run_that_hits_few() {
-    let _texts = Texts::of("limits_of_hits_and_skipped_targets_fail_a_run_that_hits_few");
     let folder = temp();
     let steps = "[[step]]\ndo = \"capture\"\n[[step]]\ndo = \"calibrate\"\n[[step]]\ndo = \"reach\"\n[[step]]\n\
                  do = \"assert\"\nhits = 5\ntargets_skipped = 0\nposes = 10\nposes_skipped = 9\n";

@@ -127,7 +127,6 @@ fn unknown_gear_ratios_of_other_joints_are_measured() {
 
 #[test]
 fn a_limit_that_does_not_hold_gives_exit_code_4_and_says_which() {
-    let _texts = Texts::of("a_limit_that_does_not_hold_gives_exit_code_4_and_says_which");
     let folder = temp();
     let limits = "[[step]]\ndo = \"assert\"\nheld_out_rms_m = 1e-6\nsimulated_s = 1e6\ntool_error_m = 1e-6\n";
     let reach = "[[step]]\ndo = \"reach\"\ntargets = [1]\n";

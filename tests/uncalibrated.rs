@@ -96,11 +96,11 @@ fn a_capture_says_why_it_ended() {
     assert!(by_error.contains("predicted"), "{by_error}");
     let short = [
         ("capture.stop_at_tool_error_m", 0.0001.into()),
-        ("capture.poses", 6.into()),
+        ("capture.poses", 9.into()),
         ("task.targets_m", vec![vec![1.074, 0.001, -0.008], vec![1.012, 0.595, 0.147]].into()),
     ];
     let by_poses = why(&run(FIRST, SEED, &short).0);
     assert!(by_poses.contains("planned"), "{by_poses}");
-    let by_time = why(&run(FIRST, SEED, &[&short[..], &[("capture.max_time_s", 40.0.into())]].concat()).0);
+    let by_time = why(&run(FIRST, SEED, &[&short[..], &[("capture.max_time_s", 60.0.into())]].concat()).0);
     assert!(by_time.contains("time"), "{by_time}");
 }

@@ -37,7 +37,6 @@ fn the_sample_is_described() {
         "water",
         "robot.toml (application/toml)",
         "determined   shoulder_yaw gain, shoulder_yaw offset",
-        "enough       views",
     ];
     inspect(&sample(), &[]).expect("sample", 0, &words);
     let told = inspect(&sample(), &["--json"]);
