@@ -199,23 +199,11 @@ fn a_tool_point_two_centimetres_off_is_refused_and_measured() {
 /// Whatever a tool point is off by: accepted only where the predicted error says so.
 #[test]
 fn no_tool_point_is_accepted_far_beyond_its_prediction() {
-    let accepted = accepted_tool_points(3);
-    assert!((1..18).contains(&accepted), "some touches must hold and some must not: {accepted}");
-}
-
-#[test]
-#[ignore = "second tier: 120 arms, XX s"]
-fn no_tool_point_of_120_is_accepted_far_beyond_its_prediction() {
-    accepted_tool_points(20);
-}
-
-/// How many of so many arms with a tool point that is off by each size are accepted.
-fn accepted_tool_points(n_seeds: u64) -> u64 {
     let robot = titan();
     let at = task(&robot);
     let (mut accepted, mut worst) = (0, 0.0_f64);
     for (k, size_m) in [0.003, 0.005, 0.007, 0.009, 0.012, 0.02].into_iter().enumerate() {
-        for seed in 0..n_seeds {
+        for seed in 0..20 {
             let off_m = Vector3::ith(seed as usize % 3, size_m);
             let case = case(&robot, 100 * k as u64 + seed, |real, _| {
                 real.tool.mount.link_from_frame.translation.vector += off_m;
@@ -233,9 +221,8 @@ fn accepted_tool_points(n_seeds: u64) -> u64 {
             worst = worst.max((at.iter().map(error).sum::<f64>() / predicted).sqrt());
         }
     }
-    println!("{accepted} of {} accepted, at most {worst:.1} times the prediction", 6 * n_seeds);
+    println!("{accepted} of 120 accepted, at most {worst:.1} times the prediction");
     assert!(worst < 3.0, "{worst}");
-    accepted
 }
 
 #[test]
