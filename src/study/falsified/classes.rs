@@ -28,7 +28,7 @@ const MIN_EIGENVALUE: f64 = 1e-3;
 #[derive(Clone, Debug)]
 pub(super) struct Column {
     pub cause: String,
-    words: String,
+    pub words: String,
     /// Of size one; then of the non-centrality that columns are scaled to.
     unit: Perturbation,
 }

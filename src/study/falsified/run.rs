@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::falsified::capture::{Capture, Scene, TrueRest};
 use crate::falsified::cases::{AXES, Case, CaseKind, Element};
-use crate::falsified::classes::{EquivalenceClasses, columns, equivalence_classes};
+use crate::falsified::classes::{Column, EquivalenceClasses, columns, equivalence_classes};
 use crate::falsified::error::FalsifiedError;
 use crate::falsified::naming::{causes_of_finding, first_causes, right_causes};
 use crate::falsified::oracle::{Oracle, OracleEffect};
@@ -122,9 +122,18 @@ pub fn falsified_study(
     cases: &[Case],
     seeds: std::ops::Range<u64>,
 ) -> Result<FalsifiedStudy, FalsifiedError> {
-    let scene = Scene { routine, robot, vehicle };
+    study_of(&Scene { routine, robot, vehicle }, cases, seeds, columns)
+}
+
+/// The same with classes of these directions.
+pub(super) fn study_of(
+    scene: &Scene<'_>,
+    cases: &[Case],
+    seeds: std::ops::Range<u64>,
+    columns: fn(&Robot) -> Vec<Column>,
+) -> Result<FalsifiedStudy, FalsifiedError> {
     let simulate = |seed: u64| -> Result<Capture, FalsifiedError> {
-        let capture = Capture::simulate(&scene, seed)?;
+        let capture = Capture::simulate(scene, seed)?;
         check_touches(&capture, cases)?;
         Ok(capture)
     };

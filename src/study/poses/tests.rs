@@ -40,8 +40,8 @@ fn chosen_poses_need_fewer_views_and_less_time_than_random_ones() {
 
 #[test]
 fn table_figure_and_csv_have_every_criterion_and_number() {
-    let rows = rows(PoseGrid::WHOLE, 1..2);
-    assert_eq!(rows.len(), CRITERIA.len() * POSES.len());
+    let rows = rows(PoseGrid { criteria: &CRITERIA, poses: &[POSES[0], 8, 30] }, 1..2);
+    assert_eq!(rows.len(), CRITERIA.len() * 3);
     let (table, figure) = (poses_table(&rows), poses_figure(&rows).expect("a figure"));
     assert!(table.contains("| D-optimal |") && table.contains("| 30 |"), "{table}");
     assert!(figure.starts_with("<svg") && figure.len() < 200_000);
