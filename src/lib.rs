@@ -67,7 +67,9 @@
 #![deny(missing_docs)]
 
 pub use armcal_belief::{calib, plan, session, tagmap, verify};
-pub use armcal_core::{input, joints, kinematics, log, optics, robot, routine, sensor, spatial, stats, streams, time};
+pub use armcal_core::{
+    codes, input, joints, kinematics, log, optics, robot, routine, sensor, spatial, stats, streams, time,
+};
 #[cfg(feature = "sim")]
 pub use armcal_detect as detect;
 #[cfg(feature = "sim")]

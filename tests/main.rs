@@ -23,6 +23,7 @@ mod bumps;
 mod cameras;
 mod cli;
 mod closed_loop;
+mod codes;
 mod detections;
 mod determinism;
 mod export;

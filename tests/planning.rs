@@ -1,5 +1,6 @@
 //! `armcal plan`: what it promises, held against random arms; what it refuses.
 
+use armcal::codes::Code;
 use std::path::{Path, PathBuf};
 
 use armcal::plan::{ClearanceModel, JointErrorBounds, PlanFile, StopReason};
@@ -194,6 +195,7 @@ fn a_single_target_out_of_reach_is_a_warning() {
     routine.targets_m[2] = [3.5, 0.0, 0.0];
     let file = planned(&routine.write(folder.path()), folder.path(), &[]);
     assert_eq!(file.warnings.len(), 1, "{:?}", file.warnings);
-    assert!(file.warnings[0].contains("target 3"), "{:?}", file.warnings);
+    assert_eq!(file.warnings[0].code, Code::TargetSkipped);
+    assert!(file.warnings[0].text.contains("target 3"), "{:?}", file.warnings);
     assert_eq!(file.totals.poses + file.totals.left_out, 16);
 }

@@ -1,5 +1,6 @@
 //! What keeps a campaign from being run, continued or merged. A run that fails is none of these: it is a row.
 
+use armcal_core::codes::{Code, Coded};
 use std::path::PathBuf;
 
 use crate::campaign::Shard;
@@ -68,5 +69,24 @@ impl CampaignError {
                 | Self::Json(_)
                 | Self::Threads(_)
         )
+    }
+}
+
+impl Coded for CampaignError {
+    fn code(&self) -> Code {
+        match self {
+            Self::Routine(error) => error.code(),
+            Self::Input(error) => error.code(),
+            Self::Read { .. } => Code::FileUnreadable,
+            Self::Table { .. } => Code::TableInvalid,
+            Self::OtherCampaign { .. } | Self::Conflict { .. } => Code::CampaignChanged,
+            Self::Busy { .. } => Code::CampaignBusy,
+            Self::Unfinished { .. } | Self::MissingShards { .. } => Code::CampaignIncomplete,
+            Self::Machine { source, .. } => source.code(),
+            Self::Usage(_) => Code::UsageInvalid,
+            Self::Output(error) => error.code(),
+            Self::Parquet { .. } => Code::FileUnwritable,
+            Self::Json(_) | Self::Threads(_) => Code::Internal,
+        }
     }
 }

@@ -105,7 +105,7 @@ fn facts(table: &Table, summary: &CampaignSummary) -> Markup {
         ("program", Some(format!("armcal {}", env!("CARGO_PKG_VERSION")))),
     ];
     markup! {
-        h2 { "What this is of" }
+        h2 { "Details" }
         table.notes {
             @for (what, value) in rows.into_iter().filter_map(|(what, value)| Some((what, value?))) {
                 tr { th scope="row" { (what) } td { code { (value) } } }
@@ -118,7 +118,7 @@ fn failures(failures: &[FailureLine]) -> Markup {
     markup! {
         @if !failures.is_empty() {
             table.notes {
-                tr { th { "seed" } th { "ended" } th { "why, and how to repeat it" } }
+                tr { th { "seed" } th { "result" } th { "reason and command to repeat" } }
                 @for FailureLine { seed, status, failure, command } in failures {
                     tr { td { (seed) } td { (status) } td { (failure) br; code { (command) } } }
                 }
@@ -172,7 +172,7 @@ pub fn regress_page(comparison: &Comparison, routine: &str) -> String {
                 }
             } }
         }
-        h2 { "Every check" }
+        h2 { "Checks" }
         div.wide {
             table {
                 @for (number, cells) in check_rows(comparison).iter().enumerate() {
@@ -185,7 +185,7 @@ pub fn regress_page(comparison: &Comparison, routine: &str) -> String {
             }
         }
         @if !comparison.worst.is_empty() {
-            h2 { "The worst pairs" }
+            h2 { "Worst pairs" }
             table.notes {
                 @for pair in &comparison.worst { tr { td { (pair.in_words()) br; code { (pair.command) } } } }
             }

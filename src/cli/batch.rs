@@ -1,5 +1,6 @@
 //! What `campaign` and `regress` share: runs on all cores, progress, Ctrl-C.
 
+use armcal_core::codes::Code;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
@@ -79,7 +80,7 @@ pub(super) fn exit_of(summary: &CampaignSummary) -> Exit {
 pub(super) fn range_of(asked: Option<SeedRange>, prepared: &Prepared) -> Result<SeedRange> {
     let problem = || {
         let file = prepared.routine.file.display();
-        UsageError(format!("which seeds? Give --seeds A..B, or seeds in [campaign] of {file}"))
+        UsageError::new(Code::UsageInvalid, format!("which seeds? Give --seeds A..B, or seeds in [campaign] of {file}"))
     };
     Ok(asked.or(prepared.routine.campaign.seeds).ok_or_else(problem)?)
 }
@@ -89,7 +90,7 @@ pub(super) fn check_name(out: &Path) -> Result<()> {
     if out.extension().is_some_and(|extension| extension == "csv") {
         return output::check_writable(out).map_err(Into::into);
     }
-    Err(UsageError(format!("{}: the name of a table must end in .csv", out.display())).into())
+    Err(UsageError::new(Code::FileFormat, format!("{}: the name of a table must end in .csv", out.display())).into())
 }
 
 /// A clock alone: nobody watches a single run of many.

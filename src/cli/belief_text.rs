@@ -3,6 +3,7 @@
 use crate::cli::exit::{Exit, UsageError};
 use crate::cli::stdout::note;
 use armcal_belief::calib::online::{BeliefRow, Follower};
+use armcal_core::codes::Code;
 use armcal_core::stats::Summary;
 
 /// What is believed at the end, with a note of the tags that were not used.
@@ -14,11 +15,16 @@ pub(super) fn belief(follower: &Follower) -> Result<BeliefRow, UsageError> {
     let ids: Vec<String> = tags.map(|tag| tag.id.to_string()).collect();
     let unknown = format!("tags {}", ids.join(", "));
     match follower.belief() {
-        None if ids.is_empty() => Err(UsageError("no view with tags: there is nothing to believe".to_owned())),
-        None => Err(UsageError(format!(
-            "no view of a tag whose place is known ({unknown} have none): map them with `armcal tagmap` and give the \
+        None if ids.is_empty() => {
+            Err(UsageError::new(Code::TagsNotSeen, "no view with tags: there is nothing to believe".to_owned()))
+        }
+        None => Err(UsageError::new(
+            Code::TagsNotSeen,
+            format!(
+                "no view of a tag whose place is known ({unknown} have none): map them with `armcal tagmap` and give the \
              map with --tag-map"
-        ))),
+            ),
+        )),
         Some(row) => {
             if !ids.is_empty() {
                 note(format!("note: nobody knows where {unknown} are: they are not used"));

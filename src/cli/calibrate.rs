@@ -1,5 +1,6 @@
 //! `armcal calibrate`: the estimator on a recording.
 
+use armcal_core::codes::Code;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -10,7 +11,7 @@ use crate::cli::calibrate_online::{Told, calibrate_online, stationary};
 use crate::cli::calibration_inputs::{Calibrated, CalibrationInputs, load_robot};
 use crate::cli::closing::ClosingArgs;
 use crate::cli::exit::Exit;
-use crate::cli::stdout::{note, say};
+use crate::cli::stdout::{say, warn};
 use crate::output;
 #[cfg(feature = "viewer")]
 use crate::report::markdown;
@@ -21,40 +22,40 @@ use armcal_core::routine::Method;
 
 #[derive(Debug, Args)]
 pub(super) struct CalibrateArgs {
-    /// The recording or recordings (.mcap); the views of several count as those of one
+    /// Recordings (.mcap); the views of several are pooled
     #[arg(required = true)]
     recordings: Vec<PathBuf>,
     /// Folder of the robot (robot.toml and its URDF)
     #[arg(long, value_name = "DIR")]
     robot: PathBuf,
-    /// For recordings that armcal did not make: an input map (.toml), which names topics and frames
+    /// Input map (.toml) with topics and frames, for recordings that armcal did not make
     #[arg(long, value_name = "FILE")]
     input: Option<PathBuf>,
-    /// Where the tags are: a tag map (.toml) in the frame of the arm's base, instead of what recording and robot say
+    /// Tag map (.toml) in the frame of the arm's base; default: the survey in the recording or robot folder
     #[arg(long, value_name = "FILE")]
     tag_map: Option<PathBuf>,
-    /// An accepted calibration.toml of this arm to start from, instead of the datasheet
+    /// Accepted calibration.toml of this arm as prior; default: the datasheet
     #[arg(long, value_name = "FILE")]
     prior: Option<PathBuf>,
-    /// Tolerance (m) and targets (m) or poses (rad) that the tool error is predicted for (.toml), where no recording
-    /// names any
+    /// Task (.toml): tolerance (m) and targets (m) or poses (rad) for the predicted tool error; default: the
+    /// recording's task
     #[arg(long, value_name = "FILE")]
     task: Option<PathBuf>,
-    /// A joint that has failed: JOINT=locked, dead, stuck or jumps; may be given several times (method bundle)
+    /// Declare a failed joint: JOINT=locked, dead, stuck or jumps; repeatable (method bundle)
     #[arg(long, value_name = "JOINT=KIND")]
     failed: Vec<String>,
     /// Calibration method
     #[arg(long, value_name = "METHOD", default_value_t)]
     method: Method,
-    /// Where to write calibration.toml, summary.json and report.html
+    /// Folder for calibration.toml, summary.json and report.html
     #[arg(long, value_name = "DIR", default_value = ".")]
     out: PathBuf,
-    /// Follow the recording view by view, as if the arm were at work, and write the belief over time (belief.jsonl);
-    /// with --json its lines are printed, too
+    /// Follow the recording view by view and write the estimate over time (belief.jsonl); --json also prints its
+    /// lines
     #[arg(long, conflicts_with_all = ["compact", "prior", "method", "details"])]
     online: bool,
-    /// With --online: nothing drifts, and model and scales are those of the batch of all views; says how far the last
-    /// belief is from that batch
+    /// With --online: assume no drift, take model and scales from the batch of all views, and print the distance of
+    /// the last estimate from that batch
     #[arg(long, requires = "online")]
     stationary: bool,
     /// Print the calibration as one line below 512 bytes instead of the verdict
@@ -110,7 +111,7 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
     if let Some((views, robot)) = &external {
         // What is calibrated is in place: a picture that does not come is a warning.
         if let Err(error) = draw(&args.out, views, robot, (&calibration, &summary)) {
-            note(format_args!("warning: no replay: {error:#}"));
+            warn(Code::ReplayMissing, format_args!("no replay: {error:#}"));
         }
     }
     let replay = external.map(|_| args.out.join("replay.rrd")).filter(|file| file.is_file());

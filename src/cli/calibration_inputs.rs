@@ -1,6 +1,7 @@
 //! What `armcal calibrate` is given: recordings, and the files beside them, as the estimator takes them.
 
 #[cfg(feature = "sim")]
+use armcal_core::codes::Code;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -65,10 +66,13 @@ impl CalibrationInputs<'_> {
         let is_own = |path: &&PathBuf| FileKind::of(path) == Some(FileKind::Bag);
         if let Some(bag) = self.recordings.iter().find(is_own).filter(|_| self.input.is_none()) {
             let file = bag.display();
-            return Err(UsageError(format!(
-                "{file}: is a ROS bag, which needs an input map: `armcal inspect {file} --write-input MAP.toml` \
+            return Err(UsageError::new(
+                Code::UsageInvalid,
+                format!(
+                    "{file}: is a ROS bag, which needs an input map: `armcal inspect {file} --write-input MAP.toml` \
                  proposes one, then give --input MAP.toml"
-            ))
+                ),
+            )
             .into());
         }
         expect_option(self.input, FileKind::InputMap)?;
@@ -262,9 +266,11 @@ impl CalibrationInputs<'_> {
         let plain = plain_landmark(file, &map, &named)?;
         let robot = robot.with_survey(named.survey);
         if robot.tags.is_empty() {
-            return Err(
-                UsageError("name the landmarks with --tag-map: the robot has no tags of its own".to_owned()).into()
-            );
+            return Err(UsageError::new(
+                Code::UsageInvalid,
+                "name the landmarks with --tag-map: the robot has no tags of its own".to_owned(),
+            )
+            .into());
         }
         let mut recordings = Vec::new();
         let mut lost = false;
@@ -294,7 +300,7 @@ impl CalibrationInputs<'_> {
             let lens = read_camera_info(path, topic)?;
             if robot.camera.lens.is_known() && robot.camera.lens != lens {
                 let problem = format!("{}: the lens on {topic} is not that of the others", path.display());
-                return Err(UsageError(problem).into());
+                return Err(UsageError::new(Code::UsageInvalid, problem).into());
             }
             robot.camera.lens = lens;
         }
@@ -395,7 +401,7 @@ pub(super) fn load_robot(folder: &Path, failed: &[String]) -> Result<Robot> {
     let failed_joint = |text: &String| {
         let (joint, kind) = text.split_once('=').unwrap_or((text, ""));
         FailedJoint::of_names(joint, kind, &robot.joint_names())
-            .map_err(|problem| UsageError(format!("--failed {text}: {problem}")))
+            .map_err(|problem| UsageError::new(Code::UsageInvalid, format!("--failed {text}: {problem}")))
     };
     let failed = failed.iter().map(failed_joint).collect::<Result<Vec<FailedJoint>, _>>()?;
     Ok(robot.with_failed(&failed))
@@ -408,7 +414,7 @@ fn plain_landmark(file: &Path, map: &InputMap, named: &NamedSurvey) -> Result<Pl
         let board = named.boards.get(id).copied().filter(|_| map.tag_use == TagUse::BoardCorners);
         if board.is_none() && map.tag_use == TagUse::BoardCorners {
             let problem = format!("is `{name}`, whose `squares` and `square_m` the tag map does not give");
-            return Err(FileIssue::new(file, "tags.child_frame", problem));
+            return Err(FileIssue::new(Code::KeyMissing, file, "tags.child_frame", problem));
         }
         return Ok(PlainLandmark { id: Some(*id), board });
     }
@@ -419,7 +425,7 @@ fn plain_landmark(file: &Path, map: &InputMap, named: &NamedSurvey) -> Result<Pl
         tags => {
             let ids = tags.iter().map(|tag| named.names.get(&tag.id).cloned().unwrap_or_else(|| tag.id.to_string()));
             let problem = format!("no landmark `{name}` in the tag map; it has {:?}", ids.collect::<Vec<_>>());
-            Err(FileIssue::new(file, "tags.child_frame", problem))
+            Err(FileIssue::new(Code::NameUnknown, file, "tags.child_frame", problem))
         }
     }
 }
@@ -429,7 +435,11 @@ pub(super) fn read_prior(file: &Path, robot: &Robot) -> Result<Calibration> {
     let prior = Calibration::read(file)?;
     if prior.status == Status::Refused {
         let why = prior.refusal.unwrap_or_default();
-        return Err(UsageError(format!("{}: was refused itself ({why}); it is no prior", file.display())).into());
+        return Err(UsageError::new(
+            Code::PriorUnusable,
+            format!("{}: was refused itself ({why}); it is no prior", file.display()),
+        )
+        .into());
     }
     prior.sensors(robot).map_err(|error| match error {
         CalibrationFileError::OtherRobot { found, found_joints, expected, .. } => {

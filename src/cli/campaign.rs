@@ -1,5 +1,6 @@
 //! `armcal campaign`: one routine, many seeds and settings.
 
+use armcal_core::codes::Code;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::Instant;
@@ -25,48 +26,48 @@ use armcal_core::routine::SeedRange;
 
 #[derive(Debug, Args)]
 pub(super) struct CampaignArgs {
-    /// The routine (.toml); [campaign] in it may give seeds and a matrix of settings
+    /// Routine (.toml); [campaign] in it may give seeds and a matrix of settings
     #[arg(required_unless_present = "merge", conflicts_with = "merge")]
     routine: Option<PathBuf>,
-    /// Seeds A..B, both included, or one number; the routine's campaign.seeds if not given
+    /// Seeds A..B, both included, or one number; default: campaign.seeds of the routine
     #[arg(long, value_name = "A..B")]
     seeds: Option<SeedRange>,
-    /// Only every N-th seed, beginning with the K-th
+    /// Run every N-th seed from the K-th on
     #[arg(long, value_name = "K/N")]
     shard: Option<Shard>,
-    /// The table (.csv); .parquet, -summary.json, -summary.md and -report.html are written beside it.
-    /// recordings/ROUTINE-NAME/campaign.csv if not given
+    /// Table (.csv); .parquet, -summary.json, -summary.md and -report.html are written next to it; default:
+    /// recordings/ROUTINE-NAME/campaign.csv
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Stop as soon as a rate is known to be below a limit or above it, as "contacts < 0.001 at 95 %"; of contacts,
-    /// missed, refused, failed, not_accepted. May be given many times; --seeds says how many at most
+    /// Stop when a rate is decided, such as "contacts < 0.001 at 95 %"; rates: contacts, missed, refused, failed,
+    /// not_accepted; repeatable. --seeds is the upper limit
     #[arg(long, value_name = "LIMIT", conflicts_with = "shard")]
     until: Vec<Until>,
-    /// Threads, one run on each; all cores if not given
+    /// Threads, one run each; default: all cores
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
-    /// Print the summary as JSON in place of the table, as -summary.json has it
+    /// Print -summary.json instead of the table
     #[arg(long)]
     json: bool,
     #[command(flatten)]
     overrides: OverrideArgs,
-    /// Keep each run's folder, as `armcal run` leaves it, in FILE.runs
+    /// Keep the folder of each run in FILE.runs
     #[arg(long)]
     keep: bool,
-    /// Keep the folders of the N worst runs, each with its replay, in FILE.worst: contacts, failures, refusals, limits
-    /// that were missed, then the largest tool errors. They are made again at the end
+    /// Run the N worst seeds again and keep their folders with replays in FILE.worst: contacts, failures, refusals,
+    /// missed limits, then the largest tool errors
     #[arg(long, value_name = "N", default_value_t = 0)]
     #[arg(value_parser = clap::value_parser!(u16).range(0..=1000))]
     keep_worst: u16,
     /// Discard existing rows
     #[arg(long)]
     fresh: bool,
-    /// Put the tables of shards together, into --out
+    /// Merge the tables of shards into --out
     #[arg(long, value_name = "FILE", num_args = 1.., requires = "out",
           conflicts_with_all = ["seeds", "shard", "until", "threads", "keep", "keep_worst", "fresh", "set", "robot",
                                 "vehicle"])]
     merge: Vec<PathBuf>,
-    /// Merge although tables of some shards are missing
+    /// Merge even if tables of some shards are missing
     #[arg(long, requires = "merge")]
     allow_missing: bool,
 }
@@ -75,7 +76,7 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<Exit> {
     match (&args.routine, &args.out) {
         (None, Some(out)) => merged(args, out),
         (Some(routine), _) => run(args, routine),
-        (None, None) => Err(UsageError("a routine is missing".to_owned()).into()),
+        (None, None) => Err(UsageError::new(Code::UsageInvalid, "a routine is missing".to_owned()).into()),
     }
 }
 

@@ -1,5 +1,6 @@
 //! `armcal check`: what is wrong with a file, before anything moves.
 
+use armcal_core::codes::{Code, Warning};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
@@ -9,7 +10,7 @@ use serde::Serialize;
 #[cfg(feature = "sim")]
 use crate::campaign::Request;
 use crate::cli::closing::say_wrapped;
-use crate::cli::exit::{Exit, UsageError, explain};
+use crate::cli::exit::{Exit, UsageError, chain_of, code_of};
 use crate::cli::file_kind::FileKind;
 use crate::cli::overrides::OverrideArgs;
 use crate::cli::stdout::say;
@@ -24,10 +25,10 @@ use armcal_core::text::counted;
 
 #[derive(Debug, Args)]
 pub(super) struct CheckArgs {
-    /// Robot folders or robot.toml files, routines, vehicles, calibrations, input maps, tag maps, tasks, plans
+    /// Robot folders, routines, vehicles, calibrations, input maps, tag maps, tasks or plans
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// Print JSON in place of text: a list, an entry a file
+    /// Print JSON instead of text: a list with one entry per file
     #[arg(long)]
     json: bool,
     /// For the routines among them
@@ -57,27 +58,33 @@ struct Checked {
     #[serde(skip_serializing_if = "Option::is_none")]
     holds: Option<String>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    warnings: Vec<String>,
+    warnings: Vec<Warning>,
     #[serde(skip_serializing_if = "Option::is_none")]
     error: Option<String>,
+    /// Class of the error.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    code: Option<Code>,
 }
 
 impl Checked {
     fn of(file: &Path, overrides: &Overrides) -> Self {
         let name = file.display().to_string();
         match check_one(file, overrides) {
-            Ok(Found { text, warnings }) => Self { file: name, ok: true, holds: Some(text), warnings, error: None },
+            Ok(Found { text, warnings }) => {
+                Self { file: name, ok: true, holds: Some(text), warnings, error: None, code: None }
+            }
             Err(error) => {
-                Self { file: name, ok: false, holds: None, warnings: Vec::new(), error: Some(explain(&error)) }
+                let code = Some(code_of(&error));
+                Self { file: name, ok: false, holds: None, warnings: Vec::new(), error: Some(chain_of(&error)), code }
             }
         }
     }
 
     fn lines(&self) -> String {
-        let Self { file, holds, warnings, error, .. } = self;
+        let Self { file, holds, warnings, error, code, .. } = self;
         let found = holds.iter().map(|holds| format!("ok: {file}: {holds}"));
         let warnings = warnings.iter().map(|warning| format!("warning: {file}: {warning}"));
-        let errors = error.iter().map(|error| format!("error: {error}"));
+        let errors = error.iter().zip(code).map(|(error, code)| format!("error: {error} [{code}]"));
         found.chain(warnings).chain(errors).collect::<Vec<_>>().join("\n")
     }
 }
@@ -85,7 +92,7 @@ impl Checked {
 /// What a file holds, and what a run would go on without.
 struct Found {
     text: String,
-    warnings: Vec<String>,
+    warnings: Vec<Warning>,
 }
 
 fn check_one(file: &Path, overrides: &Overrides) -> Result<Found> {
@@ -113,7 +120,7 @@ fn expect_toml(file: &Path) -> Result<()> {
         _ => return Ok(()),
     };
     let (name, kind) = (file.display(), FileKind::of(file).map_or("", FileKind::name));
-    Err(UsageError(format!("{name}: is {kind}, and not to be checked; {advice}")).into())
+    Err(UsageError::new(Code::FileKind, format!("{name}: is {kind}, and not to be checked; {advice}")).into())
 }
 
 /// What a file that is neither robot nor routine holds.
@@ -142,16 +149,22 @@ fn describe(file: &Path, text: &str, kind: Option<FileKind>) -> Result<String> {
             Ok(format!("task, {targets} targets and {poses} poses, tolerance {} mm", task.tolerance_m * 1e3))
         }
         Some(FileKind::Calibration) => describe_calibration(file, text),
-        Some(FileKind::RoutineWithoutVehicle) => Err(UsageError(format!(
-            "{}: vehicle: is missing; a routine names the vehicle that carries the arm: \
+        Some(FileKind::RoutineWithoutVehicle) => Err(UsageError::new(
+            Code::KeyMissing,
+            format!(
+                "{}: vehicle: is missing; a routine names the vehicle that carries the arm: \
              robots/vehicles/fixed-base.toml is an arm bolted to the ground",
-            file.display()
-        ))
+                file.display()
+            ),
+        )
         .into()),
-        _ => Err(UsageError(format!(
-            "{}: is none of robot, routine, vehicle, calibration, input map, tag map, task, plan",
-            file.display()
-        ))
+        _ => Err(UsageError::new(
+            Code::FileKind,
+            format!(
+                "{}: is none of robot, routine, vehicle, calibration, input map, tag map, task, plan",
+                file.display()
+            ),
+        )
         .into()),
     }
 }
@@ -206,7 +219,8 @@ fn check_robot(folder: &Path) -> Result<Found> {
     let lost = lost.map(|id| {
         format!("base_tag: there is no [[tag]], so that tag {id} must be one of the vehicle's, or of a tag map")
     });
-    Ok(Found { text: describe_robot(&robot)?, warnings: refused.chain(lost).collect() })
+    let warnings = refused.chain(lost).map(|text| Warning::new(Code::PlanningIncomplete, text)).collect();
+    Ok(Found { text: describe_robot(&robot)?, warnings })
 }
 
 fn describe_robot(robot: &Robot) -> Result<String> {
@@ -214,12 +228,15 @@ fn describe_robot(robot: &Robot) -> Result<String> {
     let overlaps = ClearanceModel::of_arm_alone(robot).overlaps(&robot.stowed);
     if let Some(pair) = overlaps.first().filter(|_| is_stowed) {
         let file = robot.folder.join("robot.toml");
-        return Err(UsageError(format!(
-            "{}: stowed_rad: {pair} overlap there ({} pairs in all). Links that touch by design belong to \
+        return Err(UsageError::new(
+            Code::ClearanceTooSmall,
+            format!(
+                "{}: stowed_rad: {pair} overlap there ({} pairs in all). Links that touch by design belong to \
              allowed_pairs",
-            file.display(),
-            overlaps.len()
-        ))
+                file.display(),
+                overlaps.len()
+            ),
+        )
         .into());
     }
     let mass_kg: f64 = robot.bodies.iter().map(|body| body.mass_kg).sum();
@@ -248,11 +265,11 @@ fn check_routine(file: &Path, overrides: &Overrides) -> Result<Found> {
     #[cfg(feature = "sim")]
     let beyond = armcal_sim::WorldSpec::from_routine(routine, &robot)?.beyond_datasheet(&robot);
     #[cfg(not(feature = "sim"))]
-    let beyond = Vec::new();
+    let beyond: Vec<String> = Vec::new();
     let SceneIssues { errors, mut warnings } = scene_issues(routine, &robot, &vehicle);
-    warnings.extend(beyond);
+    warnings.extend(beyond.into_iter().map(|text: String| Warning::new(Code::WorldBeyondDatasheet, text)));
     if !errors.is_empty() {
-        return Err(UsageError(format!("{}: {}", file.display(), errors.join("; "))).into());
+        return Err(UsageError::new(Code::ValueInvalid, format!("{}: {}", file.display(), errors.join("; "))).into());
     }
     #[cfg(feature = "sim")]
     if !routine.campaign.matrix.is_empty() {

@@ -45,16 +45,16 @@ const REPORT: &str = "report.html";
 /// What is said at the end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Args)]
 pub(super) struct ClosingArgs {
-    /// Print all tables, findings and counts at the end, and not the verdict and three figures alone
+    /// Print all tables, findings and counts; default: the verdict and its figures
     #[arg(long)]
     details: bool,
-    /// Print summary.json in place of text
+    /// Print summary.json instead of text
     #[arg(long, conflicts_with = "details")]
     pub json: bool,
 }
 
 impl ClosingArgs {
-    /// Writes the verdict and what it rests on, then `next`: where the files are, and what to do.
+    /// Writes the verdict and its figures, then `next`: where the files are, and what to do.
     pub fn say(self, summary: &RunSummary, next: &str) -> Result<()> {
         if self.json {
             return say(&serde_json::to_string_pretty(summary).context("the summary has no JSON form")?);
@@ -65,7 +65,9 @@ impl ClosingArgs {
         let next = match (is_quiet(), self.details) {
             (true, _) => String::new(),
             (false, true) => format!("\n{next}"),
-            (false, false) => format!("\n{}", next.replacen(REPORT, &format!("{REPORT}; all figures: --details"), 1)),
+            (false, false) => {
+                format!("\n{}", next.replacen(REPORT, &format!("{REPORT}; print all figures with --details"), 1))
+            }
         };
         say_closing(&format!("{text}{next}"))
     }

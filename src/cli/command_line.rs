@@ -16,7 +16,7 @@ use crate::cli::live::discover;
 #[cfg(feature = "viewer")]
 use crate::cli::replay;
 use crate::cli::stdout::{be_quiet, complain, is_written};
-use crate::cli::{calibrate, check, completions, exit, export, inspect, new_robot, plan, tagmap, watch};
+use crate::cli::{calibrate, check, completions, exit, explain, export, inspect, new_robot, plan, tagmap, watch};
 #[cfg(feature = "sim")]
 use crate::cli::{campaign, regress, run, sensitivity, serve, study};
 
@@ -34,7 +34,7 @@ static VERSION: LazyLock<String> = LazyLock::new(|| {
     format!("{} ({commit}; {})", env!("CARGO_PKG_VERSION"), parts.join(", "))
 });
 
-/// Calibrates the joint sensors of arms that nobody can walk up to.
+/// Calibrate a robot arm's joint sensors in place, with its wrist camera and a few AprilTags.
 #[derive(Debug, Parser)]
 #[command(name = "armcal", version = VERSION.as_str(), about, max_term_width = 100)]
 struct Cli {
@@ -47,10 +47,10 @@ struct Cli {
 /// How much is said.
 #[derive(Debug, Args)]
 struct Loudness {
-    /// Say the verdict and errors alone: no progress, notes, warnings or further lines
+    /// Print only the verdict and errors: no progress, notes, warnings or further lines
     #[arg(long, short, global = true, conflicts_with = "verbose")]
     quiet: bool,
-    /// Say on stderr what is done; -vv: why, too
+    /// Print each step on stderr; -vv also prints the reasons
     #[arg(long, short, global = true, action = clap::ArgAction::Count)]
     verbose: u8,
 }
@@ -71,46 +71,46 @@ enum Command {
     /// Run a routine in simulation: reach, plan, capture, calibrate, reach again
     #[cfg(feature = "sim")]
     Run(run::RunArgs),
-    /// Put a routine's simulated arm behind the ROS 2 topics of a real one
+    /// Serve a routine's simulated arm on the ROS 2 topics of a real arm
     #[cfg(feature = "sim")]
     Serve(serve::ServeArgs),
-    /// Find out how an arm can be reached
+    /// Find the topics of a real arm
     #[cfg(feature = "sim")]
     Live(discover::LiveCommandArgs),
-    /// Run a routine for many seeds and settings, and sum the figures up
+    /// Run a routine for many seeds and settings, and summarise the figures
     #[cfg(feature = "sim")]
     Campaign(Box<campaign::CampaignArgs>),
-    /// Run a routine for the seeds of a baseline, and say whether it has become worse
+    /// Run a routine for the seeds of a baseline, and fail if it has become worse
     #[cfg(feature = "sim")]
     Regress(Box<regress::RegressArgs>),
-    /// Measure a part on its own against known truth
+    /// Measure one part of the program against known truth
     #[cfg(feature = "sim")]
     Study(study::StudyArgs),
-    /// Show what one wrong joint offset does to the paper's two objectives and to the tool
+    /// Show the effect of one wrong joint offset on the paper's two objectives and on the tool
     #[cfg(feature = "sim")]
     Sensitivity(sensitivity::SensitivityArgs),
-    /// Choose poses and paths for a routine's first capture without moving: plan.toml for an operator, plan.rrd to look
-    /// at
+    /// Plan poses and paths of a routine's first capture without moving: plan.toml and a replay of it
     Plan(plan::PlanArgs),
-    /// Calibrate from recordings, simulated or of a real arm
+    /// Calibrate from recordings of a simulated or real arm
     Calibrate(calibrate::CalibrateArgs),
-    /// Follow a recording that another program is still writing, and say what is believed of the arm
+    /// Follow a recording while another program writes it, and print the current estimate
     Watch(watch::WatchArgs),
-    /// Find where the tags are, from camera views alone
+    /// Compute a tag map from camera views only
     Tagmap(tagmap::TagmapArgs),
-    /// Say what is in a recording, whether it is whole, and what could be calibrated from it
+    /// Print what a recording holds, whether it is complete, and what it can calibrate
     Inspect(inspect::InspectArgs),
-    /// Write a calibration as YAML, TOML or one compact line to stdout
+    /// Print a calibration in the form that a driver or another program reads
     Export(export::ExportArgs),
     /// Open a recording in the Rerun viewer, or write it as .rrd
     #[cfg(feature = "viewer")]
     Replay(replay::ReplayArgs),
     /// Write a commented robot folder for an arm's URDF
     NewRobot(new_robot::NewRobotArgs),
-    /// Read robot folders, routines, vehicles, calibrations, input maps, tag maps, tasks and plans, and say what is
-    /// wrong with them
+    /// Check robot folders, routines, vehicles, calibrations, input maps, tag maps, tasks and plans for errors
     Check(check::CheckArgs),
-    /// Print the script with which a shell completes commands and options
+    /// Print cause, evidence, remedy and page of a code, or list all codes
+    Explain(explain::ExplainArgs),
+    /// Print the completion script of a shell
     Completions(completions::CompletionsArgs),
     /// Write manual pages into a folder
     Man(completions::ManArgs),
@@ -159,6 +159,7 @@ pub fn main() -> ExitCode {
         Command::Replay(args) => replay::replay(&args),
         Command::NewRobot(args) => new_robot::new_robot(&args),
         Command::Check(args) => check::check(&args),
+        Command::Explain(args) => explain::explain(&args),
         Command::Completions(args) => completions::completions(&args, command()),
         Command::Man(args) => completions::man(&args, command()),
     };

@@ -12,7 +12,7 @@ use crate::output;
 
 #[derive(Debug, Args)]
 pub(super) struct CompletionsArgs {
-    /// The shell that reads the script
+    /// Shell that reads the script
     shell: Shell,
 }
 
@@ -26,7 +26,7 @@ pub(super) fn completions(args: &CompletionsArgs, mut command: clap::Command) ->
 
 #[derive(Debug, Args)]
 pub(super) struct ManArgs {
-    /// Folder for the pages: armcal.1, armcal-run.1, ..
+    /// Folder for the pages armcal.1, armcal-run.1 and so on
     folder: PathBuf,
 }
 

@@ -49,6 +49,7 @@ const EXAMPLES: &[(&str, &[&str])] = &[
             "armcal calibrate dive.mcap --robot robots/titan4 --online --out belief",
         ],
     ),
+    ("explain", &["armcal explain value_out_of_range", "armcal explain"]),
     ("watch", &["armcal watch recordings/dive/run.mcap --robot robots/titan4 --json"]),
     (
         "tagmap",

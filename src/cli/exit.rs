@@ -2,18 +2,21 @@
 
 use std::process::ExitCode;
 
+use crate::output::OutputError;
 #[cfg(feature = "sim")]
 use crate::report::RunSummary;
 use crate::report::proposed_map::ProposalError;
 use armcal_belief::calib::{CalibError, CalibrationFileError, CompactError};
-use armcal_belief::plan::{ItineraryError, PlanError};
+use armcal_belief::plan::{ItineraryError, PathError, PlanError};
 use armcal_belief::session::SessionError;
 use armcal_belief::tagmap::TagMapError;
 use armcal_belief::tagmap::recording::ViewsError;
+use armcal_core::codes::{Code, Coded};
 use armcal_core::input::InputError;
 use armcal_core::log::LogError;
 use armcal_core::robot::{FileIssue, RobotError};
 use armcal_core::routine::RoutineError;
+use armcal_core::streams::ArmError;
 use armcal_core::text::printable;
 
 /// How a command ended.
@@ -55,10 +58,25 @@ pub(super) fn of_summary(summary: &RunSummary) -> Exit {
     if summary.is_good() { Exit::Ok } else { Exit::Refused }
 }
 
-/// Something is missing on the command line.
+/// Something is wrong with the command line, or with a file that it names.
 #[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-pub(super) struct UsageError(pub String);
+#[error("{text}")]
+pub(super) struct UsageError {
+    code: Code,
+    text: String,
+}
+
+impl UsageError {
+    pub fn new(code: Code, text: impl Into<String>) -> Self {
+        Self { code, text: text.into() }
+    }
+}
+
+impl Coded for UsageError {
+    fn code(&self) -> Code {
+        self.code
+    }
+}
 
 /// Input that cannot be used gives 2, recordings with nothing to fit too; all else 1.
 pub(super) fn of_error(error: &anyhow::Error) -> Exit {
@@ -127,8 +145,13 @@ fn is_write_failure(error: &LogError) -> bool {
     matches!(error, LogError::Write { .. } | LogError::Create { .. })
 }
 
-/// The chain of causes, printable, each said once: many messages already hold that of their source.
+/// Returns the chain of causes and the code, printable, as the last line of a command that failed.
 pub(super) fn explain(error: &anyhow::Error) -> String {
+    format!("{} [{}]", chain_of(error), code_of(error))
+}
+
+/// The chain of causes, printable, each said once: many messages already hold that of their source.
+pub(super) fn chain_of(error: &anyhow::Error) -> String {
     let mut text = error.to_string();
     for cause in error.chain().skip(1) {
         let cause = cause.to_string();
@@ -138,4 +161,74 @@ pub(super) fn explain(error: &anyhow::Error) -> String {
         }
     }
     printable(&text).into_owned()
+}
+
+/// Returns the code of the outermost cause that has one.
+pub(super) fn code_of(error: &anyhow::Error) -> Code {
+    error.chain().find_map(code_of_cause).unwrap_or(Code::Internal)
+}
+
+fn code_of_cause(cause: &(dyn std::error::Error + 'static)) -> Option<Code> {
+    fn of<E: std::error::Error + Coded + 'static>(cause: &(dyn std::error::Error + 'static)) -> Option<Code> {
+        cause.downcast_ref::<E>().map(Coded::code)
+    }
+    let of_input = of::<UsageError>(cause)
+        .or_else(|| of::<RobotError>(cause))
+        .or_else(|| of::<FileIssue>(cause))
+        .or_else(|| of::<InputError>(cause))
+        .or_else(|| of::<LogError>(cause))
+        .or_else(|| of::<ProposalError>(cause))
+        .or_else(|| of::<RoutineError>(cause))
+        .or_else(|| of::<OutputError>(cause));
+    let of_belief = || {
+        of::<CalibrationFileError>(cause)
+            .or_else(|| of::<CalibError>(cause))
+            .or_else(|| of::<CompactError>(cause))
+            .or_else(|| of::<PlanError>(cause))
+            .or_else(|| of::<PathError>(cause))
+            .or_else(|| of::<ItineraryError>(cause))
+            .or_else(|| of::<TagMapError>(cause))
+            .or_else(|| of::<ViewsError>(cause))
+            .or_else(|| of::<SessionError>(cause))
+            .or_else(|| of::<ArmError>(cause))
+    };
+    let of_machine = || cause.is::<std::io::Error>().then_some(Code::FileUnwritable);
+    of_input.or_else(of_belief).or_else(|| of_features(cause)).or_else(of_machine)
+}
+
+/// Returns the code of an error of a crate that a build may leave out.
+fn of_features(cause: &(dyn std::error::Error + 'static)) -> Option<Code> {
+    #[cfg(feature = "sim")]
+    {
+        use crate::campaign::CampaignError;
+        use crate::run::RunError;
+        use armcal_detect::DetectError;
+        use armcal_sim::SimError;
+        let of_run = cause.downcast_ref::<RunError>().map(Coded::code);
+        let of_campaign = || cause.downcast_ref::<CampaignError>().map(Coded::code);
+        let of_sim = || cause.downcast_ref::<SimError>().map(Coded::code);
+        let of_images = || cause.downcast_ref::<DetectError>().map(Coded::code);
+        if let Some(code) = of_run.or_else(of_campaign).or_else(of_sim).or_else(of_images) {
+            return Some(code);
+        }
+    }
+    #[cfg(feature = "viewer")]
+    {
+        use armcal_replay::{ReplayError, ViewerError};
+        let of_replay = cause.downcast_ref::<ReplayError>().map(Coded::code);
+        if let Some(code) = of_replay.or_else(|| cause.downcast_ref::<ViewerError>().map(Coded::code)) {
+            return Some(code);
+        }
+    }
+    #[cfg(feature = "live")]
+    {
+        use armcal_live::{LiveError, NudgeProblem, StopReason};
+        let of_live = cause.downcast_ref::<LiveError>().map(Coded::code);
+        let of_nudge = || cause.downcast_ref::<NudgeProblem>().map(Coded::code);
+        if let Some(code) = of_live.or_else(of_nudge).or_else(|| cause.downcast_ref::<StopReason>().map(Coded::code)) {
+            return Some(code);
+        }
+    }
+    let _ = cause;
+    None
 }

@@ -1,5 +1,6 @@
 //! `armcal export`: a calibration in another form, on stdout.
 
+use armcal_core::codes::Code;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
@@ -10,7 +11,7 @@ use serde_json::Value;
 use crate::cli::calibration_inputs::load_robot;
 use crate::cli::exit::{Exit, UsageError};
 use crate::cli::file_kind::{FileKind, expect_kind};
-use crate::cli::stdout::{complain, note, say};
+use crate::cli::stdout::{complain, say, warn};
 use crate::export::{
     MAX_POINTS, MIN_POINTS, SensorTable, calibrated_urdf, camchain, csv_rows, joints_with_terms, ros_parameters,
     ros2_control, tagslam_map,
@@ -26,45 +27,44 @@ use armcal_core::sensor::{ArmSensors, SensorModel};
 pub(super) struct ExportArgs {
     /// calibration.toml, or a file with the compact text; - for stdin
     file: PathBuf,
-    /// The form that is wanted
+    /// Output form
     #[arg(long = "as", value_enum)]
     form: Form,
-    /// Robot folder with the arm's drawing, as the calibration had it: needed for urdf, ros2-control, ros-parameters,
-    /// table and kalibr; turns a compact text's corrections into the keys of calibration.toml
+    /// Robot folder that the calibration was made with: required by urdf, ros2-control, ros-parameters, table and
+    /// kalibr; expands a compact line to the keys of calibration.toml
     #[arg(long, value_name = "DIR")]
     robot: Option<PathBuf>,
-    /// Points a joint of a table, 2 .. 10000; default: as few as keep straight lines between them within 0.02 mm at the
-    /// tool
+    /// Points per joint of a table, 2 to 10000; default: as few as keep the tool within 0.02 mm
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(MIN_POINTS as i64..=MAX_POINTS as i64))]
     points: Option<u16>,
-    /// Write a refused calibration in a driver's form nevertheless
+    /// Also write a refused calibration
     #[arg(long)]
     allow_refused: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Form {
-    /// All of it, for programs that read YAML
+    /// Complete calibration as YAML
     Yaml,
-    /// All of it, as calibration.toml has it
+    /// Complete calibration with the keys of calibration.toml
     Toml,
     /// One line below 512 bytes
     Compact,
-    /// The robot's URDF with link corrections and camera mount written in; nothing of the sensors is in it
+    /// URDF with link corrections and camera mount; sensors are not included
     Urdf,
-    /// Block for the URDF: each joint's gain and offset as a transmission of `ros2_control`
+    /// `ros2_control` block with each joint's gain and offset as a transmission
     Ros2Control,
     /// ROS 2 parameter file: each joint's gain, offset, terms and their covariance
     RosParameters,
-    /// CSV: counts to radians at points, for every joint over its whole range
+    /// CSV: counts to radians at points over the range of each joint
     Table,
-    /// CSV: one row a joint, with standard deviations
+    /// CSV: one row per joint, with standard deviations
     Csv,
-    /// All of it, for programs that read JSON; keys as in YAML
+    /// Complete calibration as JSON, keys as in YAML
     Json,
-    /// The camera as Kalibr's camchain.yaml
+    /// Camera as Kalibr's camchain.yaml
     Kalibr,
-    /// The tags that were mapped, as TagSLAM's tagslam.yaml
+    /// Mapped tags as TagSLAM's tagslam.yaml
     Tagslam,
 }
 
@@ -98,7 +98,11 @@ impl Input {
 
 pub(super) fn export(args: &ExportArgs) -> Result<Exit> {
     if args.points.is_some() && args.form != Form::Table {
-        return Err(UsageError(format!("--points goes with --as table, not with --as {}", args.form.name())).into());
+        return Err(UsageError::new(
+            Code::UsageInvalid,
+            format!("--points goes with --as table, not with --as {}", args.form.name()),
+        )
+        .into());
     }
     expect_kind(&args.file, &[FileKind::Calibration])?;
     let robot = args.robot.as_deref().map(|folder| load_robot(folder, &[])).transpose()?;
@@ -144,7 +148,7 @@ fn of_full(calibration: &Calibration, robot: Option<&Robot>, args: &ExportArgs) 
         Form::Urdf => {
             let urdf = calibrated_urdf(file, calibration, drawing(robot, args.form)?)?;
             for what in urdf.left_out {
-                note(format!("warning: left out, for a URDF cannot hold it: {what}"));
+                warn(Code::ExportIncomplete, format_args!("left out, for a URDF cannot hold it: {what}"));
             }
             urdf.text
         }
@@ -176,7 +180,7 @@ fn of_compact(compact: &CompactCalibration, robot: Option<&Robot>, args: &Export
             let (file, form) = (args.file.display(), args.form.name());
             let problem =
                 format!("{file}: is a compact calibration, which lacks what {form} needs; give calibration.toml");
-            return Err(UsageError(problem).into());
+            return Err(UsageError::new(Code::UsageInvalid, problem).into());
         }
     })
 }
@@ -188,15 +192,16 @@ fn of_sensors(robot: &Robot, sensors: &ArmSensors, args: &ExportArgs) -> String 
     }
     let bent = joints_with_terms(sensors).collect::<Vec<_>>().join(", ");
     if !bent.is_empty() {
-        note(format!(
-            "warning: left out, for a transmission is a straight line: the terms of {bent}; a table has them"
-        ));
+        let text = "left out, for a transmission is a straight line: the terms of";
+        warn(Code::ExportIncomplete, format_args!("{text} {bent}; a table has them"));
     }
     ros2_control(robot, sensors)
 }
 
 fn drawing(robot: Option<&Robot>, form: Form) -> Result<&Robot> {
-    let missing = || UsageError(format!("--as {} needs the arm's drawing: add --robot DIR", form.name()));
+    let missing = || {
+        UsageError::new(Code::UsageInvalid, format!("--as {} needs the arm's drawing: add --robot DIR", form.name()))
+    };
     Ok(robot.ok_or_else(missing)?)
 }
 
@@ -283,8 +288,14 @@ fn read_input(file: &Path) -> Result<Input> {
     } else {
         files::read_bytes(file, Size::Text)
     };
-    let bytes = read.map_err(|error| UsageError(format!("{name}: cannot be read: {error}")))?;
-    let not_text = |_| UsageError(format!("{name}: is no text: neither a calibration.toml nor a compact calibration"));
+    let bytes =
+        read.map_err(|error| UsageError::new(Code::FileUnreadable, format!("{name}: cannot be read: {error}")))?;
+    let not_text = |_| {
+        UsageError::new(
+            Code::FileFormat,
+            format!("{name}: is no text: neither a calibration.toml nor a compact calibration"),
+        )
+    };
     let text = std::str::from_utf8(&bytes).map_err(not_text)?;
     if text.trim_start().starts_with("armcal") {
         let compact = CompactCalibration::from_text(text).with_context(|| name)?;
@@ -292,7 +303,7 @@ fn read_input(file: &Path) -> Result<Input> {
     }
     if !text.contains("[[joint]]") {
         let what = "neither a calibration.toml nor a compact calibration (which begins with `armcal1` or `armcal2`)";
-        return Err(UsageError(format!("{name}: is {what}")).into());
+        return Err(UsageError::new(Code::FileKind, format!("{name}: is {what}")).into());
     }
     if !is_stdin {
         match Calibration::read(file) {

@@ -1,5 +1,6 @@
 //! What a file is, by its content, and which command takes it: for those who name the wrong one.
 
+use armcal_core::codes::Code;
 use std::io::Read;
 use std::path::Path;
 
@@ -126,7 +127,8 @@ pub(super) fn expect_kind(path: &Path, wanted: &[FileKind]) -> Result<()> {
     match FileKind::of(path).filter(|kind| !wanted.contains(kind)) {
         Some(kind) => {
             let (file, wanted) = (path.display(), wanted.first().map_or("", |kind| kind.name()));
-            Err(UsageError(format!("{file}: is {}, not {wanted}; {}", kind.name(), kind.takers())).into())
+            Err(UsageError::new(Code::FileKind, format!("{file}: is {}, not {wanted}; {}", kind.name(), kind.takers()))
+                .into())
         }
         None => Ok(()),
     }

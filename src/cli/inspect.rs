@@ -1,5 +1,6 @@
 //! `armcal inspect`: what is in a recording, whether it is whole, what could be calibrated from it.
 
+use armcal_core::codes::Code;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
@@ -19,15 +20,15 @@ use armcal_core::robot::{self, Robot};
 /// Exits with 0 for a whole recording, 3 for one that is cut or damaged, 2 for what is no recording.
 #[derive(Debug, Args)]
 pub(super) struct InspectArgs {
-    /// The recording (.mcap), of armcal or of any other arm
+    /// Recording (.mcap) of armcal or of any other program
     recording: PathBuf,
-    /// Robot folder: says which of its parameters the recording would determine; the attached drawings if not given
+    /// Robot folder, to print which parameters the recording determines; default: the files attached to the recording
     #[arg(long, value_name = "DIR")]
     robot: Option<PathBuf>,
     /// Print JSON instead of text
     #[arg(long)]
     json: bool,
-    /// Write a proposed input map for `calibrate --input`; with --robot its joints are matched. Nothing is overwritten
+    /// Write a proposed input map for `calibrate --input`; --robot matches its joints. Nothing is overwritten
     #[arg(long, value_name = "FILE")]
     write_input: Option<PathBuf>,
 }
@@ -39,7 +40,11 @@ pub(super) fn inspect(args: &InspectArgs) -> Result<Exit> {
         None => attached_robot(&args.recording)?,
     };
     if let Some(file) = args.write_input.as_deref().filter(|file| file.symlink_metadata().is_ok()) {
-        return Err(UsageError(format!("{}: is there; name another --write-input", file.display())).into());
+        return Err(UsageError::new(
+            Code::FileExists,
+            format!("{}: is there; name another --write-input", file.display()),
+        )
+        .into());
     }
     let inspection = look(&args.recording, robot.as_ref())?;
     if args.json {

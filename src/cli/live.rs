@@ -6,6 +6,7 @@ pub(super) mod discover;
 #[cfg(feature = "live")]
 mod nudging;
 
+use armcal_core::codes::Code;
 use clap::Args;
 
 use crate::cli::exit::UsageError;
@@ -19,20 +20,20 @@ use armcal_core::robot::Robot;
 
 #[derive(Debug, Args)]
 pub(super) struct LiveArgs {
-    /// A real arm in place of the simulated one, by its connection map: ros2:ARM.toml over DDS, rosbridge:ARM.toml over
-    /// a rosbridge of ROS 1 or 2. It asks before each motion
+    /// Move a real arm instead of the simulated one: ros2:ARM.toml over DDS, or rosbridge:ARM.toml for ROS 1 or 2;
+    /// armcal asks before each motion
     #[arg(long, value_name = "ros2:ARM.toml")]
     arm: Option<String>,
-    /// Do not ask before each motion of a real arm
+    /// Move a real arm without asking before each motion
     #[arg(long, requires = "arm", conflicts_with = "confirm")]
     unattended: bool,
-    /// Listen to the arm, say what is heard, and move nothing
+    /// Listen to the arm, print what is heard, and move nothing
     #[arg(long, requires = "arm")]
     pub no_motion: bool,
-    /// First move one joint after the other by one degree and back, each after a yes, and go on only where all follow
+    /// First move each joint by one degree and back, each after a yes; continue only if all follow
     #[arg(long, requires = "arm", conflicts_with_all = ["unattended", "no_motion"])]
     nudge: bool,
-    /// Drive every joint at this share of the rate that the robot's file allows, 0.01 .. 1
+    /// Share of the joint rates in robot.toml, 0.01 to 1
     #[arg(long, requires = "arm", value_name = "SHARE", default_value_t = 1.0, value_parser = share)]
     speed: f64,
 }
@@ -68,7 +69,7 @@ impl LiveArgs {
             Some(("rosbridge", file)) => (Way::Rosbridge, file),
             _ => {
                 let problem = "it must be ros2: or rosbridge: and a connection map, such as ros2:arm.toml";
-                return Err(UsageError(format!("--arm {arm}: {problem}")).into());
+                return Err(UsageError::new(Code::UsageInvalid, format!("--arm {arm}: {problem}")).into());
             }
         };
         for sensor in &mut inputs.robot.sensors {
@@ -81,7 +82,11 @@ impl LiveArgs {
 /// This build has no such part.
 #[cfg(not(feature = "live"))]
 pub(super) fn not_built(what: &str) -> anyhow::Error {
-    UsageError(format!("{what}: this build of armcal knows no live arms; build it with `--features live`")).into()
+    UsageError::new(
+        Code::BuildFeatureMissing,
+        format!("{what}: this build of armcal knows no live arms; build it with `--features live`"),
+    )
+    .into()
 }
 
 #[cfg(not(feature = "live"))]

@@ -15,7 +15,7 @@ use armcal_core::routine::Scene;
 
 #[derive(Debug, Args)]
 pub(super) struct LiveViewArgs {
-    /// Show what happens in the Rerun viewer that listens at HOST:PORT; 127.0.0.1:9876 if only --live is given
+    /// Show the run in the Rerun viewer at HOST:PORT; default: 127.0.0.1:9876
     #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, require_equals = true)]
     #[arg(default_missing_value = "127.0.0.1:9876")]
     pub live: Option<String>,
@@ -44,6 +44,7 @@ mod unopened {
     use super::ViewOf;
     use crate::cli::exit::UsageError;
     use armcal_belief::session::MessageListener;
+    use armcal_core::codes::Code;
 
     /// There is none.
     pub enum OpenView {}
@@ -51,7 +52,7 @@ mod unopened {
     impl OpenView {
         pub fn open(_: &str, _: &ViewOf<'_>) -> anyhow::Result<Self> {
             let problem = "this build of armcal knows no viewer; build it with `--features viewer`";
-            Err(UsageError(format!("--live: {problem}")).into())
+            Err(UsageError::new(Code::UsageInvalid, format!("--live: {problem}")).into())
         }
 
         pub fn listener(&self, _: Duration) -> MessageListener {

@@ -1,8 +1,9 @@
 //! What of a recording could not be used, said on stderr.
 
+use armcal_core::codes::Code;
 use std::path::Path;
 
-use crate::cli::stdout::note;
+use crate::cli::stdout::{note, warn};
 use armcal_core::input::ExternalRecording;
 use armcal_core::log::{ChunkOrder, Completeness, Recording};
 use armcal_core::robot::Robot;
@@ -22,14 +23,17 @@ pub(super) fn warn_of_losses(recording: &Recording) -> bool {
     let file = recording.path.display();
     let whole = recording.completeness == Completeness::Whole;
     if !whole {
-        note(format_args!("warning: {file}: {}; what could be read is used", describe(&recording.completeness)));
+        warn(
+            Code::RecordingDamaged,
+            format_args!("{file}: {}; what could be read is used", describe(&recording.completeness)),
+        );
     }
     for (what, n) in &recording.rejected {
-        note(format_args!("warning: {file}: {n} messages rejected on {what}"));
+        warn(Code::MessagesRejected, format_args!("{file}: {n} messages rejected on {what}"));
     }
     warn_of_order(&recording.path, recording.chunk_order);
     if recording.non_monotonic > 0 {
-        note(format_args!("warning: {file}: log time went backwards {} times", recording.non_monotonic));
+        warn(Code::StampsDisordered, format_args!("{file}: log time went backwards {} times", recording.non_monotonic));
     }
     !whole || !recording.rejected.is_empty()
 }
@@ -38,10 +42,16 @@ pub(super) fn warn_of_losses(recording: &Recording) -> bool {
 fn warn_of_order(file: &Path, order: ChunkOrder) {
     let file = file.display();
     if order.moved > 0 {
-        note(format_args!("warning: {file}: {} chunks are not in the order of time; they were sorted", order.moved));
+        warn(
+            Code::ChunksDisordered,
+            format_args!("{file}: {} chunks are not in the order of time; they were sorted", order.moved),
+        );
     }
     if order.copies > 0 {
-        note(format_args!("warning: {file}: {} chunks are exact copies of others; they were left out", order.copies));
+        warn(
+            Code::ChunksDisordered,
+            format_args!("{file}: {} chunks are exact copies of others; they were left out", order.copies),
+        );
     }
 }
 
@@ -50,14 +60,17 @@ pub(super) fn warn_of_external(recording: &ExternalRecording, robot: &Robot) -> 
     let file = recording.path.display();
     let is_whole = recording.completeness == Completeness::Whole;
     if !is_whole {
-        note(format_args!("warning: {file}: {}; what could be read is used", describe(&recording.completeness)));
+        warn(
+            Code::RecordingDamaged,
+            format_args!("{file}: {}; what could be read is used", describe(&recording.completeness)),
+        );
     }
     warn_of_order(&recording.path, recording.chunk_order);
     if let Some(doubt) = &recording.unit_doubt {
-        note(format_args!("warning: {file}: {doubt}"));
+        warn(Code::InputUnitDoubtful, format_args!("{file}: {doubt}"));
     }
     for (what, n) in &recording.left_out {
-        note(format_args!("warning: {file}: {n} {what} left out"));
+        warn(Code::MessagesRejected, format_args!("{file}: {n} {what} left out"));
     }
     if !recording.extra_joints.is_empty() {
         note(format_args!(

@@ -16,6 +16,7 @@ mod completions;
 mod confirm;
 mod examples;
 mod exit;
+mod explain;
 mod export;
 mod file_kind;
 mod inspect;

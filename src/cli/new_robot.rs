@@ -1,5 +1,6 @@
 //! `armcal new-robot`: a robot folder for a URDF.
 
+use armcal_core::codes::{Code, Coded};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
@@ -14,9 +15,9 @@ use armcal_core::robot::{self, DraftedMeshes, NewFile, NewRobot, Robot, RobotErr
 
 #[derive(Debug, Args)]
 pub(super) struct NewRobotArgs {
-    /// The arm's URDF; its meshes are looked for beside it and in the folders above
+    /// URDF of the arm; meshes are searched in its folder and in the folders above
     urdf: PathBuf,
-    /// The folder to write; it must be empty or not there
+    /// Folder to write; it must be empty or absent
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Link whose frame is the base frame; default: the root
@@ -25,10 +26,10 @@ pub(super) struct NewRobotArgs {
     /// Link of the tool; default: the end of the longest chain of joints
     #[arg(long, value_name = "LINK")]
     tip: Option<String>,
-    /// Link of the camera's optical frame; default: a link that is called camera or optical, else the tool's
+    /// Link of the camera's optical frame; default: a link named camera or optical, else that of the tool
     #[arg(long, value_name = "LINK")]
     camera_link: Option<String>,
-    /// Name of the robot; default: that in the URDF
+    /// Name of the robot; default: the name in the URDF
     #[arg(long, value_name = "NAME")]
     name: Option<String>,
 }
@@ -49,10 +50,10 @@ pub(super) fn new_robot(args: &NewRobotArgs) -> Result<Exit> {
     let (files, robot) = match trial(&files, &args.out)? {
         Ok(robot) => with_shapes(&wanted, robot, &args.out)?,
         Err(why) => {
-            let without = draft_robot(&wanted, DraftedMeshes::Ignored(&why))?;
-            let robot = trial(&without, &args.out)?.map_err(UsageError)?;
+            let without = draft_robot(&wanted, DraftedMeshes::Ignored(&why.to_string()))?;
+            let robot = trial(&without, &args.out)??;
             if robot.planning_issues.iter().all(|issue| issue.key != "collision_meshes") {
-                return Err(UsageError(why).into());
+                return Err(why.into());
             }
             (without, robot)
         }
@@ -74,7 +75,7 @@ const STOWED_MARGIN_M: f64 = 0.03;
 fn with_shapes(wanted: &NewRobot<'_>, robot: Robot, out: &Path) -> Result<(Vec<NewFile>, Robot)> {
     let read = |wanted: &NewRobot<'_>| -> Result<(Vec<NewFile>, Robot)> {
         let files = draft_robot(wanted, DraftedMeshes::Read)?;
-        let robot = trial(&files, out)?.map_err(UsageError)?;
+        let robot = trial(&files, out)??;
         Ok((files, robot))
     };
     let touching = always_near(&robot, NEAR_M, N_POSES, 1);
@@ -91,15 +92,21 @@ fn refuse_full(folder: &Path) -> Result<()> {
     if is_free {
         return Ok(());
     }
-    Err(UsageError(format!("{}: is there and not an empty folder; name another --out", folder.display())).into())
+    Err(UsageError::new(
+        Code::FileExists,
+        format!("{}: is there and not an empty folder; name another --out", folder.display()),
+    )
+    .into())
 }
 
 /// The robot as it reads from a folder of these files, or why it does not.
-fn trial(files: &[NewFile], out: &Path) -> Result<Result<Robot, String>> {
+fn trial(files: &[NewFile], out: &Path) -> Result<Result<Robot, UsageError>> {
     let folder = tempfile::tempdir().context("no temporary folder can be made")?;
     write(files, folder.path())?;
-    let in_words =
-        |error: RobotError| error.to_string().replace(&folder.path().display().to_string(), &out.display().to_string());
+    let in_words = |error: RobotError| {
+        let text = error.to_string().replace(&folder.path().display().to_string(), &out.display().to_string());
+        UsageError::new(error.code(), text)
+    };
     Ok(robot::load(folder.path()).map_err(in_words))
 }
 

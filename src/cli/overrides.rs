@@ -8,13 +8,13 @@ use armcal_core::routine::{Override, Overrides};
 
 #[derive(Clone, Debug, Default, Args)]
 pub(super) struct OverrideArgs {
-    /// Replace a key of the routine, as world.camera.corner_noise_px=0.45; may be given many times
+    /// Replace a key of the routine, such as world.camera.corner_noise_px=0.45; repeatable
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<Override>,
-    /// Folder of another robot than the routine's
+    /// Robot folder instead of the routine's
     #[arg(long, value_name = "DIR")]
     robot: Option<PathBuf>,
-    /// Another vehicle file than the routine's
+    /// Vehicle file instead of the routine's
     #[arg(long, value_name = "FILE")]
     vehicle: Option<PathBuf>,
 }

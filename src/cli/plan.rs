@@ -1,5 +1,6 @@
 //! `armcal plan`: poses and paths of a routine's first capture, without moving.
 
+use armcal_core::codes::Code;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
@@ -12,7 +13,7 @@ use crate::cli::closing::{say_closing, terminal_width};
 use crate::cli::exit::Exit;
 use crate::cli::file_kind::{FileKind, expect_option, expect_routine};
 use crate::cli::overrides::OverrideArgs;
-use crate::cli::stdout::{is_quiet, note, say};
+use crate::cli::stdout::{is_quiet, note, say, warn};
 use crate::output;
 use crate::report::fit_columns;
 use armcal_belief::plan::{
@@ -25,18 +26,18 @@ use armcal_core::stats::stream_rng;
 
 #[derive(Debug, Args)]
 pub(super) struct PlanArgs {
-    /// The routine (.toml)
+    /// Routine (.toml)
     routine: PathBuf,
-    /// An accepted calibration.toml of this arm to plan under, instead of the datasheet
+    /// Accepted calibration.toml of this arm as prior; default: the datasheet
     #[arg(long, value_name = "CALIBRATION.toml")]
     prior: Option<PathBuf>,
-    /// Seed of the choice of poses and paths; the routine's own if not given
+    /// Seed of the planner; default: the routine's seed
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// Output folder for plan.toml, plan.md and plan.rrd; recordings/ROUTINE-NAME-plan if not given
+    /// Output folder for plan.toml, plan.md and plan.rrd; default: recordings/ROUTINE-NAME-plan
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Print each pose with its joints, counts and tags at the end, and not the figures alone
+    /// Also print each pose with its joints, counts and tags
     #[arg(long)]
     details: bool,
     /// Print the plan as JSON, with the keys of plan.toml
@@ -74,7 +75,7 @@ pub(super) fn plan(args: &PlanArgs) -> Result<Exit> {
         note(format_args!("warning: {warning}"));
     }
     for left in &file.left_out {
-        note(format_args!("warning: a pose is left out: {}", left.reason));
+        warn(Code::PoseSkipped, format_args!("a pose is left out: {}", left.reason));
     }
     output::make_folder(&out)?;
     let (toml, markdown) = (file.to_toml(), markdown(&file));
@@ -100,11 +101,12 @@ fn say_plan(args: &PlanArgs, file: &PlanFile, out: &Path) -> Result<()> {
         return say(totals.lines().next().unwrap_or_default());
     }
     let out = out.display();
-    let next = format!("written      {out}\nnext         {out}/plan.md to fly by, {out}/plan.rrd to look at");
+    let next =
+        format!("written      {out}\nnext         {out}/plan.md for the operator, {out}/plan.rrd for the viewer");
     if args.details {
         say_closing(&format!("{}\n{totals}\n{next}", table(file, UTF8_FULL_CONDENSED, terminal_width())))
     } else {
-        say_closing(&format!("{totals}\n{next}; each pose: --details"))
+        say_closing(&format!("{totals}\n{next}; print each pose with --details"))
     }
 }
 

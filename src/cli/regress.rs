@@ -1,5 +1,6 @@
 //! `armcal regress`: is it worse than it was?
 
+use armcal_core::codes::Code;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -26,40 +27,39 @@ use armcal_core::stats::quantile;
 #[derive(Debug, Args)]
 #[command(group(clap::ArgGroup::new("side").required(true).args(["baseline", "write_baseline"])))]
 pub(super) struct RegressArgs {
-    /// The routine (.toml); [regress] in it may give budgets
+    /// Routine (.toml); [regress] in it may give budgets
     routine: PathBuf,
-    /// Compare with this table: what --write-baseline or `armcal campaign` wrote
+    /// Baseline table, written by --write-baseline or `armcal campaign`
     #[arg(long, value_name = "FILE")]
     baseline: Option<PathBuf>,
-    /// Write the runs here (.csv) as a baseline, and compare with nothing
+    /// Write the runs as a baseline (.csv) and compare nothing
     #[arg(long, value_name = "FILE")]
     write_baseline: Option<PathBuf>,
-    /// Seeds A..B, both included, or one number. All of the baseline's if not given; for --write-baseline the routine's
-    /// campaign.seeds
+    /// Seeds A..B, both included, or one number; default: all of the baseline, or campaign.seeds for --write-baseline
     #[arg(long, value_name = "A..B")]
     seeds: Option<SeedRange>,
-    /// Write the new runs here, too (.csv)
+    /// Also write the new runs (.csv)
     #[arg(long, value_name = "FILE", conflicts_with = "write_baseline")]
     out: Option<PathBuf>,
-    /// Compare this table, which `armcal campaign` wrote, and run nothing: for runs made elsewhere
+    /// Compare this table of `armcal campaign` and run nothing
     #[arg(long, value_name = "FILE", requires = "baseline", conflicts_with_all = ["seeds", "out", "threads"])]
     rows: Option<PathBuf>,
-    /// Threads, one run on each; all cores if not given
+    /// Threads, one run each; default: all cores
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
-    /// Exit with 0 where the pairs decide nothing: they fit both no change and more than the budget
+    /// Exit with 0 if the comparison is inconclusive
     #[arg(long, conflicts_with = "write_baseline")]
     allow_inconclusive: bool,
     /// Print the comparison as JSON instead of the table
     #[arg(long, conflicts_with = "write_baseline")]
     json: bool,
-    /// Write the comparison as JUnit's XML, too, a test case a check
+    /// Also write JUnit XML with one test case per check
     #[arg(long, value_name = "FILE", conflicts_with = "write_baseline")]
     junit: Option<PathBuf>,
-    /// Write the comparison as a page (.html), too
+    /// Also write a page (.html)
     #[arg(long, value_name = "FILE", conflicts_with = "write_baseline")]
     html: Option<PathBuf>,
-    /// Write the comparison as Markdown, too
+    /// Also write Markdown
     #[arg(long, value_name = "FILE", conflicts_with = "write_baseline")]
     markdown: Option<PathBuf>,
     #[command(flatten)]
@@ -172,13 +172,16 @@ fn jobs_of(baseline: &Table, args: &RegressArgs, prepared: &Prepared) -> Result<
         let setting = prepared.settings.iter().find(|setting| setting.text() == row.settings);
         let problem = || {
             let routine = args.routine.display();
-            UsageError(format!("{file}: the matrix of {routine} has no point `{}`", row.settings))
+            UsageError::new(
+                Code::KeyMissing,
+                format!("{file}: the matrix of {routine} has no point `{}`", row.settings),
+            )
         };
         Ok(prepared.job(setting.ok_or_else(problem)?, row.seed))
     };
     let jobs = baseline.rows.iter().filter(wanted).map(job).collect::<Result<Vec<Job>>>()?;
     if jobs.is_empty() {
-        return Err(UsageError(format!("{file}: has none of the seeds asked for")).into());
+        return Err(UsageError::new(Code::UsageInvalid, format!("{file}: has none of the seeds asked for")).into());
     }
     Ok(jobs)
 }

@@ -1,5 +1,6 @@
 //! `armcal replay`: a recording in the Rerun viewer.
 
+use armcal_core::codes::Code;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
@@ -9,7 +10,7 @@ use crate::cli::exit::{Exit, UsageError};
 use crate::cli::file_kind::{FileKind, expect_kind};
 use crate::cli::live_view::LiveViewArgs;
 use crate::cli::losses::warn_of_losses;
-use crate::cli::stdout::{note, say};
+use crate::cli::stdout::{note, say, warn};
 use crate::output;
 use armcal_belief::calib::online::BeliefLog;
 use armcal_belief::calib::{Calibration, Status, surveyed};
@@ -23,15 +24,14 @@ use armcal_replay::{ReplayInput, open_viewer, read_for_replay, show_recording, w
 
 #[derive(Debug, Args)]
 pub(super) struct ReplayArgs {
-    /// The recording (.mcap); a truth.mcap beside it is shown with it, and links and sag by a calibration.toml,
-    /// the online belief by a belief.jsonl
+    /// Recording (.mcap); truth.mcap, calibration.toml and belief.jsonl in the same folder are shown with it
     recording: PathBuf,
     /// Write this .rrd file instead of opening the viewer
     #[arg(long, visible_alias = "out", value_name = "FILE")]
     save: Option<PathBuf>,
     #[command(flatten)]
     view: LiveViewArgs,
-    /// Folder of the robot, where the recording does not carry its drawings
+    /// Robot folder, for recordings without attached robot files
     #[arg(long, value_name = "DIR")]
     robot: Option<PathBuf>,
 }
@@ -65,7 +65,9 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<Exit> {
         summary_markdown: None,
     };
     match (&args.view.live, &args.save) {
-        (Some(_), Some(_)) => return Err(UsageError("--live and --save: only one of them".to_owned()).into()),
+        (Some(_), Some(_)) => {
+            return Err(UsageError::new(Code::UsageInvalid, "--live and --save: only one of them".to_owned()).into());
+        }
         (Some(address), None) => show_recording(&input, address)?,
         (None, Some(out)) => {
             let growing = output::Beside::begin(out)?;
@@ -123,7 +125,7 @@ fn calibration_beside(recording: &Path, robot: &Robot) -> Option<Calibration> {
         }
         Ok(_) => None,
         Err(why) => {
-            note(format!("warning: the arm is shown as drawn: {}: {why}", file.display()));
+            warn(Code::ReplayIncomplete, format_args!("the arm is shown as drawn: {}: {why}", file.display()));
             None
         }
     }
@@ -140,7 +142,7 @@ fn belief_beside(recording: &Path, robot: &Robot) -> Option<BeliefLog> {
         Ok(log) if log.beliefs().all(|row| row.offset_rad.len() == robot.n_joints()) => Some(log),
         Ok(_) => None,
         Err(why) => {
-            note(format!("warning: shown without the online belief: {}: {why}", file.display()));
+            warn(Code::ReplayIncomplete, format_args!("shown without the online belief: {}: {why}", file.display()));
             None
         }
     }
@@ -171,7 +173,7 @@ impl Drawings {
             None => {
                 let recording = args.recording.display();
                 let problem = "carries no drawings of its robot (attachment robot.toml); name its folder with --robot";
-                return Err(UsageError(format!("{recording}: {problem}")).into());
+                return Err(UsageError::new(Code::UsageInvalid, format!("{recording}: {problem}")).into());
             }
         };
         let vehicle =

@@ -1,5 +1,6 @@
 //! `armcal run`: the closed loop on a simulated arm, or on a real one.
 
+use armcal_core::codes::Code;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -15,7 +16,7 @@ use crate::cli::live::LiveArgs;
 use crate::cli::live_view::{LiveViewArgs, OpenView, ViewOf};
 use crate::cli::overrides::OverrideArgs;
 use crate::cli::progress::Bar;
-use crate::cli::stdout::note;
+use crate::cli::stdout::{note, warn};
 use crate::output::OutputFolder;
 use crate::run::{Failure, Keep, RunInputs, RunOutput, execute};
 use armcal_belief::session::Progress;
@@ -25,12 +26,12 @@ use armcal_sim::CameraMode;
 
 #[derive(Debug, Args)]
 pub(super) struct RunArgs {
-    /// The routine (.toml)
+    /// Routine (.toml)
     routine: PathBuf,
-    /// Seed of everything random in the world; the routine's own if not given
+    /// Seed of all random numbers; default: the routine's seed
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// Output folder; recordings/ROUTINE-NAME if not given
+    /// Output folder; default: recordings/ROUTINE-NAME
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Ask on stdin before each motion; y or Enter: go, h: hold, a: abort
@@ -64,10 +65,8 @@ pub(super) fn run(args: &RunArgs) -> Result<Exit> {
     tracing::info!("routine {routine}, robot {robot}, seed {seed}, results in {}", out.display());
     let (output, left_behind) = OutputFolder::open(&out)?;
     if let Some(kept) = left_behind {
-        note(format_args!(
-            "warning: an earlier run into this folder did not end; its recording is now {}",
-            kept.display()
-        ));
+        let text = "an earlier run into this folder did not end; its recording is now";
+        warn(Code::RunLeftOver, format_args!("{text} {}", kept.display()));
     }
     if let Some(foretold) = rendering_foretold(&inputs).filter(|_| arm.is_none()) {
         note(foretold);
@@ -92,7 +91,7 @@ pub(super) fn run(args: &RunArgs) -> Result<Exit> {
     view.into_iter().for_each(OpenView::end);
     let finished = result.map_err(explained)?;
     if let Some(why) = &finished.replay_failure {
-        note(format_args!("warning: there is no replay, all other files are whole: {why}"));
+        warn(Code::ReplayMissing, format_args!("no replay was written, all other files are complete: {why}"));
     }
     let shown = out.display();
     let next = format!("written      {shown}\nnext         {shown}/report.html; armcal replay {shown}/run.mcap");
@@ -127,7 +126,7 @@ fn rendering_foretold(inputs: &RunInputs) -> Option<String> {
     let [columns, rows] = inputs.robot.camera.lens.resolution_px().map(f64::from);
     let each_s = SEARCHED_S.max((SEARCHED_S + RENDERED_S) / cores as f64) * columns * rows / USUAL_PIXELS;
     Some(format!(
-        "about {images:.0} images are rendered and searched: some {:.0} s on {}",
+        "about {images:.0} images will be rendered and searched, in about {:.0} s on {}",
         images * each_s,
         counted(cores, "core")
     ))

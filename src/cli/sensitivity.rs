@@ -1,5 +1,6 @@
 //! `armcal sensitivity`: the paper's Figures 4 and 7 for a routine's arm and tags.
 
+use armcal_core::codes::Code;
 use std::fs;
 use std::path::PathBuf;
 
@@ -17,7 +18,7 @@ use armcal_study as study;
 
 #[derive(Debug, Args)]
 pub(super) struct SensitivityArgs {
-    /// The routine (.toml) whose arm, vehicle and tags it is
+    /// Routine (.toml) with arm, vehicle and tags
     routine: PathBuf,
     /// Folder for sensitivity.csv, statement.md and the plots
     #[arg(long, value_name = "DIR", default_value = "recordings/sensitivity")]
@@ -25,10 +26,10 @@ pub(super) struct SensitivityArgs {
     /// Random poses
     #[arg(long, value_name = "N", default_value_t = 40, value_parser = clap::value_parser!(u16).range(2..=1000))]
     poses: u16,
-    /// Tags that each pose sees at least
+    /// Least number of tags in each pose
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..=100))]
     min_tags: u16,
-    /// Seed of the poses; the routine's own if not given
+    /// Seed of the poses; default: the routine's seed
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
     #[command(flatten)]
@@ -43,7 +44,7 @@ pub(super) fn sensitivity(args: &SensitivityArgs) -> Result<Exit> {
     let clearance = ClearanceModel::new(&robot, &vehicle, &routine.scene);
     let (poses, min_tags) = (usize::from(args.poses), usize::from(args.min_tags));
     let found = study::sensitivity(&robot, &clearance, poses, min_tags, args.seed.unwrap_or(routine.seed))
-        .map_err(|problem| UsageError(format!("{}: {problem}", args.routine.display())))?;
+        .map_err(|problem| UsageError::new(Code::UsageInvalid, format!("{}: {problem}", args.routine.display())))?;
     let statement = found.statement();
     output::make_folder(&args.out)?;
     let figures = found.figures().map_err(anyhow::Error::msg)?;

@@ -15,19 +15,19 @@ mod served;
 pub(super) struct ServeArgs {
     /// The routine (.toml): its robot, vehicle, scene and world
     routine: PathBuf,
-    /// The connection map that the other side uses, too; the topics of our own recordings if not given
+    /// Connection map that the client also uses; default: the topics of armcal's recordings
     #[arg(long, value_name = "ARM.toml")]
     arm: Option<PathBuf>,
-    /// Seed of everything random in the world; the routine's own if not given
+    /// Seed of all random numbers; default: the routine's seed
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// The arm's time over ours, 0.05 .. 50
+    /// Speed of the arm's clock over real time, 0.05 to 50
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = factor)]
     factor: f64,
-    /// End after so many seconds; with Ctrl-C if not given
+    /// End after this many seconds; default: at Ctrl-C
     #[arg(long = "for", value_name = "SECONDS")]
     seconds: Option<f64>,
-    /// Write the truth of this world into FILE.mcap
+    /// Write the simulated truth to FILE.mcap
     #[arg(long, value_name = "FILE.mcap")]
     truth: Option<PathBuf>,
     #[command(flatten)]

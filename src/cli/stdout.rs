@@ -9,6 +9,7 @@ use std::io::{ErrorKind, Result as IoResult, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, Result};
+use armcal_core::codes::Code;
 use armcal_core::text::printable;
 
 /// Writes `text`, printable, to stdout and ends the line.
@@ -48,6 +49,11 @@ pub(super) fn note(text: impl Display) {
     if !is_quiet() {
         complain(text);
     }
+}
+
+/// Writes a warning with its code to stderr, unless `--quiet` was given.
+pub(super) fn warn(code: Code, text: impl Display) {
+    note(format_args!("warning: {text} [{code}]"));
 }
 
 /// Writes a line that must be read, printable, to stderr: errors and questions. Where that cannot be written nobody can

@@ -1,5 +1,6 @@
 //! `armcal study dive-faults`: when the online belief names what happens on a dive.
 
+use armcal_core::codes::Code;
 use std::fs;
 use std::path::PathBuf;
 
@@ -50,7 +51,11 @@ pub(super) fn dive_faults(args: &DiveFaultsArgs) -> Result<Exit> {
         DiveFaultKind::ALL.into_iter().filter(|kind| kind.name().contains(&args.kind)).collect();
     if kinds.is_empty() {
         let names = DiveFaultKind::ALL.map(DiveFaultKind::name).join(", ");
-        return Err(UsageError(format!("--kind {}: no kind has this in its name; there are {names}", args.kind)).into());
+        return Err(UsageError::new(
+            Code::NameUnknown,
+            format!("--kind {}: no kind has this in its name; there are {names}", args.kind),
+        )
+        .into());
     }
     let all: Vec<(DiveFaultKind, u64)> =
         kinds.into_iter().flat_map(|kind| seeds.clone().map(move |seed| (kind, seed))).collect();
@@ -77,7 +82,9 @@ fn one(args: &DiveFaultsArgs, kind: DiveFaultKind, seed: u64) -> Result<DiveFaul
         _ => None,
     });
     let Some((works, work)) = works else {
-        return Err(UsageError(format!("{}: it has no step `work`", args.routine.display())).into());
+        return Err(
+            UsageError::new(Code::UsageInvalid, format!("{}: it has no step `work`", args.routine.display())).into()
+        );
     };
     let fault = drawn_dive_fault(kind, seed, &robot, &work.looks_rad);
     if !run.join("truth.mcap").exists() {

@@ -1,5 +1,6 @@
 //! `armcal study falsified`: the verdict where drawing, survey or a sensor is wrong.
 
+use armcal_core::codes::Code;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -66,7 +67,7 @@ pub(super) fn falsified(args: &FalsifiedArgs) -> Result<Exit> {
 fn chosen(mut cases: Vec<Case>, kinds: &[String]) -> Result<Vec<Case>, UsageError> {
     let known = CaseKind::ALL.map(CaseKind::name);
     if let Some(unknown) = kinds.iter().find(|kind| !known.contains(&kind.as_str())) {
-        return Err(UsageError(format!("--kind {unknown}: is none of {}", known.join(", "))));
+        return Err(UsageError::new(Code::NameUnknown, format!("--kind {unknown}: is none of {}", known.join(", "))));
     }
     cases.retain(|case| {
         kinds.is_empty() || case.kind == CaseKind::GoodArm || kinds.iter().any(|kind| kind == case.kind.name())

@@ -1,5 +1,6 @@
 //! `armcal tagmap`: where the tags are, from camera views alone.
 
+use armcal_core::codes::{Code, Warning};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
@@ -29,7 +30,7 @@ use armcal_core::streams::Message;
 pub(super) struct TagmapArgs {
     /// The recording (.mcap)
     recording: PathBuf,
-    /// Folder of the robot: its camera, its tags, its base tag
+    /// Robot folder with camera, tags and base tag
     #[arg(long, value_name = "DIR", required_unless_present_all = ["camera", "tags"])]
     #[arg(conflicts_with_all = ["camera", "tags"])]
     robot: Option<PathBuf>,
@@ -39,30 +40,30 @@ pub(super) struct TagmapArgs {
     /// Tags: tagslam.yaml, a target of Kalibr (.yaml), or a tag map (.toml)
     #[arg(long, visible_alias = "tag-map", value_name = "FILE", requires = "camera")]
     tags: Option<PathBuf>,
-    /// Topic of the detections; else the one that the camera file names, or the only one there is
+    /// Topic of the detections; default: the one in the camera file, or the only one
     #[arg(long, value_name = "NAME")]
     topic: Option<String>,
-    /// How much of the places given is believed; `unknown` with --robot, `partly-known` with --tags
+    /// Trust in the given tag poses; default: `unknown` with --robot, `partly-known` with --tags
     #[arg(long, value_enum)]
     mode: Option<Mode>,
-    /// Where to write the map: .toml, or .yaml for TagSLAM; nowhere if not given
+    /// Write the map here: .toml, or .yaml for TagSLAM
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Write the map as a page (.html), with the tags drawn
+    /// Write a page (.html) with a drawing of the tags
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
-    /// Print JSON in place of tables
+    /// Print JSON instead of tables
     #[arg(long)]
     json: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Mode {
-    /// Every place given is exact: only the cameras are located
+    /// Given poses are exact: only cameras are located
     Known,
-    /// Places given hold to within their standard deviations
+    /// Given poses have their standard deviations
     PartlyKnown,
-    /// Only the base tag's place is used
+    /// Only the pose of the base tag is used
     Unknown,
 }
 
@@ -89,7 +90,13 @@ pub(super) fn tagmap(args: &TagmapArgs) -> Result<Exit> {
     let (cameras, tags, settings) = match (&args.robot, &args.camera, &args.tags) {
         (Some(folder), ..) => of_robot(&args.recording, &load_robot(folder, &[])?)?,
         (None, Some(camera), Some(tags)) => of_files(camera, tags)?,
-        _ => return Err(crate::cli::exit::UsageError("name --robot, or --camera and --tags".to_owned()).into()),
+        _ => {
+            return Err(crate::cli::exit::UsageError::new(
+                Code::UsageInvalid,
+                "name --robot, or --camera and --tags".to_owned(),
+            )
+            .into());
+        }
     };
     let settings = MapSettings { mode: args.mode.map_or(settings.mode, MapMode::from), ..settings };
     let read = read_views(&args.recording, &cameras, args.topic.as_deref(), &tags)?;
@@ -235,23 +242,26 @@ fn to_json(map: &TagMap) -> Result<String> {
 }
 
 /// What is wrong with data and map, and whether the map is good nevertheless.
-fn warnings(file: &str, map: &TagMap, read: &RecordedViews, tags: &TagFile) -> (Vec<String>, bool) {
+fn warnings(file: &str, map: &TagMap, read: &RecordedViews, tags: &TagFile) -> (Vec<Warning>, bool) {
     let is_whole = read.completeness == Completeness::Whole;
     let mut found = Vec::new();
     if !is_whole {
-        found.push(format!("{file}: is not whole; what could be read is used"));
+        found.push(Warning::new(Code::RecordingDamaged, format!("{file}: is not whole; what could be read is used")));
     }
-    found.extend(read.left_out.iter().map(|(what, n)| format!("{file}: {n} {what} left out")));
-    found.extend(tags.ignored_keys.iter().map(|key| format!("{key} has no effect here")));
-    found.extend(map.scale_warnings.iter().map(ToString::to_string));
+    let left_out = read.left_out.iter().map(|(what, n)| format!("{file}: {n} {what} left out"));
+    found.extend(left_out.map(|text| Warning::new(Code::MessagesRejected, text)));
+    let ignored = tags.ignored_keys.iter().map(|key| format!("{key} has no effect here"));
+    found.extend(ignored.map(|text| Warning::new(Code::KeyIgnored, text)));
+    found.extend(map.scale_warnings.iter().map(|warning| Warning::new(Code::MapTagSize, warning.to_string())));
     found.extend(map.warnings.iter().cloned());
     if !map.has_converged {
-        found.push("the fit did not come to rest".to_owned());
+        found.push(Warning::new(Code::MapNotConverged, "the fit did not come to rest"));
     }
     let faults = map.rejected.iter().filter(|rejected| rejected.reason.is_fault()).count();
     let too_many = faults as f64 > MAX_REJECTED_SHARE * map.n_detections as f64;
     if too_many {
-        found.push(format!("{file}: {faults} of {} detections rejected", map.n_detections));
+        let text = format!("{file}: {faults} of {} detections rejected", map.n_detections);
+        found.push(Warning::new(Code::MapDetectionsRejected, text));
     }
     let is_sound =
         is_whole && read.n_unreadable == 0 && !too_many && map.has_converged && map.scale_warnings.is_empty();

@@ -1,5 +1,6 @@
 //! `armcal watch`: a recording followed while another program writes it.
 
+use armcal_core::codes::Code;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -14,7 +15,7 @@ use crate::cli::file_kind::expect_recording;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::live_view::{LiveViewArgs, OpenView, ViewOf};
 use crate::cli::losses::warn_of_losses;
-use crate::cli::stdout::{note, say};
+use crate::cli::stdout::{note, say, warn};
 use crate::output;
 use armcal_belief::calib::check_joints;
 use armcal_belief::calib::online::{BeliefLine, BeliefLog, Follower, OnlineEvent, OnlineSettings};
@@ -34,28 +35,28 @@ const POLL: Duration = Duration::from_millis(500);
 /// than the task's tolerance, else with 3 where the recording ends cut or damaged.
 #[derive(Debug, Args)]
 pub(super) struct WatchArgs {
-    /// The recording (.mcap), which another program may still be writing; waited for where it does not exist yet
+    /// Recording (.mcap) that another program may still be writing; armcal waits until it exists
     recording: PathBuf,
     /// Folder of the robot (robot.toml and its URDF)
     #[arg(long, value_name = "DIR")]
     robot: PathBuf,
-    /// Tolerance (m) and targets (m) or poses (rad) that the tool error is predicted for (.toml), until the recording
+    /// Task (.toml): tolerance (m) and targets (m) or poses (rad) for the predicted tool error, until the recording
     /// names its own
     #[arg(long, value_name = "FILE")]
     task: Option<PathBuf>,
-    /// Where the tags are: a tag map (.toml) in the frame of the arm's base, instead of what recording and robot say
+    /// Tag map (.toml) in the frame of the arm's base; default: the survey in the recording or robot folder
     #[arg(long, value_name = "FILE")]
     tag_map: Option<PathBuf>,
-    /// A joint that has failed: JOINT=locked, dead, stuck or jumps; may be given several times
+    /// Declare a failed joint: JOINT=locked, dead, stuck or jumps; repeatable
     #[arg(long, value_name = "JOINT=KIND")]
     failed: Vec<String>,
-    /// Print JSON, a line each as in belief.jsonl, instead of text
+    /// Print the lines of belief.jsonl instead of text
     #[arg(long)]
     json: bool,
-    /// Where to write belief.jsonl at the end; nowhere if not given
+    /// Write belief.jsonl here at the end
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Seconds without anything new after which the recording counts as ended; 0: never
+    /// Seconds without new data after which the recording counts as ended; 0: never
     #[arg(long, default_value_t = 60, value_name = "SECONDS")]
     idle_s: u64,
     #[command(flatten)]
@@ -144,7 +145,9 @@ fn opened<'a>(path: &Path, map: &'a TopicMap, patience: &mut Patience) -> Result
             }
         }
         if patience.interrupt.is_requested() {
-            return Err(UsageError(format!("{}: stopped before it began", path.display())).into());
+            return Err(
+                UsageError::new(Code::Interrupted, format!("{}: stopped before it began", path.display())).into()
+            );
         }
         if !patience.waits((0, 0)) {
             return Err(error.into());
@@ -185,10 +188,8 @@ fn follow(
         }
     }
     if recording.is_out_of_order() {
-        note(format_args!(
-            "warning: {}: chunks are not in the order of time, or doubled; they were heard as they came",
-            recording.path().display()
-        ));
+        let text = "chunks are not in the order of time, or doubled; they were heard as they came";
+        warn(Code::ChunksDisordered, format_args!("{}: {text}", recording.path().display()));
     }
     Ok((recording.finish(hear)?, None))
 }

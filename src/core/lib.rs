@@ -5,6 +5,7 @@
 // For its symbols: the sines of everything that is linked with this crate.
 use armcal_libm as _;
 
+pub mod codes;
 pub mod files;
 pub mod input;
 pub mod joints;

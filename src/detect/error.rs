@@ -1,5 +1,7 @@
 //! Errors of the detector.
 
+use armcal_core::codes::{Code, Coded};
+
 /// Why an image could not be searched for tags.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[expect(missing_docs, reason = "each variant's message says what it is")]
@@ -12,4 +14,13 @@ pub enum DetectError {
     Jpeg(String),
     #[error("the AprilTag library failed: {0}")]
     Library(String),
+}
+
+impl Coded for DetectError {
+    fn code(&self) -> Code {
+        match self {
+            Self::Size { .. } | Self::Resolution { .. } | Self::Jpeg(_) => Code::ImageInvalid,
+            Self::Library(_) => Code::Internal,
+        }
+    }
 }

@@ -1,5 +1,6 @@
 //! The camera as Kalibr's camchain.yaml, with the place that the calibration found for it.
 
+use armcal_core::codes::Code;
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -46,7 +47,7 @@ fn entry(
     let robot_file = robot.folder.join("robot.toml");
     if camera.lens.port.is_some() {
         let problem = "is a flat window, which Kalibr has no model for";
-        return Err(FileIssue::new(&robot_file, format!("{key}.port"), problem));
+        return Err(FileIssue::new(Code::ValueInvalid, &robot_file, format!("{key}.port"), problem));
     }
     let (model, coefficients) = match camera.lens.lens {
         LensModel::Equidistant(lens) => ("equidistant", lens.distortion),
@@ -54,14 +55,14 @@ fn entry(
             let [k1, k2, p1, p2, k3] = lens.distortion;
             if k3 != 0.0 {
                 let problem = format!("has k3 = {k3}, which Kalibr's radtan lacks; 0 is allowed");
-                return Err(FileIssue::new(&robot_file, format!("{key}.distortion"), problem));
+                return Err(FileIssue::new(Code::ValueInvalid, &robot_file, format!("{key}.distortion"), problem));
             }
             ("radtan", [k1, k2, p1, p2])
         }
         LensModel::Unknown(_) => {
             let problem =
                 "has no lens, which a camchain describes: add model, resolution_px, focal_px, center_px, distortion";
-            return Err(FileIssue::new(&robot_file, format!("[{key}]"), problem));
+            return Err(FileIssue::new(Code::KeyMissing, &robot_file, format!("[{key}]"), problem));
         }
     };
     let pose = place.unwrap_or(camera.mount.link_from_frame).to_homogeneous();

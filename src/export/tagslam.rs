@@ -1,5 +1,6 @@
 //! The tags of a calibration's map as TagSLAM's tagslam.yaml.
 
+use armcal_core::codes::Code;
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -21,7 +22,7 @@ const HELD_RAD: f64 = 1e-5;
 pub fn tagslam_map(file: &Path, calibration: &Calibration) -> Result<String, FileIssue> {
     let Some(map) = &calibration.map else {
         let problem = "is missing: the tags' places were surveyed, and this calibration has no others";
-        return Err(FileIssue::new(file, "map", problem));
+        return Err(FileIssue::new(Code::KeyMissing, file, "map", problem));
     };
     let frame = quoted(&map.frame);
     let mut text = format!("default_body: {frame}\nbodies:\n  - {frame}:\n      type: simple\n      is_static: true\n");
@@ -30,7 +31,8 @@ pub fn tagslam_map(file: &Path, calibration: &Calibration) -> Result<String, Fil
         let [w, x, y, z] = tag.quaternion_wxyz;
         let turn = UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-6);
         let key = format!("map.tag {}: quaternion_wxyz", tag.id);
-        let turn = turn.ok_or_else(|| FileIssue::new(file, key, "is no rotation; its length must not be 0"))?;
+        let turn = turn
+            .ok_or_else(|| FileIssue::new(Code::ValueInvalid, file, key, "is no rotation; its length must not be 0"))?;
         let _ = writeln!(text, "        - id: {}\n          size: {}\n          pose:", tag.id, double(tag.size_m));
         for (key, values) in [
             ("position", tag.position_m),

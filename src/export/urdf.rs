@@ -1,5 +1,6 @@
 //! The robot's URDF with the calibrated geometry written in.
 
+use armcal_core::codes::Code;
 use std::path::Path;
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
@@ -63,10 +64,13 @@ pub fn calibrated_urdf(file: &Path, calibration: &Calibration, robot: &Robot) ->
         let problem = format!(
             "has `{MARK}` in it: its corrections would be applied twice; give --robot the folder with the drawing"
         );
-        return Err(FileIssue::new(&urdf_file, "robot", problem).into());
+        return Err(FileIssue::new(Code::ValueInvalid, &urdf_file, "robot", problem).into());
     }
-    let urdf =
-        UrdfText::read(&robot.urdf_text).map_err(|message| RobotError::Syntax { file: urdf_file.clone(), message })?;
+    let urdf = UrdfText::read(&robot.urdf_text).map_err(|message| RobotError::Syntax {
+        code: Code::FileSyntax,
+        file: urdf_file.clone(),
+        message,
+    })?;
     let mut changes = Changes::default();
     move_joints(file, calibration, robot, &urdf, &mut changes)?;
     place_camera(file, calibration, robot, &urdf, &mut changes)?;
@@ -98,7 +102,7 @@ fn move_joints(
         let joint = robot.chain.joints().iter().position(|joint| joint.name == link.joint);
         let in_text = urdf.joints.iter().position(|joint| joint.name == link.joint);
         let (Some(joint), Some(in_text)) = (joint, in_text) else {
-            return Err(FileIssue::new(file, key("joint"), "is no moving joint of the arm"));
+            return Err(FileIssue::new(Code::NameUnknown, file, key("joint"), "is no moving joint of the arm"));
         };
         let drawn = &robot.chain.joints()[joint].parent_from_joint;
         let corrected = urdf.joints[in_text].origin * drawn.inverse() * corrections[joint].applied_to(drawn);
@@ -199,7 +203,8 @@ fn place(file: &Path, table: &str, position_m: [f64; 3], [w, x, y, z]: [f64; 4])
     }
     let rotation = UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-6).filter(|turn| turn.norm().is_finite());
     let key = format!("{table}.quaternion_wxyz");
-    let rotation = rotation.ok_or_else(|| FileIssue::new(file, key, "is no rotation; its length must not be 0"))?;
+    let rotation = rotation
+        .ok_or_else(|| FileIssue::new(Code::ValueInvalid, file, key, "is no rotation; its length must not be 0"))?;
     Ok(Isometry3::from_parts(Translation3::from(Vector3::from(position_m)), rotation))
 }
 

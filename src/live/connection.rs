@@ -2,6 +2,7 @@
 
 mod bridge;
 
+use armcal_core::codes::Code;
 use std::collections::BTreeMap;
 use std::net::Ipv4Addr;
 use std::path::Path;
@@ -216,7 +217,13 @@ impl Connection {
 
     fn check(&self, file: &Path) -> Result<(), RobotError> {
         if self.version != 1 {
-            return Err(FileIssue::new(file, "version", format!("{} is not 1", self.version)).into());
+            return Err(FileIssue::new(
+                Code::VersionUnsupported,
+                file,
+                "version",
+                format!("{} is not 1", self.version),
+            )
+            .into());
         }
         FileIssue::check_range(file, "domain", f64::from(self.domain), 0.0..=232.0)?;
         FileIssue::check_range(file, "commands.rate_hz", self.commands.rate_hz, 5.0..=1000.0)?;
@@ -234,7 +241,7 @@ impl Connection {
         }
         if let Some(bridge) = &self.rosbridge {
             FileIssue::check_range(file, "rosbridge.ros", f64::from(bridge.ros), 1.0..=2.0)?;
-            bridge.address().map_err(|problem| FileIssue::new(file, "rosbridge.url", problem))?;
+            bridge.address().map_err(|problem| FileIssue::new(Code::ValueInvalid, file, "rosbridge.url", problem))?;
         }
         if let Some(deadman) = &self.deadman {
             FileIssue::check_range(file, "deadman.timeout_s", deadman.timeout_s, 0.05..=10.0)?;
@@ -243,12 +250,12 @@ impl Connection {
             let is_needed = ["joint_sensors", "commands.topic"].contains(&key);
             if !is_name(topic) && (is_needed || !topic.is_empty()) {
                 let problem = format!("{topic:?} is no absolute name of a topic, such as \"/joint_sensors\"");
-                return Err(FileIssue::new(file, key, problem).into());
+                return Err(FileIssue::new(Code::ValueInvalid, file, key, problem).into());
             }
         }
         if self.stop.topic.is_empty() && self.stop.service.is_empty() {
             let problem = "neither `topic` nor `service` is given: there must be a way to stop the arm";
-            return Err(FileIssue::new(file, "stop", problem).into());
+            return Err(FileIssue::new(Code::KeyMissing, file, "stop", problem).into());
         }
         Ok(())
     }
@@ -259,7 +266,9 @@ impl Connection {
     /// [`LiveError::File`] where it names none.
     pub fn require_rosbridge(&self, file: &Path) -> Result<&Rosbridge, LiveError> {
         let problem = "the table is missing: write [rosbridge] and url = \"ws://HOST:PORT\"";
-        self.rosbridge.as_ref().ok_or_else(|| LiveError::File(FileIssue::new(file, "rosbridge", problem).into()))
+        self.rosbridge
+            .as_ref()
+            .ok_or_else(|| LiveError::File(FileIssue::new(Code::KeyMissing, file, "rosbridge", problem).into()))
     }
 
     /// Every topic and service by its key.

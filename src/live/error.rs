@@ -1,5 +1,6 @@
 //! Why a connection to an arm cannot be made or used.
 
+use armcal_core::codes::{Code, Coded};
 use armcal_core::robot::RobotError;
 
 /// Why there is no live arm.
@@ -28,5 +29,16 @@ impl LiveError {
 
     pub(crate) fn rosbridge(url: &str, problem: impl Into<String>) -> Self {
         Self::Rosbridge { url: url.to_owned(), problem: problem.into() }
+    }
+}
+
+impl Coded for LiveError {
+    fn code(&self) -> Code {
+        match self {
+            Self::File(error) => error.code(),
+            Self::Dds { .. } | Self::Rosbridge { .. } => Code::ArmConnection,
+            Self::NotReady(_) => Code::ArmNotReady,
+            Self::Encode(_) | Self::Thread(_) => Code::Internal,
+        }
     }
 }

@@ -1,5 +1,6 @@
 //! When a live arm must stop: pure rules on readings, set-points and clocks.
 
+use armcal_core::codes::{Code, Coded};
 use std::time::Duration;
 
 use crate::leaps::{Leaps, Leapt};
@@ -273,6 +274,21 @@ impl Guard {
         self.listening_since = now;
         if self.held_at.is_some() {
             self.held_at = Some(now);
+        }
+    }
+}
+
+impl Coded for StopReason {
+    fn code(&self) -> Code {
+        match self {
+            Self::Stale { .. } => Code::ReadingsStale,
+            Self::Deadman { .. } => Code::DeadmanReleased,
+            Self::Tracking { .. } => Code::JointNotFollowing,
+            Self::Leapt { .. } => Code::ReadingJumped,
+            Self::Frozen { .. } => Code::ReadingsFrozen,
+            Self::ClockStep { .. } => Code::ClockJumped,
+            Self::Range { .. } => Code::JointLimit,
+            Self::Asked(_) => Code::Interrupted,
         }
     }
 }

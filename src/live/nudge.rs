@@ -1,5 +1,6 @@
 //! The first set-points of an arm: one joint by one degree out and back, to see that it follows.
 
+use armcal_core::codes::{Code, Coded};
 use std::f64::consts::PI;
 
 use crate::{LiveArm, Wire};
@@ -171,4 +172,17 @@ struct Way {
     start: JointCounts,
     from_rad: f64,
     to_rad: f64,
+}
+
+impl Coded for NudgeProblem {
+    fn code(&self) -> Code {
+        match self {
+            Self::Astray { .. } | Self::Reversed { .. } => Code::SetPointsReversed,
+            Self::Another { .. } => Code::SetPointsExchanged,
+            Self::Scale { .. } => Code::SetPointsScaled,
+            Self::NotBack { .. } => Code::JointNotFollowing,
+            Self::Stopped => Code::Interrupted,
+            Self::Arm(error) => error.code(),
+        }
+    }
 }

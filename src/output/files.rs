@@ -1,5 +1,6 @@
 //! Files put in place when they are whole.
 
+use armcal_core::codes::{Code, Coded};
 use std::io::Error;
 use std::path::{Path, PathBuf};
 
@@ -81,4 +82,10 @@ pub(crate) fn remove(path: &Path) -> Result<(), OutputError> {
 /// Makes the output folder.
 pub(crate) fn make_folder(folder: &Path) -> Result<(), OutputError> {
     std::fs::create_dir_all(folder).map_err(OutputError::of(folder, "cannot be made"))
+}
+
+impl Coded for OutputError {
+    fn code(&self) -> Code {
+        Code::FileUnwritable
+    }
 }

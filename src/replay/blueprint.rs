@@ -64,7 +64,7 @@ pub(super) fn build(run: &ReplayScene) -> Vec<Entry> {
     let root = if run.tracks.marks.is_empty() && run.state == RunState::Over {
         main
     } else {
-        let phases = b.lanes("What the arm does");
+        let phases = b.lanes("Phases of the run");
         // Each of these has one lane more.
         let lanes: BTreeSet<&str> =
             run.truth.iter().flat_map(|truth| &truth.faults).map(|fault| fault.of.lane()).collect();
@@ -77,8 +77,8 @@ pub(super) fn build(run: &ReplayScene) -> Vec<Entry> {
 /// The layout of a plan.
 pub(super) fn build_plan(run: &ReplayScene) -> Vec<Entry> {
     let mut b = Builder::default();
-    let scene = titled_scene(&mut b, run, "Plan: solid = believed arm, amber = arms that the errors allow");
-    let camera = titled_camera(&mut b, run, "Wrist camera: tags as expected");
+    let scene = titled_scene(&mut b, run, "Plan: solid = estimated arm, amber = arms within the error bounds");
+    let camera = titled_camera(&mut b, run, "Wrist camera: predicted tags");
     let summary = b.view("TextDocument", "Plan", SUMMARY);
     let log = b.view("TextLog", "Poses", LOG);
     let columns = [TextLogColumn { kind: TextLogColumnKind::Body, visible: true.into() }];
@@ -88,10 +88,10 @@ pub(super) fn build_plan(run: &ReplayScene) -> Vec<Entry> {
     let left = b.container(ContainerKind::Vertical, &[(scene, 5.0), (below, 4.0)]);
     let clearance = b.plot("Clearance [mm]", CLEARANCE, legend(Corner2D::RightTop), run);
     let predicted = b.plot("Predicted tool error [mm]", PREDICTED, legend(Corner2D::RightTop), run);
-    let angles = b.plot("Joint angles as believed [deg]", JOINT_ANGLE, legend(Corner2D::RightTop), run);
+    let angles = b.plot("Estimated joint angles [deg]", JOINT_ANGLE, legend(Corner2D::RightTop), run);
     let right = b.container(ContainerKind::Vertical, &[(clearance, 3.0), (predicted, 2.4), (angles, 2.2)]);
     let main = b.container(ContainerKind::Horizontal, &[(left, 3.0), (right, 2.0)]);
-    let phases = b.lanes("What the arm would do");
+    let phases = b.lanes("Phases of the plan");
     let root = b.container(ContainerKind::Vertical, &[(main, 4.3), (phases, 1.0)]);
     b.finish(&root, run)
 }
@@ -99,10 +99,10 @@ pub(super) fn build_plan(run: &ReplayScene) -> Vec<Entry> {
 /// The layout of a real arm's views.
 pub(super) fn build_views(run: &ReplayScene) -> Vec<Entry> {
     let mut b = Builder::default();
-    let scene = titled_scene(&mut b, run, "Scene: the arm as calibrated; yellow = where it sees a tag");
+    let scene = titled_scene(&mut b, run, "Scene: calibrated arm; yellow = measured tags");
     let summary = b.view("TextDocument", "Summary", SUMMARY);
     let left = b.container(ContainerKind::Vertical, &[(scene, 5.0), (summary, 4.0)]);
-    let title = "A view's sightings from the mean of their tag's [mm]";
+    let title = "Tag position in each view from the mean over views [mm]";
     let sightings = b.plot(title, SIGHTING, legend(Corner2D::RightTop), run);
     let angles = b.plot(joints_title(run), JOINT_ANGLE, legend(Corner2D::RightTop), run);
     let right = b.container(ContainerKind::Vertical, &[(sightings, 3.0), (angles, 2.2)]);
@@ -111,11 +111,8 @@ pub(super) fn build_views(run: &ReplayScene) -> Vec<Entry> {
 }
 
 fn scene_view(b: &mut Builder, run: &ReplayScene) -> Part {
-    let title = if run.has_true_joints() {
-        "Scene: solid arm = true, pink ghost = believed"
-    } else {
-        "Scene: the arm as believed"
-    };
+    let title =
+        if run.has_true_joints() { "Scene: solid arm = true, pink ghost = estimated" } else { "Scene: estimated arm" };
     titled_scene(b, run, title)
 }
 
@@ -135,9 +132,9 @@ fn titled_scene(b: &mut Builder, run: &ReplayScene, title: &str) -> Part {
 
 fn camera_view(b: &mut Builder, run: &ReplayScene) -> Part {
     let title = if run.tracks.rejects.is_empty() {
-        "Wrist camera: green = tags seen, pink = expected"
+        "Wrist camera: green = measured tags, pink = predicted"
     } else {
-        "Tags: green seen, orange rejected, pink expected"
+        "Tags: green measured, orange rejected, pink predicted"
     };
     titled_camera(b, run, title)
 }
@@ -156,16 +153,16 @@ fn right_column(b: &mut Builder, run: &ReplayScene) -> Part {
     let mut rows = Vec::new();
     if run.has_true_joints() {
         let errors_deg = plots::joint_errors_deg(run).into_iter().flat_map(|(_, errors_deg)| errors_deg);
-        let all = b.plot("Joint error: believed - true [deg]", JOINT_ERROR, legend(Corner2D::RightTop), run);
+        let all = b.plot("Joint error: estimated - true [deg]", JOINT_ERROR, legend(Corner2D::RightTop), run);
         b.show_within(&all, labelled_range(errors_deg), run);
         let range = [-CLOSE_DEG, CLOSE_DEG];
         let close = b.plot_within(&format!("within {CLOSE_DEG} deg"), JOINT_ERROR, range, run);
         rows.push((b.tabs(&[all, close]), 3.0));
     }
     let title = if run.has_true_joints() {
-        "Joint angles [deg]: bright believed, dark true"
+        "Joint angles [deg]: bright estimated, dark true"
     } else {
-        "Joint angles as believed [deg]"
+        "Estimated joint angles [deg]"
     };
     // The colours are explained beside the errors, where there are any.
     let colors_here = legend(Corner2D::RightTop).with_visible(!run.has_true_joints());
@@ -184,7 +181,7 @@ fn right_column(b: &mut Builder, run: &ReplayScene) -> Part {
         rows.push((b.tabs(&shown), 2.4));
     }
     if run.online.is_some() {
-        let title = "Offsets since the first belief [deg]: bright believed, dark one sigma";
+        let title = "Offset change since the first estimate [deg]: bright estimate, dark one sigma";
         rows.push((b.plot(title, OFFSET_CHANGE, legend(Corner2D::LeftTop).with_visible(false), run), 2.4));
     }
     if !run.tracks.oil_c.is_empty() || !run.tracks.water_c.is_empty() {
@@ -315,7 +312,7 @@ impl Builder {
 
 fn joints_title(run: &ReplayScene) -> &'static str {
     match run.robot.first_slide() {
-        Some(_) => "Joints as calibrated [deg; slides mm]",
-        None => "Joint angles as calibrated [deg]",
+        Some(_) => "Calibrated joints [deg; slides mm]",
+        None => "Calibrated joint angles [deg]",
     }
 }

@@ -1,5 +1,6 @@
 //! Errors of a replay.
 
+use armcal_core::codes::{Code, Coded};
 use std::path::PathBuf;
 
 use rerun::external::re_log_encoding::EncodeError;
@@ -35,4 +36,20 @@ pub enum ReplayError {
     NoViewer { address: String },
     #[error("no thread can be started: {source}")]
     Thread { source: std::io::Error },
+}
+
+impl Coded for ReplayError {
+    fn code(&self) -> Code {
+        match self {
+            Self::Empty { .. } => Code::RecordingFormat,
+            Self::JointCount { .. } => Code::JointsMismatch,
+            Self::TooLong { .. } => Code::RecordingTooLong,
+            Self::Truth(error) => error.code(),
+            Self::NoTruth { .. } | Self::TruthMessage { .. } | Self::TruthJoints { .. } => Code::TruthInvalid,
+            Self::Create { .. } | Self::Encode { .. } => Code::FileUnwritable,
+            Self::Live(_) | Self::NoViewer { .. } => Code::ViewerMissing,
+            Self::Address { .. } => Code::UsageInvalid,
+            Self::Thread { .. } => Code::Internal,
+        }
+    }
 }

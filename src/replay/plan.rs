@@ -180,7 +180,7 @@ fn pose_text(pose: &PoseTable) -> String {
         pose.tags.iter().map(|tag| format!("{} ({:.0} %)", tag.id, 100.0 * tag.probability)).collect();
     let error = pose.predicted_tool_error_m.map_or_else(String::new, |m| format!(", predicted {:.2} mm", 1e3 * m));
     format!(
-        "pose {}: {:.0} mm clear{error}; {:.0} mm as believed; tags {}",
+        "pose {}: clearance {:.0} mm{error}, {:.0} mm for the estimated arm; tags {}",
         pose.number,
         1e3 * pose.proven_clearance_m,
         1e3 * pose.clearance_m,
@@ -280,15 +280,15 @@ fn draw_plots(input: &PlanInput<'_>, stream: &mut EntityLog) {
     let plan = input.plan;
     let entity = |name: &str| format!("{CLEARANCE}/{name}");
     let lines = [
-        ("believed", "believed arm, at the pose", colors::CAMERA),
-        ("proven", "every arm, at the pose", colors::SEEN),
-        ("on_the_way", "every arm, on the way there", colors::TARGET),
+        ("believed", "estimated arm, at the pose", colors::CAMERA),
+        ("proven", "all arms within bounds, at the pose", colors::SEEN),
+        ("on_the_way", "all arms within bounds, on the path", colors::TARGET),
     ];
     for (name, label, shade) in lines {
         let style = SeriesPoints::new().with_names([label]).with_colors([shade]).with_markers([MarkerShape::Circle]);
         stream.log_static(&entity(name), &style.with_marker_sizes([4.0]));
     }
-    let margin = SeriesLines::new().with_names(["kept clear"]).with_colors([colors::MISS]).with_widths([1.0]);
+    let margin = SeriesLines::new().with_names(["required clearance"]).with_colors([colors::MISS]).with_widths([1.0]);
     stream.log_static(&entity("margin"), &margin);
     for time_s in [0.0, plan.totals.arm_time_s] {
         stream.draw(&entity("margin"), time_s, &Scalars::single(1e3 * plan.margin_m));

@@ -25,11 +25,11 @@ fn contents(run: &ReplayScene, input: &ReplayInput) -> String {
     // Writing to a String cannot fail.
     let _ = writeln!(text, "- {:.0} s, {} messages", run.tracks.duration_s, recording.messages.len());
     if recording.completeness != Completeness::Whole {
-        let _ = writeln!(text, "- **the recording is cut or damaged**: something of it is missing");
+        let _ = writeln!(text, "- **the recording is cut or damaged**");
     }
     let rejected: u64 = recording.rejected.values().sum();
     if rejected > 0 {
-        let _ = writeln!(text, "- {rejected} messages were unusable");
+        let _ = writeln!(text, "- {rejected} messages were rejected");
     }
     if let Some((_, task)) = run.tracks.task {
         let arrivals = run.arrivals();
@@ -48,9 +48,9 @@ fn contents(run: &ReplayScene, input: &ReplayInput) -> String {
 
 fn legend(run: &ReplayScene, input: &ReplayInput) -> String {
     let arms = if run.has_true_joints() {
-        "- solid arm: where it truly is; **pink ghost**: where it believes to be\n"
+        "- solid arm: true pose; **pink ghost**: estimated pose\n"
     } else {
-        "- arm: where it believes to be (this recording has no truth)\n"
+        "- arm: estimated pose (this recording has no truth)\n"
     };
     let rests = if run.has_true_tool() {
         "; a line leads to where the tool truly came to rest (red missed, green hit, grey: before calibration), \

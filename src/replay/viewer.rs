@@ -1,5 +1,6 @@
 //! Start of an installed Rerun viewer.
 
+use armcal_core::codes::{Code, Coded};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
@@ -41,6 +42,16 @@ fn open_with(program: &str, rrd: &Path) -> Result<Child, ViewerError> {
         std::io::ErrorKind::NotFound => ViewerError::NotInstalled { path: rrd.to_owned() },
         _ => ViewerError::Start { source },
     })
+}
+
+impl Coded for ViewerError {
+    fn code(&self) -> Code {
+        match self {
+            Self::NoFile { .. } => Code::FileUnreadable,
+            Self::NotInstalled { .. } => Code::ViewerMissing,
+            Self::Start { .. } => Code::ViewerMissing,
+        }
+    }
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ pub fn markdown(summary: &RunSummary) -> String {
     // The verdict comes first, and is seen without scrolling.
     let mut text = colored(&verdict(summary));
     if let Some(score) = &summary.score {
-        text.push_str("| against the truth | before | after |\n|---|--:|--:|\n");
+        text.push_str("| simulated truth | before | after |\n|---|--:|--:|\n");
         for [what, before, after, _] in score_rows(&score.before, score.after.as_ref()) {
             text.push_str(&format!("| {what} | {before} | {after} |\n"));
         }
@@ -32,7 +32,7 @@ fn colored(Verdict { grade, headline, reasons, next }: &Verdict) -> String {
         Grade::Red => "CAUTION",
     };
     let mut text = format!("> [!{kind}]\n> **{headline}**\n");
-    for (title, lines) in [("", reasons), ("What to do next", next)].iter().filter(|(_, lines)| !lines.is_empty()) {
+    for (title, lines) in [("", reasons), ("Next steps", next)].iter().filter(|(_, lines)| !lines.is_empty()) {
         text.push_str(&if title.is_empty() { ">\n".to_owned() } else { format!(">\n> **{title}**\n>\n") });
         lines.iter().for_each(|line| text.push_str(&format!("> - {line}\n")));
     }
@@ -50,7 +50,7 @@ mod tests {
         for (grade, kind) in [(Grade::Green, "TIP"), (Grade::Amber, "WARNING"), (Grade::Red, "CAUTION")] {
             let verdict = Verdict { grade, headline: "So it is", reasons: reasons.clone(), next: next.clone() };
             let expected = format!(
-                "> [!{kind}]\n> **So it is**\n>\n> - elbow slipped.\n>\n> **What to do next**\n>\n> - Fasten it.\n\n"
+                "> [!{kind}]\n> **So it is**\n>\n> - elbow slipped.\n>\n> **Next steps**\n>\n> - Fasten it.\n\n"
             );
             assert_eq!(colored(&verdict), expected);
         }

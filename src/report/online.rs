@@ -62,7 +62,7 @@ pub(super) fn online_section(log: &BeliefLog, summary: &RunSummary) -> Markup {
     let points: Vec<String> =
         rows.iter().map(|row| format!("{:.1},{:.1}", x(hours(row.stamp_nanos)), y(row.tool_error_m.median))).collect();
     markup! {
-        h2 { "The tool over time" }
+        h2 { "Tool error over time" }
         svg viewBox=(format!("0 0 {} {}", WIDTH + 30.0, HEIGHT + 30.0)) role="img" aria-label="tool error over time" {
             @for share in [0.0, 0.5, 1.0] {
                 @let level = y(share * top_m);

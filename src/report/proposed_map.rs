@@ -1,6 +1,7 @@
 //! A proposed input map: which topics of a recording are joint readings, tags and slow sensors, with comments on what
 //! was chosen and what else is there.
 
+use armcal_core::codes::{Code, Coded};
 use std::path::Path;
 
 use armcal_core::input::parse_input_map;
@@ -112,6 +113,17 @@ fn quoted(text: &str) -> String {
 /// One line without control characters.
 fn comment(text: &str) -> String {
     printable(text).replace(['\n', '\r', '\t'], " ")
+}
+
+impl Coded for ProposalError {
+    fn code(&self) -> Code {
+        match self {
+            Self::Log(error) => error.code(),
+            Self::Missing { .. } => Code::TopicMissing,
+            Self::Joints { .. } => Code::JointsMismatch,
+            Self::Unreadable(error) => error.code(),
+        }
+    }
 }
 
 #[cfg(test)]

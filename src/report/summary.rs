@@ -29,7 +29,7 @@ pub struct RunSummary {
     /// All reasons in words.
     pub refusal: Option<String>,
     /// The same as data, the most telling first.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty", with = "armcal_belief::calib::refusals_in_files")]
     pub refusals: Vec<Refusal>,
     /// By the arm's clock, first to last step.
     pub simulated_s: Option<f64>,

@@ -10,8 +10,9 @@ use crate::report::summary::{
 use crate::report::verdict::{beside_refusal, joint_remedy, repairs};
 use crate::score::{ReachScore, ScoreSide};
 use armcal_belief::calib::{
-    CameraMount, FailedJointTable, FurtherCamera, MapResult, PriorTable, Status, SurveyCoverage, UNSEEN_LINKS,
+    CameraMount, FailedJointTable, FurtherCamera, MapResult, PriorTable, Status, SurveyCoverage,
 };
+use armcal_core::codes::{Code, Warning};
 use armcal_core::stats::Summary;
 use armcal_core::text::counted;
 use armcal_core::units::Unit;
@@ -65,12 +66,12 @@ fn score_line(summary: &RunSummary) -> Option<String> {
     let before = median(&score.before);
     Some(match &score.after {
         Some(after) => format!(
-            "tool error   {before} before, {} after, medians against the truth; {} of {} targets hit",
+            "tool error   {before} before, {} after (medians, simulated truth); {} of {} targets hit",
             median(after),
             after.hits,
             after.targets
         ),
-        None => format!("tool error   {before} before, median against the truth; nothing was reached for afterwards"),
+        None => format!("tool error   {before} before (median, simulated truth); no reach task followed"),
     })
 }
 
@@ -78,7 +79,7 @@ fn score_line(summary: &RunSummary) -> Option<String> {
 /// the figures with priors say so.
 fn first_warning(summary: &RunSummary) -> Option<String> {
     let warnings = &summary.calibration.verdict.as_ref()?.warnings;
-    let is_known = |warning: &&String| warning.as_str() == UNSEEN_LINKS;
+    let is_known = |warning: &&Warning| warning.code == Code::LinksUnobservable;
     let first = warnings.iter().find(|warning| !is_known(warning))?;
     Some(match warnings.len() - 1 {
         0 => format!("warning      {first}"),
@@ -203,27 +204,29 @@ fn accuracy_lines(summary: &RunSummary) -> Vec<String> {
     }];
     let held_out = &summary.held_out;
     lines.push(format!(
-        "held out     {} views, {}: tag position error {} rms (datasheet sensors: {}{}){}",
+        "held out     {} views, {}: tag position error {} rms (datasheet sensors {}{}){}",
         held_out.views,
         if held_out.cross_validated { "5-fold cross-validation" } else { "not fitted" },
         Unit::Metres.shown_if(held_out.rms_m, 1),
         Unit::Metres.shown_if(held_out.nominal_rms_m, 1),
         held_out.baseline.map_or_else(String::new, |baseline| format!(
-            ", and mount and map fitted: {}",
+            ", with fitted mount and map {}",
             Unit::Metres.shown(baseline.rms_m, 1)
         )),
-        held_out.rms_px.map_or_else(String::new, |px| format!(", reprojection error {}", Unit::Pixels.shown(px, 1))),
+        held_out
+            .rms_px
+            .map_or_else(String::new, |px| format!(", reprojection error {} rms", Unit::Pixels.shown(px, 1))),
     ));
     lines.extend(summary.calibration.predicted_tool_error_m.map(|predicted| {
         format!(
-            "predicted    tool error {} median, {} worst over the targets, from the recording and the datasheets",
+            "predicted    tool error {} median, {} worst of the targets (one sigma, from the recording and the datasheets)",
             Unit::Metres.shown(predicted.median, 1),
             Unit::Metres.shown(predicted.max, 1)
         )
     }));
     lines.extend(summary.calibration.predicted_tool_error_with_priors_m.map(|predicted| {
         format!(
-            "with priors  tool error {} median, {} worst: what no view shows may be as far off as the drawing's sigmas",
+            "with priors  tool error {} median, {} worst, with unobservable parameters at one sigma of robot.toml",
             Unit::Metres.shown(predicted.median, 1),
             Unit::Metres.shown(predicted.max, 1)
         )
@@ -239,19 +242,19 @@ fn repaired(summary: &RunSummary) -> String {
         0 => String::new(),
         n => format!("; and {n} more"),
     };
-    format!(", repaired: {}; {}{more}", first.cause, first.remedy_and_result())
+    format!(", repaired: {}; {} [{}]{more}", first.cause, first.remedy_and_result(), first.code)
 }
 
 /// The first of what else is wrong and may be the cause of a refusal.
 fn beside(summary: &RunSummary) -> String {
     let first = beside_refusal(summary).into_iter().next();
-    first.map_or_else(String::new, |repair| format!("; besides, {}; {}", repair.cause, repair.remedy))
+    first.map_or_else(String::new, |repair| format!("; also: {}; {} [{}]", repair.cause, repair.remedy, repair.code))
 }
 
 /// How many views there were, what of them was left out, and why the capture ended.
 fn capture_lines(capture: &CaptureSummary) -> Vec<String> {
     let mut lines = vec![format!(
-        "captured     {} poses, {} skipped; {} tag observations in {} fitted views, {} rejected{}; {} targets skipped",
+        "captured     {} poses ({} skipped); {} tag observations in {} fitted views, {} rejected{}; {} targets skipped",
         capture.poses,
         capture.poses_skipped,
         capture.detections,
@@ -306,13 +309,12 @@ fn time_line(summary: &RunSummary) -> Option<String> {
     let waited = if waited_s > 0.0 { format!(", {waited_s:.0} s waiting") } else { String::new() };
     if summary.world.is_none() {
         return Some(format!(
-            "time         {simulated_s:.0} s of the arm's ({motion_s:.0} s of them moving{waited}), {:.1} s in all",
+            "time         {simulated_s:.0} s of arm time ({motion_s:.0} s moving{waited}), {:.1} s in all",
             summary.wall_s
         ));
     }
     Some(format!(
-        "time         {simulated_s:.0} s simulated ({motion_s:.0} s of them moving{waited}) in {:.1} s: {:.0} times \
-         real time",
+        "time         {simulated_s:.0} s simulated ({motion_s:.0} s moving{waited}) in {:.1} s, {:.0} times real time",
         summary.wall_s,
         (simulated_s - waited_s) / summary.wall_s.max(1e-9)
     ))
@@ -337,8 +339,8 @@ const LITTLE: f64 = 0.005;
 
 fn gain_line(largest: &GainChange) -> String {
     let GainChange { joint, change, std } = largest;
-    let how = if change.abs() < LITTLE { "changed little, at most by" } else { "changed by up to" };
-    format!("gains        {how} {:+.2} % ({joint}), known to {:.2} %", 100.0 * change, 100.0 * std)
+    let how = if change.abs() < LITTLE { "almost unchanged, at most" } else { "changed by up to" };
+    format!("gains        {how} {:+.2} % ({joint}), sigma {:.2} %", 100.0 * change, 100.0 * std)
 }
 
 /// Of how much later the joint sensors' stamps are than the camera's, and one sigma.
@@ -348,17 +350,17 @@ fn clock_line([offset_s, std_s]: [f64; 2]) -> String {
     } else {
         "the joints' stamps are later than the camera's"
     };
-    format!("clock        {which} by {:.1} ms, known to {:.1} ms", 1e3 * offset_s.abs(), 1e3 * std_s)
+    format!("clock        {which} by {:.1} ms, sigma {:.1} ms", 1e3 * offset_s.abs(), 1e3 * std_s)
 }
 
 fn mount_line(mount: &CameraMount) -> String {
     match &mount.left_out {
-        Some(why) => format!("camera mount by the drawing: {why}"),
+        Some(why) => format!("camera mount nominal: {why}"),
         None => {
             let by_tag = match (mount.views, mount.rms_px) {
-                (0, _) => "by the tags".to_owned(),
-                (views, Some(rms_px)) => format!("by the tag on the gripper in {views} views ({rms_px:.2} px)"),
-                (views, None) => format!("by the tags and the one on the gripper in {views} views"),
+                (0, _) => "from the tags".to_owned(),
+                (views, Some(rms_px)) => format!("from the gripper tag in {views} views ({rms_px:.2} px rms)"),
+                (views, None) => format!("from the tags and the gripper tag in {views} views"),
             };
             format!("camera mount {by_tag}: {}", known_to(mount.position_std_m, mount.rotation_std_rad))
         }
@@ -367,14 +369,14 @@ fn mount_line(mount: &CameraMount) -> String {
 
 fn further_camera_line(camera: &FurtherCamera) -> String {
     let FurtherCamera { name, position_std_m, rotation_std_rad, views, .. } = camera;
-    format!("camera {name}: {}, its mount {}", counted(*views, "view"), known_to(*position_std_m, *rotation_std_rad))
+    format!("camera {name}: {}, mount {}", counted(*views, "view"), known_to(*position_std_m, *rotation_std_rad))
 }
 
 /// The axis that is known least: the others say nothing for it.
 fn known_to(position_std_m: [f64; 3], rotation_std_rad: [f64; 3]) -> String {
     let worst = |v: [f64; 3]| v.into_iter().fold(0.0, f64::max);
     let (std_mm, std_deg) = (worst(position_std_m) * 1e3, worst(rotation_std_rad).to_degrees());
-    format!("known to {std_mm:.1} mm, {std_deg:.2} deg in its worst axis")
+    format!("sigma {std_mm:.1} mm and {std_deg:.2} deg along its worst axis")
 }
 
 fn failed_line(failed: &FailedJointTable) -> String {
@@ -387,15 +389,14 @@ fn held_line(held: &HeldJointSummary) -> String {
     let HeldJointSummary { joint, kind, angle_rad, bound_rad } = held;
     let (kind, [angle_deg, bound_deg]) = (kind.name(), [angle_rad, bound_rad].map(|rad| rad.to_degrees()));
     format!(
-        "held         {joint} ({kind}): did not follow its set-points, stands at {angle_deg:.1} deg within \
-         {bound_deg:.2} deg"
+        "held         {joint} ({kind}): it did not follow its set-points; it is at {angle_deg:.1} deg, ±{bound_deg:.2} deg"
     )
 }
 
 fn prior_line(prior: &PriorTable) -> String {
     let says = match (prior.agrees, prior.used) {
         (true, _) => "agrees with the views",
-        (false, true) => "CONTRADICTS the views",
+        (false, true) => "CONTRADICTS the views, still used",
         (false, false) => "contradicted the views and was dropped",
     };
     format!(
@@ -407,11 +408,11 @@ fn prior_line(prior: &PriorTable) -> String {
 fn map_lines(map: &MapResult) -> Vec<String> {
     let surveyed = match map.known {
         SurveyCoverage::Partly => "some of it surveyed",
-        SurveyCoverage::BaseTagAlone => "nothing surveyed but the base tag",
+        SurveyCoverage::BaseTagAlone => "only the base tag surveyed",
     };
     let worst_m = map.tag.iter().flat_map(|tag| tag.position_std_m).fold(0.0, f64::max);
     let mut lines = vec![format!(
-        "tag map      {} from {}, {surveyed}: {:.2} px rms, known to {:.1} mm or better",
+        "tag map      {} from {}, {surveyed}: {:.2} px rms, largest sigma {:.1} mm",
         counted(map.tag.len(), "tag"),
         counted(map.views, "view"),
         map.rms_px,
@@ -428,12 +429,13 @@ fn compared_line(summary: &RunSummary) -> Option<String> {
     let (common, all) = (&score.compared_targets, score.before.targets.max(after.targets));
     if common.is_empty() && score.before.reach_error_m.is_some() {
         return Some(
-            "compared     no target was reached both before and after: the errors are of different ones".to_owned(),
+            "compared     no target was reached both before and after: the two errors are of different targets"
+                .to_owned(),
         );
     }
     let numbers = common.iter().map(|target| (target + 1).to_string()).collect::<Vec<_>>().join(", ");
     (!common.is_empty() && common.len() < all)
-        .then(|| format!("compared     errors before and after are over targets {numbers} of {all}"))
+        .then(|| format!("compared     errors before and after: targets {numbers} of {all}"))
 }
 
 /// Every reach of a script that has more than the usual two, or in which targets are touched.
@@ -448,7 +450,7 @@ fn reach_lines(summary: &RunSummary) -> Vec<String> {
         let (tool, miss) = (mm(reach.side.tool_error_m), mm(reach.side.reach_error_m));
         let touches = reach.touches.map(|t| format!("; touched {} of {}", t.touched, t.tried)).unwrap_or_default();
         format!(
-            "reach        step {} ({belief}): tool position error {tool}, miss {miss}, medians{touches}",
+            "reach        step {} ({belief}): tool position error {tool}, distance to target {miss} (medians){touches}",
             reach.step
         )
     };
@@ -460,11 +462,11 @@ fn assert_line(limit: &AssertSummary) -> String {
     let unit = limit.key.unit();
     let digits = if unit == Unit::Count { 0 } else { 2 };
     let value = limit.value.map_or_else(
-        || "there is no such figure (the script did not come to it, or nothing was measured)".to_owned(),
+        || "no such figure (the step did not run, or nothing was measured)".to_owned(),
         |value| unit.shown(value, digits),
     );
     let asked = unit.shown(limit.limit, digits);
-    format!("assert       {verdict}: step {}, {} {asked} against {value}", limit.step, limit.key)
+    format!("assert       {verdict}: step {}, {} {asked}, measured {value}", limit.step, limit.key)
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! A tag map for people: its table on the terminal, and the same as a page with the tags drawn.
 
 use armcal_charts::{Color, Panel, Style};
+use armcal_core::codes::Warning;
 use maud::{Markup, html as markup};
 
 use crate::report::html::{chart, page, panel, series};
@@ -21,7 +22,7 @@ pub struct TagMapPage<'a> {
     /// Which topic of which camera was read.
     pub sources: &'a [String],
     /// What is wrong with data and map, a sentence each.
-    pub warnings: &'a [String],
+    pub warnings: &'a [Warning],
     /// Whether the map can be used as it is.
     pub is_sound: bool,
 }
@@ -110,7 +111,7 @@ pub fn tag_map_html(given: &TagMapPage<'_>) -> String {
                 }
             }
         }
-        h2 { "The fit" }
+        h2 { "Fit" }
         table.notes { @for (name, text) in fit_lines(map, given.sources) { tr { th { (name) } td { (text) } } } }
         p { small {
             "Standard deviations are along the axes of the frame, relative to what holds it; a tag that is held has \
@@ -138,7 +139,7 @@ fn verdict(given: &TagMapPage<'_>) -> Markup {
                 (format!("{:.3} px", map.rms_px)) " rms."
             }
         }
-        @if n_warnings > 0 { ul { @for warning in given.warnings { li { (warning) } } } }
+        @if n_warnings > 0 { ul { @for warning in given.warnings { li { (warning.to_string()) } } } }
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::report::summary::RunSummary;
 use armcal_belief::calib::{FailedJointTable, Finding, FindingKind, PriorTable, Refusal, Status};
+use armcal_core::codes::{Code, Coded};
 use armcal_core::robot::FailedKind;
 
 /// How a verdict reads at a glance.
@@ -43,23 +44,24 @@ pub(super) fn verdict(summary: &RunSummary) -> Verdict {
                 next.push(remedy);
             }
         }
-        next.push("Keep the sensors that were believed in before, and calibrate again.".to_owned());
+        next.push("Keep the previous sensor parameters, and calibrate again.".to_owned());
         return Verdict { grade: Grade::Red, headline: "REFUSED: do not use this calibration", reasons, next };
     }
     let repairs = repairs(summary);
     let mut reasons: Vec<String> = repairs.iter().map(|repair| sentence(&repair.cause)).collect();
     reasons.extend(attention(summary));
-    let load = "Load calibration.toml, or export it (armcal export) for the arm's driver.".to_owned();
+    let load = "Load calibration.toml, or export it for the arm's driver (armcal export).".to_owned();
     if reasons.is_empty() {
         return Verdict { grade: Grade::Green, headline: "ACCEPTED: use it", reasons, next: vec![load] };
     }
     let mut next: Vec<String> = repairs.iter().map(|repair| sentence(&repair.remedy_and_result())).collect();
-    next.extend([load, "Look at each point above before work that depends on it.".to_owned()]);
+    next.extend([load, "Review each point above before you rely on the result.".to_owned()]);
     Verdict { grade: Grade::Amber, headline: "ACCEPTED, with points to look at", reasons, next }
 }
 
 /// What was wrong with the arm or its survey, and is taken as it was found.
 pub(super) struct Repair {
+    pub code: Code,
     pub cause: String,
     /// What to do.
     pub remedy: String,
@@ -129,56 +131,56 @@ fn of_finding(found: &Finding, since: &str) -> Option<Repair> {
         FindingKind::SensorSlip => (
             format!("the sensor of {name} slipped{}{since}", by(found)),
             format!("fasten the sensor of {name}"),
-            "the result is of it as it is now",
+            "the result holds for the sensor after the slip",
         ),
         FindingKind::TagMoved => (
-            format!("tag {name} hangs {} from where the survey has it", size(found)),
+            format!("tag {name} is {} from its surveyed position", size(found)),
             format!("fasten tag {name}, or correct the survey"),
-            "the result has it where it was seen",
+            "the result uses the estimated position",
         ),
         FindingKind::TagsMoved => (
-            format!("tags {name} hang {} (median) from where the survey has them", size(found)),
+            format!("tags {name} are {} (median) from their surveyed positions", size(found)),
             format!("fasten tags {name}, or correct the survey"),
-            "the result has them where they were seen",
+            "the result uses the estimated positions",
         ),
         FindingKind::TagSwapped => (
-            format!("tags {name} hang in one another's places"),
+            format!("tags {name} are exchanged"),
             "correct their ids in the survey".to_owned(),
-            "the result has them where they were seen",
+            "the result uses the estimated positions",
         ),
         FindingKind::TagSize if name == "all" => (
             format!("all tags are {} than the survey says", differs(found, ["larger", "smaller"])),
-            "measure the side of one black square again, and correct the survey".to_owned(),
-            "the result has the size that was seen",
+            "measure the side of one black square, and correct the survey".to_owned(),
+            "the result uses the estimated size",
         ),
         FindingKind::TagSize => (
             format!("tag {name} is {} than the survey says", differs(found, ["larger", "smaller"])),
-            "measure the side of its black square again, and correct the survey".to_owned(),
-            "the result has the size that was seen",
+            "measure the side of its black square, and correct the survey".to_owned(),
+            "the result uses the estimated size",
         ),
         FindingKind::Lens => (
             format!("the focal length is {} than robot.toml says", differs(found, ["longer", "shorter"])),
             "measure the intrinsics again".to_owned(),
-            "the result has the lens that was seen",
+            "the result uses the estimated lens",
         ),
         FindingKind::Base => (
-            format!("the arm's base is not where the survey has it, off{}", by(found)),
-            "check the tag map's frame and where the arm stands; correct the one that is wrong".to_owned(),
+            format!("the arm's base is displaced from the survey{}", by(found)),
+            "check the frame of the tag map and the position of the base; correct the wrong one".to_owned(),
             "",
         ),
         FindingKind::CameraMount => (
-            format!("the {name} is not as drawn, off{}", by(found)),
-            "correct the camera's place in robot.toml, or fasten the camera".to_owned(),
-            "the result has it as it was seen",
+            format!("the {name} differs from the nominal model{}", by(found)),
+            "correct the camera mount in robot.toml, or fasten the camera".to_owned(),
+            "the result uses the estimate",
         ),
         FindingKind::Link => (
-            format!("{name} is not as drawn, off{}", by(found)),
-            format!("correct the drawing of {name}"),
-            "the result has it as it was seen",
+            format!("{name} differs from the URDF{}", by(found)),
+            format!("correct {name} in the URDF"),
+            "the result uses the estimate",
         ),
         _ => return None,
     };
-    Some(Repair { cause, remedy, taken })
+    Some(Repair { code: found.code(), cause, remedy, taken })
 }
 
 /// `25.0 % larger`.
@@ -204,14 +206,15 @@ fn of_joint(failed: &FailedJointTable) -> Repair {
         None if *kind == FailedKind::Locked => format!("{joint} is locked{colon}{evidence}"),
         None => format!("the sensor of {joint} {}{colon}{evidence}", kind.predicate()),
     };
-    Repair { cause, remedy: joint_remedy(failed), taken: "" }
+    let code = if since_pose.is_some() { Code::SensorSlip } else { Code::SensorFailed };
+    Repair { code, cause, remedy: joint_remedy(failed), taken: "" }
 }
 
 /// What to do about a failed joint.
 pub(super) fn joint_remedy(failed: &FailedJointTable) -> String {
     let joint = &failed.joint;
     match (failed.kind, failed.since_pose) {
-        (_, Some(_)) => format!("fasten the sensor of {joint}: the result is of it as it is since then"),
+        (_, Some(_)) => format!("fasten the sensor of {joint}: the result holds since the slip"),
         (FailedKind::Locked, None) => format!("targets that need {joint} are out of reach; free it"),
         (_, None) => format!("check the sensor of {joint}, its shaft and its cable"),
     }
@@ -221,10 +224,10 @@ pub(super) fn joint_remedy(failed: &FailedJointTable) -> String {
 fn attention(summary: &RunSummary) -> Vec<String> {
     let mut points: Vec<String> = Vec::new();
     for limit in summary.asserts.iter().filter(|limit| !limit.holds) {
-        points.push(format!("A limit of the script does not hold: step {}, {}.", limit.step, limit.key));
+        points.push(format!("A limit of the script is not met: step {}, {}.", limit.step, limit.key));
     }
     if summary.online.as_ref().is_some_and(|online| online.is_good_enough == Some(false)) {
-        points.push("What is believed at the end is not good enough for the task.".to_owned());
+        points.push("The final online estimate is not accurate enough for the task.".to_owned());
     }
     points.extend(summary.stopped.iter().map(|why| sentence(&format!("the script stopped early: {why}"))));
     points.extend(summary.calibration.prior.as_ref().filter(|prior| !prior.agrees).map(against_prior));
@@ -235,7 +238,7 @@ fn attention(summary: &RunSummary) -> Vec<String> {
 
 fn against_prior(prior: &PriorTable) -> String {
     let PriorTable { worst_joint: joint, moves, worst_off_rad, used, .. } = prior;
-    let fate = if *used { "it is in the result all the same" } else { "the result rests on the new views alone" };
+    let fate = if *used { "the result still includes it" } else { "the result uses only the new views" };
     let off = moves.unit().shown(worst_off_rad.abs(), 2);
     format!("The earlier calibration contradicts the new views, {joint} the most, by {off}: {fate}.")
 }

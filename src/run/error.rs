@@ -1,5 +1,6 @@
 //! Where a run failed, and of what.
 
+use armcal_core::codes::{Code, Coded};
 use std::path::PathBuf;
 
 use crate::output::OutputError;
@@ -97,5 +98,19 @@ impl Failure {
             _ => Stage::Motion,
         };
         Self { stage, error: Box::new(error.into()), kept: None }
+    }
+}
+
+impl Coded for RunError {
+    fn code(&self) -> Code {
+        match self {
+            Self::Routine(error) => error.code(),
+            Self::Robot(error) => error.code(),
+            Self::Sim(error) => error.code(),
+            Self::Log(error) => error.code(),
+            Self::Session(error) => error.code(),
+            Self::Output(error) => error.code(),
+            Self::Json(_) => Code::Internal,
+        }
     }
 }

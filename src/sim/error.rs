@@ -1,5 +1,6 @@
 //! Errors of building a world and of recording its truth.
 
+use armcal_core::codes::{Code, Coded};
 use std::path::PathBuf;
 
 use armcal_core::robot::{FileIssue, RobotError};
@@ -37,4 +38,19 @@ pub enum SimError {
     Truth(#[source] SinkError),
     #[error("{}: {problem}", path.display())]
     TruthFile { path: PathBuf, problem: String },
+}
+
+impl Coded for SimError {
+    fn code(&self) -> Code {
+        match self {
+            Self::Spec(issue) => issue.code(),
+            Self::Robot(error) => error.code(),
+            Self::NoEffort { .. } => Code::ValueOutOfRange,
+            Self::StowedInside { .. } => Code::ClearanceTooSmall,
+            Self::Joint { .. } | Self::FreeBase => Code::SimulationUnsupported,
+            Self::SpecText(_) | Self::Detector(_) | Self::Jpeg(_) => Code::Internal,
+            Self::Truth(_) => Code::FileUnwritable,
+            Self::TruthFile { .. } => Code::TruthInvalid,
+        }
+    }
 }

@@ -1,5 +1,6 @@
 //! Why no calibration came out at all.
 
+use armcal_core::codes::{Code, Coded};
 use armcal_core::log::StampRegression;
 
 /// Why no calibration came out at all; a poor one comes out refused instead.
@@ -69,4 +70,28 @@ fn no_tags(robot: &str, known: &[u32], seen: &[u32]) -> String {
         "correct the ids in the tag map or in robot.toml"
     };
     format!("no surveyed tag was seen in any view to fit; tags of robot `{robot}`: {known:?}, seen: {seen:?}; {todo}")
+}
+
+impl Coded for CalibError {
+    fn code(&self) -> Code {
+        match self {
+            Self::JointNames { .. } => Code::JointsMismatch,
+            Self::NoReadings { .. } => Code::ReadingsMissing,
+            Self::NoCaptures { .. }
+            | Self::NoFitViews { .. }
+            | Self::TooFewViews { .. }
+            | Self::AllRejected { .. }
+            | Self::NoInterimEstimate { .. } => Code::ViewsMissing,
+            Self::NoTags { .. } => Code::TagsNotSeen,
+            Self::NothingObservable { .. } | Self::NoStops { .. } => Code::NothingObservable,
+            Self::Map { .. } => Code::MapFailed,
+            Self::Identify { .. } => Code::ScaleUnmeasured,
+            Self::OnePose { .. } => Code::ArmNotMoved,
+            Self::Twice { .. } => Code::RecordingDuplicate,
+            Self::Surveys { .. } => Code::SurveysConflict,
+            Self::PriorSag { .. } => Code::PriorUnusable,
+            Self::NotFinite { .. } => Code::MessageInvalid,
+            Self::Disorder { .. } => Code::StampsDisordered,
+        }
+    }
 }

@@ -1,5 +1,6 @@
 //! What a calibration found to be other than robot.toml, survey and drawing say.
 
+use armcal_core::codes::{Code, Coded};
 use armcal_core::kinematics::JointKind;
 use serde::{Deserialize, Serialize};
 
@@ -7,7 +8,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Finding {
-    /// What was found.
+    /// Cause; its code in files.
+    #[serde(rename = "code")]
     pub kind: FindingKind,
     /// Joint, tag id or link.
     pub name: String,
@@ -68,6 +70,36 @@ pub enum FindingKind {
     Outliers,
 }
 
+impl Coded for FindingKind {
+    fn code(&self) -> Code {
+        match self {
+            Self::TagMoved => Code::TagMoved,
+            Self::TagsMoved => Code::TagsMoved,
+            Self::TagSize => Code::TagSize,
+            Self::TagSwapped => Code::TagSwapped,
+            Self::Lens => Code::Lens,
+            Self::Link => Code::Link,
+            Self::Sag => Code::Sag,
+            Self::CameraMount => Code::CameraMount,
+            Self::Base => Code::Base,
+            Self::Tool => Code::Tool,
+            Self::SensorSlip => Code::SensorSlip,
+            Self::SensorReversed => Code::SensorReversed,
+            Self::SensorScale => Code::SensorScale,
+            Self::SensorFailed => Code::SensorFailed,
+            Self::SensorWorn => Code::SensorWorn,
+            Self::OffsetWalks => Code::OffsetWalks,
+            Self::Outliers => Code::Outliers,
+        }
+    }
+}
+
+impl Coded for Finding {
+    fn code(&self) -> Code {
+        self.kind.code()
+    }
+}
+
 impl FindingKind {
     /// In words: `tag moved`.
     #[must_use]
@@ -77,15 +109,15 @@ impl FindingKind {
             Self::TagsMoved => "tags moved together",
             Self::TagSize => "tag of another size",
             Self::TagSwapped => "tags swapped",
-            Self::Lens => "lens not as stated",
-            Self::Link => "link not as drawn",
-            Self::Sag => "bends under its weight",
-            Self::CameraMount => "camera not mounted as drawn",
-            Self::Base => "base not where the survey has it",
-            Self::Tool => "tool point not as drawn",
+            Self::Lens => "lens differs from robot.toml",
+            Self::Link => "link differs from the URDF",
+            Self::Sag => "compliance under weight",
+            Self::CameraMount => "camera mount differs",
+            Self::Base => "base displaced from the survey",
+            Self::Tool => "tool point differs",
             Self::SensorSlip => "sensor slipped",
-            Self::SensorReversed => "sensor reads the other way",
-            Self::SensorScale => "sensor of another scale",
+            Self::SensorReversed => "sensor reversed",
+            Self::SensorScale => "sensor scale differs",
             Self::SensorFailed => "joint or sensor failed",
             Self::SensorWorn => "sensor worn",
             Self::OffsetWalks => "offset walks at random",

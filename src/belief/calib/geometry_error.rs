@@ -53,12 +53,9 @@ impl GeometryError {
     #[must_use]
     pub fn remedy(&self) -> &'static str {
         match (self.element.as_str(), &self.joint) {
-            (BASE, _) => {
-                "check the frame that the tag map is in, and where the arm stands, against the arm's base; then \
-                 correct the map"
-            }
-            (_, None) => "check how the camera is fastened, and its mount in the drawing",
-            _ => "check the drawing against the arm",
+            (BASE, _) => "check the frame of the tag map and the position of the base, then correct the wrong one",
+            (_, None) => "check the fastening of the camera and its mount in robot.toml",
+            _ => "measure the link and correct the URDF",
         }
     }
 }
@@ -67,26 +64,22 @@ impl fmt::Display for GeometryError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { element, joint, error, size, chi2, limit, tool_error_m } = self;
         let what = match (element.as_str(), joint) {
-            (BASE, _) => "the arm on its base, or the tag map's frame,".to_owned(),
+            (BASE, _) => "the base, or the frame of the tag map,".to_owned(),
             (_, None) => "the camera".to_owned(),
             (_, Some(joint)) => joint.clone(),
         };
         let (scale, unit) = error.display_unit();
         let [x, y, z] = size.map(|v| v * scale);
         let norm = (x * x + y * y + z * z).sqrt();
-        write!(f, "joint sensors do not explain the data, {element} does: {what} ")?;
+        write!(f, "{element} explains the data better than joint sensors: {what} ")?;
         match error {
             ErrorKind::Shift => {
-                write!(f, "is {norm:.1} {unit} from its place in the drawing, ({x:.1}, {y:.1}, {z:.1}) {unit}")?
+                write!(f, "is {norm:.1} {unit} from its nominal position, ({x:.1}, {y:.1}, {z:.1}) {unit}")?
             }
             ErrorKind::Turn => {
-                write!(f, "is turned by {norm:.2} {unit} from the drawing, ({x:.2}, {y:.2}, {z:.2}) {unit}")?;
+                write!(f, "is turned by {norm:.2} {unit} from its nominal pose, ({x:.2}, {y:.2}, {z:.2}) {unit}")?;
             }
         }
-        write!(
-            f,
-            " in its own axes (chi-square {chi2:.0}, by chance up to {limit:.0}; {:.1} mm at the tool)",
-            tool_error_m * 1e3
-        )
+        write!(f, " in its axes (chi-square {chi2:.0}, limit {limit:.0}; {:.1} mm at the tool)", tool_error_m * 1e3)
     }
 }

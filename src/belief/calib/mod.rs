@@ -31,7 +31,6 @@ mod views;
 mod wrong_input;
 
 pub use baseline_comparison::{BaselineComparison, SIGNIFICANCE};
-pub use bundle::UNSEEN_LINKS;
 pub use calibrate::{MIN_VIEWS, calibrate, calibrate_data, calibrate_with_survey};
 pub use covariance::{CommonErrors, JointAt, ParameterCovariance, ToolErrorPrediction};
 pub use error::CalibError;
@@ -44,7 +43,7 @@ pub use methods::{
     free_parameters, least_squares, minimum_distance, mount_by_gripper_tag,
 };
 pub use parameters::{JointParameters, Parameter, ParameterKind, WornSpot};
-pub use refusal::{InnovationQuantity, Refusal};
+pub use refusal::{InnovationQuantity, Refusal, in_files as refusals_in_files};
 pub use refusal_conditions::{MIN_HELD_OUT_VIEWS, MIN_VIEWS_PER_PARAMETER, fewest_views};
 pub use reservation::Reservation;
 pub use result::{

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use armcal_core::codes::{Code, Coded};
 use armcal_core::kinematics::JointKind;
 use armcal_core::numeric::Outcome;
 use armcal_core::robot::FailedKind;
@@ -276,40 +277,25 @@ impl Refusal {
         }
     }
 
-    /// A short code, for narrow links.
-    #[must_use]
-    pub fn code(&self) -> &'static str {
-        match self {
-            Self::TooFewViews { .. } => "few_views",
-            Self::NotSolved { .. } => "solver",
-            Self::TooFewHeldOutViews { .. } => "few_held_out",
-            Self::NoHeldOutTag => "no_held_out",
-            Self::NoBetterThanDatasheet { .. } | Self::NoBetterThanBaseline { .. } => "no_better",
-            Self::Overfitted { .. } => "overfitted",
-            Self::BeyondTolerance { .. } | Self::PriorsBeyondTolerance { .. } => "tool_error",
-            _ => "other",
-        }
-    }
-
     /// What to do about it.
     #[must_use]
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::TooFewViews { .. } | Self::PriorUntested => "capture more views",
-            Self::TooFewViewsSinceSlip { .. } => "fasten that sensor on its shaft, then capture more views",
+            Self::TooFewViewsSinceSlip { .. } => "fasten the sensor on its shaft, then capture more views",
             Self::NotSolved { .. } => "capture views that move each joint over more of its range",
             Self::TooFewHeldOutViews { .. } | Self::NoHeldOutTag => "hold out more views that show tags",
             Self::NoBetterThanDatasheet { .. } | Self::NoBetterThanBaseline { .. } => {
-                "keep the datasheet's sensors, or check tag map, camera mount and time stamps"
+                "keep the datasheet values, or check tag map, camera mount and time stamps"
             }
-            Self::Overfitted { .. } => "capture more views, or more different ones",
+            Self::Overfitted { .. } => "capture more views at other configurations",
             Self::PriorsBeyondTolerance { most: Some(most), .. } if most.starts_with("tag survey") => {
-                "measure how the frame of the tags stands to the arm's base and state the sigmas in [geometry] of \
-                 robot.toml, or touch three surveyed surfaces (step `touch`)"
+                "measure the frame of the tags in the arm's base and state its sigmas in [geometry] of robot.toml, or touch \
+                 three surveyed surfaces (step `touch`)"
             }
             Self::PriorsBeyondTolerance { .. } => {
-                "put a tag on the gripper, touch three surveyed surfaces (step `touch`), or measure the arm and state \
-                 its sigmas in [geometry] of robot.toml"
+                "put a tag on the gripper, touch three surveyed surfaces (step `touch`), or measure the arm and state its \
+                 sigmas in [geometry] of robot.toml"
             }
             Self::BeyondTolerance { .. } => "capture more views, or put a tag on the gripper",
             Self::WrongInput(wrong) => wrong.remedy(),
@@ -319,27 +305,59 @@ impl Refusal {
             Self::SensorLine { .. } => "swap its ends, or correct scale_counts_per_deg and its sign in robot.toml",
             Self::Nonlinearity { .. } => "replace the sensor, or state its linearity in robot.toml",
             Self::OffsetsWalk { .. } => {
-                "calibrate right before the work and again during it, keep the belief up online, or replace the sensor"
+                "calibrate right before the work and again during it, follow the estimate online, or replace the sensor"
             }
-            Self::BeyondDatasheet { .. } => "check joint and sensor, and robot.toml against the sensor that is there",
-            Self::Outliers { .. } => "check tag map, tag ids and the drawing",
+            Self::BeyondDatasheet { .. } => "check joint and sensor, and robot.toml against the installed sensor",
+            Self::Outliers { .. } => "check tag map, tag ids and the URDF",
             Self::Innovations { .. } => "look for what moved or warmed up during the capture",
             Self::Touch { .. } => {
-                "measure the tool point ([tool] point_m of robot.toml), the links beyond the camera and its \
-                 mount"
+                "measure the tool point ([tool] point_m of robot.toml), the links beyond the camera and the camera mount"
             }
             Self::PriorReused => "give a prior that was made from other views",
-            Self::PriorSingular => "make the prior anew",
-            Self::PriorContradicted { .. } => "calibrate without the prior (leave --prior out)",
+            Self::PriorSingular => "make the prior again",
+            Self::PriorContradicted { .. } => "calibrate without --prior",
         }
     }
 }
 
-/// Cause, evidence, and what to do next.
+/// Cause, evidence, what to do next, and the code.
 impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.fmt_cause(f)?;
-        write!(f, "; {}", self.remedy())
+        write!(f, "; {} [{}]", self.remedy(), self.code())
+    }
+}
+
+impl Coded for Refusal {
+    fn code(&self) -> Code {
+        match self {
+            Self::TooFewViews { .. } => Code::TooFewViews,
+            Self::NotSolved { .. } => Code::NotSolved,
+            Self::TooFewHeldOutViews { .. } => Code::TooFewHeldOutViews,
+            Self::NoHeldOutTag => Code::NoHeldOutTag,
+            Self::NoBetterThanDatasheet { .. } => Code::NoBetterThanDatasheet,
+            Self::NoBetterThanBaseline { .. } => Code::NoBetterThanBaseline,
+            Self::Overfitted { .. } => Code::Overfitted,
+            Self::BeyondTolerance { .. } => Code::BeyondTolerance,
+            Self::PriorsBeyondTolerance { .. } => Code::PriorsBeyondTolerance,
+            Self::WrongInput(wrong) => wrong.code(),
+            Self::Geometry(_) => Code::GeometryContradicted,
+            Self::SensorError { .. } => Code::SensorError,
+            Self::OffsetsWalk { .. } => Code::OffsetsWalk,
+            Self::Nonlinearity { .. } => Code::Nonlinearity,
+            Self::CornerNoise { .. } => Code::CornerNoise,
+            Self::BeyondDatasheet { .. } => Code::BeyondDatasheet,
+            Self::Outliers { .. } => Code::TooManyOutliers,
+            Self::Innovations { .. } => Code::Innovations,
+            Self::Touch { .. } => Code::TouchContradicted,
+            Self::PriorReused => Code::PriorReused,
+            Self::PriorSingular => Code::PriorSingular,
+            Self::PriorUntested => Code::PriorUntested,
+            Self::PriorContradicted { .. } => Code::PriorContradicted,
+            Self::TooFewViewsSinceSlip { .. } => Code::TooFewViewsSinceSlip,
+            Self::SensorLine { .. } => Code::SensorLine,
+            Self::SensorFailed { .. } => Code::SensorNeeded,
+        }
     }
 }
 
@@ -372,6 +390,7 @@ impl Refusal {
             | Self::TooFewViewsSinceSlip { .. }
             | Self::Touch { .. } => self.fmt_of_arm(f),
             Self::Innovations { .. }
+            | Self::CornerNoise { .. }
             | Self::OffsetsWalk { .. }
             | Self::PriorReused
             | Self::PriorSingular
@@ -386,56 +405,56 @@ impl Refusal {
         let mm = |m: f64| m * 1e3;
         match self {
             Self::TooFewViews { views, parameters } => {
-                write!(f, "{views} views to fit are too few for {parameters} parameters, however many tags each shows")
+                write!(
+                    f,
+                    "{views} views cannot determine {parameters} parameters; at least {parameters} views are needed"
+                )
             }
             Self::NotSolved { outcome, evaluations } => {
                 write!(f, "the solver {} after {evaluations} steps", outcome.name())
             }
             Self::TooFewHeldOutViews { views, needed } => {
-                write!(f, "only {views} held-out views show a tag; {needed} are needed for a verdict")
+                write!(f, "only {views} held-out views show a tag; the verdict needs {needed}")
             }
-            Self::NoHeldOutTag => write!(f, "the held-out views hold no usable tag (0 seen)"),
+            Self::NoHeldOutTag => write!(f, "no held-out view shows a usable tag"),
             Self::NoBetterThanDatasheet { held_out_m, datasheet_m } => write!(
                 f,
-                "held-out views are no better than with the datasheet: {:.1} mm against {:.1} mm",
+                "held-out tag error is no better than with the datasheet: {:.1} mm against {:.1} mm rms",
                 mm(*held_out_m),
                 mm(*datasheet_m)
             ),
             Self::NoBetterThanBaseline { held_out_m, baseline_m, p_value } => write!(
                 f,
-                "held-out views are no better than with the datasheet's sensors once camera mount and tag map are \
-                 fitted: {:.1} mm against {:.1} mm (p = {p_value:.2}, below {SIGNIFICANCE} wanted)",
+                "held-out tag error is no better than with datasheet sensors, fitted mount and fitted map: {:.1} mm against \
+                 {:.1} mm rms (p = {p_value:.2}, required below {SIGNIFICANCE})",
                 mm(*held_out_m),
                 mm(*baseline_m)
             ),
             Self::Overfitted { held_out_m, fit_m } => write!(
                 f,
-                "held-out views are off by {:.1} mm, fitted ones by {:.1} mm: overfitted",
+                "tag error is {:.1} mm rms in held-out views and {:.1} mm in fitted views: overfitted",
                 mm(*held_out_m),
                 mm(*fit_m)
             ),
             Self::BeyondTolerance { predicted_m, tolerance_m } => {
                 let [predicted, tolerance] = told_apart_mm([*predicted_m, *tolerance_m]);
-                write!(f, "the predicted tool error of {predicted} mm exceeds the task's tolerance of {tolerance} mm")
+                write!(
+                    f,
+                    "the predicted tool error is {predicted} mm (95 % of the targets); the task tolerates {tolerance} mm"
+                )
             }
             Self::PriorsBeyondTolerance { predicted_m, tolerance_m, most } => {
                 let [predicted, tolerance] = told_apart_mm([*predicted_m, *tolerance_m]);
                 write!(
                     f,
-                    "predicted tool error with what no view shows is {predicted} mm (95 % of the targets), the task \
+                    "the predicted tool error with unobservable parameters is {predicted} mm (95 % of the targets); the task \
                      tolerates {tolerance} mm"
                 )?;
-                most.as_ref().map_or(Ok(()), |most| write!(f, "; most of it by the {most}"))
+                most.as_ref().map_or(Ok(()), |most| write!(f, "; the largest part: {most}"))
             }
             Self::Outliers { outliers, observations } => write!(
                 f,
-                "{outliers} of {observations} tag observations fit no arm of this drawing: other tags, or links that \
-                 are not as in the drawing"
-            ),
-            Self::CornerNoise { residual_px, stated_px, limit_px } => write!(
-                f,
-                "the model does not explain the corners: averaged over a view they are {residual_px:.2} px off, above \
-                 {limit_px:.2} px; robot.toml has {stated_px:.2} px for one frame"
+                "{outliers} of {observations} tag observations fit no arm of this URDF: the tags or the links differ"
             ),
             _ => Ok(()),
         }
@@ -448,35 +467,31 @@ impl Refusal {
             Self::Geometry(geometry) => write!(f, "{geometry}"),
             Self::SensorError { joint, std_rad, datasheet_std_rad, moves } => write!(
                 f,
-                "joint sensors do not explain the data: {joint} needs a random error of {} from view to view, its \
-                 datasheet has {}: a joint that slips, or links that are not as in the drawing",
+                "{joint} varies by {} between views; its datasheet linearity is {}: a slipping sensor or wrong link geometry",
                 moves.unit().shown(*std_rad, 2),
                 moves.unit().shown(*datasheet_std_rad, 2)
             ),
             Self::BeyondDatasheet { parameter, sigmas } => write!(
                 f,
-                "{parameter} is estimated {sigmas:.0} sigma from its datasheet: the joint or its sensor has failed, \
-                 or it is another sensor"
+                "{parameter} is {sigmas:.0} sigma from its datasheet: joint or sensor failed, or another sensor is installed"
             ),
             Self::Nonlinearity { joint, std_rad, datasheet_std_rad, moves } => write!(
                 f,
-                "{joint} is farther from a straight line than a sensor of its datasheet: {}, {:.1} times the \
-                 datasheet's {}",
+                "the nonlinearity of {joint} is {}, {:.1} times the {} of its datasheet",
                 moves.unit().shown(*std_rad, 2),
                 std_rad / datasheet_std_rad,
                 moves.unit().shown(*datasheet_std_rad, 2)
             ),
             Self::SensorLine { joint, slope } => {
-                let what = if *slope < 0.0 { "reversed" } else { "of another scale than its datasheet's" };
-                write!(f, "the sensor of {joint} is {what}: the camera's angles follow it with a slope of {slope:.2}")
+                let what = if *slope < 0.0 { "is reversed" } else { "has another scale than its datasheet" };
+                write!(f, "the sensor of {joint} {what}: the camera's angles follow it with a slope of {slope:.2}")
             }
             Self::SensorFailed { joint, kind, tool_error_m, tool_error_by_camera_m, tolerance_m } => {
                 let mm = |m: Option<f64>| m.unwrap_or(f64::INFINITY) * 1e3;
                 write!(
                     f,
-                    "the sensor of {joint} {}, and the task needs that joint: without it the tool error is {:.0} \
-                     mm for a tolerance of {:.1} mm; while the camera sees tags and tells the joint's angle it is \
-                     {:.1} mm",
+                    "the sensor of {joint} {}, and the task needs this joint: without it the tool error is {:.0} mm, the \
+                     tolerance {:.1} mm; while the camera sees tags the error is {:.1} mm",
                     kind.predicate(),
                     mm(*tool_error_m),
                     tolerance_m * 1e3,
@@ -484,13 +499,13 @@ impl Refusal {
                 )
             }
             Self::TooFewViewsSinceSlip { joint, evidence, views } => {
-                write!(f, "{joint}: {evidence}; the {views} views since are too few to calibrate it as it is now")
+                write!(f, "{joint}: {evidence}; {views} views since then cannot calibrate it")
             }
             Self::Touch { off_m, surface, chi2, limit, causes, link, tool_point_m: [x, y, z] } => write!(
                 f,
-                "touch: the tool is {:.0} mm from where it should be at {surface} (chi-square {chi2:.0}, limit \
-                 {limit:.0}): {}; a tool point [{:.1}, {:.1}, {:.1}] mm from the drawn one, in the axes of {link}, \
-                 would explain it best",
+                "touch: the tool is {:.0} mm from its predicted position at {surface} (chi-square {chi2:.0}, limit \
+                 {limit:.0}): {}; best explained by a tool point [{:.1}, {:.1}, {:.1}] mm from the nominal one in the \
+                 axes of {link}",
                 off_m.abs() * 1e3,
                 causes.join(", or "),
                 x * 1e3,
@@ -506,29 +521,34 @@ impl Refusal {
         match self {
             Self::Innovations { quantity, per_dof, limit, expected: [low, high] } => write!(
                 f,
-                "{}: chi-square per degree of freedom is {per_dof:.2}, above {limit:.2} (expected in 95 % of cases: \
-                 {low:.2} .. {high:.2}): views that the fit did not use are worse than it predicts",
+                "{} are less precise than predicted: chi-square per degree of freedom {per_dof:.2}, limit {limit:.2} (95 % \
+                 expected in {low:.2} to {high:.2})",
                 quantity.name()
             ),
             Self::OffsetsWalk { joint, walked_rad, moves, predicted_m, tolerance_m } => write!(
                 f,
-                "the offset of {joint} walked at random by {} while the views were captured; when as much time has \
-                 gone by again the tool is {:.1} mm off, the task tolerates {:.1} mm",
+                "the offset of {joint} walked at random by {} during the capture; after as much time again the predicted tool \
+                 error is {:.1} mm, the task tolerates {:.1} mm",
                 moves.unit().shown(*walked_rad, 2),
                 predicted_m * 1e3,
                 tolerance_m * 1e3
             ),
-            Self::PriorReused => write!(f, "the prior rests on these very messages, which must not count twice"),
+            Self::CornerNoise { residual_px, stated_px, limit_px } => write!(
+                f,
+                "corner residuals averaged over a view are {residual_px:.2} px rms, above {limit_px:.2} px; robot.toml states \
+                 {stated_px:.2} px for one frame"
+            ),
+            Self::PriorReused => write!(f, "the prior was made from the same messages, which must not count twice"),
             Self::PriorSingular => write!(f, "the prior's covariance has no inverse"),
             Self::PriorUntested => write!(f, "the views determine too little to be tested against the prior"),
             Self::PriorContradicted { joint, off_rad, joints_off, moves, .. } => {
                 let off = moves.unit().shown(*off_rad, 2);
                 write!(f, "the new views contradict the prior: ")?;
                 if *joints_off > 1 {
-                    write!(f, "{joints_off} joints are off, {joint} the most, by {off}, so that it is of ")?;
-                    write!(f, "another arm, or of one whose sensors were changed since")?;
+                    write!(f, "{joints_off} joints differ, {joint} the most by {off}: another arm, or ")?;
+                    write!(f, "sensors were replaced since")?;
                 } else {
-                    write!(f, "{joint} is off by {off}, so that its sensor slipped or was changed since")?;
+                    write!(f, "{joint} differs by {off}: its sensor slipped or was replaced since")?;
                 }
                 self.fmt_evidence_against_prior(f)
             }
@@ -542,10 +562,10 @@ impl Refusal {
             return Ok(());
         };
         let std = moves.unit().shown(*off_std_rad, 3);
-        write!(f, " (chi-square {chi2:.1} of {degrees_of_freedom}, expected below {limit:.1} in 99.9 % of cases; ")?;
-        write!(f, "{std} allowed, one sigma")?;
+        write!(f, " (chi-square {chi2:.1} of {degrees_of_freedom}, 99.9 % expected below {limit:.1}; ")?;
+        write!(f, "sigma {std}")?;
         if *used_share < MIN_USED_SHARE {
-            write!(f, "; only {:.0} % of the tag observations fit anything near it", 100.0 * used_share)?;
+            write!(f, "; only {:.0} % of the tag observations fit near it", 100.0 * used_share)?;
         }
         write!(f, ")")
     }
@@ -561,7 +581,40 @@ fn told_apart_mm(lengths_m: [f64; 2]) -> [String; 2] {
 #[must_use]
 pub fn in_words(refusals: &[Refusal]) -> Option<String> {
     let words: Vec<String> = refusals.iter().map(ToString::to_string).collect();
-    (!words.is_empty()).then(|| words.join("; besides, "))
+    (!words.is_empty()).then(|| words.join("; also: "))
+}
+
+/// In files each refusal has its code and its sentence beside the evidence.
+pub mod in_files {
+    use super::{Code, Coded, Refusal};
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    #[derive(Serialize)]
+    struct Entry<'a> {
+        code: Code,
+        text: String,
+        #[serde(flatten)]
+        evidence: &'a Refusal,
+    }
+
+    /// Writes code, text and evidence of each refusal.
+    ///
+    /// # Errors
+    /// Those of the serializer.
+    pub fn serialize<S: Serializer>(refusals: &[Refusal], serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(refusals.iter().map(|evidence| {
+            let text = format!("{}; {}", evidence.cause(), evidence.remedy());
+            Entry { code: evidence.code(), text, evidence }
+        }))
+    }
+
+    /// Reads the evidence; code and text follow from it.
+    ///
+    /// # Errors
+    /// Those of the deserializer.
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<Refusal>, D::Error> {
+        Vec::deserialize(deserializer)
+    }
 }
 
 #[cfg(test)]

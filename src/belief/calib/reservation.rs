@@ -45,12 +45,6 @@ impl fmt::Display for Reservation {
             FindingUnit::Newton => (1.0, "N"),
         };
         let list = |factor: f64| all_m.iter().map(|m| format!("{:.1}", factor * m)).collect::<Vec<_>>().join(", ");
-        write!(
-            f,
-            "1 {name} of {what}, unseen: {} mm at the tool; the drawing has {:.2} {name}: {} mm",
-            list(1e3 / (prior_std * scale)),
-            prior_std * scale,
-            list(1e3)
-        )
+        write!(f, "{what}: unobservable; ±{:.2} {name} (robot.toml) moves the tool {} mm", prior_std * scale, list(1e3))
     }
 }

@@ -15,6 +15,7 @@ use nalgebra::{Isometry3, Point3, Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::calib::views::view::{CaptureData, TagMeasurement, TagObservation, View};
+use armcal_core::codes::{Code, Coded};
 use armcal_core::joints::JointAngles;
 use armcal_core::optics::{CameraModel, Fisheye, LensModel, Radtan, TagFamily, solve_square_both};
 use armcal_core::robot::{Robot, SurveyedTag};
@@ -371,6 +372,21 @@ fn spread_rad(poses: &[(usize, Isometry3<f64>)]) -> Option<f64> {
     tags.into_iter().filter_map(of_tag).reduce(f64::max)
 }
 
+impl Coded for WrongInput {
+    fn code(&self) -> Code {
+        match &self.input {
+            WrongInputKind::MapQuaternions => Code::InputOrder,
+            WrongInputKind::RecordedQuaternions => Code::InputRotation,
+            WrongInputKind::RecordedDirection => Code::InputDirection,
+            WrongInputKind::ImageSize { .. } | WrongInputKind::ImageScale(_) => Code::InputImageSize,
+            WrongInputKind::LensModel => Code::InputLensModel,
+            WrongInputKind::TagSize(_) => Code::InputTagSize,
+            WrongInputKind::ExchangedIds(_) => Code::InputTagIds,
+            WrongInputKind::OtherMap => Code::InputTagMap,
+        }
+    }
+}
+
 impl WrongInput {
     /// What to do about it.
     #[must_use]
@@ -394,8 +410,8 @@ impl WrongInput {
             }
             WrongInputKind::ExchangedIds(_) => "give each of them the id that is printed there",
             WrongInputKind::OtherMap => {
-                "give the tag map of this site with --tag-map, check the tags' ids, or make the map anew with `armcal \
-                 tagmap`; if the map is right, check the lens in [camera] of robot.toml"
+                "give the tag map of this site with --tag-map, check the tag ids, or make a map with `armcal tagmap`; if the \
+                 map is right, check the lens in [camera] of robot.toml"
             }
         }
     }
@@ -411,43 +427,51 @@ impl fmt::Display for WrongInput {
         let of_turns = format!("{} instead of {}", degrees(otherwise), degrees(self.mismatch));
         match &self.input {
             WrongInputKind::MapQuaternions => {
-                write!(f, "the tag map's quaternions are in the order x, y, z, w: so read, the tags of a view fit ")?;
-                write!(f, "one another within {of_pairs}")
+                write!(
+                    f,
+                    "the quaternions of the tag map are in the order x, y, z, w: read so, the tags of a view fit "
+                )?;
+                write!(f, "each other within {of_pairs}")
             }
             WrongInputKind::RecordedQuaternions => {
-                write!(f, "the recorded quaternions are in the other order: so read, the landmark's turns over ")?;
+                write!(
+                    f,
+                    "the recorded quaternions are in the other order: read so, the rotations of the landmark over "
+                )?;
                 write!(f, "the views agree within {of_turns}")
             }
             WrongInputKind::RecordedDirection => {
-                write!(f, "the recorded poses are of the other direction: turned round, the landmark's turns over ")?;
+                write!(f, "the recorded poses are inverse: inverted, the rotations of the landmark over ")?;
                 write!(f, "the views agree within {of_turns}")
             }
             WrongInputKind::ImageSize { stated_px: [columns, rows], seen_px: [x, y] } => write!(
                 f,
-                "the lens of robot.toml is that of an image of {columns} x {rows} px, and corners were seen up to \
-                 ({x:.0}, {y:.0}) px"
+                "the lens of robot.toml belongs to an image of {columns} x {rows} px, but corners reach ({x:.0}, {y:.0}) px"
             ),
             WrongInputKind::ImageScale(scale) => {
-                write!(f, "the lens of robot.toml is that of an image {scale} times the size of the recorded one: ")?;
-                write!(f, "with that taken into account, the tags of a view fit one another within {of_pairs}")
+                write!(f, "the lens of robot.toml belongs to an image {scale} times the size of the recorded image: ")?;
+                write!(f, "scaled, the tags of a view fit each other within {of_pairs}")
             }
             WrongInputKind::LensModel => {
-                write!(f, "the lens is not of the model that robot.toml names, but a fisheye (equidistant) or ")?;
-                write!(f, "pinhole in its place: so taken, the tags of a view fit one another within {of_pairs}")
+                write!(
+                    f,
+                    "the lens has another model than robot.toml says (fisheye or pinhole): with the other model "
+                )?;
+                write!(f, "the tags of a view fit each other within {of_pairs}")
             }
             WrongInputKind::TagSize(ratio) => {
-                write!(f, "all tags are {:+.1} % of their stated size", 100.0 * (ratio - 1.0))?;
+                write!(f, "the size of all tags differs by {:+.1} % from the stated size", 100.0 * (ratio - 1.0))?;
                 self.size_hint.as_ref().map_or(Ok(()), |hint| write!(f, ", {hint}"))
             }
             WrongInputKind::ExchangedIds(ids) => {
                 let ids: Vec<String> = ids.iter().map(ToString::to_string).collect();
-                write!(f, "the tag map has the ids {} in one another's places: so exchanged, ", ids.join(", "))?;
-                write!(f, "the tags of a view fit one another within {of_pairs}")
+                write!(f, "the tag map has the ids {} exchanged: corrected, ", ids.join(", "))?;
+                write!(f, "the tags of a view fit each other within {of_pairs}")
             }
             WrongInputKind::OtherMap => write!(
                 f,
-                "the tags do not stand to one another as the tag map says: in one and the same view they are off by \
-                 {} of their distances, whatever the arm does",
+                "the tags are not placed as the tag map says: within one view they differ by {} of their distances, \
+                 regardless of the arm",
                 percent(self.mismatch)
             ),
         }

@@ -3,6 +3,7 @@
 //! What a session does with the arm in hand, done on paper: the arm is taken to stand at its stowed pose, and to be as
 //! wrong as the datasheet, or an earlier calibration, allows.
 
+use armcal_core::codes::{Code, Coded, Warning};
 use rand_chacha::ChaCha8Rng;
 
 use crate::calib::{Calibration, CalibrationFileError};
@@ -75,7 +76,7 @@ pub struct CapturePlan {
     /// Poses chosen that no path leads to.
     pub left_out: Vec<UnreachablePose>,
     /// Targets of the task that no pose reaches under this belief.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
     /// Why there are no more views.
     pub stop: StopReason,
     /// By the arm's clock, from the start to the end of the last view; 0 without views.
@@ -268,7 +269,7 @@ impl Planner<'_> {
     }
 
     /// Believed angles at the targets that can be reached, and what is wrong with the others.
-    fn targets(&self, rng: &mut ChaCha8Rng) -> Result<(Vec<JointAngles>, Vec<String>), ItineraryError> {
+    fn targets(&self, rng: &mut ChaCha8Rng) -> Result<(Vec<JointAngles>, Vec<Warning>), ItineraryError> {
         let targets_m = &self.request.routine.task.targets_m;
         let asked = TargetRequest { targets_m, preferred: None, margin_m: self.margin_m() };
         let planned = plan_targets(self.request.robot, self.request.clearance_at_targets, self.bounds(), &asked, rng);
@@ -282,7 +283,7 @@ impl Planner<'_> {
         if reached.is_empty() && !errors.is_empty() {
             return Err(ItineraryError::NoTarget { n: errors.len(), first: errors.swap_remove(0) });
         }
-        Ok((reached, errors.iter().map(PlanError::to_string).collect()))
+        Ok((reached, errors.iter().map(|error| Warning::new(Code::TargetSkipped, error.to_string())).collect()))
     }
 
     fn poses(&self, targets: &[JointAngles], rng: &mut ChaCha8Rng) -> Result<Vec<PlannedPose>, PlanError> {
@@ -365,6 +366,17 @@ impl Planner<'_> {
             error_bound_rad: JointAngles::from_fn(angles.len(), |j| self.request.belief.bounds.error_rad(j, angles[j])),
             arm_time_s: since_s + duration_s + SETTLE_S,
             pose,
+        }
+    }
+}
+
+impl Coded for ItineraryError {
+    fn code(&self) -> Code {
+        match self {
+            Self::Plan(error) => error.code(),
+            Self::NoTarget { .. } => Code::TargetOutOfReach,
+            Self::Move { .. } => Code::StepImpossible,
+            Self::NoPath { .. } => Code::PathNotFound,
         }
     }
 }

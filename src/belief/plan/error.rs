@@ -1,5 +1,6 @@
 //! Why there is no plan.
 
+use armcal_core::codes::{Code, Coded};
 use armcal_core::kinematics::IkError;
 
 use crate::plan::path::PathError;
@@ -51,5 +52,16 @@ impl PlanError {
             *target = number;
         }
         self
+    }
+}
+
+impl Coded for PlanError {
+    fn code(&self) -> Code {
+        match self {
+            Self::TargetOutOfReach { .. } => Code::TargetOutOfReach,
+            Self::TargetTooClose { .. } | Self::StartTooClose { .. } => Code::ClearanceTooSmall,
+            Self::NoUsefulPose { .. } | Self::TooFewTags { .. } | Self::TooFewPoses { .. } => Code::PosesMissing,
+            Self::Path(error) => error.code(),
+        }
     }
 }

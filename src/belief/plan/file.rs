@@ -1,5 +1,7 @@
 //! plan.toml: a plan as operators, checks and pictures read it.
 
+use armcal_core::codes::Code;
+use armcal_core::codes::Warning;
 use std::path::Path as FilePath;
 
 use serde::{Deserialize, Serialize};
@@ -40,7 +42,7 @@ pub struct PlanFile {
     /// Readings there under the belief.
     pub start_counts: Vec<f64>,
     /// What of the task cannot be reached under this belief.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
     /// Sums over the plan.
     pub totals: PlanTotals,
     /// In the order of visits.
@@ -235,7 +237,7 @@ impl PlanFile {
         let numbers = |key: String, list: &[f64]| {
             if list.len() != self.joints.len() {
                 let problem = format!("has {} numbers, there are {} joints", list.len(), self.joints.len());
-                return Err(FileIssue::new(file, key, problem));
+                return Err(FileIssue::new(Code::ValueCount, file, key, problem));
             }
             list.iter().try_for_each(|&value| range(&key, value, -1e9..=1e9))
         };
@@ -247,7 +249,7 @@ impl PlanFile {
                 self.path.len(),
                 self.pose.len()
             );
-            return Err(FileIssue::new(file, "path", problem));
+            return Err(FileIssue::new(Code::ValueCount, file, "path", problem));
         }
         for (n, pose) in self.pose.iter().enumerate() {
             let key = |name: &str| format!("pose {}: {name}", n + 1);

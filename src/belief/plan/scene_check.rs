@@ -1,5 +1,6 @@
 //! What can be seen to be wrong with arm, vehicle, scene and task before anything moves.
 
+use armcal_core::codes::{Code, Warning};
 use std::collections::BTreeMap;
 
 use rand::RngExt;
@@ -41,7 +42,7 @@ pub struct SceneIssues {
     /// A run would be refused, or the files contradict each other.
     pub errors: Vec<String>,
     /// What a run goes on without.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 impl SceneCheck<'_> {
@@ -105,7 +106,8 @@ impl SceneCheck<'_> {
                 Some((name, n)) => format!("`{name}` hides it in {n} poses that have it in view"),
                 None => "it comes into view of the camera from none".to_owned(),
             };
-            issues.warnings.push(format!("tag {} is seen from no pose that was tried: {why}", tag.id));
+            let text = format!("tag {} is seen from no pose that was tried: {why}", tag.id);
+            issues.warnings.push(Warning::new(Code::TagHidden, text));
         }
         let n_seen = seen.iter().filter(|seen| **seen).count();
         let min_tags = self.routine.capture.min_tags as usize;
@@ -191,7 +193,9 @@ mod tests {
         let covered = site("titan4-quickstart.toml");
         let [x, y, z] = covered.tag_in_vehicle_m(6);
         let covered = covered.with_box("plate", [x, y - 0.08, z], [0.5, 0.02, 0.5]);
-        one(&covered.issues().warnings, &["tag 6", "plate"]);
+        let hidden = covered.issues().warnings;
+        assert!(hidden.iter().all(|warning| warning.code == Code::TagHidden), "{hidden:?}");
+        one(&hidden.iter().map(ToString::to_string).collect::<Vec<_>>(), &["tag 6", "plate"]);
 
         let mut far = site("titan4-quickstart.toml");
         far.routine.task.targets_m[3] = [5.0, 0.0, 0.0];

@@ -2,6 +2,7 @@
 
 use crate::calib::CalibError;
 use crate::plan::PlanError;
+use armcal_core::codes::{Code, Coded};
 use armcal_core::log::LogError;
 use armcal_core::streams::ArmError;
 
@@ -37,4 +38,21 @@ pub enum SessionError {
     /// Stopped by the caller; the arm holds its last set-point.
     #[error("stopped on request at {at_s:.1} s of the arm's time")]
     Interrupted { at_s: f64 },
+}
+
+impl Coded for SessionError {
+    fn code(&self) -> Code {
+        match self {
+            Self::Plan(error) => error.code(),
+            Self::Arm(error) => error.code(),
+            Self::Log(error) => error.code(),
+            Self::Calib(error) => error.code(),
+            Self::NoReadings => Code::ReadingsMissing,
+            Self::TooFewViews { .. } => Code::CaptureFailed,
+            Self::NothingSeen { .. } => Code::TagsNotSeen,
+            Self::UnknownJoint { .. } => Code::NameUnknown,
+            Self::Step { .. } => Code::StepImpossible,
+            Self::Interrupted { .. } => Code::Interrupted,
+        }
+    }
 }

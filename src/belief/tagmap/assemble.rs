@@ -1,5 +1,6 @@
 //! From the solved problem to the map.
 
+use armcal_core::codes::{Code, Warning};
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Isometry3, Matrix6};
@@ -35,7 +36,8 @@ pub(super) fn assemble(
     let inverse = factor.as_ref().map(Factor::selected_inverse);
     let mut warnings = Vec::new();
     if factor.is_none() {
-        warnings.push("the views do not determine every tag: no covariances".to_owned());
+        let text = "the views do not determine every tag: no covariances";
+        warnings.push(Warning::new(Code::MapUndetermined, text));
     }
     warnings.extend(doubts(problem));
     let pixels = Pixels::of(problem);
@@ -74,7 +76,7 @@ pub(super) fn assemble(
 }
 
 /// Tags whose known place disagrees with the views, and tags most of whose detections were rejected.
-fn doubts(problem: &MapProblem<'_>) -> Vec<String> {
+fn doubts(problem: &MapProblem<'_>) -> Vec<Warning> {
     let mut out = Vec::new();
     let mut counts = vec![(0_usize, 0_usize); problem.tags.len()];
     for seen in &problem.observations {
@@ -89,17 +91,19 @@ fn doubts(problem: &MapProblem<'_>) -> Vec<String> {
             let off = log(&tag.pose.inv_mul(&(owner * prior.pose)));
             if off.component_mul(&prior.information).dot(&off) > FAR_FROM_KNOWN {
                 let (mm, deg) = (off.fixed_rows::<3>(0).norm() * 1e3, off.fixed_rows::<3>(3).norm().to_degrees());
-                out.push(format!(
+                let text = format!(
                     "tag {id}: its known place disagrees with the views by {mm:.1} mm and {deg:.2} deg, beyond its \
                      standard deviations"
-                ));
+                );
+                out.push(Warning::new(Code::MapTagDisagrees, text));
             }
         }
         if 2 * used < n {
-            out.push(format!(
+            let text = format!(
                 "tag {id}: {} of {n} detections disagree with the map; is it where and what it was said to be?",
                 n - used
-            ));
+            );
+            out.push(Warning::new(Code::MapTagDisagrees, text));
         }
     }
     out

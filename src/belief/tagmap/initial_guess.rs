@@ -4,6 +4,7 @@
 //! vote of their images carries; a pair whose images contradict each other is passed over. `grow` then lays the groups
 //! out anew.
 
+use armcal_core::codes::{Code, Warning};
 use nalgebra::Isometry3;
 
 use crate::tagmap::incremental_layout::grow;
@@ -16,7 +17,7 @@ use armcal_core::optics::CameraModel;
 pub(super) struct Layout {
     pub(super) label: Vec<usize>,
     pub(super) pose: Vec<Isometry3<f64>>,
-    pub(super) warnings: Vec<String>,
+    pub(super) warnings: Vec<Warning>,
 }
 
 pub(super) fn lay_out(
@@ -50,9 +51,9 @@ pub(super) fn lay_out(
         // One wrong id would tie two whole groups together; a tag by itself harms nobody.
         if forest.size(a) > 1 && forest.size(b) > 1 {
             let (first, second, n) = (tags[a].id, tags[b].id, pair.n_views());
-            warnings.push(format!(
-                "the groups of tags {first} and {second} were seen together in {n} view only: not joined"
-            ));
+            let text =
+                format!("the groups of tags {first} and {second} were seen together in {n} view only: not joined");
+            warnings.push(Warning::new(Code::MapGroupsApart, text));
         } else if let Some(relative) = consensus(observations, pair) {
             forest.join(a, b, &relative);
         }

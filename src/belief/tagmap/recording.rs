@@ -1,5 +1,6 @@
 //! Views from recordings, ours and others'.
 
+use armcal_core::codes::{Code, Coded};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -186,4 +187,13 @@ fn attitude_at(attitudes: &[(Stamp, UnitQuaternion<f64>)], stamp: Stamp) -> Opti
     };
     let span_s = later.since_s(*earlier);
     (span_s <= MAX_GAP_S).then(|| turn.slerp(later_turn, stamp.since_s(*earlier) / span_s.max(1e-9)))
+}
+
+impl Coded for ViewsError {
+    fn code(&self) -> Code {
+        match self {
+            Self::Log(error) => error.code(),
+            Self::NoTopic { .. } => Code::TopicMissing,
+        }
+    }
 }

@@ -1,5 +1,6 @@
 //! The map, and how good it is.
 
+use armcal_core::codes::Warning;
 use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, Isometry3, Matrix3, Matrix6};
@@ -123,7 +124,7 @@ pub struct TagMap {
     /// Tags whose size disagrees with the known distances between tags.
     pub scale_warnings: Vec<ScaleWarning>,
     /// Sentences for people; empty where nothing is doubtful.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
     /// Whether the last fit found a minimum.
     pub has_converged: bool,
     /// Steps of all fits.

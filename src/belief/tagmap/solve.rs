@@ -13,6 +13,7 @@ use crate::tagmap::scale;
 use crate::tagmap::screen::{Screened, screen};
 use crate::tagmap::types::{MapInput, MapSettings, NoiseScale, TagMapError};
 use crate::tagmap::{adjust, linearize};
+use armcal_core::codes::{Code, Warning};
 use armcal_core::numeric::Loss;
 
 /// Rounds of choosing detections and fitting again.
@@ -87,10 +88,10 @@ pub fn solve(input: &MapInput<'_>, settings: &MapSettings) -> Result<TagMap, Tag
 }
 
 /// Why no more steps were made, where that was so.
-fn contradiction(problem: &MapProblem<'_>) -> Option<String> {
+fn contradiction(problem: &MapProblem<'_>) -> Option<Warning> {
     let n = adjust::MAX_STEPS;
     let what = format!("the views contradict each other: after {n} steps the map still moved, and no more are made");
-    (problem.steps_left == 0).then_some(what)
+    (problem.steps_left == 0).then(|| Warning::new(Code::MapNotConverged, what))
 }
 
 fn nothing_left(screened: &Screened) -> TagMapError {

@@ -1,5 +1,6 @@
 //! What a tag map is made from.
 
+use armcal_core::codes::{Code, Coded};
 use nalgebra::{Isometry3, Matrix2, UnitQuaternion};
 
 use armcal_core::optics::CameraModel;
@@ -202,4 +203,16 @@ pub enum TagMapError {
     Setting { what: &'static str, value: f64 },
     #[error("every one of {rejected} detections was rejected: {reasons}")]
     NothingLeft { rejected: usize, reasons: String },
+}
+
+impl Coded for TagMapError {
+    fn code(&self) -> Code {
+        match self {
+            Self::NoDetections | Self::NoBaseTag { .. } | Self::NoKnownTag { .. } => Code::TagsNotSeen,
+            Self::TagSize { .. } | Self::Setting { .. } => Code::ValueOutOfRange,
+            Self::TagTwice { .. } => Code::ValueDuplicate,
+            Self::NoSuchBody { .. } | Self::NoSuchCamera { .. } => Code::NameUnknown,
+            Self::NothingLeft { .. } => Code::MapFailed,
+        }
+    }
 }

@@ -1,5 +1,6 @@
 //! A real arm over ROS 2, or over a rosbridge.
 
+use armcal_core::codes::Code;
 use std::path::Path;
 
 use anyhow::Result;
@@ -41,7 +42,8 @@ fn describe(survey: &Survey, robot: &Robot) -> String {
         None => text.push_str("\nno known tag is in view: the angles are not checked"),
     }
     if let Some((n, why)) = &survey.unusable {
-        text.push_str(&format!("\nwarning: {n} messages were of no use, the last: {why}"));
+        let code = Code::MessagesRejected;
+        text.push_str(&format!("\nwarning: {n} messages were of no use, the last: {why} [{code}]"));
     }
     text
 }

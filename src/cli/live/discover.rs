@@ -19,7 +19,7 @@ pub(in crate::cli) struct LiveCommandArgs {
 
 #[derive(Debug, Subcommand)]
 enum LiveCommand {
-    /// Listen to a ROS 2 domain, and propose a connection map: which topic is what, and what is left to fill in
+    /// Listen to a ROS 2 domain and propose a connection map with the topics of the arm
     Discover(DiscoverArgs),
 }
 
@@ -28,16 +28,16 @@ struct DiscoverArgs {
     /// ROS_DOMAIN_ID
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u16).range(0..=232))]
     domain: u16,
-    /// Address of an interface of this machine to listen on; may be given many times; all of them if not given
+    /// Address of a local interface to listen on; repeatable; default: all
     #[arg(long = "network", value_name = "ADDRESS")]
     networks: Vec<Ipv4Addr>,
-    /// Robot folder: the driver's joints are matched to those of its robot.toml
+    /// Robot folder whose joints are matched to the driver's
     #[arg(long)]
     robot: Option<PathBuf>,
-    /// How long to listen
+    /// Listening time, s
     #[arg(long = "for", value_name = "SECONDS", default_value_t = 5.0, value_parser = seconds)]
     seconds: f64,
-    /// Write the map here; to stdout if not given. Nothing is overwritten
+    /// Write the map here; default: stdout. Nothing is overwritten
     #[arg(long, value_name = "ARM.toml")]
     out: Option<PathBuf>,
 }

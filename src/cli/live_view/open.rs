@@ -1,5 +1,6 @@
 //! A view that was begun, and how it ended.
 
+use armcal_core::codes::Code;
 use std::time::Duration;
 
 use anyhow::Result;
@@ -19,7 +20,8 @@ pub struct OpenView {
 impl OpenView {
     pub fn open(address: &str, of: &ViewOf<'_>) -> Result<Self> {
         let drawings = LiveDrawings { robot: of.robot.clone(), vehicle: of.vehicle.cloned(), scene: of.scene.cloned() };
-        let view = LiveView::open(drawings, address).map_err(|error| UsageError(format!("--live: {error}")))?;
+        let view = LiveView::open(drawings, address)
+            .map_err(|error| UsageError::new(Code::UsageInvalid, format!("--live: {error}")))?;
         Ok(Self { view, address: address.to_owned() })
     }
 

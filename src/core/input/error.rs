@@ -1,6 +1,7 @@
 //! Why a recording of a real arm cannot be used.
 
 use super::map::{JointUnit, SlideUnit};
+use crate::codes::{Code, Coded};
 use crate::log::{CdrError, LogError, StampRegression};
 
 /// A message or a row of a table.
@@ -85,4 +86,23 @@ pub enum InputError {
     CameraInfo { file: String, topic: String, problem: String },
     #[error("{file}: topic {topic} holds {held}; `tags.use` of the input map must be {allowed}")]
     Use { file: String, topic: String, held: &'static str, allowed: &'static str },
+}
+
+impl Coded for InputError {
+    fn code(&self) -> Code {
+        match self {
+            Self::Log(error) => error.code(),
+            Self::NoTopic { .. } => Code::TopicMissing,
+            Self::Type { .. } | Self::Encoding { .. } | Self::Use { .. } => Code::MessageType,
+            Self::Undecodable { .. } | Self::NameCount { .. } | Self::NotFinite { .. } => Code::MessageInvalid,
+            Self::Disorder { .. } => Code::StampsDisordered,
+            Self::JointNames { .. } => Code::JointsMismatch,
+            Self::Unit { .. } | Self::SlideUnit { .. } => Code::InputUnit,
+            Self::TooLong { .. } => Code::RecordingTooLong,
+            Self::NoTags { .. } => Code::TagsNotSeen,
+            Self::Unreadable { .. } => Code::FileUnreadable,
+            Self::Table { .. } | Self::Row { .. } => Code::TableInvalid,
+            Self::CameraInfo { .. } => Code::CameraInfoInvalid,
+        }
+    }
 }

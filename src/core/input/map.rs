@@ -32,6 +32,7 @@
 //!
 //! Tables have columns instead of topics: [`TableLayout`].
 
+use crate::codes::Code;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -195,7 +196,7 @@ impl Topics {
         match self.further.iter().find(|further| others.contains(&&further.topic)) {
             Some(FurtherTopic { topic, .. }) => {
                 let problem = format!("is `{topic}`, which is named for something else, too");
-                Err(FileIssue::new(file, "further_tags.topic", problem))
+                Err(FileIssue::new(Code::ValueDuplicate, file, "further_tags.topic", problem))
             }
             None => Ok(()),
         }
@@ -256,14 +257,14 @@ impl InputMap {
         let joints = robot.joint_names();
         if let Some(name) = self.joint_names.keys().find(|name| !joints.contains(name)) {
             let problem = format!("`{name}` is no joint of the robot; it has {joints:?}");
-            return Err(FileIssue::new(file, "joint_sensors.names", problem));
+            return Err(FileIssue::new(Code::NameUnknown, file, "joint_sensors.names", problem));
         }
         let cameras: Vec<&String> = robot.further_cameras.iter().map(|camera| &camera.name).collect();
         match self.further().iter().find(|further| !cameras.contains(&&further.camera)) {
             None => Ok(()),
             Some(FurtherTopic { camera, .. }) => {
                 let problem = format!("`{camera}` is no [[further_camera]] of robot.toml; it has {cameras:?}");
-                Err(FileIssue::new(file, "further_tags.camera", problem))
+                Err(FileIssue::new(Code::NameUnknown, file, "further_tags.camera", problem))
             }
         }
     }
@@ -370,14 +371,16 @@ pub fn parse_input_map(file: &Path, text: &str) -> Result<InputMap, RobotError> 
     let raw: MapToml = parse_toml(file, text)?;
     FileIssue::check_range(file, "version", f64::from(raw.version), 1.0..=1.0)?;
     let child_frame = raw.tags.child_frame.as_deref().map(|frame| child_frame(file, frame)).transpose()?;
-    let family = |text: &String| text.parse().map_err(|problem: String| FileIssue::new(file, "tags.family", problem));
+    let family = |text: &String| {
+        text.parse().map_err(|problem: String| FileIssue::new(Code::NameUnknown, file, "tags.family", problem))
+    };
     let tag_family = raw.tags.family.as_ref().map(family);
     if raw.table.is_some() {
         check_no_topics(file, &raw)?;
     }
     if raw.tags.tag_use == TagUse::BoardCorners && !matches!(child_frame, Some(ChildFrame::Plain(_))) {
         let problem = "must be the plain name of the board in the tag map; its corners have numbers of their own";
-        return Err(FileIssue::new(file, "tags.child_frame", problem).into());
+        return Err(FileIssue::new(Code::ValueInvalid, file, "tags.child_frame", problem).into());
     }
     let source = match raw.table {
         Some(table) => {
@@ -408,7 +411,7 @@ pub fn parse_input_map(file: &Path, text: &str) -> Result<InputMap, RobotError> 
 fn slide_unit(file: &Path, unit: JointUnit, slide_unit: Option<SlideUnit>) -> Result<SlideUnit, FileIssue> {
     if slide_unit.is_some() && unit == JointUnit::Counts {
         let problem = "is for numbers that are no raw readings: set unit = \"rad\" or \"deg\", too";
-        return Err(FileIssue::new(file, "joint_sensors.slide_unit", problem));
+        return Err(FileIssue::new(Code::KeysConflict, file, "joint_sensors.slide_unit", problem));
     }
     Ok(slide_unit.unwrap_or_default())
 }
@@ -426,7 +429,12 @@ fn check_no_topics(file: &Path, raw: &MapToml) -> Result<(), FileIssue> {
     ];
     let given = given.into_iter().find(|(_, value)| value.is_some()).map(|(key, _)| key);
     match given.or((!raw.further_tags.is_empty()).then_some("further_tags")) {
-        Some(key) => Err(FileIssue::new(file, key, "is for recordings; a [table] has columns. Leave one out")),
+        Some(key) => Err(FileIssue::new(
+            Code::KeysConflict,
+            file,
+            key,
+            "is for recordings; a [table] has columns. Leave one out",
+        )),
         None => Ok(()),
     }
 }
@@ -436,7 +444,9 @@ fn further(file: &Path, first: &TagsToml, raw: Vec<FurtherTagsToml>) -> Result<V
     let mut seen = vec![(first.topic.clone().unwrap_or_default(), first.camera_frame.clone())];
     let mut found: Vec<FurtherTopic> = Vec::with_capacity(raw.len());
     for FurtherTagsToml { camera, topic, camera_frame } in raw {
-        let issue = |key: &str, problem: &str| Err(FileIssue::new(file, format!("further_tags.{key}"), problem));
+        let issue = |key: &str, problem: &str| {
+            Err(FileIssue::new(Code::ValueDuplicate, file, format!("further_tags.{key}"), problem))
+        };
         if found.iter().any(|other| other.camera == camera) {
             return issue("camera", &format!("names `{camera}` twice"));
         }
@@ -463,7 +473,7 @@ fn further(file: &Path, first: &TagsToml, raw: Vec<FurtherTagsToml>) -> Result<V
 }
 
 fn topics(file: &Path, joints: &JointsToml, tags: &TagsToml, conditions: ConditionTopics) -> Result<Topics, FileIssue> {
-    let issue = |key: &str, problem: &str| Err(FileIssue::new(file, key, problem));
+    let issue = |key: &str, problem: &str| Err(FileIssue::new(Code::ValueInvalid, file, key, problem));
     let topic = |key: &str, topic: &Option<String>| match topic.as_deref() {
         Some("") => issue(key, "is empty; name a topic").map(|()| String::new()),
         Some(topic) => Ok(topic.to_owned()),
@@ -504,7 +514,8 @@ fn topics(file: &Path, joints: &JointsToml, tags: &TagsToml, conditions: Conditi
 }
 
 fn base_from_attitude(file: &Path, conditions: &ConditionTopics) -> Result<UnitQuaternion<f64>, FileIssue> {
-    let issue = |problem: &str| Err(FileIssue::new(file, "conditions.attitude_in_base_wxyz", problem));
+    let issue =
+        |problem: &str| Err(FileIssue::new(Code::KeyMissing, file, "conditions.attitude_in_base_wxyz", problem));
     let Some([w, x, y, z]) = conditions.attitude_in_base_wxyz else { return Ok(UnitQuaternion::identity()) };
     let quaternion = Quaternion::new(w, x, y, z);
     let is_unit = (quaternion.norm() - 1.0).abs() <= QUATERNION_LENGTH_TOLERANCE;
@@ -516,7 +527,8 @@ fn base_from_attitude(file: &Path, conditions: &ConditionTopics) -> Result<UnitQ
 }
 
 fn child_frame(file: &Path, frame: &str) -> Result<ChildFrame, FileIssue> {
-    let issue = |problem: &str| FileIssue::new(file, "tags.child_frame", format!("`{frame}` {problem}"));
+    let issue =
+        |problem: &str| FileIssue::new(Code::ValueInvalid, file, "tags.child_frame", format!("`{frame}` {problem}"));
     let frame = without_slash(frame);
     match frame.split_once("{id}") {
         _ if frame.is_empty() => Err(issue("is empty; name a frame")),

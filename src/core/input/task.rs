@@ -8,6 +8,7 @@
 //! # poses_rad = [[-1.3, -0.3, -0.4, 0.3, -0.6, 0.0]]
 //! ```
 
+use crate::codes::Code;
 use std::path::Path;
 
 use serde::Deserialize;
@@ -69,7 +70,9 @@ pub fn parse_task(file: &Path, text: &str) -> Result<TaskFile, RobotError> {
         }
     }
     if raw.targets_m.is_empty() && raw.poses_rad.is_empty() {
-        return Err(FileIssue::new(file, "targets_m", "is empty; give targets_m, poses_rad or both").into());
+        return Err(
+            FileIssue::new(Code::ValueCount, file, "targets_m", "is empty; give targets_m, poses_rad or both").into()
+        );
     }
     Ok(TaskFile { tolerance_m: raw.tolerance_m, targets_m: raw.targets_m, poses_rad: raw.poses_rad })
 }
@@ -84,7 +87,7 @@ impl TaskFile {
         for (k, pose) in self.poses_rad.iter().enumerate() {
             if pose.len() != robot.n_joints() {
                 let problem = format!("has {} angles; the robot has the joints {:?}", pose.len(), robot.joint_names());
-                return Err(FileIssue::new(file, format!("poses_rad[{k}]"), problem));
+                return Err(FileIssue::new(Code::ValueCount, file, format!("poses_rad[{k}]"), problem));
             }
             let tool = robot.chain.link_poses(&JointAngles::from_slice(pose)).frame(&robot.tool.mount);
             targets_m.push(tool.translation.vector.into());

@@ -1,5 +1,6 @@
 //! Errors of recordings and reasons to reject single messages.
 
+use crate::codes::{Code, Coded};
 use std::path::PathBuf;
 
 use super::cdr::CdrError;
@@ -109,4 +110,18 @@ pub enum DecodeRejection {
     MarkKind,
     #[error("the mark ends before it starts")]
     MarkSpan,
+}
+
+impl Coded for LogError {
+    fn code(&self) -> Code {
+        match self {
+            Self::Read { .. } => Code::FileUnreadable,
+            Self::Empty { .. } | Self::NotMcap { .. } | Self::NotBag { .. } => Code::RecordingFormat,
+            Self::Truncated { .. } | Self::Replaced { .. } => Code::RecordingChanged,
+            Self::NoDirectory { .. } | Self::Create { .. } | Self::SameFile { .. } | Self::Write { .. } => {
+                Code::FileUnwritable
+            }
+            Self::Encode { .. } | Self::SchemaChanged { .. } | Self::Late { .. } => Code::Internal,
+        }
+    }
 }

@@ -1,5 +1,6 @@
 //! `allowed_pairs` of robot.toml: parts that touch by design, which neither planning nor the simulator keeps apart.
 
+use crate::codes::Code;
 use std::path::Path;
 
 use super::body::LinkBody;
@@ -16,7 +17,7 @@ impl AllowedPairs {
         for (k, pair) in pairs.iter().enumerate() {
             if !pair.iter().any(|name| links.contains(&name.as_str())) || pair[0] == pair[1] {
                 let problem = format!("{pair:?} needs a moving link and another part; moving links are {links:?}");
-                return Err(FileIssue::new(file, format!("allowed_pairs[{k}]"), problem));
+                return Err(FileIssue::new(Code::ValueInvalid, file, format!("allowed_pairs[{k}]"), problem));
             }
         }
         Ok(Self(pairs))
@@ -36,7 +37,7 @@ impl AllowedPairs {
         let unknown = |(k, pair): (usize, &[String; 2])| {
             let name = pair.iter().find(|name| !is_known(name))?;
             let problem = format!("`{name}` is neither a link of the arm nor a part of the vehicle `{}`", vehicle.name);
-            Some(FileIssue::new(file, format!("allowed_pairs[{k}]"), problem))
+            Some(FileIssue::new(Code::ValueInvalid, file, format!("allowed_pairs[{k}]"), problem))
         };
         self.0.iter().enumerate().find_map(unknown).map_or(Ok(()), Err)
     }

@@ -1,5 +1,6 @@
 //! The arm in a URDF: its longest serial chain of revolute joints and slides, without a gripper's fingers.
 
+use crate::codes::Code;
 use urdf_rs::JointType;
 
 use super::error::FileIssue;
@@ -47,7 +48,7 @@ pub(super) fn find_arm(urdf: &UrdfModel, ends: &Ends<'_>) -> Result<FoundArm, Fi
         if let Some(link) = link.filter(|link| !urdf.has_link(link)) {
             let ends = leaves(urdf).take(20).collect::<Vec<_>>().join(", ");
             let problem = format!("`{link}` is not a link of the URDF; some that are: {ends}");
-            return Err(FileIssue::new(&urdf.file, option, problem));
+            return Err(FileIssue::new(Code::ValueInvalid, &urdf.file, option, problem));
         }
     }
     let mut candidates: Vec<Candidate> = match ends.tip {
@@ -62,7 +63,7 @@ pub(super) fn find_arm(urdf: &UrdfModel, ends: &Ends<'_>) -> Result<FoundArm, Fi
             }
             _ => "no chain of revolute, continuous or prismatic joints was found".to_owned(),
         };
-        return Err(FileIssue::new(&urdf.file, "joint", problem));
+        return Err(FileIssue::new(Code::ValueInvalid, &urdf.file, "joint", problem));
     };
     let mut arms: Vec<&Candidate> = vec![best];
     for other in &candidates {
@@ -77,7 +78,7 @@ pub(super) fn find_arm(urdf: &UrdfModel, ends: &Ends<'_>) -> Result<FoundArm, Fi
     if arms.len() > 1 {
         let each = arms.iter().map(|arm| format!("{} ({} joints)", arm.tip, arm.joints.len())).collect::<Vec<_>>();
         let problem = format!("{} arms end at {}: name one with --tip", arms.len(), each.join(", "));
-        return Err(FileIssue::new(&urdf.file, "joint", problem));
+        return Err(FileIssue::new(Code::ValueInvalid, &urdf.file, "joint", problem));
     }
     let camera = ends.camera.map(str::to_owned).or_else(|| camera_link(urdf, best));
     Ok(FoundArm { base: best.base.clone(), tip: best.tip.clone(), camera })

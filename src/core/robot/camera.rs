@@ -1,5 +1,6 @@
 //! `[camera]` and `[[further_camera]]` of robot.toml.
 
+use crate::codes::Code;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
@@ -99,7 +100,7 @@ pub(super) struct CameraTable<'a> {
 
 impl CameraTable<'_> {
     fn issue(&self, key: &str, problem: impl Into<String>) -> FileIssue {
-        FileIssue::new(self.file, format!("{}.{key}", self.name), problem)
+        FileIssue::new(Code::ValueInvalid, self.file, format!("{}.{key}", self.name), problem)
     }
 
     fn check(&self, key: &str, value: f64, range: RangeInclusive<f64>) -> Result<f64, FileIssue> {
@@ -137,7 +138,7 @@ impl CameraFile {
         }
         let missing = LENS_KEYS.iter().zip(has).filter(|(_, has)| !has).map(|(key, _)| *key);
         let problem = format!("has no {}: a lens needs them all", missing.collect::<Vec<_>>().join(", "));
-        Err(FileIssue::new(table.file, format!("[{}]", table.name), problem))
+        Err(FileIssue::new(Code::KeyMissing, table.file, format!("[{}]", table.name), problem))
     }
 }
 

@@ -1,5 +1,6 @@
 //! What robot.toml lacks, all of it at once.
 
+use crate::codes::Code;
 use std::cell::LazyCell;
 use std::path::Path;
 
@@ -92,7 +93,7 @@ pub(super) fn check_complete(
     }
     let problem =
         format!("{}. Add them: `armcal new-robot` writes all of them for a URDF, with their units", missing.join("; "));
-    Err(FileIssue::new(file, "missing", problem))
+    Err(FileIssue::new(Code::KeyMissing, file, "missing", problem))
 }
 
 fn quoted(name: &str) -> String {

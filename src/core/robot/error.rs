@@ -1,9 +1,10 @@
 //! Errors in a robot folder or a vehicle file.
 
+use crate::codes::{Code, Coded};
 use std::path::{Path, PathBuf};
 
 use self::toml_errors::explained;
-pub use self::toml_errors::{from_table, toml_problem};
+pub use self::toml_errors::{from_table, syntax_code, toml_problem};
 use super::toml_text::check_entries;
 use crate::files::{self, FileKind};
 
@@ -13,6 +14,8 @@ mod toml_errors;
 #[derive(Clone, Debug, thiserror::Error, PartialEq)]
 #[error("{}: {key}: {problem}", file.display())]
 pub struct FileIssue {
+    /// Class of the problem.
+    pub code: Code,
     /// The file with the wrong value.
     pub file: PathBuf,
     /// The value's place in the file, dotted.
@@ -28,7 +31,7 @@ pub enum RobotError {
     #[error("{}: cannot be read: {source}", file.display())]
     Unreadable { file: PathBuf, source: std::io::Error },
     #[error("{}: {message}", file.display())]
-    Syntax { file: PathBuf, message: String },
+    Syntax { code: Code, file: PathBuf, message: String },
     #[error(transparent)]
     Value(#[from] FileIssue),
     #[error("{}: links and joints form a loop at link `{link}`; an arm must be a tree", file.display())]
@@ -48,10 +51,17 @@ pub enum RobotError {
 }
 
 impl FileIssue {
-    /// The problem with the value at `key`.
+    /// Returns the problem with the value at `key`, of the class `code`.
     #[must_use]
-    pub fn new(file: &Path, key: impl Into<String>, problem: impl Into<String>) -> Self {
-        Self { file: file.to_owned(), key: key.into(), problem: problem.into() }
+    pub fn new(code: Code, file: &Path, key: impl Into<String>, problem: impl Into<String>) -> Self {
+        Self { code, file: file.to_owned(), key: key.into(), problem: problem.into() }
+    }
+
+    /// Returns the problem of a text's reader with the table at `key`, classed by its words.
+    #[must_use]
+    pub fn syntax(file: &Path, key: impl Into<String>, problem: impl Into<String>) -> Self {
+        let problem = problem.into();
+        Self::new(syntax_code(&problem), file, key, problem)
     }
 
     /// One issue of `file` for several; `None` where there are none.
@@ -61,7 +71,12 @@ impl FileIssue {
             [only] => Some(only.clone()),
             several => {
                 let each = several.iter().map(|issue| format!("{}: {}", issue.key, issue.problem));
-                Some(Self::new(file, format!("{} keys", several.len()), each.collect::<Vec<_>>().join("; ")))
+                Some(Self::new(
+                    several[0].code,
+                    file,
+                    format!("{} keys", several.len()),
+                    each.collect::<Vec<_>>().join("; "),
+                ))
             }
         }
     }
@@ -74,7 +89,12 @@ impl FileIssue {
         if value.is_finite() && range.contains(&value) {
             Ok(value)
         } else {
-            Err(Self::new(file, key, format!("{value} is outside {} .. {}", range.start(), range.end())))
+            Err(Self::new(
+                Code::ValueOutOfRange,
+                file,
+                key,
+                format!("{value} is outside {} .. {}", range.start(), range.end()),
+            ))
         }
     }
 }
@@ -103,5 +123,25 @@ fn read(file: &Path, kind: FileKind) -> Result<String, RobotError> {
 pub fn parse_toml<T: serde::de::DeserializeOwned>(file: &Path, text: &str) -> Result<T, RobotError> {
     check_entries(text)
         .and_then(|()| toml::from_str(text).map_err(|error| explained::<T>(text, &error)))
-        .map_err(|message| RobotError::Syntax { file: file.to_owned(), message })
+        .map_err(|message| RobotError::Syntax { code: syntax_code(&message), file: file.to_owned(), message })
+}
+
+impl Coded for RobotError {
+    fn code(&self) -> Code {
+        match self {
+            Self::Unreadable { .. } => Code::FileUnreadable,
+            Self::Syntax { code, .. } => *code,
+            Self::Value(issue) => issue.code,
+            Self::Loop { .. } | Self::MissingLink { .. } | Self::NoChain { .. } | Self::JointKind { .. } => {
+                Code::UrdfStructure
+            }
+            Self::ZeroMass { .. } => Code::ValueOutOfRange,
+        }
+    }
+}
+
+impl Coded for FileIssue {
+    fn code(&self) -> Code {
+        self.code
+    }
 }

@@ -1,5 +1,6 @@
 //! The file robot.toml and its checks.
 
+use crate::codes::Code;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -152,11 +153,11 @@ fn planning_issues(file: &Path, raw: &RobotFile, camera: &CameraSpec, arm: &Urdf
     let mut issues = Vec::new();
     if raw.stowed_rad.is_none() {
         let problem = "is missing; add one angle per joint, rad, at which the arm stands clear: paths start there";
-        issues.push(FileIssue::new(file, STOWED, problem));
+        issues.push(FileIssue::new(Code::KeyMissing, file, STOWED, problem));
     }
     if raw.base_tag.is_none() {
         let problem = "is missing; add it and the [[tag]]s around the arm, or name a vehicle that carries tags";
-        issues.push(FileIssue::new(file, BASE_TAG, problem));
+        issues.push(FileIssue::new(Code::KeyMissing, file, BASE_TAG, problem));
     }
     if !camera.lens.is_known() {
         issues.push(lens_issue(file));
@@ -165,12 +166,12 @@ fn planning_issues(file: &Path, raw: &RobotFile, camera: &CameraSpec, arm: &Urdf
         let problem = "is prismatic, and an arm with slides is neither simulated nor planned for yet: `armcal \
                        calibrate` works on recordings of it; where it is a lift that stands still, name the link on \
                        it as base_link";
-        issues.push(FileIssue::new(&arm.urdf.file, format!("joint `{}`", slide.name), problem));
+        issues.push(FileIssue::new(Code::UrdfStructure, &arm.urdf.file, format!("joint `{}`", slide.name), problem));
     }
     if camera.mount.n_joints == 0 && raw.tag_link.is_none() {
         let problem = "no joint moves it; run and plan need a camera that the arm carries, or tags that it carries \
                        before this one (tag_link)";
-        issues.push(FileIssue::new(file, "[camera] link", problem));
+        issues.push(FileIssue::new(Code::UrdfStructure, file, "[camera] link", problem));
     }
     let mut ignored: Vec<&str> = arm.collision_meshes().iter().map(|mesh| mesh.link).collect();
     ignored.dedup();
@@ -180,7 +181,7 @@ fn planning_issues(file: &Path, raw: &RobotFile, camera: &CameraSpec, arm: &Urdf
              the key out, or draw boxes, cylinders or spheres",
             ignored.join(", ")
         );
-        issues.push(FileIssue::new(file, "collision_meshes", problem));
+        issues.push(FileIssue::new(Code::MeshUnusable, file, "collision_meshes", problem));
     }
     issues
 }
@@ -269,7 +270,7 @@ fn check_gripper_tag(
 ) -> Result<(), FileIssue> {
     if tag_frame.is_some() {
         let problem = "does not go together with [gripper_tag]: name that tag as a [[tag]], too";
-        return Err(FileIssue::new(file, TAG_LINK, problem));
+        return Err(FileIssue::new(Code::KeysConflict, file, TAG_LINK, problem));
     }
     tag.check_beside(file, tags, family)
 }
@@ -281,7 +282,8 @@ fn check_tag_link(
     links: &BTreeMap<String, Attachment>,
     camera: &CameraSpec,
 ) -> Result<Attachment, FileIssue> {
-    let issue = |problem: &str| Err(FileIssue::new(file, TAG_LINK, format!("is `{link}`; {problem}")));
+    let issue =
+        |problem: &str| Err(FileIssue::new(Code::NameUnknown, file, TAG_LINK, format!("is `{link}`; {problem}")));
     match links.get(link) {
         None => issue("no link between base and tool or camera is called so"),
         Some(place) if place.n_joints == 0 => issue("no joint moves it: leave the key out for tags beside the arm"),

@@ -3,6 +3,7 @@
 //! The jaws are links of the URDF, fixed to the tool's link at their rest opening. Mass, collision shapes and
 //! kinematics are those of the chain; only the visual shapes of the jaws move.
 
+use crate::codes::Code;
 use std::path::Path;
 
 use nalgebra::{Isometry3, Unit, Vector3};
@@ -75,7 +76,8 @@ impl GripperFile {
     /// # Errors
     /// [`RobotError`] naming file, key and allowed range.
     pub(super) fn check(self, file: &Path, arm: &UrdfChain<'_>, tool: &Attachment) -> Result<GripperSpec, RobotError> {
-        let issue = |key: &str, problem: String| FileIssue::new(file, format!("gripper.{key}"), problem);
+        let issue =
+            |key: &str, problem: String| FileIssue::new(Code::ValueInvalid, file, format!("gripper.{key}"), problem);
         let check =
             |key: &str, value: f64, range| FileIssue::check_range(file, &format!("gripper.{key}"), value, range);
         if self.jaws[0] == self.jaws[1] {

@@ -2,6 +2,7 @@
 //!
 //! It is not a tag of the survey and does not locate the base. It measures the joints between camera and tool.
 
+use crate::codes::Code;
 use std::path::Path;
 
 use serde::Deserialize;
@@ -50,10 +51,11 @@ impl GripperTag {
     ) -> Result<(), FileIssue> {
         if let Some(other) = family.filter(|other| *other != self.family) {
             let problem = format!("is {}, that of the surveyed tags is {other}; one family an arm", self.family);
-            return Err(FileIssue::new(file, "gripper_tag.family", problem));
+            return Err(FileIssue::new(Code::KeysConflict, file, "gripper_tag.family", problem));
         }
         if tags.iter().any(|tag| tag.id == self.id) {
             return Err(FileIssue::new(
+                Code::ValueInvalid,
                 file,
                 "gripper_tag.id",
                 format!("{} is also the id of a surveyed tag", self.id),
@@ -88,7 +90,9 @@ impl GripperTagFile {
         arm: &UrdfChain<'_>,
         camera_mount: &Attachment,
     ) -> Result<GripperTag, RobotError> {
-        let issue = |key: &str, problem: String| FileIssue::new(file, format!("gripper_tag.{key}"), problem);
+        let issue = |key: &str, problem: String| {
+            FileIssue::new(Code::ValueInvalid, file, format!("gripper_tag.{key}"), problem)
+        };
         let check =
             |key: &str, value: f64, range| FileIssue::check_range(file, &format!("gripper_tag.{key}"), value, range);
         let family: TagFamily = self.family.parse().map_err(|problem| issue("family", problem))?;

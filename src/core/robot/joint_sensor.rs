@@ -1,5 +1,6 @@
 //! Joint sensors of robot.toml by their datasheets.
 
+use crate::codes::Code;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
@@ -217,7 +218,7 @@ impl OfJoint<'_> {
         let instead: Vec<&str> = wrong.iter().map(|key| key.names[own]).collect();
         let moves = ["turns", "is prismatic"][own];
         let problem = format!("the joint {moves} in the URDF; write {} in its place", instead.join(", "));
-        Err(FileIssue::new(self.file, self.key(first.names[other]), problem))
+        Err(FileIssue::new(Code::KeyUnknown, self.file, self.key(first.names[other]), problem))
     }
 
     /// The figure as the file has it, if it has one.
@@ -235,7 +236,7 @@ impl OfJoint<'_> {
 
     fn figure(&self, key: &UnitKey) -> Result<f64, FileIssue> {
         let usual = key.usual.map(|usual| usual[self.unit()]);
-        let missing = || FileIssue::new(self.file, self.key(key.names[self.unit()]), "is missing");
+        let missing = || FileIssue::new(Code::KeyMissing, self.file, self.key(key.names[self.unit()]), "is missing");
         self.given(key)?.or(usual).ok_or_else(missing)
     }
 }
@@ -260,7 +261,7 @@ pub(super) fn check_sensors(
         if without.is_empty() && beside.is_empty() {
             problem += &format!("; the sensors name {names:?}");
         }
-        return Err(FileIssue::new(file, "joint_sensor", problem).into());
+        return Err(FileIssue::new(Code::JointsMismatch, file, "joint_sensor", problem).into());
     }
     raw.iter().zip(chain.joints()).map(|(s, joint)| check_sensor(file, s, joint)).collect()
 }
@@ -275,7 +276,7 @@ fn check_sensor(file: &Path, s: &SensorFile, joint: &ChainJoint) -> Result<Joint
         let range_counts = range * counts_per_unit.abs();
         if s.wrap_counts < range_counts {
             let problem = format!("{} is less than the {range_counts:.0} counts of the joint's range", s.wrap_counts);
-            return Err(FileIssue::new(file, of_joint.key("wrap_counts"), problem).into());
+            return Err(FileIssue::new(Code::ValueOutOfRange, file, of_joint.key("wrap_counts"), problem).into());
         }
     }
     Ok(JointSensorSpec {

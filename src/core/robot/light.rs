@@ -1,5 +1,6 @@
 //! `[[light]]` of a vehicle's file.
 
+use crate::codes::Code;
 use std::path::Path;
 
 use nalgebra::{Point3, Unit, Vector3};
@@ -46,7 +47,7 @@ impl LightFile {
             check("direction", value, -1e3..=1e3)?;
         }
         let direction = Unit::try_new(Vector3::from(self.direction), 1e-6)
-            .ok_or_else(|| FileIssue::new(file, at("direction"), "has no direction"))?;
+            .ok_or_else(|| FileIssue::new(Code::ValueInvalid, file, at("direction"), "has no direction"))?;
         Ok(VehicleLight {
             name: self.name.clone(),
             position_m: Point3::from(self.position_m),

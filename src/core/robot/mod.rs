@@ -43,7 +43,7 @@ pub use body::{GRAVITY_M_S2, LinkBody};
 pub use camera::{CameraSpec, LensPriors, MAX_FURTHER_CAMERAS};
 pub use described::{Described, tag_frame_name};
 pub use drive::{DriveSpec, MotionSpec};
-pub use error::{FileIssue, RobotError, from_table, parse_toml, read_table, read_text, toml_problem};
+pub use error::{FileIssue, RobotError, from_table, parse_toml, read_table, read_text, syntax_code, toml_problem};
 pub use failed::{FailedJoint, FailedKind};
 pub use file::{load, load_attached, load_without_pairs};
 pub use frame_tree::{FixedFrame, FrameTree, MovingFrame};

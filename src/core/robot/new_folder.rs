@@ -1,5 +1,6 @@
 //! A robot folder for a URDF: robot.toml with what was read, what was assumed, and what is left to fill in.
 
+use crate::codes::Code;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -80,7 +81,7 @@ fn read_arm(wanted: &NewRobot<'_>) -> Result<(UrdfModel, FoundArm), RobotError> 
     let urdf = UrdfModel::parse(wanted.urdf, text)?;
     if has_xacro && urdf.robot.joints.iter().all(|joint| joint.name.contains("${")) {
         let message = "has elements of xacro: expand them first, `xacro ARM.urdf.xacro > ARM.urdf`".to_owned();
-        return Err(RobotError::Syntax { file: wanted.urdf.to_owned(), message });
+        return Err(RobotError::Syntax { code: Code::FileSyntax, file: wanted.urdf.to_owned(), message });
     }
     let arm = find_arm(&urdf, &Ends { base: wanted.base, tip: wanted.tip, camera: wanted.camera })?;
     Ok((urdf, arm))
@@ -103,7 +104,7 @@ fn mesh_files(arm: &UrdfChain<'_>, urdf: &Path) -> Result<Vec<NewFile>, RobotErr
     if n_bytes > MAX_MESH_BYTES {
         let (have, most) = (n_bytes / 1_000_000, MAX_MESH_BYTES / 1_000_000);
         let problem = format!("have {have} MB together, at most {most} MB are copied: simplify them");
-        return Err(FileIssue::new(urdf, "collision meshes", problem).into());
+        return Err(FileIssue::new(Code::MeshUnusable, urdf, "collision meshes", problem).into());
     }
     let read = |(path, source): (PathBuf, PathBuf)| {
         let bytes = files::read_bytes(&source, FileKind::Mesh);

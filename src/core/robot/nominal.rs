@@ -1,5 +1,6 @@
 //! The nominal arm.
 
+use crate::codes::Code;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -91,7 +92,7 @@ pub(super) const TAG_LINK: &str = "tag_link";
 /// That the camera's lens is missing.
 pub(super) fn lens_issue(file: &Path) -> FileIssue {
     let problem = format!("is missing; images and the corners of tags need it: add {}", LENS_KEYS.join(", "));
-    FileIssue::new(file, "[camera] lens", problem)
+    FileIssue::new(Code::KeyMissing, file, "[camera] lens", problem)
 }
 
 /// `[tool]` of robot.toml.
@@ -267,9 +268,13 @@ impl Robot {
             }
             if let Some(link) = &body.bad_inertia {
                 let key = format!("link `{link}`: inertia");
-                return Err(
-                    FileIssue::new(&file, key, "is not positive definite, so the arm cannot be simulated").into()
-                );
+                return Err(FileIssue::new(
+                    Code::ValueInvalid,
+                    &file,
+                    key,
+                    "is not positive definite, so the arm cannot be simulated",
+                )
+                .into());
             }
         }
         Ok(())
@@ -296,7 +301,12 @@ impl Robot {
     pub fn require_turning(&self, what: &str) -> Result<(), FileIssue> {
         let Some(slide) = self.first_slide() else { return Ok(()) };
         let problem = format!("is prismatic, and {what} knows no slides yet: `armcal calibrate` on a recording does");
-        Err(FileIssue::new(&self.folder.join(&self.urdf_name), format!("joint `{}`", slide.name), problem))
+        Err(FileIssue::new(
+            Code::UrdfStructure,
+            &self.folder.join(&self.urdf_name),
+            format!("joint `{}`", slide.name),
+            problem,
+        ))
     }
 
     /// Checks that the camera's lens is known: tags' corners mean nothing without it.
@@ -340,7 +350,7 @@ pub(super) fn check_stowed(
 ) -> Result<JointAngles, RobotError> {
     if angles_rad.len() != n_joints || !angles_rad.iter().all(|v| v.abs() <= 100.0) {
         let problem = format!("needs {n_joints} angles within 100 rad, one per joint");
-        return Err(FileIssue::new(file, key, problem).into());
+        return Err(FileIssue::new(Code::ValueCount, file, key, problem).into());
     }
     Ok(JointAngles::from_slice(angles_rad))
 }

@@ -1,5 +1,6 @@
 //! Parts of a vehicle and obstacles in files: primitives, hulls and meshes.
 
+use crate::codes::Code;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -86,7 +87,7 @@ pub fn check_parts(raw: &[PartFile], file: &Path, table: &str) -> Result<(Vec<Pa
     }
     if plain.len() > MAX_PARTS {
         let problem = format!("{} shapes, 0 .. {MAX_PARTS} allowed", plain.len());
-        return Err(FileIssue::new(file, table, problem).into());
+        return Err(FileIssue::new(Code::ValueCount, file, table, problem).into());
     }
     let parts = plain.iter().map(|part| part.check(file, table)).collect::<Result<_, _>>()?;
     Ok((parts, plain))
@@ -103,7 +104,8 @@ impl PartFile {
 
     fn check(&self, file: &Path, table: &str) -> Result<Part, RobotError> {
         let at = |key: &str| self.key(table, key);
-        let missing = |key: &str| FileIssue::new(file, at(key), format!("is needed by shape `{}`", self.shape));
+        let missing =
+            |key: &str| FileIssue::new(Code::KeyMissing, file, at(key), format!("is needed by shape `{}`", self.shape));
         let size = || self.size_m.ok_or_else(|| missing("size_m"));
         let radius = || self.radius_m.ok_or_else(|| missing("radius_m"));
         let length = || self.length_m.ok_or_else(|| missing("length_m"));
@@ -115,7 +117,7 @@ impl PartFile {
             "hull" => self.hull(file, table, self.points_m.as_deref().ok_or_else(|| missing("points_m"))?)?,
             other => {
                 let problem = format!("`{other}` is none of box, cylinder, capsule, sphere, hull, mesh");
-                return Err(FileIssue::new(file, at("shape"), problem).into());
+                return Err(FileIssue::new(Code::NameUnknown, file, at("shape"), problem).into());
             }
         };
         for (key, given) in [
@@ -125,15 +127,22 @@ impl PartFile {
             ("convex", self.convex.is_some()),
         ] {
             if given {
-                return Err(FileIssue::new(file, at(key), format!("is not a key of shape `{}`", self.shape)).into());
+                return Err(FileIssue::new(
+                    Code::KeyUnknown,
+                    file,
+                    at(key),
+                    format!("is not a key of shape `{}`", self.shape),
+                )
+                .into());
             }
         }
         for (key, value) in shape.lengths() {
             FileIssue::check_range(file, &at(key), value, 1e-4..=1e4)?;
         }
         let place: Pose<VehicleFrame, VehicleFrame> =
-            Pose::from_position_quaternion_wxyz(self.position_m, self.quaternion_wxyz)
-                .ok_or_else(|| FileIssue::new(file, at("position_m, quaternion_wxyz"), "must be finite, not zero"))?;
+            Pose::from_position_quaternion_wxyz(self.position_m, self.quaternion_wxyz).ok_or_else(|| {
+                FileIssue::new(Code::ValueInvalid, file, at("position_m, quaternion_wxyz"), "must be finite, not zero")
+            })?;
         check_place(file, &at("position_m"), &self.position_m)?;
         let placed = PlacedShape { owner_from_shape: *place.isometry(), shape, color_rgb: self.color_rgb };
         Ok(Part { name: self.name.clone(), placed })
@@ -142,7 +151,9 @@ impl PartFile {
     fn hull(&self, file: &Path, table: &str, points_m: &[[f64; 3]]) -> Result<Shape, RobotError> {
         let key = self.key(table, "points_m");
         points_m.iter().try_for_each(|point| check_place(file, &key, point))?;
-        Ok(Shape::Hull(Hull::new(points_m).map_err(|error| FileIssue::new(file, key, error.to_string()))?))
+        Ok(Shape::Hull(
+            Hull::new(points_m).map_err(|error| FileIssue::new(Code::MeshUnusable, file, key, error.to_string()))?,
+        ))
     }
 
     /// The part itself, or the hulls of its mesh.
@@ -151,15 +162,17 @@ impl PartFile {
             return Ok(vec![self.clone()]);
         }
         let at = |key: &str| self.key(table, key);
-        let missing = |key: &str| FileIssue::new(file, at(key), "is needed by shape `mesh`");
+        let missing = |key: &str| FileIssue::new(Code::KeyMissing, file, at(key), "is needed by shape `mesh`");
         let named = self.file.as_ref().ok_or_else(|| missing("file"))?;
         let mesh_file = file.parent().unwrap_or(Path::new(".")).join(named);
-        let issue =
-            |key: &str, problem: String| FileIssue::new(file, at(key), format!("{}: {problem}", mesh_file.display()));
+        let issue = |key: &str, problem: String| {
+            FileIssue::new(Code::MeshUnusable, file, at(key), format!("{}: {problem}", mesh_file.display()))
+        };
         let scale_m = FileIssue::check_range(file, &at("scale_m"), self.scale_m.unwrap_or(1.0), 1e-6..=1e4)?;
         let place: Pose<VehicleFrame, VehicleFrame> =
-            Pose::from_position_quaternion_wxyz(self.position_m, self.quaternion_wxyz)
-                .ok_or_else(|| FileIssue::new(file, at("position_m, quaternion_wxyz"), "must be finite, not zero"))?;
+            Pose::from_position_quaternion_wxyz(self.position_m, self.quaternion_wxyz).ok_or_else(|| {
+                FileIssue::new(Code::ValueInvalid, file, at("position_m, quaternion_wxyz"), "must be finite, not zero")
+            })?;
         let mut mesh = mesh::read(&mesh_file).map_err(|error| issue("file", error.to_string()))?;
         mesh.vertices.as_flattened_mut().iter_mut().for_each(|v| *v *= scale_m);
         mesh.vertices

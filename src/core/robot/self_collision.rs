@@ -3,6 +3,7 @@
 //! `plan::sample_self_pairs` (`armcal study self-collision`) finds them by sampling; planning skips all other pairs.
 //! The file holds the hash of the URDF and is valid for that URDF only.
 
+use crate::codes::Code;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -55,7 +56,7 @@ impl SelfPairs {
                 .collect(),
         };
         let text = toml::to_string(&raw)
-            .map_err(|error| FileIssue::new(file, "pair", format!("has no TOML form: {error}")))?;
+            .map_err(|error| FileIssue::new(Code::Internal, file, "pair", format!("has no TOML form: {error}")))?;
         Ok(format!(
             "# Links of this arm that can come nearer to each other than near_m, among n random configurations \
              within the joint\n\
@@ -88,13 +89,14 @@ pub(super) fn read(folder: &Path, urdf_text: &str, bodies: &[LinkBody]) -> Resul
             "is of another URDF; make the file again with `armcal study self-collision {}`, or remove it",
             folder.display()
         );
-        return Ok(Stored::Stale(FileIssue::new(&file, SELF_COLLISION_FILE, problem)));
+        return Ok(Stored::Stale(FileIssue::new(Code::RobotMismatch, &file, SELF_COLLISION_FILE, problem)));
     }
     let mut pairs = Vec::new();
     for (k, pair) in raw.pair.iter().enumerate() {
         let body = |name: &String| {
             let problem = || {
                 FileIssue::new(
+                    Code::ValueInvalid,
                     &file,
                     format!("pair[{k}].links"),
                     format!("`{name}` is neither the base nor a moving link"),

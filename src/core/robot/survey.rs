@@ -1,5 +1,6 @@
 //! Surveyed tags of robot.toml or of the vehicle that carries them.
 
+use crate::codes::Code;
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -129,23 +130,32 @@ pub(super) fn check_tags<Owner: Frame>(
     base_from_owner: &Pose<Base, Owner>,
 ) -> Result<(Vec<SurveyedTag>, Option<TagFamily>), RobotError> {
     if raw.len() > MAX_TAGS {
-        return Err(FileIssue::new(file, "tag", format!("{} tags, 0 .. {MAX_TAGS} allowed", raw.len())).into());
+        return Err(FileIssue::new(
+            Code::ValueCount,
+            file,
+            "tag",
+            format!("{} tags, 0 .. {MAX_TAGS} allowed", raw.len()),
+        )
+        .into());
     }
     let (mut seen, mut family) = (BTreeSet::new(), None);
     let mut tags = Vec::new();
     for tag in raw {
         let key = |name: &str| format!("tag {}: {name}", tag.id);
         if !seen.insert(tag.id) {
-            return Err(FileIssue::new(file, key("id"), "is defined twice").into());
+            return Err(FileIssue::new(Code::ValueDuplicate, file, key("id"), "is defined twice").into());
         }
-        let own: TagFamily = tag.family.parse().map_err(|problem| FileIssue::new(file, key("family"), problem))?;
+        let own: TagFamily =
+            tag.family.parse().map_err(|problem| FileIssue::new(Code::NameUnknown, file, key("family"), problem))?;
         if *family.get_or_insert(own) != own {
             let problem = format!("is {own}, that of tag {} is {}; one family an arm", raw[0].id, raw[0].family);
-            return Err(FileIssue::new(file, key("family"), problem).into());
+            return Err(FileIssue::new(Code::KeysConflict, file, key("family"), problem).into());
         }
         check_place(file, &key("position_m"), &tag.position_m)?;
         let owner_from_tag: Pose<Owner, Tag> = Pose::from_position_quaternion_wxyz(tag.position_m, tag.quaternion_wxyz)
-            .ok_or_else(|| FileIssue::new(file, key("position_m, quaternion_wxyz"), "must be finite, not zero"))?;
+            .ok_or_else(|| {
+                FileIssue::new(Code::ValueInvalid, file, key("position_m, quaternion_wxyz"), "must be finite, not zero")
+            })?;
         tags.push(SurveyedTag {
             id: tag.id,
             size_m: FileIssue::check_range(file, &key("size_m"), tag.size_m, 1e-3..=10.0)?,
@@ -157,10 +167,16 @@ pub(super) fn check_tags<Owner: Frame>(
     match base_tag {
         None if !tags.is_empty() => {
             let problem = "is missing; it is the id of the [[tag]] beside the base, or of any other";
-            return Err(FileIssue::new(file, "base_tag", problem).into());
+            return Err(FileIssue::new(Code::KeyMissing, file, "base_tag", problem).into());
         }
         Some(id) if !tags.is_empty() && !seen.contains(&id) => {
-            return Err(FileIssue::new(file, "base_tag", format!("tag {id} is not among the [[tag]]s")).into());
+            return Err(FileIssue::new(
+                Code::NameUnknown,
+                file,
+                "base_tag",
+                format!("tag {id} is not among the [[tag]]s"),
+            )
+            .into());
         }
         _ => {}
     }

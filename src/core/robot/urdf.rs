@@ -1,5 +1,6 @@
 //! Serial chain and bodies of a URDF file.
 
+use crate::codes::Code;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -82,13 +83,19 @@ impl UrdfModel {
     pub fn parse(file: &Path, text: String) -> Result<Self, RobotError> {
         let robot = plain_urdf(&text)
             .and_then(|plain| urdf_rs::read_from_string(&plain).map_err(|error| error.to_string()))
-            .map_err(|message| RobotError::Syntax { file: file.to_owned(), message })?;
+            .map_err(|message| RobotError::Syntax { code: Code::FileSyntax, file: file.to_owned(), message })?;
         let links: BTreeSet<&str> = robot.links.iter().map(|l| l.name.as_str()).collect();
         let mut joint_of_child = BTreeMap::new();
         let mut joint_names = BTreeSet::new();
         for (idx, joint) in robot.joints.iter().enumerate() {
             if !joint_names.insert(joint.name.as_str()) {
-                return Err(FileIssue::new(file, format!("joint `{}`", joint.name), "is defined twice").into());
+                return Err(FileIssue::new(
+                    Code::ValueDuplicate,
+                    file,
+                    format!("joint `{}`", joint.name),
+                    "is defined twice",
+                )
+                .into());
             }
             for link in [&joint.parent.link, &joint.child.link] {
                 if !links.contains(link.as_str()) {
@@ -184,7 +191,7 @@ impl UrdfModel {
         if joints.is_empty() || joints.len() > MAX_JOINTS {
             let problem =
                 format!("{} moving joints between `{base}` and {tips:?}, 1 .. {MAX_JOINTS} allowed", joints.len());
-            return Err(FileIssue::new(&self.file, "joint", problem).into());
+            return Err(FileIssue::new(Code::UrdfStructure, &self.file, "joint", problem).into());
         }
         Ok(Chain::new(joints))
     }
@@ -212,7 +219,7 @@ impl UrdfModel {
         let inertia = Matrix3::new(i.ixx, i.ixy, i.ixz, i.ixy, i.iyy, i.iyz, i.ixz, i.iyz, i.izz);
         if !inertia.iter().all(|v| v.is_finite()) {
             let key = format!("link `{}`: inertia", link.name);
-            return Err(FileIssue::new(&self.file, key, "is not finite").into());
+            return Err(FileIssue::new(Code::ValueInvalid, &self.file, key, "is not finite").into());
         }
         if mass_kg > 0.0 {
             FileIssue::check_range(&self.file, &mass_key, mass_kg, 1e-6..=1e6)?;
@@ -355,7 +362,7 @@ impl UrdfChain<'_> {
         let n_shapes = primitives.count() + meshes.map_or(0, |_| named.len());
         if n_shapes > MAX_COLLISION_SHAPES {
             let problem = format!("{n_shapes} shapes on the chain, 0 .. {MAX_COLLISION_SHAPES} allowed");
-            return Err(FileIssue::new(&self.urdf.file, "collision", problem).into());
+            return Err(FileIssue::new(Code::MeshUnusable, &self.urdf.file, "collision", problem).into());
         }
         let Some(folders) = meshes else { return Ok(()) };
         let problems: Vec<String> = named
@@ -372,7 +379,7 @@ impl UrdfChain<'_> {
             problems.len(),
             problems.join("; ")
         );
-        Err(FileIssue::new(&self.urdf.file, "collision meshes", problem).into())
+        Err(FileIssue::new(Code::MeshUnusable, &self.urdf.file, "collision meshes", problem).into())
     }
 
     /// The links that the chain carries.
@@ -404,7 +411,13 @@ fn check_moving(file: &Path, joint: &urdf_rs::Joint) -> Result<(), RobotError> {
         return Ok(());
     }
     if Vector3::from(joint.axis.xyz.0).norm() < 1e-6 {
-        return Err(FileIssue::new(file, format!("joint `{}`: axis", joint.name), "has no direction").into());
+        return Err(FileIssue::new(
+            Code::ValueInvalid,
+            file,
+            format!("joint `{}`: axis", joint.name),
+            "has no direction",
+        )
+        .into());
     }
     FileIssue::check_range(file, &format!("joint `{}`: effort", joint.name), joint.limit.effort, 0.0..=1e7)?;
     let (lower, upper) = (joint.limit.lower, joint.limit.upper);
@@ -412,7 +425,13 @@ fn check_moving(file: &Path, joint: &urdf_rs::Joint) -> Result<(), RobotError> {
         && !(lower.is_finite() && upper.is_finite() && lower < upper)
     {
         let key = format!("joint `{}`: limit", joint.name);
-        return Err(FileIssue::new(file, key, format!("lower {lower} must lie below upper {upper}")).into());
+        return Err(FileIssue::new(
+            Code::ValueInvalid,
+            file,
+            key,
+            format!("lower {lower} must lie below upper {upper}"),
+        )
+        .into());
     }
     Ok(())
 }

@@ -1,5 +1,6 @@
 //! Collision meshes that a URDF names: found below the robot folder, read as convex hulls.
 
+use crate::codes::Code;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
@@ -68,7 +69,7 @@ impl MeshFolders {
     pub fn hull(&self, urdf: &Path, mesh: &NamedMesh<'_>) -> Result<(Shape, [f64; 3]), FileIssue> {
         let issue = |problem: String| {
             let key = format!("link `{}`: collision mesh {}", mesh.link, mesh.name);
-            FileIssue::new(urdf, key, problem)
+            FileIssue::new(Code::MeshUnusable, urdf, key, problem)
         };
         let file = self.find(mesh.name).map_err(issue)?;
         let mut read = mesh::read(&file).map_err(|error: MeshError| issue(error.to_string()))?;

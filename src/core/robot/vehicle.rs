@@ -1,5 +1,6 @@
 //! The nominal vehicle: convex parts, tags, lights, and the mount of the arm.
 
+use crate::codes::Code;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -146,7 +147,12 @@ pub fn load_vehicle(file: &Path) -> Result<Vehicle, RobotError> {
     check_place(file, "mount.position_m", &raw.mount.position_m)?;
     let mount =
         Pose::from_position_quaternion_wxyz(raw.mount.position_m, raw.mount.quaternion_wxyz).ok_or_else(|| {
-            FileIssue::new(file, "mount", "position and quaternion must be finite and the quaternion not zero")
+            FileIssue::new(
+                Code::ValueInvalid,
+                file,
+                "mount",
+                "position and quaternion must be finite and the quaternion not zero",
+            )
         })?;
     if let Some(dynamics) = &raw.dynamics {
         dynamics.check(file)?;
@@ -158,7 +164,7 @@ pub fn load_vehicle(file: &Path) -> Result<Vehicle, RobotError> {
     if raw.part.iter().any(PartFile::is_mesh) {
         raw.part = plain;
         text = toml::to_string(&raw)
-            .map_err(|error| FileIssue::new(file, "part", format!("has no TOML form: {error}")))?;
+            .map_err(|error| FileIssue::new(Code::Internal, file, "part", format!("has no TOML form: {error}")))?;
     }
     Ok(Vehicle {
         file: file.to_owned(),
@@ -182,8 +188,12 @@ fn check_survey(
 ) -> Result<Option<TagSurvey>, RobotError> {
     match (raw.base_tag, raw.tag.is_empty()) {
         (None, true) => Ok(None),
-        (None, false) => Err(FileIssue::new(file, "base_tag", "is missing; it is required with [[tag]]s").into()),
-        (Some(_), true) => Err(FileIssue::new(file, "base_tag", "is not among the [[tag]]s: there are none").into()),
+        (None, false) => {
+            Err(FileIssue::new(Code::KeyMissing, file, "base_tag", "is missing; it is required with [[tag]]s").into())
+        }
+        (Some(_), true) => {
+            Err(FileIssue::new(Code::NameUnknown, file, "base_tag", "is not among the [[tag]]s: there are none").into())
+        }
         (Some(base_tag), false) => {
             let base_tag = Some(base_tag);
             let (tags, family) = check_tags(file, &raw.tag, base_tag, &vehicle_from_base.inverse())?;

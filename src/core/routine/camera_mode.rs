@@ -1,5 +1,6 @@
 //! `[camera]` of a routine: the origin of the images.
 
+use crate::codes::Code;
 use std::path::Path;
 
 use serde::Deserialize;
@@ -19,7 +20,12 @@ impl CameraFile {
         const MODES: [&str; 2] = ["geometric", "rendered"];
         let Some(mode) = self.mode else { return Ok(world) };
         if !MODES.contains(&mode.as_str()) {
-            return Err(FileIssue::new(file, "camera.mode", format!("`{mode}` is none of {}", MODES.join(", "))));
+            return Err(FileIssue::new(
+                Code::NameUnknown,
+                file,
+                "camera.mode",
+                format!("`{mode}` is none of {}", MODES.join(", ")),
+            ));
         }
         let camera = world.entry("camera").or_insert_with(|| toml::Table::new().into());
         // The simulator refuses a `world.camera` that is not a table.
@@ -27,7 +33,7 @@ impl CameraFile {
             match camera.get("mode").map(|other| other.as_str().unwrap_or_default()) {
                 Some(other) if other != mode => {
                     let problem = format!("`{mode}`, but world.camera.mode is `{other}`: leave one of them out");
-                    return Err(FileIssue::new(file, "camera.mode", problem));
+                    return Err(FileIssue::new(Code::KeysConflict, file, "camera.mode", problem));
                 }
                 _ => drop(camera.insert("mode".to_owned(), mode.into())),
             }

@@ -1,5 +1,6 @@
 //! What a routine says about being run many times: `[campaign]` and `[regress]`.
 
+use crate::codes::Code;
 use std::fmt;
 use std::ops::RangeInclusive;
 use std::path::Path;
@@ -155,16 +156,20 @@ pub(super) struct CampaignFile {
 impl CampaignFile {
     pub(super) fn check(&self, file: &Path) -> Result<CampaignSettings, RoutineError> {
         let seeds = self.seeds.as_deref().map(str::parse).transpose();
-        let seeds = seeds.map_err(|problem: String| FileIssue::new(file, "campaign.seeds", problem))?;
+        let seeds =
+            seeds.map_err(|problem: String| FileIssue::new(Code::ValueInvalid, file, "campaign.seeds", problem))?;
         let mut matrix = Vec::new();
-        flatten(&self.matrix, "", &mut matrix)
-            .map_err(|(key, problem)| FileIssue::new(file, format!("campaign.matrix.{key}"), problem))?;
+        flatten(&self.matrix, "", &mut matrix).map_err(|(key, problem)| {
+            FileIssue::new(Code::ValueInvalid, file, format!("campaign.matrix.{key}"), problem)
+        })?;
         matrix.sort_by(|a, b| a.0.cmp(&b.0));
         let mut weights = Vec::new();
         flatten(&self.weights, "", &mut weights)
             .and_then(|()| weights.iter().map(|(key, values)| weights_of(key, values, &matrix)).collect())
             .map(|weights| CampaignSettings { seeds, matrix, weights })
-            .map_err(|(key, problem)| FileIssue::new(file, format!("campaign.weights.{key}"), problem).into())
+            .map_err(|(key, problem)| {
+                FileIssue::new(Code::ValueInvalid, file, format!("campaign.weights.{key}"), problem).into()
+            })
     }
 }
 

@@ -1,5 +1,6 @@
 //! A checked routine and the arm that it is for.
 
+use crate::codes::Code;
 use std::path::PathBuf;
 
 use serde::Deserialize;
@@ -69,14 +70,17 @@ impl Routine {
             vehicle.survey = None;
         }
         if let Some(ids) = &self.tags {
-            let survey =
-                robot.survey().only(ids).map_err(|problem| FileIssue::new(&self.file, "site.tags", problem))?;
+            let survey = robot
+                .survey()
+                .only(ids)
+                .map_err(|problem| FileIssue::new(Code::NameUnknown, &self.file, "site.tags", problem))?;
             robot = robot.with_survey(survey.clone());
             vehicle.survey = Some(survey);
         }
         if self.map != MapKnowledge::Known || self.base_tag_std != BaseTagStd::default() {
             let survey = robot.survey().with_knowledge(&self.map, self.base_tag_std);
-            let survey = survey.map_err(|problem| FileIssue::new(&self.file, "site.known_tags", problem))?;
+            let survey =
+                survey.map_err(|problem| FileIssue::new(Code::ValueInvalid, &self.file, "site.known_tags", problem))?;
             robot = robot.with_survey(survey.clone());
             vehicle.survey = Some(survey);
         }
@@ -89,8 +93,9 @@ impl Routine {
 
     fn failed_of(&self, robot: &Robot) -> Result<Vec<FailedJoint>, RoutineError> {
         let of = |(index, entry): (usize, &FailedJointEntry)| {
-            FailedJoint::of_names(&entry.joint, &entry.kind, &robot.joint_names())
-                .map_err(|problem| FileIssue::new(&self.file, format!("failed_joint.{index}"), problem).into())
+            FailedJoint::of_names(&entry.joint, &entry.kind, &robot.joint_names()).map_err(|problem| {
+                FileIssue::new(Code::NameUnknown, &self.file, format!("failed_joint.{index}"), problem).into()
+            })
         };
         self.failed_joints.iter().enumerate().map(of).collect()
     }
@@ -147,7 +152,7 @@ impl Routine {
                 },
                 _ => continue,
             };
-            return Err(FileIssue::new(&self.file, key, problem).into());
+            return Err(FileIssue::new(Code::ValueInvalid, &self.file, key, problem).into());
         }
         Ok(())
     }

@@ -1,5 +1,6 @@
 //! Errors of routines.
 
+use crate::codes::{Code, Coded};
 use crate::robot::{FileIssue, RobotError};
 
 /// Why a routine was refused.
@@ -13,5 +14,12 @@ pub enum RoutineError {
 impl From<FileIssue> for RoutineError {
     fn from(issue: FileIssue) -> Self {
         Self::File(issue.into())
+    }
+}
+
+impl Coded for RoutineError {
+    fn code(&self) -> Code {
+        let Self::File(error) = self;
+        error.code()
     }
 }

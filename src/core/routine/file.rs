@@ -1,5 +1,6 @@
 //! The file of a routine and its checks.
 
+use crate::codes::Code;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
@@ -85,7 +86,7 @@ pub fn load_with(file: &Path, overrides: &Overrides) -> Result<Routine, RoutineE
     raw.capture.check(file, "capture.")?;
     check("task.tolerance_m", raw.task.tolerance_m, 1e-4..=1.0)?;
     if raw.task.targets_m.is_empty() {
-        return Err(FileIssue::new(file, "task.targets_m", "needs one target or more").into());
+        return Err(FileIssue::new(Code::ValueCount, file, "task.targets_m", "needs one target or more").into());
     }
     for (k, target) in raw.task.targets_m.iter().enumerate() {
         for value in target {
@@ -94,7 +95,7 @@ pub fn load_with(file: &Path, overrides: &Overrides) -> Result<Routine, RoutineE
     }
     if raw.name.is_empty() || !raw.name.chars().all(|c| c.is_ascii_alphanumeric() || "-_".contains(c)) {
         let problem = format!("`{}` must be letters, digits, - and _: it names the output folder", raw.name);
-        return Err(FileIssue::new(file, "name", problem).into());
+        return Err(FileIssue::new(Code::ValueInvalid, file, "name", problem).into());
     }
     raw.regress.check(file)?;
     let campaign = raw.campaign.check(file)?;
@@ -103,7 +104,7 @@ pub fn load_with(file: &Path, overrides: &Overrides) -> Result<Routine, RoutineE
     let (map, base_tag_std) = (raw.site.map(file)?, raw.site.base_tag_std(file)?);
     let (scene, scene_file) = SceneFile { site: raw.site, obstacle: raw.obstacle }.check(file)?;
     let scene_toml = toml::to_string(&scene_file)
-        .map_err(|error| FileIssue::new(file, "obstacle", format!("has no TOML form: {error}")))?;
+        .map_err(|error| FileIssue::new(Code::Internal, file, "obstacle", format!("has no TOML form: {error}")))?;
     let script = if raw.step.is_empty() {
         Script { steps: script::standard(raw.capture, &raw.task), faults: Vec::new() }
     } else {

@@ -2,6 +2,7 @@
 //!
 //! An override is put into the routine's table before it is read, so it passes the same checks as the file itself.
 
+use crate::codes::Code;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -118,7 +119,8 @@ impl fmt::Display for Override {
 pub fn effective_table(file: &Path, set: &[Override]) -> Result<Table, RoutineError> {
     let mut table: Table = parse_toml(file, &read_text(file)?)?;
     for one in set {
-        one.apply(&mut table).map_err(|problem| FileIssue::new(file, format!("--set {one}"), problem))?;
+        one.apply(&mut table)
+            .map_err(|problem| FileIssue::new(Code::ValueInvalid, file, format!("--set {one}"), problem))?;
     }
     Ok(table)
 }
@@ -134,7 +136,7 @@ pub(super) fn read_with<T: DeserializeOwned>(file: &Path, set: &[Override]) -> R
         read_alone().err().unwrap_or_else(|| {
             let given: Vec<String> = set.iter().map(|one| format!("--set {one}")).collect();
             let problem = with_nearest(&error.to_string().trim().replace('\n', " "));
-            FileIssue::new(file, given.join(" "), problem).into()
+            FileIssue::new(Code::ValueInvalid, file, given.join(" "), problem).into()
         })
     })
 }

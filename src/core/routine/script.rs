@@ -1,5 +1,6 @@
 //! `[[step]]` tables to checked steps: each by itself, then what no step can do before another one did something.
 
+use crate::codes::Code;
 use std::path::Path;
 
 use serde::Deserialize;
@@ -71,11 +72,11 @@ pub(super) fn read(
             Some(toml::Value::String(name)) => name,
             Some(other) => {
                 let problem = format!("{other} is no text; it is one of {NAMES}");
-                return Err(FileIssue::new(file, format!("{step_name}: do"), problem).into());
+                return Err(FileIssue::new(Code::ValueType, file, format!("{step_name}: do"), problem).into());
             }
             None => {
                 let problem = format!("is missing; it is one of {NAMES}");
-                return Err(FileIssue::new(file, format!("{step_name}: do"), problem).into());
+                return Err(FileIssue::new(Code::KeyMissing, file, format!("{step_name}: do"), problem).into());
             }
         };
         let reader = StepReader { file, key: format!("{step_name} ({name})"), table };
@@ -99,7 +100,7 @@ pub(super) fn read(
             other => {
                 let hint = nearest(other, NAMES.split(", ")).map(|name| format!("; did you mean `{name}`?"));
                 let problem = format!("`{other}` is none of {NAMES}{}", hint.unwrap_or_default());
-                return Err(FileIssue::new(file, format!("{step_name}: do"), problem).into());
+                return Err(FileIssue::new(Code::NameUnknown, file, format!("{step_name}: do"), problem).into());
             }
         };
         script.steps.push(step);
@@ -116,7 +117,7 @@ struct StepReader<'a> {
 
 impl StepReader<'_> {
     fn parse<T: DeserializeOwned>(&self) -> Result<T, FileIssue> {
-        from_table(&self.table).map_err(|problem| FileIssue::new(self.file, &self.key, problem))
+        from_table(&self.table).map_err(|problem| FileIssue::syntax(self.file, &self.key, problem))
     }
 
     fn key(&self, name: &str) -> String {
@@ -144,6 +145,7 @@ impl StepReader<'_> {
                 Ok(Step::Move(MoveGoal::Angles(angles)))
             }
             _ => Err(FileIssue::new(
+                Code::ValueInvalid,
                 self.file,
                 &self.key,
                 "needs either to = \"stowed\" or to_rad = [one angle a joint]",
@@ -168,7 +170,7 @@ impl StepReader<'_> {
         let n = task.targets_m.len();
         let targets = targets.unwrap_or_else(|| (0..n).collect());
         if targets.is_empty() {
-            return Err(FileIssue::new(self.file, self.key("targets"), "needs one number or more"));
+            return Err(FileIssue::new(Code::ValueCount, self.file, self.key("targets"), "needs one number or more"));
         }
         for &target in &targets {
             self.range("targets", target as f64, 0.0..=(n - 1) as f64)?;
@@ -362,7 +364,7 @@ impl StepReader<'_> {
         let length = raw.normal.iter().map(|v| v * v).sum::<f64>().sqrt();
         if !(0.99..=1.01).contains(&length) {
             let problem = format!("has the length {length}; it is a direction out of the surface, of length 1");
-            return Err(FileIssue::new(self.file, self.key("normal"), problem));
+            return Err(FileIssue::new(Code::ValueInvalid, self.file, self.key("normal"), problem));
         }
         Ok(Step::Touch(TouchSettings {
             part: raw.part,
@@ -399,7 +401,12 @@ impl StepReader<'_> {
     fn assert(&self) -> Result<Step, FileIssue> {
         let limits: AssertLimits = self.parse()?;
         if limits.is_empty() {
-            return Err(FileIssue::new(self.file, &self.key, "holds the run against nothing: name one limit or more"));
+            return Err(FileIssue::new(
+                Code::KeyMissing,
+                self.file,
+                &self.key,
+                "holds the run against nothing: name one limit or more",
+            ));
         }
         for (figure, limit) in limits.each() {
             self.range(figure.key(), limit, 0.0..=1e9)?;
@@ -413,7 +420,12 @@ fn check_order(file: &Path, names: StepNames<'_>, steps: &[Step]) -> Result<(), 
     let (mut captures, mut calibrations, mut reaches, mut moved) = (0, 0, 0, false);
     for (index, step) in steps.iter().enumerate() {
         let wrong = |problem: &str| {
-            Err(FileIssue::new(file, format!("{} ({})", names.name(index), step.name()), problem.to_owned()))
+            Err(FileIssue::new(
+                Code::ValueInvalid,
+                file,
+                format!("{} ({})", names.name(index), step.name()),
+                problem.to_owned(),
+            ))
         };
         match step {
             Step::Move(_) | Step::Stops(_) | Step::Touch(_) => moved = true,
@@ -446,7 +458,7 @@ fn check_order(file: &Path, names: StepNames<'_>, steps: &[Step]) -> Result<(), 
         }
     }
     if calibrations == 0 {
-        return Err(FileIssue::new(file, "step", "a script needs a `calibrate` step"));
+        return Err(FileIssue::new(Code::KeyMissing, file, "step", "a script needs a `calibrate` step"));
     }
     Ok(())
 }

@@ -1,5 +1,6 @@
 //! `[site]` of a routine: the seafloor, the tags that are there, and how much of their places is known.
 
+use crate::codes::Code;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -34,7 +35,9 @@ enum MapFile {
 
 impl SiteFile {
     pub(super) fn map(&self, file: &Path) -> Result<MapKnowledge, FileIssue> {
-        let tracking_error = || FileIssue::new(file, "site.known_tags", "goes with map = \"partly\", and that with it");
+        let tracking_error = || {
+            FileIssue::new(Code::KeysConflict, file, "site.known_tags", "goes with map = \"partly\", and that with it")
+        };
         match (self.map.unwrap_or(MapFile::Known), &self.known_tags) {
             (MapFile::Known, None) => Ok(MapKnowledge::Known),
             (MapFile::Unknown, None) => Ok(MapKnowledge::Unknown),

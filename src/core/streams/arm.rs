@@ -2,6 +2,7 @@
 
 use super::late::LateMessages;
 use super::message::Message;
+use crate::codes::{Code, Coded};
 use crate::joints::JointCounts;
 use crate::time::Stamp;
 
@@ -113,5 +114,20 @@ pub trait Arm {
     /// [`ArmError::NoSuchFault`]; always, for a real arm.
     fn fault(&mut self, number: usize) -> Result<(), ArmError> {
         Err(ArmError::NoSuchFault { number, known: 0 })
+    }
+}
+
+impl Coded for ArmError {
+    fn code(&self) -> Code {
+        match self {
+            Self::Sink(_) => Code::FileUnwritable,
+            Self::JointCount { .. } | Self::SetPoint { .. } | Self::Opening { .. } | Self::NoGripper => {
+                Code::SetPointInvalid
+            }
+            Self::NotFinite { .. } => Code::SimulationUnstable,
+            Self::NoSuchFault { .. } => Code::ValueInvalid,
+            Self::Stopped { .. } => Code::ArmStopped,
+            Self::Connection(_) => Code::ArmConnection,
+        }
     }
 }

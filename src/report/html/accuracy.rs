@@ -16,7 +16,7 @@ pub(super) fn section(report: &Report<'_>) -> Markup {
     let score = report.summary.score.as_ref();
     let targets = targets(report);
     markup! {
-        @if score.is_some() || !targets.is_empty() { h2 { "How good the tool is" } }
+        @if score.is_some() || !targets.is_empty() { h2 { "Tool accuracy" } }
         @if let Some(score) = score { (reach_task(score)) }
         div.figures {
             @if !targets.is_empty() { (target_chart(&targets)) }
@@ -30,7 +30,7 @@ fn reach_task(score: &Score) -> Markup {
     markup! {
         div.wide {
             table {
-                tr { th { "reach task, against the truth" } th { "before" } th { "after" } th { "ratio" } }
+                tr { th { "reach task, simulated truth" } th { "before" } th { "after" } th { "ratio" } }
                 @for row in score_rows(&score.before, score.after.as_ref()) {
                     tr { @for cell in row { td { (cell) } } }
                 }
@@ -82,19 +82,19 @@ fn target_chart<'a>(targets: &BTreeMap<usize, Target<'a>>) -> Markup {
     };
     let has_truth = targets.values().any(|target| target.truth.is_some());
     let series = vec![
-        series("before, true", Color::Red, Style::Crosses, points(Target::before_m)),
-        series("after, true", Color::Green, Style::Dots, points(Target::after_m)),
+        series("true, before", Color::Red, Style::Crosses, points(Target::before_m)),
+        series("true, after", Color::Green, Style::Dots, points(Target::after_m)),
         series("predicted", Color::Blue, Style::Line, points(Target::predicted_m)),
         series("predicted, with priors", Color::Grey, Style::Dashes, points(Target::with_priors_m)),
     ];
     let shown = series.into_iter().filter(|series| !series.points.is_empty()).collect();
     let chart = Panel {
-        x: ("number of the target".to_owned(), Axis::Whole),
+        x: ("target number".to_owned(), Axis::Whole),
         y: ("tool error, mm".to_owned(), Axis::Log),
         ..panel("Tool error at each target", "", "", shown)
     };
-    let of_truth = if has_truth { " True errors are the simulator's." } else { "" };
-    figure(&chart, &format!("Predicted: one sigma in space.{of_truth}"))
+    let of_truth = if has_truth { " True errors come from the simulator." } else { "" };
+    figure(&chart, &format!("Predicted: one sigma of the position.{of_truth}"))
 }
 
 fn target_table(targets: &BTreeMap<usize, Target<'_>>) -> Markup {
@@ -105,7 +105,7 @@ fn target_table(targets: &BTreeMap<usize, Target<'_>>) -> Markup {
             table {
                 tr {
                     th { "target" }
-                    @if has_truth { th { "before, true" } th { "after, true" } }
+                    @if has_truth { th { "true, before" } th { "true, after" } }
                     th { "predicted" } th { "with priors" }
                 }
                 @for (number, target) in targets {
@@ -141,5 +141,5 @@ fn growth(report: &Report<'_>) -> Markup {
         y: ("tool error, mm".to_owned(), Axis::Log),
         ..panel("Tool error by number of views", "", "", shown)
     };
-    figure(&chart, "What was predicted while views were captured.")
+    figure(&chart, "Predictions made while views were captured.")
 }

@@ -31,16 +31,16 @@ pub(super) fn section(report: &Report<'_>) -> Markup {
     let side: Projection = Box::new(move |p| [p.x * azimuth.cos() + p.y * azimuth.sin(), p.z]);
     let above: Projection = Box::new(|p| [p.x, p.y]);
     markup! {
-        h2 { "The arm before and after" }
+        h2 { "Arm before and after calibration" }
         div.figures {
             (picture("From the side", report.robot, most, &postures, &side))
             (picture("From above", report.robot, most, &postures, &above))
         }
         p { small {
-            "The same sensor readings, by the datasheet (grey, broken) and as calibrated (blue), where the two "
+            "The same sensor readings with datasheet (grey, dashed) and calibrated sensors (blue), in the view where both "
             "differ most: "
             (format!("{:.0} mm", 1e3 * most.off_m())) " at the tool. Dots: the tool at each " (at)
-            ", joined to where the datasheet had it."
+            ", with a line to its position by the datasheet."
         } }
     }
 }

@@ -19,9 +19,9 @@ pub(super) fn section(calibration: &Calibration) -> Markup {
 
 fn findings(findings: &[Finding]) -> Markup {
     markup! {
-        h2 { "Found to be other than stated" }
+        h2 { "Findings" }
         table.notes {
-            tr { th { "what" } th { "which" } th { "how much" } th { "at the tool" } th { "repaired" } }
+            tr { th { "finding" } th { "name" } th { "size" } th { "tool error" } th { "repaired" } }
             @for finding in findings {
                 tr {
                     td { (finding.kind.words()) }
@@ -69,7 +69,7 @@ fn camera_mount(mount: &CameraMount) -> Markup {
     let rows = place_rows(mount.position_m, mount.position_std_m, mount.rotation_std_rad);
     markup! {
         table.notes {
-            @if let Some(why) = &mount.left_out { tr { th { "by the drawing" } td { (why) } } }
+            @if let Some(why) = &mount.left_out { tr { th { "nominal" } td { (why) } } }
             @for (what, value) in rows { tr { th scope="row" { "camera, " (what) } td { (value) } } }
         }
     }
@@ -80,7 +80,7 @@ fn links(links: &[LinkResult]) -> Markup {
         div.wide {
             table {
                 tr {
-                    th { "place of" } th { "shift, mm" } th { "1 sigma, mm" } th { "turn, deg" } th { "1 sigma, deg" }
+                    th { "link" } th { "shift, mm" } th { "1 sigma, mm" } th { "turn, deg" } th { "1 sigma, deg" }
                 }
                 @for link in links {
                     tr {
@@ -99,7 +99,7 @@ fn bending(sag: &SagTable) -> Markup {
     let scale = 1e3 * 1f64.to_degrees();
     markup! {
         table {
-            tr { th { "bends under weight" } th { "deg per kN m" } th { "1 sigma" } }
+            tr { th { "compliance" } th { "deg per kN m" } th { "1 sigma" } }
             @for joint in &sag.joint {
                 tr {
                     td { (joint.joint) } td { (format!("{:.3}", joint.rad_per_nm * scale)) }
@@ -114,16 +114,16 @@ fn model_lines(model: &ModelTable) -> Markup {
     markup! {
         table.notes {
             tr {
-                th scope="row" { "corner noise over what robot.toml states" }
+                th scope="row" { "corner noise over the stated noise" }
                 td { (format!("{:.2}", model.noise_scale)) }
             }
             @if let Some([offset_s, std_s]) = model.time_offset_s {
                 tr {
-                    th scope="row" { "joint sensors' clock behind the camera's" }
+                    th scope="row" { "delay of the joint sensors' clock against the camera's" }
                     td { (format!("{:.1} ms, one sigma {:.1} ms", 1e3 * offset_s, 1e3 * std_s)) }
                 }
             }
-            @for line in &model.decided { tr { th scope="row" { "decided by evidence" } td { (line) } } }
+            @for line in &model.decided { tr { th scope="row" { "chosen by evidence" } td { (line) } } }
         }
     }
 }

@@ -24,7 +24,7 @@ pub(super) fn section(report: &Report<'_>) -> Markup {
                 }
             }
             p { small {
-                "Line: calibrated less datasheet angle, over the joint's range. Band: two sigma. "
+                "Line: calibrated minus datasheet angle over the joint's range. Band: two sigma. "
                 "Ticks: readings at which views were captured."
             } }
         }
@@ -44,7 +44,7 @@ fn table(calibration: &Calibration) -> Markup {
                 tr {
                     th { "joint" } th { "gain, " (si) "/count" } th { "1 sigma, %" } th { "offset, " (shown) }
                     th { "1 sigma, " (shown) }
-                    th { "covered, " (shown) } th { "change, %" }
+                    th { "covered range, " (shown) } th { "gain change, %" }
                 }
                 @for joint in &calibration.joint {
                     tr {

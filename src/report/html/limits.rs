@@ -28,7 +28,7 @@ fn unobservable(calibration: &Calibration) -> Markup {
     let not_covered = calibration.verdict.iter().flat_map(|verdict| &verdict.not_covered);
     markup! {
         table.notes {
-            @for line in &calibration.unobservable { tr { th scope="row" { "not observable" } td { (line) } } }
+            @for line in &calibration.unobservable { tr { th scope="row" { "unobservable" } td { (line) } } }
             @for line in not_covered { tr { th scope="row" { "not covered" } td { (line) } } }
             @for line in warnings { tr { th scope="row" { "warning" } td { (line) } } }
         }
@@ -37,7 +37,7 @@ fn unobservable(calibration: &Calibration) -> Markup {
 
 fn reservations(reservations: &[Reservation]) -> Markup {
     markup! {
-        h3 { "What rests on the drawing alone" }
+        h3 { "Unobservable parameters" }
         table.notes { @for one in reservations { tr { td { (one.to_string()) } } } }
     }
 }
@@ -70,11 +70,11 @@ fn sensitivity(report: &Report<'_>) -> Markup {
     }
     markup! {
         @let has_slide = report.robot.first_slide().is_some();
-        h3 { "What one degree " @if has_slide { "or millimetre " } "costs" }
+        h3 { "Tool motion per degree " @if has_slide { "or millimetre " } "of joint error" }
         table {
             tr {
                 th { "joint" }
-                th { "tool moves, mm per degree" @if has_slide { " or mm" } " (rms over the " (over) ")" }
+                th { "tool motion, mm per degree" @if has_slide { " or mm" } " (rms over the " (over) ")" }
             }
             @for (joint, m) in report.robot.joint_names().iter().zip(tool_per_degree_m(report.robot, &at)) {
                 tr { td { (joint) } td { (format!("{:.1}", 1e3 * m)) } }
@@ -88,9 +88,9 @@ fn left_out(report: &Report<'_>) -> Markup {
     let beyond = calibration.outliers.len().saturating_sub(MOST_LISTED);
     let line = |what: &str, text: &str| markup! { tr { th scope="row" { (what) } td { (text) } } };
     let skipped = format!("{} of {}", capture.poses_skipped, capture.poses + capture.poses_skipped);
-    let rejected = format!("{} beside {} used", capture.rejected, capture.detections);
+    let rejected = format!("{} rejected, {} used", capture.rejected, capture.detections);
     markup! {
-        h3 { "What was left out" }
+        h3 { "Rejected data" }
         table.notes {
             (line("poses skipped", &skipped))
             @for skipped in &capture.skipped_targets { (line("target skipped", &skipped.to_string())) }
@@ -112,7 +112,7 @@ fn checks(verdict: &VerdictTable) -> Markup {
         }
     };
     markup! {
-        h3 { "Every test behind the verdict" }
+        h3 { "Checks of the verdict" }
         div.wide {
             table {
                 tr { th { "test" } th { "value" } th { "limit" } th { "result" } }

@@ -20,7 +20,7 @@ pub(super) fn section(report: &Report<'_>) -> Markup {
         return Markup::default();
     }
     markup! {
-        h2 { "What the fit leaves" }
+        h2 { "Residuals" }
         div.figures {
             (over_time(views))
             (over_image(views))
@@ -72,8 +72,8 @@ fn by_tag(views: &[ViewResidual]) -> Markup {
         div.wide {
             table {
                 tr {
-                    th { "tag" } th { "views" } th { "rejected" } th { "place off, mm rms" }
-                    @if has_corners { th { "corners off, px rms" } th { "mean x, px" } th { "mean y, px" } }
+                    th { "tag" } th { "views" } th { "rejected" } th { "position, mm rms" }
+                    @if has_corners { th { "corners, px rms" } th { "mean x, px" } th { "mean y, px" } }
                 }
                 @for (id, sum) in &sums {
                     tr.out[sum.rejected > sum.views] {
@@ -101,7 +101,7 @@ fn by_joint(views: &[ViewResidual], sensors: &[JointSensorSpec]) -> Markup {
         h3 { "By joint" }
         table {
             @let shown = units(sensors);
-            tr { th { "joint" } th { "off its calibrated sensor, " (shown) " rms" } th { "worst, " (shown) } }
+            tr { th { "joint" } th { "residual, " (shown) " rms" } th { "largest, " (shown) } }
             @for (joint, spec) in sensors.iter().enumerate() {
                 // What no view shows is never off.
                 @let is_off = worst(joint) > 0.0;
@@ -136,9 +136,9 @@ fn over_time(views: &[ViewResidual]) -> Markup {
     // What was rejected would hide the rest: it stands at the upper edge.
     let top = used.iter().map(|p: &[f64; 2]| p[1]).fold(0.0, f64::max) * 1.1;
     rejected.iter_mut().for_each(|p| p[1] = p[1].min(top));
-    let y = if has_corners { "corners off, px rms" } else { "place off, mm" };
+    let y = if has_corners { "corner residual, px rms" } else { "position residual, mm" };
     let shown = with_rejected(series("used", Color::Blue, Style::Dots, used), rejected);
-    figure(&panel("Each tag in each view, over time", "since the first view, s", y, shown), "")
+    figure(&panel("Residual of each tag in each view over time", "time since the first view, s", y, shown), "")
 }
 
 fn all_corners_px(tag: &ObservedTag) -> Option<f64> {
@@ -172,8 +172,8 @@ fn over_image(views: &[ViewResidual]) -> Markup {
     }
     let shown = with_rejected(series("", Color::Blue, Style::Strokes, strokes), rejected);
     let y = ("y, px".to_owned(), Axis::Downward);
-    let chart = Panel { is_map: true, y, ..panel("Corners over the image", "x, px", "", shown) };
-    figure(&chart, "Strokes: from where a corner was seen to where it is predicted, 40 times as long as it is.")
+    let chart = Panel { is_map: true, y, ..panel("Corner residuals over the image", "x, px", "", shown) };
+    figure(&chart, "Strokes lead from the measured to the predicted corner, 40 times enlarged.")
 }
 
 /// How far each joint was off its calibrated sensor.
@@ -189,6 +189,9 @@ fn joint_errors(views: &[ViewResidual], sensors: &[JointSensorSpec]) -> Markup {
     if shown.is_empty() {
         return Markup::default();
     }
-    let y = format!("off, {}", units(sensors));
-    figure(&panel("Each joint against its calibrated sensor", "since the first view, s", &y, shown), "")
+    let y = format!("residual, {}", units(sensors));
+    figure(
+        &panel("Residual of each joint against its calibrated sensor", "time since the first view, s", &y, shown),
+        "",
+    )
 }

@@ -17,7 +17,7 @@ pub(super) fn section(report: &Report<'_>) -> Markup {
             strong { (verdict.headline) }
             p { (in_one_sentence(report)) }
             @if !verdict.reasons.is_empty() { ul { @for reason in &verdict.reasons { li { (reason) } } } }
-            p { b { "What to do next" } }
+            p { b { "Next steps" } }
             ul { @for step in &verdict.next { li { (step) } } }
         }
         (facts(report))
@@ -31,29 +31,25 @@ fn in_one_sentence(report: &Report<'_>) -> String {
     let mut words = match (calibration.predicted_tool_error_with_priors_m, calibration.predicted_tool_error_m) {
         (Some(all), _) => {
             format!(
-                "The tool is expected within {} of where it is believed (median of its targets; worst {}).",
+                "Predicted tool error, one sigma with unobservable parameters included: {} median of the targets, {} worst.",
                 mm(all.median),
                 mm(all.max)
             )
         }
         (None, Some(data)) => format!(
-            "The tool is expected within {} of where it is believed (median; worst {}).",
+            "Predicted tool error, one sigma: {} median of the targets, {} worst.",
             mm(data.median),
             mm(data.max)
         ),
         (None, None) => format!(
-            "No task was named, so no tool error is predicted. Views that were held out see the tags {} off (rms).",
+            "No task was given, so no tool error is predicted. Tag position error of held-out views: {} rms.",
             Unit::Metres.shown_if(calibration.held_out.rms_m, 1)
         ),
     };
     let truth = report.summary.score.as_ref();
     let measured = truth.and_then(|score| Some((score.before.tool_error_m?, score.after.as_ref()?.tool_error_m?)));
     if let Some((before, after)) = measured {
-        words += &format!(
-            " Against the simulator's truth: {} before, {} after (medians).",
-            mm(before.median),
-            mm(after.median)
-        );
+        words += &format!(" Simulated truth: {} before, {} after (medians).", mm(before.median), mm(after.median));
     }
     words
 }
@@ -84,7 +80,7 @@ fn facts(report: &Report<'_>) -> Markup {
         ("program", Some(format!("armcal {}", env!("CARGO_PKG_VERSION")))),
     ];
     markup! {
-        h2 { "What this is of" }
+        h2 { "Details" }
         table.notes {
             @for (what, value) in rows.iter().filter_map(|(what, value)| Some((what, value.as_ref()?))) {
                 tr { th scope="row" { (what) } td { code { (value) } } }
@@ -113,7 +109,7 @@ fn depth(valid: &ValidRange) -> Option<String> {
 /// The lines of the terminal's table, all of them.
 pub(super) fn all_lines(summary: &RunSummary) -> Markup {
     markup! {
-        h2 { "How it went" }
+        h2 { "Course of the run" }
         table.notes {
             @for (label, text) in check_lines(summary).iter().map(|line| labelled(line)) {
                 tr { th scope="row" { (label) } td { (text) } }

@@ -116,7 +116,7 @@ pub fn inspect(path: &Path, robot: Option<&Robot>) -> Result<Inspection, LogErro
     }
     if topics.iter().any(|t| t.topic == log_topics::SCENE) {
         // Every ROS arm has a topic of that name, too; it is armcal's own beside another one of its own.
-        let known_as = Some("arm as believed, for viewers");
+        let known_as = Some("estimated arm, for viewers");
         topics.iter_mut().filter(|t| t.topic == log_topics::TF).for_each(|t| t.known_as = known_as);
     }
     let mut inspection = Inspection {
@@ -192,31 +192,29 @@ fn hints(inspection: &Inspection) -> Vec<String> {
     let mut hint = |text: &str| hints.push(text.to_owned());
     let arm = &inspection.arm;
     if inspection.messages == 0 {
-        hint("no message can be read");
+        hint("no message is readable");
         return hints;
     }
     if inspection.topics.iter().any(|topic| topic.topic.starts_with("/truth/")) {
-        hint("this is the truth of a simulation; what can be calibrated is the run.mcap beside it");
+        hint("this is the truth of a simulation; calibrate the run.mcap in the same folder");
         return hints;
     }
     match inspection.completeness.state {
         State::Whole => {}
-        State::Cut => hint("cut: all commands use what could be read; views captured before the cut are good"),
-        State::Damaged => hint("damaged: all commands use what could be read; damaged chunks are left out"),
+        State::Cut => hint("cut: all commands use the readable part; views captured before the cut are valid"),
+        State::Damaged => hint("damaged: all commands use the readable chunks"),
     }
     if inspection.topics.iter().any(|topic| topic.encoding == "ros1") {
-        hint(
-            "ROS 1 messages are not decoded by armcal: convert the recording to ROS 2 (for example `rosbags-convert`)",
-        );
+        hint("armcal does not decode ROS 1 messages: convert the recording to ROS 2 (for example `rosbags-convert`)");
     }
     if arm.joint_readings == 0 {
-        hint("no joint readings on /joint_sensors, where `armcal calibrate` looks for raw counts");
+        hint("no joint readings on /joint_sensors, the topic of raw counts for `armcal calibrate`");
     }
     if arm.detection_frames == 0 {
-        hint("no tag detections on /camera/wrist/detections, where `armcal calibrate` looks for them");
+        hint("no tag detections on /camera/wrist/detections, the topic that `armcal calibrate` reads");
     }
     if arm.views_fit == 0 {
-        hint("no captured views (marks `capture_fit` on /marks): nothing says when the arm stood still for a view");
+        hint("no captured views: no mark `capture_fit` on /marks says when the arm rested for a view");
     }
     for topic in &inspection.topics {
         if let Some(what) = topic.may_be.as_deref().filter(|_| topic.known_as.is_none()) {

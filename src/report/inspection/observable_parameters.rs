@@ -95,7 +95,7 @@ fn missing(determined: &ObservableParameters) -> Vec<String> {
     let views = determined.views + determined.held_out_views;
     if views < wanted {
         let of = if views == 0 { String::new() } else { format!(" for {parameters} parameters") };
-        missing.push(format!("views: {views} captured ones show a surveyed tag, at least {wanted} are needed{of}"));
+        missing.push(format!("views: {views} captured views show a surveyed tag, at least {wanted} are needed{of}"));
     }
     if determined.views > 0 && parameters == 0 {
         missing.push("a sensor that the views determine".to_owned());

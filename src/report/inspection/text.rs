@@ -80,10 +80,10 @@ fn head(inspection: &Inspection) -> Vec<String> {
         lines.push(format!("order        log time goes backwards {} times", i.non_monotonic));
     }
     if i.chunks_moved > 0 {
-        lines.push(format!("order        {} chunks are not in the order of time; they were sorted", i.chunks_moved));
+        lines.push(format!("order        {} chunks are out of order; they were sorted", i.chunks_moved));
     }
     if i.chunk_copies > 0 {
-        lines.push(format!("copies       {} chunks are exact copies of others; they were left out", i.chunk_copies));
+        lines.push(format!("copies       {} chunks are exact copies; they were skipped", i.chunk_copies));
     }
     for a in &i.attachments {
         lines.push(format!("attachment   {} ({}), {}", a.name, a.media_type, size(a.bytes)));
@@ -103,7 +103,7 @@ fn topic_lines(inspection: &Inspection, width: usize) -> Vec<String> {
         return whole;
     }
     let mut narrow = topic_table(inspection, &[0, 3, 4, 7]);
-    narrow.push("note         types and times of the topics: with --json, or in a wider terminal".to_owned());
+    narrow.push("note         --json or a wider terminal shows types and times of the topics".to_owned());
     narrow
 }
 
@@ -151,7 +151,7 @@ fn arm_lines(inspection: &Inspection) -> Vec<String> {
     lines.push(format!("tags         {tags} in {frames} frames"));
     if !arm.detections_rejected.is_empty() {
         let reasons = arm.detections_rejected.iter().map(|(why, n)| format!("{} ({n})", why.replace('_', " ")));
-        lines.push(format!("not believed {}; reason (candidates)", reasons.collect::<Vec<_>>().join(", ")));
+        lines.push(format!("rejected     {}; reason (candidates)", reasons.collect::<Vec<_>>().join(", ")));
     }
     if let Some(task) = &arm.task {
         let (n, mm) = (task.targets_m.len(), task.tolerance_m * 1e3);
@@ -166,7 +166,7 @@ fn arm_lines(inspection: &Inspection) -> Vec<String> {
     if let Some([low, high]) = arm.pressure_pa {
         let depth = |pa: f64| (pa - SURFACE_PA) / PA_PER_M;
         lines.push(format!(
-            "pressure     {low:.0} to {high:.0} Pa, some {:.0} to {:.0} m of sea",
+            "pressure     {low:.0} to {high:.0} Pa, about {:.0} to {:.0} m of sea",
             depth(low),
             depth(high)
         ));
@@ -176,12 +176,12 @@ fn arm_lines(inspection: &Inspection) -> Vec<String> {
 
 fn determined_lines(d: &ObservableParameters) -> Vec<String> {
     let mut lines = vec![format!(
-        "robot        {}: {} views and {} held-out ones show its tags, {} tags to fit",
+        "robot        {}: {} views and {} held-out views show its tags, {} tags to fit",
         d.robot, d.views, d.held_out_views, d.tags_used
     )];
     if !d.unknown_tags.is_empty() {
         let ids: Vec<String> = d.unknown_tags.iter().map(u32::to_string).collect();
-        lines.push(format!("unknown      tags that its survey lacks: {}", ids.join(", ")));
+        lines.push(format!("unknown      tags outside its survey: {}", ids.join(", ")));
     }
     if !d.parameters.is_empty() {
         lines.push(format!("determined   {}", d.parameters.join(", ")));
@@ -189,7 +189,7 @@ fn determined_lines(d: &ObservableParameters) -> Vec<String> {
     lines.extend(d.undetermined.iter().map(|line| format!("undetermined {line}")));
     lines.extend(d.missing.iter().map(|line| format!("missing      {line}")));
     if d.missing.is_empty() {
-        lines.push("enough       views for a calibration and a verdict".to_owned());
+        lines.push("enough       the views suffice for a calibration and its verdict".to_owned());
     }
     lines
 }

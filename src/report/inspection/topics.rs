@@ -157,7 +157,7 @@ impl Seen {
             }
             "CameraInfo" | "CameraCalibration" => "a camera's lens".to_owned(),
             "Image" | "CompressedImage" | "RawImage" | "CompressedVideo" => {
-                "images; `calibrate --input` looks for tags in png, jpeg and 8-bit ones".to_owned()
+                "images; `calibrate --input` searches png, jpeg and 8-bit images for tags".to_owned()
             }
             _ => return None,
         })
@@ -171,7 +171,7 @@ impl Seen {
         };
         // No joint of an arm turns more than two turns either way.
         let unit = if self.largest > 4.0 * std::f64::consts::PI { "raw counts or degrees" } else { "radians" };
-        format!("joint sensors: {joints}; the values look like {unit}, the largest is {:.4}", self.largest)
+        format!("joint sensors: {joints}; values look like {unit}, largest {:.4}", self.largest)
     }
 }
 
@@ -189,18 +189,18 @@ fn known_as(topic: &str, schema: &str) -> Option<&'static str> {
         return (plain(stream.schema().name) == plain(schema)).then_some(match stream {
             Stream::JointSensors => "joint readings, counts",
             Stream::JointCommands => "set-points, counts",
-            Stream::JointStates => "believed angles",
+            Stream::JointStates => "estimated angles",
             Stream::Detections => "tag detections",
-            Stream::Rejects => "what was not taken for a tag",
+            Stream::Rejects => "rejected candidates of tags",
             Stream::Images => "camera images",
             Stream::OilTemperature => "oil temperature",
             Stream::WaterTemperature => "water temperature",
             Stream::DepthPressure => "depth",
-            Stream::VehicleImu => "vehicle's attitude",
+            Stream::VehicleImu => "vehicle attitude",
             Stream::GripperState => "gap between the jaws",
-            Stream::GripperCommand => "gap told to the jaws",
+            Stream::GripperCommand => "commanded gap between the jaws",
             Stream::Task => "reach task",
-            Stream::TagSurvey => "where the tags are",
+            Stream::TagSurvey => "tag survey",
             Stream::Touch => "touches of surveyed surfaces",
             Stream::Marks => "marks of views and phases",
             Stream::Log => "log",
@@ -209,7 +209,7 @@ fn known_as(topic: &str, schema: &str) -> Option<&'static str> {
     match topic {
         topics::ROBOT_DESCRIPTION => Some("URDF, for viewers"),
         topics::CAMERA_INFO => Some("lens, for viewers"),
-        topics::TF_STATIC => Some("frames that stay, for viewers"),
+        topics::TF_STATIC => Some("static frames, for viewers"),
         topics::SCENE => Some("tags and targets, for viewers"),
         topics::IMAGE_MARKS => Some("tags in images, for viewers"),
         _ => None,

@@ -1,5 +1,6 @@
 //! Reader of fault tables: `[[world.fault]]` and the `fault` steps of a script.
 
+use armcal_core::codes::Code;
 use std::path::Path;
 
 use crate::fault::kinds::ScheduledFault;
@@ -17,7 +18,14 @@ pub(crate) fn read_list(table: &toml::Table, file: &Path) -> Result<Vec<Schedule
     let entries = match table.get("fault") {
         None => return Ok(Vec::new()),
         Some(toml::Value::Array(entries)) => entries,
-        Some(_) => return Err(FileIssue::new(file, "world.fault", "must be a list of tables: [[world.fault]]")),
+        Some(_) => {
+            return Err(FileIssue::new(
+                Code::ValueType,
+                file,
+                "world.fault",
+                "must be a list of tables: [[world.fault]]",
+            ));
+        }
     };
     let read = |(index, entry): (usize, &toml::Value)| read_one(entry.clone(), file, &list_key(index));
     entries.iter().enumerate().map(read).collect()
@@ -33,6 +41,6 @@ pub(crate) fn read_one<T: serde::de::DeserializeOwned>(
     key: &str,
 ) -> Result<T, FileIssue> {
     entry.try_into().map_err(|error: toml::de::Error| {
-        FileIssue::new(file, key, format!("{}; kinds: {KINDS}", toml_problem(&error)))
+        FileIssue::syntax(file, key, format!("{}; kinds: {KINDS}", toml_problem(&error)))
     })
 }

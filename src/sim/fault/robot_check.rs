@@ -1,6 +1,7 @@
 //! Check of a fault against the routine's robot: names, ids and allowed ranges.
 
 use crate::fault::kinds::Fault;
+use armcal_core::codes::Code;
 use armcal_core::robot::{FileIssue, Robot, SensorKind};
 use armcal_core::routine::Routine;
 
@@ -32,7 +33,7 @@ impl RobotCheck<'_> {
                 let sensor = self.robot.sensors.iter().find(|sensor| sensor.joint == *joint);
                 if sensor.is_some_and(|sensor| sensor.kind != SensorKind::Potentiometer) {
                     let problem = format!("`{joint}` has no potentiometer, and so no wiper that loses contact");
-                    return Err(FileIssue::new(&self.routine.file, key, problem));
+                    return Err(FileIssue::new(Code::ValueInvalid, &self.routine.file, key, problem));
                 }
                 self.check_range(key, "dropout_per_s", *dropout_per_s, 0.0..=100.0)
             }
@@ -54,7 +55,7 @@ impl RobotCheck<'_> {
                 self.check_tag(key, *id)?;
                 if id == as_id {
                     let problem = format!("as_id: {as_id} is the tag's own id, which is no misreading");
-                    return Err(FileIssue::new(&self.routine.file, key, problem));
+                    return Err(FileIssue::new(Code::ValueInvalid, &self.routine.file, key, problem));
                 }
                 // The recording's ids are signed words of 32 bits.
                 self.check_range(key, "as_id", f64::from(*as_id), 0.0..=f64::from(i32::MAX))
@@ -101,7 +102,7 @@ impl RobotCheck<'_> {
         if known.iter().any(|other| other == name) {
             return Ok(());
         }
-        Err(FileIssue::new(&self.routine.file, key, format!("{what} `{name}` is none of {known:?}")))
+        Err(FileIssue::new(Code::NameUnknown, &self.routine.file, key, format!("{what} `{name}` is none of {known:?}")))
     }
 
     fn check_tag(&self, key: &str, id: u32) -> Result<(), FileIssue> {
@@ -109,6 +110,6 @@ impl RobotCheck<'_> {
             return Ok(());
         }
         let ids: Vec<u32> = self.robot.tags.iter().map(|tag| tag.id).collect();
-        Err(FileIssue::new(&self.routine.file, key, format!("tag {id} is none of {ids:?}")))
+        Err(FileIssue::new(Code::NameUnknown, &self.routine.file, key, format!("tag {id} is none of {ids:?}")))
     }
 }

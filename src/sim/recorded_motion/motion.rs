@@ -1,5 +1,6 @@
 //! A recorded motion: interpolation and checks.
 
+use armcal_core::codes::Code;
 use std::path::Path;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -146,7 +147,12 @@ impl RecordedMotion {
                 None => Ok(()),
                 Some((row, worst)) => {
                     let problem = format!("a jump: it would take {worst:.3} {unit}; allowed is 0 .. {limit} {unit}");
-                    Err(FileIssue::new(file, format!("line {}, {columns}", samples[row].line), problem))
+                    Err(FileIssue::new(
+                        Code::TableInvalid,
+                        file,
+                        format!("line {}, {columns}", samples[row].line),
+                        problem,
+                    ))
                 }
             }
         };
@@ -163,11 +169,21 @@ fn check_times(file: &Path, samples: &[Sample]) -> Result<(), FileIssue> {
         let step_s = pair[1].time_s - pair[0].time_s;
         if step_s <= 0.0 {
             let problem = format!("{} s does not come after {} s; times must rise", pair[1].time_s, pair[0].time_s);
-            return Err(FileIssue::new(file, format!("line {}, column time_s", pair[1].line), problem));
+            return Err(FileIssue::new(
+                Code::TableInvalid,
+                file,
+                format!("line {}, column time_s", pair[1].line),
+                problem,
+            ));
         }
         if step_s > MAX_GAP_S {
             let problem = format!("a gap of {step_s:.3} s since the line before; at most {MAX_GAP_S} s are allowed");
-            return Err(FileIssue::new(file, format!("line {}, column time_s", pair[1].line), problem));
+            return Err(FileIssue::new(
+                Code::TableInvalid,
+                file,
+                format!("line {}, column time_s", pair[1].line),
+                problem,
+            ));
         }
     }
     Ok(())
@@ -187,7 +203,7 @@ fn continuous(file: &Path, header: &Header, samples: &[Sample]) -> Result<Vec<Va
             let key = format!("line {}, {}", sample.line, header.attitude_columns());
             let problem =
                 format!("turns by {turn_rad:.3} rad since the line before; allowed is 0 .. {MAX_TURN_RAD} rad");
-            return Err(FileIssue::new(file, key, problem));
+            return Err(FileIssue::new(Code::TableInvalid, file, key, problem));
         }
         let p = sample.position_m;
         values.push([p[0], p[1], p[2], q.w, q.i, q.j, q.k]);

@@ -1,5 +1,6 @@
 //! The CSV of a recorded motion: columns and figures, each checked by itself.
 
+use armcal_core::codes::Code;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
@@ -44,7 +45,7 @@ impl Header {
                 BY_ANGLES.join(","),
                 BY_QUATERNION.join(",")
             );
-            FileIssue::new(file, "first line", problem)
+            FileIssue::new(Code::TableInvalid, file, "first line", problem)
         })
     }
 
@@ -71,7 +72,8 @@ pub(super) fn parse(file: &Path, text: &str) -> Result<(Header, Vec<Sample>), Fi
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut reader =
         csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).flexible(true).from_reader(text.as_bytes());
-    let unreadable = |error: csv::Error| FileIssue::new(file, "table", format!("is no CSV: {error}"));
+    let unreadable =
+        |error: csv::Error| FileIssue::new(Code::TableInvalid, file, "table", format!("is no CSV: {error}"));
     let header = Header::of(file, &reader.headers().map_err(unreadable)?.iter().collect::<Vec<_>>())?;
     let mut samples = Vec::new();
     for record in reader.records() {
@@ -79,7 +81,7 @@ pub(super) fn parse(file: &Path, text: &str) -> Result<(Header, Vec<Sample>), Fi
     }
     if samples.len() < MIN_ROWS {
         let problem = format!("has {} samples; a motion needs {MIN_ROWS} or more", samples.len());
-        return Err(FileIssue::new(file, "table", problem));
+        return Err(FileIssue::new(Code::TableInvalid, file, "table", problem));
     }
     Ok((header, samples))
 }
@@ -89,7 +91,7 @@ fn sample(file: &Path, header: &Header, record: &csv::StringRecord) -> Result<Sa
     let n = header.names.len();
     if record.len() != n {
         let problem = format!("has {} columns; the first line has {n}", record.len());
-        return Err(FileIssue::new(file, format!("line {line}"), problem));
+        return Err(FileIssue::new(Code::TableInvalid, file, format!("line {line}"), problem));
     }
     let mut figures = [0.0; BY_QUATERNION.len()];
     for (column, (figure, text)) in figures.iter_mut().zip(record).enumerate() {
@@ -97,7 +99,7 @@ fn sample(file: &Path, header: &Header, record: &csv::StringRecord) -> Result<Sa
         let range = header.range(column);
         *figure = text.parse().map_err(|_| {
             let problem = format!("`{text}` is no number; allowed is {} .. {}", range.start(), range.end());
-            FileIssue::new(file, &key, problem)
+            FileIssue::new(Code::TableInvalid, file, &key, problem)
         })?;
         FileIssue::check_range(file, &key, *figure, range)?;
     }

@@ -1,5 +1,6 @@
 //! `[world.joint_sensors]`.
 
+use armcal_core::codes::Code;
 use std::num::NonZeroU8;
 use std::ops::RangeInclusive;
 use std::path::Path;
@@ -103,7 +104,7 @@ impl JointSensorsSpec {
         let (peak, width) = (self.worn_spot_peak_rad, self.worn_spot_width_rad);
         if peak > width {
             let problem = format!("{peak} is above worn_spot_width_rad, {width}");
-            return Err(FileIssue::new(file, "world.joint_sensors.worn_spot_peak_rad", problem));
+            return Err(FileIssue::new(Code::ValueOutOfRange, file, "world.joint_sensors.worn_spot_peak_rad", problem));
         }
         Ok(())
     }

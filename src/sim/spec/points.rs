@@ -1,5 +1,6 @@
 //! Short lists of figures, and the lines through them.
 
+use armcal_core::codes::Code;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
@@ -78,12 +79,17 @@ impl Polyline<'_> {
         let check = |value: &f64| FileIssue::check_range(file, value_key, *value, value_range.clone()).map(drop);
         values.iter().try_for_each(check)?;
         if let Some(pair) = at.windows(2).find(|pair| pair[0] >= pair[1]) {
-            return Err(FileIssue::new(file, at_key, format!("{} does not come before {}", pair[0], pair[1])));
+            return Err(FileIssue::new(
+                Code::ValueInvalid,
+                file,
+                at_key,
+                format!("{} does not come before {}", pair[0], pair[1]),
+            ));
         }
         if at.len() != values.len() {
             let name = at_key.rsplit('.').next().unwrap_or(at_key);
             let problem = format!("has {} figures for {} of {name}", values.len(), at.len());
-            return Err(FileIssue::new(file, value_key, problem));
+            return Err(FileIssue::new(Code::ValueCount, file, value_key, problem));
         }
         Ok(())
     }

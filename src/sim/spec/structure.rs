@@ -1,5 +1,6 @@
 //! `[world.structure]`.
 
+use armcal_core::codes::Code;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -97,7 +98,12 @@ impl CheckedTable for StructureSpec {
             check(&format!("bearing_play_rad.{joint}"), *play, 0.0..=0.1)?;
             if *play > 0.0 && self.joint_compliance(joint) == 0.0 {
                 let problem = "needs joint_compliance_rad_per_nm of that joint: what lies beyond the play gives, too";
-                return Err(FileIssue::new(file, format!("{table}.bearing_play_rad.{joint}"), problem));
+                return Err(FileIssue::new(
+                    Code::KeyMissing,
+                    file,
+                    format!("{table}.bearing_play_rad.{joint}"),
+                    problem,
+                ));
             }
         }
         vector("mount_compliance_rad_per_nm", &self.mount_compliance_rad_per_nm, 0.0..=1e-2)?;

@@ -1,5 +1,6 @@
 //! The whole `[world]`: its sub-tables, and the checks that concern more than one of them.
 
+use armcal_core::codes::Code;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
@@ -98,7 +99,7 @@ impl WorldSpec {
         ];
         if let Some(key) = table.keys().find(|key| !TABLES.contains(&key.as_str())) {
             let problem = format!("is unknown; [world] has the tables {}", TABLES.join(", "));
-            return Err(FileIssue::new(file, format!("world.{key}"), problem).into());
+            return Err(FileIssue::new(Code::KeyUnknown, file, format!("world.{key}"), problem).into());
         }
         let reader = Reader { table, file };
         let spec = Self {
@@ -208,7 +209,7 @@ impl WorldSpec {
         }
         if self.vehicle_floats() {
             let problem = "\"rapier\" has no vehicle that floats (motion = \"free\", \"parked\"): use \"featherstone\"";
-            return Err(FileIssue::new(file, "world.physics.engine", problem));
+            return Err(FileIssue::new(Code::KeysConflict, file, "world.physics.engine", problem));
         }
         let (physics, usual) = (&self.physics, PhysicsSpec::default());
         let softness = [
@@ -220,7 +221,7 @@ impl WorldSpec {
             Some((key, ..)) => {
                 let problem =
                     "contacts of \"rapier\" have a softness of their own: set engine = \"featherstone\" beside it";
-                Err(FileIssue::new(file, format!("world.physics.{key}"), problem))
+                Err(FileIssue::new(Code::KeysConflict, file, format!("world.physics.{key}"), problem))
             }
         }
     }
@@ -277,29 +278,29 @@ impl WorldSpec {
         }
         let problem = "a flat port or a dome beside the pupil sees from no single point: with mode = \"rendered\" only \
                        \"none\", or \"dome\" with dome_decentre_std_m = 0, are allowed";
-        Err(FileIssue::new(file, "world.camera.port", problem))
+        Err(FileIssue::new(Code::KeysConflict, file, "world.camera.port", problem))
     }
 
     fn check_relations(&self, file: &Path) -> Result<(), FileIssue> {
         let (min, max) = (self.vehicle.period_min_s, self.vehicle.period_max_s);
         if min > max {
             let problem = format!("{max} is below period_min_s, {min}");
-            return Err(FileIssue::new(file, "world.vehicle.period_max_s", problem));
+            return Err(FileIssue::new(Code::ValueOutOfRange, file, "world.vehicle.period_max_s", problem));
         }
         let is_recorded = self.vehicle.motion == MotionKind::Recorded;
         if is_recorded != self.vehicle.motion_file.is_some() {
             let problem = "goes with motion = \"recorded\", and that with it";
-            return Err(FileIssue::new(file, "world.vehicle.motion_file", problem));
+            return Err(FileIssue::new(Code::KeysConflict, file, "world.vehicle.motion_file", problem));
         }
         self.check_engine(file)?;
         if self.vehicle.motion == MotionKind::Parked && self.ground.vehicle_weight_n <= 0.0 {
             let problem = "must be above 0 for [world.vehicle] motion = \"parked\"";
-            return Err(FileIssue::new(file, "world.ground.vehicle_weight_n", problem));
+            return Err(FileIssue::new(Code::ValueOutOfRange, file, "world.ground.vehicle_weight_n", problem));
         }
         let step_s = self.physics.step_s;
         if (self.steps_per_period() as f64 * step_s - CONTROL_PERIOD_S).abs() > 1e-9 {
             let problem = format!("{step_s} does not divide the control period of {CONTROL_PERIOD_S} s");
-            return Err(FileIssue::new(file, "world.physics.step_s", problem));
+            return Err(FileIssue::new(Code::ValueInvalid, file, "world.physics.step_s", problem));
         }
         self.image.check_relations(file)?;
         self.check_view_point(file)?;
@@ -325,7 +326,7 @@ impl Reader<'_> {
         match self.table.get(name) {
             None => Ok(T::default()),
             Some(value) => value.clone().try_into().map_err(|error: toml::de::Error| {
-                FileIssue::new(self.file, format!("world.{name}"), toml_problem(&error))
+                FileIssue::syntax(self.file, format!("world.{name}"), toml_problem(&error))
             }),
         }
     }

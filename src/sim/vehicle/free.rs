@@ -1,5 +1,6 @@
 //! A vehicle that floats free: its body for the equations of motion, and the thrusters that keep it on station.
 
+use armcal_core::codes::Code;
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
 use crate::dynamics::{Body, Force, HullDrag, Inertia, Motion};
@@ -38,7 +39,7 @@ impl FreeVehicle {
     pub(crate) fn new(vehicle: &Vehicle, spec: &VehicleMotionSpec, seed: u64) -> Result<Self, SimError> {
         let Some(dynamics) = vehicle.dynamics else {
             let problem = "is needed for a vehicle that floats free ([world.vehicle] motion = \"free\")";
-            return Err(FileIssue::new(&vehicle.file, "dynamics", problem).into());
+            return Err(FileIssue::new(Code::KeyMissing, &vehicle.file, "dynamics", problem).into());
         };
         let linear = dynamics.added_mass_kg.map(|added| vehicle.mass_kg + added);
         let angular: [f64; 3] = std::array::from_fn(|i| dynamics.inertia_kg_m2[i] + dynamics.added_inertia_kg_m2[i]);
@@ -112,7 +113,7 @@ impl FreeVehicle {
         self.ground = Ground::parked(spec, vehicle, &center_m);
         if self.ground.is_none() {
             let problem = "its weight is not above the lowest corners of its parts: it cannot be parked on them";
-            return Err(FileIssue::new(&vehicle.file, "part", problem).into());
+            return Err(FileIssue::new(Code::ValueInvalid, &vehicle.file, "part", problem).into());
         }
         Ok(())
     }

@@ -1,5 +1,6 @@
 //! A routine's `[world]` and faults, read and checked against its robot.
 
+use armcal_core::codes::Code;
 use std::path::Path;
 
 use crate::error::SimError;
@@ -37,7 +38,7 @@ impl WorldSpec {
             let Some(at_s) = scheduled.at_s else {
                 let problem = "needs at_s, the time when it happens; faults without one are steps of the script: \
                                [[step]] do = \"fault\"";
-                return Err(FileIssue::new(&routine.file, key, problem).into());
+                return Err(FileIssue::new(Code::KeyMissing, &routine.file, key, problem).into());
             };
             check.check_range(&key, "at_s", at_s, 0.0..=1e6)?;
             check.check_fault(&key, &scheduled.fault)?;
@@ -68,5 +69,5 @@ fn check_step(spec: &WorldSpec, robot: &Robot, file: &Path) -> Result<(), SimErr
         "{} s is too large for the oil's stiffness (bulk_modulus_pa, dead_volume_ratio): at most {longest_s:.2e} s",
         spec.physics.step_s
     );
-    Err(FileIssue::new(file, "world.physics.step_s", problem).into())
+    Err(FileIssue::new(Code::ValueOutOfRange, file, "world.physics.step_s", problem).into())
 }

@@ -15,6 +15,7 @@ use crate::calib::geometry_error::{BASE, ErrorKind, GeometryError};
 use crate::calib::refusal::Refusal;
 use crate::calib::result::calibration::Calibration;
 use crate::calib::wrong_input::margin_hint;
+use armcal_core::codes::{Coded, Warning};
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::Robot;
 use armcal_core::spatial::log;
@@ -59,19 +60,20 @@ impl Estimate<'_> {
         let n = found.iter().filter(|departure| departure.weight() > NAMED_SIGMAS).count();
         found.truncate(n.max(1));
         let mut findings: Vec<Finding> = found.iter().map(Departure::finding).collect();
-        let mut words: Vec<String> = found.iter().map(Departure::words).collect();
+        let mut warnings: Vec<Warning> =
+            found.iter().map(|departure| Warning::new(departure.kind.code(), departure.words())).collect();
         if let Some(base) = found.iter().find(|departure| departure.is_undecided()) {
             // Base or tags: the tool follows the one, and not the other.
             calibration.refuse_first_for([Refusal::Geometry(base.geometry_error(self.problem.robot))]);
         }
         let of_tags = drawing.tags.iter().filter_map(|fault| self.tag_finding(fault));
-        for (finding, word) in self.sag_findings(task).into_iter().chain(self.lens_finding()).chain(of_tags) {
+        for (finding, words) in self.sag_findings(task).into_iter().chain(self.lens_finding()).chain(of_tags) {
+            warnings.push(Warning::new(finding.code(), words));
             findings.push(finding);
-            words.push(word);
         }
         calibration.findings.splice(0..0, findings);
         if let Some(verdict) = &mut calibration.verdict {
-            verdict.warnings.extend(words);
+            verdict.warnings.extend(warnings);
         }
     }
 
@@ -146,8 +148,8 @@ impl Estimate<'_> {
         let ratio = lens.focal_px()[0] / drawn.focal_px()[0] - 1.0;
         let shift = [0, 1].map(|k| lens.center_px()[k] - drawn.center_px()[k]);
         let words = format!(
-            "camera: focal length {:+.2} % of robot.toml's (sigma {:.2} %), centre off by {:.1}, {:.1} px: estimated \
-             with the rest; measure the intrinsics again",
+            "camera: focal length {:+.2} % from robot.toml (sigma {:.2} %), centre {:.1}, {:.1} px; the estimate includes \
+             it. Measure the intrinsics again",
             100.0 * ratio,
             100.0 * std(0) / drawn.focal_px()[0],
             shift[0],
@@ -167,14 +169,14 @@ impl Estimate<'_> {
         let (kind, name, size, words) = match *fault {
             TagFault::Swapped([a, b]) => {
                 let (a, b) = (tags[a].id, tags[b].id);
-                let words = format!("tags {a} and {b} hang in each other's place: taken so; correct the survey");
+                let words = format!("tags {a} and {b} are exchanged; the estimate includes it. Correct the survey");
                 (FindingKind::TagSwapped, format!("{a} and {b}"), None, words)
             }
             TagFault::Size { tag_idx, ratio } => {
                 let (id, size_mm) = (tags[tag_idx].id, 1e3 * tags[tag_idx].size_m);
                 let percent = 100.0 * (ratio - 1.0);
                 let words = format!(
-                    "tag {id} is {size_mm:.1} mm wide, {percent:+.1} % of the survey: taken so; measure it again"
+                    "tag {id} is {size_mm:.1} mm wide, {percent:+.1} % from the survey; the estimate includes it. Measure it again"
                 );
                 (FindingKind::TagSize, id.to_string(), Some(ratio - 1.0), words)
             }
@@ -261,8 +263,8 @@ impl Departure {
         let [x, y, z] = <[f64; 3]>::from(self.size * factor);
         let at_tool = self.tool_m.map_or(String::new(), |m| format!(", {:.1} mm at the tool", 1e3 * m));
         format!(
-            "{}: {what} its axes by [{x:.2}, {y:.2}, {z:.2}] {unit} (sigma {:.2}) against the drawing{at_tool}: \
-             estimated with the sensors; correct the drawing",
+            "{}: {what} its axes by [{x:.2}, {y:.2}, {z:.2}] {unit} (sigma {:.2}) from the nominal model{at_tool}; the \
+             estimate includes it. Correct the URDF",
             self.name,
             factor * self.std,
         )

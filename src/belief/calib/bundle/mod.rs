@@ -56,7 +56,6 @@ pub use model_selection::{OptionalTerm, Selection, select_model};
 pub use observability::{Observability, observability};
 pub use outliers::Outlier;
 pub use score_test::{GeometryElement, ScoreTestResult};
-pub use verdict::UNSEEN_LINKS;
 
 #[cfg(test)]
 pub(crate) mod tests;

@@ -17,13 +17,13 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Vector3};
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::score_test::{GeometryElement, Score, ToolJacobian, columns};
 use crate::calib::bundle::solve::shifted;
-use crate::calib::bundle::verdict::UNSEEN_LINKS;
 use crate::calib::finding::{Finding, FindingKind, FindingUnit};
 use crate::calib::geometry_error::ErrorKind;
 use crate::calib::refusal::Refusal;
 use crate::calib::result::calibration::Calibration;
 use crate::calib::result::verdict_tables::Check;
 use crate::calib::views::view::Touch;
+use armcal_core::codes::Code;
 use armcal_core::robot::Robot;
 use armcal_core::stats::chi_square_quantile;
 
@@ -235,7 +235,7 @@ impl TouchUpdate {
         let holds = check.holds;
         if let Some(verdict) = &mut calibration.verdict {
             verdict.checks.push(check);
-            verdict.warnings.retain(|warning| warning != UNSEEN_LINKS);
+            verdict.warnings.retain(|warning| warning.code != Code::LinksUnobservable);
         }
         if holds {
             return;

@@ -19,6 +19,7 @@ use crate::calib::result::calibration::Calibration;
 use crate::calib::result::validity::not_covered;
 use crate::calib::result::verdict_tables::{Check, ObservabilityTable, VerdictTable};
 use crate::calib::views::view::TaskRests;
+use armcal_core::codes::{Code, Warning};
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::{JointSensorSpec, Robot};
 use armcal_core::sensor::ConditionChange;
@@ -63,7 +64,7 @@ const TAILS: f64 = 1.5;
 /// So many times that limit is refused: innovations then are about three times as large as they should be.
 const FAR_BEYOND: f64 = 4.0;
 /// A warning that touches answer, and that every arm without a tag on the gripper has.
-pub const UNSEEN_LINKS: &str = "links distal to the camera: errors are unobservable without a gripper tag";
+const UNSEEN_LINKS: &str = "links distal to the camera: errors are unobservable without a gripper tag";
 /// An offset that walks by more than so many times a sensor's usual error from view to view is named.
 const WALKED: f64 = 1.0;
 /// Standard deviation over the prior's above which the prior holds a parameter.
@@ -92,7 +93,7 @@ impl VerdictInput<'_> {
         table.warnings.extend(self.scales_at_bounds());
         table.not_covered = not_covered(calibration, &targets);
         if self.has_unseen_links() {
-            table.warnings.push(UNSEEN_LINKS.to_owned());
+            table.warnings.push(Warning::new(Code::LinksUnobservable, UNSEEN_LINKS));
         }
         calibration.verdict = Some(table);
         if let Some(found) = observability(self.input) {
@@ -148,7 +149,7 @@ impl VerdictInput<'_> {
                 if matters {
                     refusal = Some(Refusal::Geometry(geometry));
                 } else {
-                    table.warnings.push(geometry.to_string());
+                    table.warnings.push(Warning::new(Code::GeometryDoubtful, geometry.to_string()));
                 }
             }
             table.checks.push(check);
@@ -183,13 +184,13 @@ impl VerdictInput<'_> {
         if !is_confirmed {
             return Some(refusal);
         }
-        table.warnings.push(format!(
-            "the views do not show that the sensors need calibration: held-out tags are {:.1} mm off with them \
-             calibrated, {:.1} mm with the datasheet's once camera mount and tag map are fitted (p = {:.2})",
+        table.warnings.push(Warning::new(Code::SensorsUnconfirmed, format!(
+            "the views do not show that the sensors need calibration: held-out tag error {:.1} mm rms calibrated, {:.1} mm \
+             with datasheet sensors, fitted mount and fitted map (p = {:.2})",
             1e3 * held_out_m,
             1e3 * baseline.rms_m,
             baseline.p_value
-        ));
+        )));
         None
     }
 
@@ -229,8 +230,9 @@ impl VerdictInput<'_> {
             if !check.holds && self.found.has_positions() {
                 // Their noise has no datasheet, and one landmark a view cannot part it from the joints' errors.
                 let (found, name) = (spec.unit().shown(std_rad, 2), &spec.joint);
-                table.warnings.push(format!(
-                    "{name} has a random error of {found} from view to view, or the positions have as much"
+                table.warnings.push(Warning::new(
+                    Code::JointNoise,
+                    format!("{name} varies by {found} between views, or the measured positions do"),
                 ));
             } else if !check.holds && refusal.is_none() {
                 let (joint, datasheet_std_rad) = (spec.joint.clone(), spec.linearity_std_rad);
@@ -239,12 +241,12 @@ impl VerdictInput<'_> {
             } else if walked_rad > WALKED * stated.joint_std_rad[joint] {
                 let kind = FindingKind::OffsetWalks;
                 calibration.findings.push(Finding { kind, repaired: true, ..worn(spec, walked_rad) });
-                table.warnings.push(format!(
-                    "{} has an offset that walks at random, by {} (std) while the views were captured: as much again \
-                     is counted in the predicted tool error; calibrate again soon, or keep the belief up online",
+                table.warnings.push(Warning::new(Code::OffsetWalks, format!(
+                    "the offset of {} walks at random, by {} (std) during the capture; the predicted tool error includes as much \
+                     again. Calibrate again soon, or follow the estimate online",
                     spec.joint,
                     spec.unit().shown(walked_rad, 2)
-                ));
+                )));
             }
             table.checks.push(check);
         }
@@ -265,18 +267,24 @@ impl VerdictInput<'_> {
             let check = Check::at_most(what, std_rad / datasheet_std_rad, WORN);
             let is_refused = check.value > MAX_NONLINEARITY && !self.found.has_positions();
             if !check.holds && self.found.has_positions() {
-                table.warnings.push(format!(
-                    "{} has a nonlinearity of {}, or the positions have as much",
-                    spec.joint,
-                    spec.unit().shown(std_rad, 2)
+                table.warnings.push(Warning::new(
+                    Code::JointNoise,
+                    format!(
+                        "{} has a nonlinearity of {}, or the measured positions do",
+                        spec.joint,
+                        spec.unit().shown(std_rad, 2)
+                    ),
                 ));
             } else if !check.holds {
                 calibration.findings.push(Finding { repaired: !is_refused, ..worn(spec, std_rad) });
-                table.warnings.push(format!(
-                    "{} is worn: its nonlinearity is {}, {:.1} times its datasheet's; estimated with the rest",
-                    spec.joint,
-                    spec.unit().shown(std_rad, 2),
-                    check.value
+                table.warnings.push(Warning::new(
+                    Code::SensorWorn,
+                    format!(
+                        "{} is worn: its nonlinearity is {}, {:.1} times its datasheet; the estimate includes it",
+                        spec.joint,
+                        spec.unit().shown(std_rad, 2),
+                        check.value
+                    ),
                 ));
             }
             if is_refused && refusal.is_none() {
@@ -295,10 +303,9 @@ impl VerdictInput<'_> {
         let noise = self.found.scales().noise;
         let check = Check::at_most("corners: noise over what frames and robot.toml say", noise, NOISY);
         if !check.holds {
-            table.warnings.push(format!(
-                "corners are {noise:.1} times as far off as frames and robot.toml say: lens, tag sizes or map are not \
-                 as stated, or the corner noise ({stated_px:.2} px) is"
-            ));
+            table.warnings.push(Warning::new(Code::CornersNoisy, format!(
+                "corner noise is {noise:.1} times the stated {stated_px:.2} px: check lens, tag sizes, map and corner_std_px"
+            )));
         }
         table.checks.push(check);
         let limit_px = MAX_OVER_CORNER_NOISE * stated_px;
@@ -368,7 +375,8 @@ impl VerdictInput<'_> {
                 let expected = [quantile(0.025), quantile(0.975)];
                 let found = Refusal::Innovations { quantity, per_dof, limit, expected };
                 if per_dof <= FAR_BEYOND * limit {
-                    table.warnings.push(found.to_string());
+                    let words = format!("{}; {}", found.cause(), found.remedy());
+                    table.warnings.push(Warning::new(Code::InnovationsLarge, words));
                 } else if refusal.is_none() {
                     refusal = Some(found);
                 }
@@ -396,10 +404,10 @@ impl VerdictInput<'_> {
                     Check::at_most(format!("{}: serial correlation {along}, sigmas", spec.joint), sigmas, limit);
                 if !check.holds {
                     let name = &spec.joint;
-                    table.warnings.push(format!(
-                        "{name}: errors of neighbouring views {along} are correlated ({sigmas:.1} sigmas): the model \
-                         lacks a smooth effect"
-                    ));
+                    table.warnings.push(Warning::new(Code::ErrorsCorrelated, format!(
+                        "{name}: errors of neighbouring views {along} are correlated ({sigmas:.1} sigma): the model lacks a \
+                         smooth effect"
+                    )));
                 }
                 table.checks.push(check);
             }
@@ -407,7 +415,7 @@ impl VerdictInput<'_> {
     }
 
     /// Fitted sizes that the data would have beyond their bounds.
-    fn scales_at_bounds(&self) -> Vec<String> {
+    fn scales_at_bounds(&self) -> Vec<Warning> {
         const NEAR: f64 = 1e-6;
         let (robot, now, first) = (self.input.robot, self.found.scales(), &self.input.scales);
         let mut all = vec![("noise of corners".to_owned(), now.noise, 1.0, NOISE_BOUNDS)];
@@ -441,7 +449,8 @@ impl VerdictInput<'_> {
             *now <= first * low * (1.0 + NEAR) || *now >= first * high * (1.0 - NEAR)
         };
         let beyond = all.into_iter().filter(is_at_bound);
-        beyond.map(|(what, now, ..)| format!("{what}: fitted to {now:.2e}, the bound of what is fitted")).collect()
+        let text = |what, now| format!("{what}: the fitted {now:.2e} is at its bound");
+        beyond.map(|(what, now, ..)| Warning::new(Code::ScaleAtBound, text(what, now))).collect()
     }
 
     /// Links between camera and tool that no tag shows.

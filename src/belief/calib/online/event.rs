@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::calib::finding::{Finding, FindingKind, FindingUnit};
 use crate::calib::online::diagnosis::Verdict;
 use crate::calib::online::hypothesis::Fault;
+use armcal_core::codes::Coded;
 use armcal_core::robot::Robot;
 use armcal_core::time::Stamp;
 
@@ -79,31 +80,29 @@ impl OnlineEvent {
                 format!("the sensor of {name} slipped on its shaft by {:.2} deg", size.to_degrees())
             }
             FindingKind::SensorScale => {
-                format!(
-                    "the sensor of {name} has another scale: the angle is {size:.3} of what the datasheet makes of it"
-                )
+                format!("the sensor of {name} has another scale: the angle is {size:.3} of the datasheet angle")
             }
             FindingKind::SensorReversed => {
-                format!("the sensor of {name} reads the other way ({size:.3} of the datasheet)")
+                format!("the sensor of {name} is reversed ({size:.3} of the datasheet angle)")
             }
             FindingKind::SensorFailed => {
-                format!("the sensor of {name} says nothing any more: only views tell where the joint stands")
+                format!("the sensor of {name} failed: only views determine its angle")
             }
             FindingKind::SensorWorn => {
                 let at_deg = self.at_rad.unwrap_or(f64::NAN).to_degrees();
                 format!(
-                    "the sensor of {name} is worn about {at_deg:.1} deg: it reads {:.2} deg more there",
+                    "the sensor of {name} is worn near {at_deg:.1} deg: it reads {:.2} deg more there",
                     size.to_degrees()
                 )
             }
             FindingKind::TagMoved => format!("tag {name} was moved by {:.1} mm", 1e3 * size),
             FindingKind::TagsMoved => format!("tags {name} were moved together by {:.1} mm", 1e3 * size),
             FindingKind::CameraMount => format!("the camera turned on its mount by {:.2} deg", size.to_degrees()),
-            _ => format!("the {name} or all tags have moved by {:.1} mm", 1e3 * size),
+            _ => format!("the {name} or all tags moved by {:.1} mm", 1e3 * size),
         };
         if let Some(other) = self.or_else.as_ref().filter(|_| self.lead_nats < CLEAR_LEAD_NATS) {
             line += &format!(" (or: {other})");
         }
-        line
+        line + &format!(" [{}]", self.finding.code())
     }
 }

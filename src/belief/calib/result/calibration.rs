@@ -108,7 +108,7 @@ pub struct Calibration {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub prior: Option<PriorTable>,
     /// The reasons to refuse as data, the most telling first.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty", with = "crate::calib::refusal::in_files")]
     pub refusals: Vec<Refusal>,
     /// What rests on priors alone, the largest at the tool first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

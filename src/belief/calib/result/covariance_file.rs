@@ -3,6 +3,7 @@
 //! calibration.toml is for people; a hundred rows of numbers are not. `NAME.toml` has its covariance in
 //! `NAME.covariance.toml`. Each file holds the other's hash, so that a covariance never meets another's parameters.
 
+use armcal_core::codes::Code;
 use std::path::{Path, PathBuf};
 
 use nalgebra::DMatrix;
@@ -98,7 +99,7 @@ impl CovarianceTable {
         let (n, lower) = (read.parameters.len(), &read.lower_triangle);
         if lower.len() != n || lower.iter().enumerate().any(|(i, row)| row.len() != i + 1) {
             let problem = format!("needs {n} rows, one for each of `parameters`, of 1 .. {n} numbers");
-            return Err(RobotError::from(FileIssue::new(&file, "lower_triangle", problem)).into());
+            return Err(RobotError::from(FileIssue::new(Code::ValueCount, &file, "lower_triangle", problem)).into());
         }
         if content_hash(&covariance) != hash || read.calibration_hash != content_hash(text) {
             return Err(CalibrationFileError::ForeignCovariance { file, calibration: calibration.to_owned() });

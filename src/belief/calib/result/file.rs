@@ -1,5 +1,6 @@
 //! calibration.toml as a file: written, read, checked, and turned into sensors again.
 
+use armcal_core::codes::Code;
 use std::path::Path;
 
 use crate::calib::covariance::ParameterCovariance;
@@ -15,7 +16,9 @@ use crate::calib::result::terms_table::TermsTable;
 use crate::calib::views::View;
 use armcal_core::joints::JointAngles;
 use armcal_core::kinematics::LinkCorrections;
-use armcal_core::robot::{FileIssue, JointSensorSpec, Robot, RobotError, from_table, parse_toml, read_text};
+use armcal_core::robot::{
+    FileIssue, JointSensorSpec, Robot, RobotError, from_table, parse_toml, read_text, syntax_code,
+};
 use armcal_core::sensor::{ArmSensors, Correction};
 
 /// The texts of a calibration's two files, which hold each other's hashes: to be put in place together.
@@ -245,7 +248,11 @@ impl Calibration {
     pub fn parse(file: &Path, text: &str) -> Result<Self, CalibrationFileError> {
         let calibration: Self = if text.contains("prismatic") {
             let table = named_as_angles(file, parse_toml(file, text)?).map_err(RobotError::from)?;
-            from_table(&table).map_err(|message| RobotError::Syntax { file: file.to_owned(), message })?
+            from_table(&table).map_err(|message| RobotError::Syntax {
+                code: syntax_code(&message),
+                file: file.to_owned(),
+                message,
+            })?
         } else {
             parse_toml(file, text)?
         };
@@ -267,14 +274,19 @@ impl Calibration {
             terms.check(file, &joint.name)?;
             if self.reference.is_none() {
                 let problem = format!("is missing; the terms of joint `{}` are counted from it", joint.name);
-                return Err(FileIssue::new(file, "reference", problem));
+                return Err(FileIssue::new(Code::KeyMissing, file, "reference", problem));
             }
         }
         self.reference.map_or(Ok(()), |reference| reference.check(file))?;
         self.sag.as_ref().map_or(Ok(()), |sag| sag.check(file))?;
         let n = self.covariance.parameters.len();
         if self.covariance.rows.len() != n || self.covariance.rows.iter().any(|row| row.len() != n) {
-            return Err(FileIssue::new(file, "covariance.rows", format!("needs {n} rows of {n} numbers")));
+            return Err(FileIssue::new(
+                Code::ValueCount,
+                file,
+                "covariance.rows",
+                format!("needs {n} rows of {n} numbers"),
+            ));
         }
         Ok(())
     }

@@ -1,5 +1,6 @@
 //! What can be wrong with calibration.toml and the covariance beside it.
 
+use armcal_core::codes::{Code, Coded};
 use std::path::PathBuf;
 
 use armcal_core::robot::RobotError;
@@ -27,4 +28,15 @@ pub enum CalibrationFileError {
          calibration beside each other", file.display(), calibration.display()
     )]
     ForeignCovariance { file: PathBuf, calibration: PathBuf },
+}
+
+impl Coded for CalibrationFileError {
+    fn code(&self) -> Code {
+        match self {
+            Self::File(error) => error.code(),
+            Self::OtherRobot { .. } => Code::RobotMismatch,
+            Self::Bent { .. } => Code::ValueOutOfRange,
+            Self::NoCovariance { .. } | Self::ForeignCovariance { .. } => Code::CovarianceMismatch,
+        }
+    }
 }

@@ -2,6 +2,7 @@
 //!
 //! Within the program a slide's figures are metres under the names of angles; a file names their unit.
 
+use armcal_core::codes::Code;
 use std::path::Path;
 
 use armcal_core::robot::FileIssue;
@@ -56,7 +57,7 @@ fn renamed(file: &Path, joint: &str, table: &toml::Table) -> Result<toml::Table,
     for (key, value) in table {
         if metric(key) != *key {
             let problem = format!("the joint slides: write {} in its place, in metres", metric(key));
-            return Err(FileIssue::new(file, format!("joint `{joint}`: {key}"), problem));
+            return Err(FileIssue::new(Code::KeyUnknown, file, format!("joint `{joint}`: {key}"), problem));
         }
         let value = match value.as_table() {
             Some(inner) => toml::Value::Table(renamed(file, joint, inner)?),

@@ -1,5 +1,6 @@
 //! `[joint.terms]` and `[reference]` of calibration.toml: what a sensor is beyond a straight line.
 
+use armcal_core::codes::Code;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -159,7 +160,7 @@ impl TermsTable {
             let Some(values) = values else { continue };
             if values.len() != N_SHAPE {
                 let problem = format!("has {} numbers, needs {N_SHAPE}", values.len());
-                return Err(FileIssue::new(file, key(name), problem));
+                return Err(FileIssue::new(Code::ValueCount, file, key(name), problem));
             }
             for value in values {
                 check(name, *value, range.clone())?;

@@ -1,5 +1,6 @@
 //! `[observability]` and `[verdict]` of calibration.toml.
 
+use armcal_core::codes::Warning;
 use serde::{Deserialize, Serialize};
 
 /// What the data determine, before solving.
@@ -36,7 +37,7 @@ pub struct ObservabilityTable {
 #[serde(deny_unknown_fields)]
 pub struct VerdictTable {
     /// What deserves a look without being a reason to refuse.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
     /// Where the task goes beyond what the views covered.
     pub not_covered: Vec<String>,
     /// Every test in its order, passed or not.

@@ -1,5 +1,6 @@
 //! Reasons why there is no path.
 
+use armcal_core::codes::{Code, Coded};
 use armcal_core::streams::JointAngles;
 
 /// Why there is no path.
@@ -41,4 +42,15 @@ pub enum PathError {
          stops, {lower_rad:.3} to {upper_rad:.3} rad are left"
     )]
     GoalBeyondLimits { joint: usize, angle_rad: f64, lower_rad: f64, upper_rad: f64 },
+}
+
+impl Coded for PathError {
+    fn code(&self) -> Code {
+        match self {
+            Self::Blocked { .. } => Code::PathNotFound,
+            Self::StartTooNear { .. } => Code::ClearanceTooSmall,
+            Self::GoalTooNear { .. } => Code::ClearanceTooSmall,
+            Self::GoalBeyondLimits { .. } => Code::JointLimit,
+        }
+    }
 }

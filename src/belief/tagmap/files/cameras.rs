@@ -1,5 +1,6 @@
 //! cameras.yaml of TagSLAM and camchain.yaml of Kalibr.
 
+use armcal_core::codes::Code;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -52,7 +53,7 @@ pub fn read_cameras(file: &Path) -> Result<Vec<NamedCamera>, RobotError> {
 pub fn parse_cameras(file: &Path, text: &str) -> Result<Vec<NamedCamera>, RobotError> {
     let raw: BTreeMap<String, CameraYaml> = yaml::parse(file, text)?;
     if raw.is_empty() {
-        return Err(FileIssue::new(file, "cam0", "the file names no camera").into());
+        return Err(FileIssue::new(Code::KeyMissing, file, "cam0", "the file names no camera").into());
     }
     let mut cameras: Vec<NamedCamera> =
         raw.iter().map(|(name, raw)| camera(file, name, raw)).collect::<Result<_, _>>()?;
@@ -63,7 +64,8 @@ pub fn parse_cameras(file: &Path, text: &str) -> Result<Vec<NamedCamera>, RobotE
 
 fn camera(file: &Path, name: &str, raw: &CameraYaml) -> Result<NamedCamera, RobotError> {
     let key = |of: &str| format!("{name}.{of}");
-    let issue = |of: &str, problem: String| RobotError::from(FileIssue::new(file, key(of), problem));
+    let issue =
+        |of: &str, problem: String| RobotError::from(FileIssue::new(Code::ValueInvalid, file, key(of), problem));
     if raw.camera_model != "pinhole" {
         let problem =
             format!("`{}` is not supported; use pinhole, with distortion_model: {SUPPORTED}", raw.camera_model);

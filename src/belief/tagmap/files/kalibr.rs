@@ -1,5 +1,6 @@
 //! Kalibr's target: an aprilgrid is a board of tags of known places.
 
+use armcal_core::codes::Code;
 use std::path::Path;
 
 use nalgebra::{Isometry3, Translation3};
@@ -33,9 +34,9 @@ pub(super) fn parse(file: &Path, text: &str) -> Result<TagFile, RobotError> {
     let raw: TargetYaml = yaml::parse(file, text)?;
     if raw.target_type != "aprilgrid" {
         let problem = format!("`{}` is not supported; use aprilgrid", raw.target_type);
-        return Err(FileIssue::new(file, "target_type", problem).into());
+        return Err(FileIssue::new(Code::NameUnknown, file, "target_type", problem).into());
     }
-    let missing = |key: &str| FileIssue::new(file, key, "is missing");
+    let missing = |key: &str| FileIssue::new(Code::KeyMissing, file, key, "is missing");
     let size_m = raw.tag_size.ok_or_else(|| missing("tagSize"))?;
     FileIssue::check_range(file, "tagSize", size_m, SIZE_RANGE_M)?;
     let spacing = raw.tag_spacing.ok_or_else(|| missing("tagSpacing"))?;

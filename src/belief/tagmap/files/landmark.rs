@@ -3,6 +3,7 @@
 //! A landmark may be less than an AprilTag: without size, without rotation, with a name instead of a number. The use of
 //! the detections decides whether that is enough.
 
+use armcal_core::codes::Code;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -88,7 +89,7 @@ impl LandmarkFile {
         let ids: Vec<u32> = tags.iter().map(|tag| tag.id).collect();
         let base_tag = self.base_tag.or(robot.base_tag).filter(|id| ids.contains(id)).or(ids.first().copied());
         if base_tag.is_none() {
-            return Err(FileIssue::new(file, "tag", "holds no tag in that frame"));
+            return Err(FileIssue::new(Code::ValueInvalid, file, "tag", "holds no tag in that frame"));
         }
         let named = self.landmarks.iter().filter_map(|landmark| Some((landmark.id, landmark.name.clone()?)));
         let boards = self.landmarks.iter().filter_map(|landmark| Some((landmark.id, landmark.board?))).collect();
@@ -100,7 +101,9 @@ impl LandmarkFile {
 impl LandmarkFile {
     /// The file's frame: the base's, or that of a link that moves before a camera that stands still.
     fn on_arm(&self, file: &Path, robot: &Robot) -> Result<Attachment, FileIssue> {
-        let issue = |problem: String| Err(FileIssue::new(file, "frame", format!("is `{}`; {problem}", self.frame)));
+        let issue = |problem: String| {
+            Err(FileIssue::new(Code::ValueInvalid, file, "frame", format!("is `{}`; {problem}", self.frame)))
+        };
         if self.frame == robot.base_link {
             return Ok(Attachment::base());
         }
@@ -125,8 +128,9 @@ impl LandmarkFile {
 impl Landmark {
     fn surveyed(&self, file: &Path, tag_use: TagUse) -> Result<SurveyedTag, FileIssue> {
         let label = self.name.as_ref().map_or_else(|| format!("tag {}", self.id), |name| format!("tag `{name}`"));
-        let missing =
-            |key: &str, why: &str| FileIssue::new(file, format!("{label}: {key}"), format!("is missing; {why}"));
+        let missing = |key: &str, why: &str| {
+            FileIssue::new(Code::KeyMissing, file, format!("{label}: {key}"), format!("is missing; {why}"))
+        };
         let is_board = tag_use == TagUse::BoardCorners && self.board.is_some();
         if is_board && self.quaternion_wxyz.is_none() {
             return Err(missing("quaternion_wxyz", "a board's place and rotation in the frame of the file are needed"));

@@ -1,5 +1,6 @@
 //! Readers of landmarks from the files of tag maps.
 
+use armcal_core::codes::Code;
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -47,12 +48,12 @@ fn check(file: &Path, map: &LandmarkFile) -> Result<(), FileIssue> {
     let (mut ids, mut names) = (BTreeSet::new(), BTreeSet::new());
     for landmark in &map.landmarks {
         if !ids.insert(landmark.id) {
-            return Err(FileIssue::new(file, format!("tag {}: id", landmark.id), "stands twice"));
+            return Err(FileIssue::new(Code::ValueDuplicate, file, format!("tag {}: id", landmark.id), "stands twice"));
         }
         if let Some(name) = &landmark.name
             && !names.insert(name)
         {
-            return Err(FileIssue::new(file, format!("tag `{name}`: name"), "stands twice"));
+            return Err(FileIssue::new(Code::ValueDuplicate, file, format!("tag `{name}`: name"), "stands twice"));
         }
     }
     Ok(())

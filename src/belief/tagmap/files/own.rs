@@ -7,6 +7,7 @@
 //! board with a name, whose origin is an outer corner; `[[body]]` with `name` and `moving`, for frames that
 //! move.
 
+use armcal_core::codes::Code;
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -63,7 +64,13 @@ struct TagToml {
 fn raw(file: &Path, text: &str) -> Result<MapToml, RobotError> {
     let raw: MapToml = parse_toml(file, text)?;
     if raw.version != 1 {
-        return Err(FileIssue::new(file, "version", format!("{} is not supported; use 1", raw.version)).into());
+        return Err(FileIssue::new(
+            Code::VersionUnsupported,
+            file,
+            "version",
+            format!("{} is not supported; use 1", raw.version),
+        )
+        .into());
     }
     Ok(raw)
 }
@@ -77,7 +84,13 @@ pub(super) fn parse_landmarks(file: &Path, text: &str) -> Result<LandmarkFile, R
             (Some(id), _) => format!("tag {id}"),
             (None, Some(name)) => format!("tag `{name}`"),
             (None, None) => {
-                return Err(FileIssue::new(file, format!("tag number {}", k + 1), "has neither id nor name").into());
+                return Err(FileIssue::new(
+                    Code::KeyMissing,
+                    file,
+                    format!("tag number {}", k + 1),
+                    "has neither id nor name",
+                )
+                .into());
             }
         };
         let key = |of: &str| format!("{label}: {of}");
@@ -111,7 +124,9 @@ pub(super) fn parse_landmarks(file: &Path, text: &str) -> Result<LandmarkFile, R
 
 /// `None` where the file says nothing of squares.
 fn board(file: &Path, tag: &TagToml, key: &impl Fn(&str) -> String) -> Result<Option<Chessboard>, FileIssue> {
-    let missing = |of: &str| Err(FileIssue::new(file, key(of), "is missing; a board has `squares` and `square_m`"));
+    let missing = |of: &str| {
+        Err(FileIssue::new(Code::KeyMissing, file, key(of), "is missing; a board has `squares` and `square_m`"))
+    };
     let (squares, square_m) = match (tag.squares, tag.square_m) {
         (None, None) => return Ok(None),
         (Some(_), None) => return missing("square_m"),
@@ -119,7 +134,12 @@ fn board(file: &Path, tag: &TagToml, key: &impl Fn(&str) -> String) -> Result<Op
         (Some(squares), Some(square_m)) => (squares, square_m),
     };
     if tag.id.is_some() {
-        return Err(FileIssue::new(file, key("squares"), "is for a board, which has a name and no id"));
+        return Err(FileIssue::new(
+            Code::KeysConflict,
+            file,
+            key("squares"),
+            "is for a board, which has a name and no id",
+        ));
     }
     for n in squares {
         FileIssue::check_range(file, &key("squares"), f64::from(n), 3.0..=MAX_SQUARES)?;
@@ -140,7 +160,13 @@ pub(super) fn parse(file: &Path, text: &str) -> Result<TagFile, RobotError> {
         };
         let key = |of: &str| format!("tag {id}: {of}");
         let Some(size_m) = tag.size_m.or(raw.default_size_m) else {
-            return Err(FileIssue::new(file, key("size_m"), "is missing; a tag's corners need its size").into());
+            return Err(FileIssue::new(
+                Code::KeyMissing,
+                file,
+                key("size_m"),
+                "is missing; a tag's corners need its size",
+            )
+            .into());
         };
         FileIssue::check_range(file, &key("size_m"), size_m, SIZE_RANGE_M)?;
         let body = body_of(&mut out, &raw.body, tag.frame.as_ref().unwrap_or(&raw.frame));
@@ -159,7 +185,9 @@ pub(super) fn parse(file: &Path, text: &str) -> Result<TagFile, RobotError> {
 
 fn pose(file: &Path, key: &str, position: [f64; 3], wxyz: [f64; 4]) -> Result<Isometry3<f64>, RobotError> {
     let pose: Option<Pose<Base, Tag>> = Pose::from_position_quaternion_wxyz(position, wxyz);
-    Ok(*pose.ok_or_else(|| FileIssue::new(file, key, "must be finite, the quaternion not zero"))?.isometry())
+    Ok(*pose
+        .ok_or_else(|| FileIssue::new(Code::ValueInvalid, file, key, "must be finite, the quaternion not zero"))?
+        .isometry())
 }
 
 /// Exact where all are zero or absent. The position's are along the frame's axes, so the largest counts for all of

@@ -1,5 +1,6 @@
 //! Readers of files about tags.
 
+use armcal_core::codes::Code;
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -28,7 +29,7 @@ pub fn parse_tags(file: &Path, text: &str) -> Result<TagFile, RobotError> {
         "yaml" | "yml" => tagslam::parse(file, text)?,
         other => {
             let problem = format!("`.{other}` is not a format of tag files; use .toml, or .yaml of TagSLAM or Kalibr");
-            return Err(FileIssue::new(file, "extension", problem).into());
+            return Err(FileIssue::new(Code::FileFormat, file, "extension", problem).into());
         }
     };
     check(file, &tags)?;
@@ -40,7 +41,9 @@ fn check(file: &Path, tags: &TagFile) -> Result<(), RobotError> {
     let mut seen = BTreeSet::new();
     for tag in &tags.tags {
         if !seen.insert(tag.id) {
-            return Err(FileIssue::new(file, format!("tag {}: id", tag.id), "is defined twice").into());
+            return Err(
+                FileIssue::new(Code::ValueDuplicate, file, format!("tag {}: id", tag.id), "is defined twice").into()
+            );
         }
         FileIssue::check_range(file, &format!("tag {}: size", tag.id), tag.size_m, SIZE_RANGE_M)?;
     }

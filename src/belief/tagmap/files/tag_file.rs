@@ -1,5 +1,6 @@
 //! The contents of a file about tags.
 
+use armcal_core::codes::Code;
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -52,5 +53,5 @@ pub(super) fn check_number(file: &Path, n_tags: usize) -> Result<(), FileIssue> 
     if n_tags <= MAX_TAGS {
         return Ok(());
     }
-    Err(FileIssue::new(file, "tag", format!("{n_tags} tags, 0 .. {MAX_TAGS} allowed")))
+    Err(FileIssue::new(Code::ValueCount, file, "tag", format!("{n_tags} tags, 0 .. {MAX_TAGS} allowed")))
 }

@@ -1,5 +1,6 @@
 //! tagslam.yaml: bodies and their tags, as TagSLAM (Pfrommer and Daniilidis 2019) reads them.
 
+use armcal_core::codes::Code;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -110,7 +111,13 @@ pub(super) fn parse(file: &Path, text: &str) -> Result<TagFile, RobotError> {
     if let Some(name) = &raw.default_body {
         let Some(body) = out.bodies.iter().position(|body| body.name == *name) else {
             let names: Vec<&str> = out.bodies.iter().map(|body| body.name.as_str()).collect();
-            return Err(FileIssue::new(file, "default_body", format!("`{name}` is none of {names:?}")).into());
+            return Err(FileIssue::new(
+                Code::NameUnknown,
+                file,
+                "default_body",
+                format!("`{name}` is none of {names:?}"),
+            )
+            .into());
         };
         let size = raw.bodies.iter().flatten().nth(body).and_then(|(_, body)| body.default_tag_size);
         out.default_tag = size.map(|size| (size, body));
@@ -160,9 +167,13 @@ fn add_body(file: &Path, out: &mut TagFile, name: &str, raw: &BodyYaml, noise: (
     for tag in &raw.tags {
         let of_tag = |of: &str| key(&format!("tags: id {}: {of}", tag.id));
         let Some(size_m) = tag.size.or(raw.default_tag_size) else {
-            return Err(
-                FileIssue::new(file, of_tag("size"), "is missing, and so is the body's default_tag_size").into()
-            );
+            return Err(FileIssue::new(
+                Code::KeyMissing,
+                file,
+                of_tag("size"),
+                "is missing, and so is the body's default_tag_size",
+            )
+            .into());
         };
         FileIssue::check_range(file, &of_tag("size"), size_m, SIZE_RANGE_M)?;
         let pose = tag.pose.map(|pose| pose.pose(file, &of_tag("pose"))).transpose()?;
@@ -175,10 +186,12 @@ fn add_body(file: &Path, out: &mut TagFile, name: &str, raw: &BodyYaml, noise: (
         ("staggered_board", _, Some(board)) => {
             out.tags.extend(board_tags(file, body, &key("staggered_board"), board, Rows::Staggered)?);
         }
-        ("board" | "staggered_board", ..) => return Err(FileIssue::new(file, key("board"), "is missing").into()),
+        ("board" | "staggered_board", ..) => {
+            return Err(FileIssue::new(Code::KeyMissing, file, key("board"), "is missing").into());
+        }
         (other, ..) => {
             let problem = format!("`{other}` is not supported; use simple, board or staggered_board");
-            return Err(FileIssue::new(file, key("type"), problem).into());
+            return Err(FileIssue::new(Code::NameUnknown, file, key("type"), problem).into());
         }
     }
     if let Some(std) = raw.overriding_std(file, &key)? {
@@ -244,7 +257,7 @@ fn board_tags(file: &Path, body: usize, key: &str, raw: &BoardYaml, rows: Rows) 
 
 /// Seconds with a fraction, kept to the nanosecond.
 fn stamp(file: &Path, key: &str, text: &str) -> Result<Stamp, RobotError> {
-    let wrong = || FileIssue::new(file, key, format!("`{text}` is no time in seconds"));
+    let wrong = || FileIssue::new(Code::ValueInvalid, file, key, format!("`{text}` is no time in seconds"));
     let (whole, fraction) = text.trim().split_once('.').unwrap_or((text.trim(), ""));
     let seconds: i64 = whole.parse().map_err(|_| wrong())?;
     let digits: String = fraction.chars().chain(std::iter::repeat('0')).take(9).collect();

@@ -1,5 +1,6 @@
 //! Writers of tag maps.
 
+use armcal_core::codes::Code;
 use std::path::Path;
 
 use crate::tagmap::files::read::extension;
@@ -20,7 +21,7 @@ pub fn map_to_text(file: &Path, map: &TagMap, input: &MapInput<'_>) -> Result<St
         "yaml" | "yml" => Ok(tagslam::to_text(&groups)),
         other => {
             let problem = format!("`.{other}` is not a format of tag maps; use .toml, or .yaml for TagSLAM's");
-            Err(FileIssue::new(file, "extension", problem))
+            Err(FileIssue::new(Code::FileFormat, file, "extension", problem))
         }
     }
 }

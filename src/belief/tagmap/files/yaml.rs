@@ -6,14 +6,16 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
-use armcal_core::robot::{FileIssue, RobotError};
+use armcal_core::robot::{FileIssue, RobotError, syntax_code};
 use armcal_core::text::with_nearest;
 
 pub(super) fn parse<T: DeserializeOwned>(file: &Path, text: &str) -> Result<T, RobotError> {
     // Some editors leave tabs at the ends of lines and comments, which other parsers take.
     let trimmed: Vec<&str> = text.lines().map(str::trim_end).collect();
-    serde_saphyr::from_str(&trimmed.join("\n"))
-        .map_err(|error| RobotError::Syntax { file: file.to_owned(), message: with_nearest(&error.to_string()) })
+    serde_saphyr::from_str(&trimmed.join("\n")).map_err(|error| {
+        let message = with_nearest(&error.to_string());
+        RobotError::Syntax { code: syntax_code(&message), file: file.to_owned(), message }
+    })
 }
 
 /// `x: .. y: .. z: ..`.

@@ -1,6 +1,7 @@
 //! A look around, and what is proposed of it.
 
 use anyhow::{Result, bail};
+use armcal_core::codes::Code;
 
 use super::DiscoverArgs;
 use crate::cli::calibration_inputs::load_robot;
@@ -14,7 +15,9 @@ use armcal_live::{Domain, look_around, propose_connection};
 pub(super) fn discover(args: &DiscoverArgs) -> Result<Exit> {
     let robot = args.robot.as_ref().map(|folder| load_robot(folder, &[])).transpose()?;
     if let Some(file) = args.out.as_deref().filter(|file| file.symlink_metadata().is_ok()) {
-        return Err(UsageError(format!("{}: is there; name another --out", file.display())).into());
+        return Err(
+            UsageError::new(Code::FileExists, format!("{}: is there; name another --out", file.display())).into()
+        );
     }
     let interrupt = Interrupt::install()?;
     let domain = Domain { number: args.domain, networks: args.networks.clone() };

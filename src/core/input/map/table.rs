@@ -1,5 +1,6 @@
 //! The part of an input map that describes a table: which columns of a CSV or YAML file are what.
 
+use crate::codes::Code;
 use std::path::Path;
 
 use serde::Deserialize;
@@ -217,7 +218,7 @@ pub(super) fn layout(
     columns: Option<TagColumnsToml>,
     tags: (TagUse, Option<&ChildFrame>),
 ) -> Result<TableLayout, FileIssue> {
-    let issue = |key: &str, problem: &str| FileIssue::new(file, key, problem);
+    let issue = |key: &str, problem: &str| FileIssue::new(Code::KeyMissing, file, key, problem);
     let Some(columns) = columns else {
         return Err(issue("tags.columns", "is missing; a [table] needs it: direction, position, rotation"));
     };
@@ -250,7 +251,9 @@ fn time_column(time: TimeToml) -> TimeColumn {
 }
 
 fn pixel(file: &Path, columns: &TagColumnsToml) -> Result<[String; 2], FileIssue> {
-    let issue = |key: &str, problem: &str| Err(FileIssue::new(file, format!("tags.columns.{key}"), problem));
+    let issue = |key: &str, problem: &str| {
+        Err(FileIssue::new(Code::ValueInvalid, file, format!("tags.columns.{key}"), problem))
+    };
     let of_poses = [
         ("direction", columns.direction.is_some()),
         ("position", columns.position.is_some()),
@@ -267,7 +270,8 @@ fn pixel(file: &Path, columns: &TagColumnsToml) -> Result<[String; 2], FileIssue
 }
 
 fn pose(file: &Path, columns: &TagColumnsToml, tag_use: TagUse) -> Result<PoseColumns, FileIssue> {
-    let issue = |key: &str, problem: &str| FileIssue::new(file, format!("tags.columns.{key}"), problem);
+    let issue =
+        |key: &str, problem: &str| FileIssue::new(Code::KeyMissing, file, format!("tags.columns.{key}"), problem);
     if columns.pixel.is_some() {
         return Err(issue("pixel", "is for corners of a board; set use = \"board_corners\""));
     }
@@ -285,7 +289,9 @@ fn pose(file: &Path, columns: &TagColumnsToml, tag_use: TagUse) -> Result<PoseCo
 }
 
 fn rotation(file: &Path, raw: &TagColumnsToml) -> Result<Option<RotationColumns>, FileIssue> {
-    let issue = |key: &str, problem: String| Err(FileIssue::new(file, format!("tags.columns.{key}"), problem));
+    let issue = |key: &str, problem: String| {
+        Err(FileIssue::new(Code::ValueInvalid, file, format!("tags.columns.{key}"), problem))
+    };
     let (columns, form) = match (&raw.rotation, raw.rotation_form) {
         (Some(columns), Some(form)) => (columns, form),
         (None, None) => return Ok(None),

@@ -1,5 +1,6 @@
 //! `[[further_camera]]` of robot.toml: cameras beside the first one, which `calibrate` uses where a recording has them.
 
+use crate::codes::Code;
 use std::path::Path;
 
 use super::{CameraFile, CameraSpec, CameraTable, check_camera};
@@ -21,13 +22,14 @@ pub(in crate::robot) fn check_further_cameras(
 ) -> Result<Vec<CameraSpec>, RobotError> {
     if raw.len() > MAX_FURTHER_CAMERAS {
         let problem = format!("has {} entries, at most {MAX_FURTHER_CAMERAS} are allowed", raw.len());
-        return Err(FileIssue::new(file, "further_camera", problem).into());
+        return Err(FileIssue::new(Code::ValueCount, file, "further_camera", problem).into());
     }
     let mut names = vec![&first.name];
     let mut found = Vec::with_capacity(raw.len());
     for (number, camera) in raw.iter().enumerate() {
         let name = format!("further_camera[{}]", number + 1);
-        let issue = |key: &str, problem: String| FileIssue::new(file, format!("{name}.{key}"), problem);
+        let issue =
+            |key: &str, problem: String| FileIssue::new(Code::ValueInvalid, file, format!("{name}.{key}"), problem);
         if camera.name.is_empty() || names.contains(&&camera.name) {
             let problem = format!("is `{}`; each camera needs a name of its own", camera.name);
             return Err(issue("name", problem).into());

@@ -8,6 +8,7 @@ use std::ops::Range;
 use serde::de::DeserializeOwned;
 use toml::de::Error;
 
+use crate::codes::Code;
 use crate::text::with_nearest;
 
 /// Values that keys may take, the plain ones first.
@@ -25,6 +26,21 @@ pub(super) fn explained<T: DeserializeOwned>(text: &str, error: &Error) -> Strin
         message += &format!("; also missing: {}", others.join(", "));
     }
     message
+}
+
+/// Returns the class of a reader's message, of TOML as of YAML.
+#[must_use]
+pub fn syntax_code(message: &str) -> Code {
+    let kinds = [
+        ("unknown field", Code::KeyUnknown),
+        ("missing field", Code::KeyMissing),
+        ("duplicate", Code::ValueDuplicate),
+        ("unknown variant", Code::NameUnknown),
+        ("invalid type", Code::ValueType),
+        ("invalid length", Code::ValueCount),
+        ("invalid value", Code::ValueInvalid),
+    ];
+    kinds.into_iter().find(|(words, _)| message.contains(words)).map_or(Code::FileSyntax, |(_, code)| code)
 }
 
 /// What is wrong with a value of a text that was read before: without a line, and with the likeliest of the known keys.

@@ -1,5 +1,6 @@
 //! The rendered camera: images are rendered, and the tags are read from them.
 
+use armcal_core::codes::Code;
 use std::fmt;
 
 use nalgebra::{Isometry3, Unit, Vector3};
@@ -61,7 +62,7 @@ impl RenderedCamera {
         let image = spec.image;
         if vehicle.lights.is_empty() && image.ambient_lux <= 0.0 {
             let problem = "needs one or more lights: images are rendered and world.image.ambient_lux is 0";
-            return Err(FileIssue::new(&vehicle.file, "light", problem).into());
+            return Err(FileIssue::new(Code::KeyMissing, &vehicle.file, "light", problem).into());
         }
         let base_from_vehicle = *vehicle.vehicle_from_base.inverse().isometry();
         let light = |light: &armcal_core::robot::VehicleLight| Light {

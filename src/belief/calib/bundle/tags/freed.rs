@@ -8,6 +8,7 @@ use crate::calib::bundle::tags::identity::{NEARER, SAME_PLACE_M, TagFault};
 use crate::calib::finding::{Finding, FindingKind, FindingUnit};
 use crate::calib::result::calibration::Calibration;
 use crate::calib::views::view::View;
+use armcal_core::codes::{Coded, Warning};
 use armcal_core::robot::{Robot, SurveyedTag};
 use armcal_core::spatial::{Pose, log};
 use armcal_core::stats::quantile;
@@ -96,10 +97,10 @@ impl MovedTags {
         let moved = (!group.is_empty()).then_some(&group[..]).into_iter().chain(alone);
         let moved = moved.map(|tags| self.finding(estimate, tags));
         for (finding, words) in rings.iter().map(|ring| self.ring_finding(ring)).chain(moved) {
-            calibration.findings.push(finding);
             if let Some(verdict) = &mut calibration.verdict {
-                verdict.warnings.push(words);
+                verdict.warnings.push(Warning::new(finding.code(), words));
             }
+            calibration.findings.push(finding);
         }
     }
 
@@ -133,7 +134,7 @@ impl MovedTags {
         let ids: Vec<String> = ring.iter().map(|&tag| self.surveyed[tag].id.to_string()).collect();
         let places = ids.iter().zip(ids.iter().cycle().skip(1)).map(|(id, place)| format!("{id} at {place}'s"));
         let words = format!(
-            "tags {} hang in one another's places ({}): estimated with the rest; correct the survey",
+            "tags {} are exchanged ({}); the estimate includes it. Correct the survey",
             list(&ids),
             places.collect::<Vec<_>>().join(", "),
         );

@@ -1,6 +1,5 @@
 //! From a full calibration to the compact one, rounded as its text will be, and from there to sensors.
 
-use crate::calib::refusal::Refusal;
 use crate::calib::result::calibration::{Calibration, JointResult};
 use crate::calib::result::compact::content::{CompactCalibration, CompactJoint, PredictedToolError};
 use crate::calib::result::compact::error::CompactError;
@@ -10,6 +9,7 @@ use crate::calib::result::compact::precision::{
 use crate::calib::result::compact::terms::{CompactReference, CompactTerms, SHAPE_STEPS_RAD};
 use crate::calib::result::compact::text;
 use crate::calib::result::terms_table::ReferenceTable;
+use armcal_core::codes::Coded;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::{ArmSensors, Correction};
 use armcal_core::streams::MAX_JOINTS;
@@ -194,8 +194,8 @@ fn joints_hash<'a>(joints: impl Iterator<Item = (&'a str, f64, Option<f64>)>) ->
     hasher.finalize().to_hex()[..8].to_owned()
 }
 
-/// A short code of the first reason; files of before this version name none.
+/// Returns the code of the first refusal; `other` where a file holds its sentence only.
 fn refusal_code(calibration: &Calibration) -> Option<&'static str> {
     let unnamed = calibration.refusal.as_ref().map(|_| "other");
-    calibration.refusals.first().map(Refusal::code).or(unnamed)
+    calibration.refusals.first().map(|refusal| refusal.code().as_str()).or(unnamed)
 }

@@ -1,6 +1,7 @@
 //! What can be wrong with a compact calibration.
 
 use crate::calib::result::compact::precision::MAX_COMPACT_BYTES;
+use armcal_core::codes::{Code, Coded};
 use armcal_core::streams::MAX_JOINTS;
 
 /// Why a calibration has no compact form, or a text is none.
@@ -34,4 +35,20 @@ pub enum CompactError {
     TooLong { bytes: usize },
     #[error("compact calibration: was made for robot `{found}`, not for `{expected}`, or for other joints of it")]
     OtherRobot { found: String, expected: String },
+}
+
+impl Coded for CompactError {
+    fn code(&self) -> Code {
+        match self {
+            Self::NotCompact | Self::Field { .. } | Self::Joints { .. } | Self::Checksum { .. } => Code::CompactInvalid,
+            Self::Version { .. } => Code::VersionUnsupported,
+            Self::Range { .. }
+            | Self::NoRelativeGain { .. }
+            | Self::Slide { .. }
+            | Self::MeasuredScale { .. }
+            | Self::TooLong { .. }
+            | Self::Links => Code::CompactUnsupported,
+            Self::OtherRobot { .. } => Code::RobotMismatch,
+        }
+    }
 }
