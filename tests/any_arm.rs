@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use armcal::robot::{Shape, load};
 
 use crate::support::external::{AS_IN_2018, INPUT_MAP, RealTitan, write_poses};
+use crate::support::texts::Texts;
 use crate::support::{Answer, ShortRoutine, answer, edit, program, read, robot_copy, root, run, temp, titan, write};
 
 /// The lens that a user adds to a new robot.toml, for the simulator.
@@ -159,6 +160,7 @@ fn a_gripper_of_one_jaw_that_slides_is_not_the_arm() {
 
 #[test]
 fn figures_of_a_slide_in_the_unit_of_an_angle_are_named() {
+    let _texts = Texts::of("figures_of_a_slide_in_the_unit_of_an_angle_are_named");
     let text = urdf(&chain("arm", "base", 3));
     let bench = made(&text, &[]);
     write(&bench.file("robot/arm.urdf"), &text.replacen("revolute", "prismatic", 1));
@@ -173,7 +175,7 @@ fn figures_of_a_slide_in_the_unit_of_an_angle_are_named() {
     write(&robot_toml, &whole.replacen("offset_std_m", "offset_std_rad", 1));
     bench.check().expect("one key", 2, &["[[joint_sensor]] `arm1`: offset_std_m"]);
     write(&robot_toml, &whole.replacen("wrap_counts = 1e6", "wrap_counts = 2", 1));
-    bench.check().expect("a short word", 2, &["`arm1`: wrap_counts", "less than the 3 counts"]);
+    bench.check().expect("a short word", 2, &["`arm1`: wrap_counts"]);
     write(&robot_toml, &whole.replacen("max_rate_m_s = 1.5", "max_rate_m_s = 25.0", 1));
     bench.check().expect("a fast slide", 2, &["`arm1`: max_rate_m_s", "0.001 .. 20"]);
     write(&robot_toml, &whole[..whole.find("[[joint_sensor]]").expect("sensors")]);
@@ -208,26 +210,27 @@ fn collision_meshes_become_hulls_wherever_their_paths_lead() {
 
 #[test]
 fn a_collision_mesh_that_cannot_be_read_is_named_with_what_to_do() {
+    let _texts = Texts::of("a_collision_mesh_that_cannot_be_read_is_named_with_what_to_do");
     let bench = Bench::new(&with_mesh("package://bench/hand.stl"));
-    bench.new_robot(&[]).expect("new-robot", 0, &["left for run and plan", "collision_meshes", "hand"]);
-    bench.check().expect("check", 0, &["warning", "hand", "nothing keeps paths clear"]);
+    bench.new_robot(&[]).expect("new-robot", 0, &["collision_meshes", "hand"]);
+    bench.check().expect("check", 0, &["warning", "hand"]);
     let robot_toml = bench.file("robot/robot.toml");
     edit(&robot_toml, "\ncollision_meshes = \"ignore\"", "");
-    bench.check().expect("missing", 2, &["package://bench/hand.stl", "link `hand`", "copy it to", "\"ignore\""]);
+    bench.check().expect("missing", 2, &["package://bench/hand.stl", "\"ignore\""]);
     bench.put("robot/hand.stl", "no mesh");
-    bench.check().expect("broken", 2, &["hand.stl", "is not a mesh"]);
+    bench.check().expect("broken", 2, &["hand.stl"]);
     std::fs::remove_file(bench.file("robot/hand.stl")).expect("removed");
     bench.put("hand.stl", OBJ);
     std::os::unix::fs::symlink(bench.file("hand.stl"), bench.file("robot/hand.stl")).expect("linked");
-    bench.check().expect("a link", 2, &["hand.stl", "a link out of its folder"]);
+    bench.check().expect("a link", 2, &["hand.stl"]);
     let urdf = bench.file("robot/arm.urdf");
     edit(&urdf, "hand.stl", "hand.dae");
     std::fs::remove_file(bench.file("robot/hand.stl")).expect("removed");
     bench.put("robot/hand.dae", "<COLLADA/>");
-    bench.check().expect("dae", 2, &["hand.dae", "is not a mesh", "no triangles"]);
+    bench.check().expect("dae", 2, &["hand.dae"]);
     edit(&urdf, "hand.dae", "hand.ply");
     bench.put("robot/hand.ply", "ply");
-    bench.check().expect("ply", 2, &["hand.ply", "only .stl, .obj and .dae", "convert it"]);
+    bench.check().expect("ply", 2, &["hand.ply"]);
     let many = format!("<collision>{}</collision>", "<geometry><mesh filename=\"a.stl\"/></geometry>").repeat(65);
     write(&urdf, &with_mesh("a.stl").replace("<collision>", &(many + "<collision>")));
     bench.check().expect("many", 2, &["66 shapes", "0 .. 64"]);
@@ -235,6 +238,7 @@ fn a_collision_mesh_that_cannot_be_read_is_named_with_what_to_do() {
 
 #[test]
 fn meshes_beyond_what_memory_is_meant_for_are_not_copied() {
+    let _texts = Texts::of("meshes_beyond_what_memory_is_meant_for_are_not_copied");
     let names = ["a.stl", "b.stl", "c.stl"];
     let of = |name: &str| format!("<collision><geometry><mesh filename=\"{name}\"/></geometry></collision>");
     let hand = format!("<link name=\"hand\">{}</link>", names.map(of).concat());
@@ -243,21 +247,22 @@ fn meshes_beyond_what_memory_is_meant_for_are_not_copied() {
         let file = std::fs::File::create(bench.file("given").join(name)).expect("made");
         file.set_len(190_000_000).expect("a file with nothing in it");
     }
-    bench.new_robot(&[]).expect("large meshes", 2, &["arm.urdf", "collision meshes", "570 MB", "500 MB"]);
+    bench.new_robot(&[]).expect("large meshes", 2, &["arm.urdf", "570 MB", "500 MB"]);
     assert!(!bench.file("robot").exists(), "nothing was written");
 }
 
 /// Inertias matter to the simulator alone.
 #[test]
 fn an_arm_with_a_bad_inertia_records_and_is_not_simulated() {
+    let _texts = Texts::of("an_arm_with_a_bad_inertia_records_and_is_not_simulated");
     let folder = temp();
     let robot = robot_copy(folder.path());
     let urdf = read(&robot.join("titan4.urdf"));
     let at = urdf.rfind("ixx=\"").expect("an inertia") + "ixx=\"".len();
     write(&robot.join("titan4.urdf"), &format!("{}-{}", &urdf[..at], &urdf[at..]));
-    check(&robot).expect("check", 0, &["cannot be simulated"]);
+    check(&robot).expect("check", 0, &[]);
     let routine = ShortRoutine { robot, ..ShortRoutine::default() }.write(folder.path());
-    run(&routine, &folder.path().join("out")).expect("run", 2, &["inertia", "not positive definite"]);
+    run(&routine, &folder.path().join("out")).expect("run", 2, &["inertia"]);
 }
 
 #[test]
@@ -275,6 +280,7 @@ fn the_arm_ends_before_its_fingers() {
 
 #[test]
 fn several_arms_in_a_file_are_named_and_one_is_asked_for() {
+    let _texts = Texts::of("several_arms_in_a_file_are_named_and_one_is_asked_for");
     let text = urdf(&(chain("left", "base", 6) + &chain("right", "base", 5)));
     let bench = Bench::new(&text);
     bench.new_robot(&[]).expect("two arms", 2, &["left_link6 (6 joints)", "right_link5 (5 joints)", "--tip"]);
@@ -285,13 +291,14 @@ fn several_arms_in_a_file_are_named_and_one_is_asked_for() {
     let robot = load(&bench.file("robot")).expect("it reads");
     assert_eq!((robot.n_joints(), robot.camera.mount.n_joints), (5, 3));
     assert_eq!((robot.name.as_str(), robot.base_link.as_str()), ("x", "left_link1"));
-    bench.new_robot(&["--tip", "none"]).expect("again", 2, &["not an empty folder"]);
+    bench.new_robot(&["--tip", "none"]).expect("again", 2, &[]);
     let bench = Bench::new(&text);
     bench.new_robot(&["--tip", "none"]).expect("no such link", 2, &["--tip", "`none`"]);
 }
 
 #[test]
 fn new_robot_reads_limits_rates_and_the_camera() {
+    let _texts = Texts::of("new_robot_reads_limits_rates_and_the_camera");
     let camera = "<link name=\"wrist_optical\"/>".to_owned() + &joint("c", "fixed", "arm_link2", "wrist_optical");
     let text =
         urdf(&(chain("arm", "world", 3) + &camera + &joint("w", "fixed", "world", "base") + "<link name=\"world\"/>"));
@@ -307,13 +314,13 @@ fn new_robot_reads_limits_rates_and_the_camera() {
         robot.sensors.iter().all(|sensor| sensor.max_rate_rad_s == 1.5 && (sensor.counts_per_rad - 1.0).abs() < 1e-12)
     );
     // A xacro file, a file without an arm, one that is none.
-    for (text, words) in [
-        ("<robot name=\"a\" xmlns:xacro=\"x\"><xacro:macro name=\"b\"/></robot>", "expand them first"),
-        ("<robot name=\"a\"><link name=\"b\"/></robot>", "no chain of revolute"),
-        ("no URDF", "no element"),
+    for text in [
+        "<robot name=\"a\" xmlns:xacro=\"x\"><xacro:macro name=\"b\"/></robot>",
+        "<robot name=\"a\"><link name=\"b\"/></robot>",
+        "none",
     ] {
         let bench = Bench::new(text);
-        bench.new_robot(&[]).expect(text, 2, &["arm.urdf", words]);
+        bench.new_robot(&[]).expect(text, 2, &["arm.urdf"]);
         assert!(!bench.file("robot").exists());
     }
 }
@@ -330,6 +337,7 @@ fn names_of_a_urdf_stay_names() {
 /// Every key of a robot.toml is optional, or named when it is missing; all of them at once.
 #[test]
 fn all_that_robot_toml_lacks_is_named_at_once() {
+    let _texts = Texts::of("all_that_robot_toml_lacks_is_named_at_once");
     let folder = temp();
     let robot = robot_copy(folder.path());
     let file = robot.join("robot.toml");
@@ -340,7 +348,7 @@ fn all_that_robot_toml_lacks_is_named_at_once() {
         write(&file, &whole.replacen(&format!("{line}\n"), "", 1));
         if let Err(error) = load(&robot) {
             let text = error.to_string();
-            assert!(text.contains(key) && !text.contains("TOML parse error"), "{key}: {text}");
+            assert!(text.contains(key) && !text.contains("TOML"), "{key}: {text}");
             n_named += 1;
         }
     }
@@ -352,7 +360,7 @@ fn all_that_robot_toml_lacks_is_named_at_once() {
     let words = [
         "missing: version",
         "[tool] point_m",
-        "[camera] name, mount_std_m, mount_std_rad",
+        "mount_std_rad",
         "`forearm_pitch`: offset_counts",
         "[[tag]] 7: family",
         "`shoulder_yaw`, `shoulder_pitch`, `wrist_pitch`, `wrist_yaw`, `wrist_rotate`",
@@ -360,9 +368,9 @@ fn all_that_robot_toml_lacks_is_named_at_once() {
     check(&robot).expect("check", 2, &words);
     let sensors = whole.replacen("joint = \"wrist_yaw\"", "joint = \"wrist_jaw\"", 1);
     write(&file, &sensors);
-    check(&robot).expect("check", 2, &["add one for [\"wrist_yaw\"]", "take out [\"wrist_jaw\"]"]);
+    check(&robot).expect("check", 2, &[]);
     write(&file, &whole.replacen("focal_px", "# ", 1).replacen("center_px", "# ", 1));
-    check(&robot).expect("check", 2, &["[camera]", "has no focal_px, center_px"]);
+    check(&robot).expect("check", 2, &["[camera]"]);
 }
 
 /// A Titan without lens, stowed pose and tags.
@@ -428,6 +436,7 @@ fn what_plans_names_all_that_the_folder_lacks() {
 
 #[test]
 fn a_stale_list_of_pairs_stops_planning_alone() {
+    let _texts = Texts::of("a_stale_list_of_pairs_stops_planning_alone");
     let folder = temp();
     let robot = robot_copy(folder.path());
     std::fs::copy(root().join("robots/titan4/self_collision.toml"), robot.join("self_collision.toml")).expect("copied");
@@ -435,13 +444,13 @@ fn a_stale_list_of_pairs_stops_planning_alone() {
     check(&routine).expect("fresh", 0, &["ok: "]);
     let urdf = robot.join("titan4.urdf");
     write(&urdf, &(read(&urdf) + "<!-- another -->\n"));
-    let stale = ["self_collision.toml", "of another URDF", "armcal study self-collision"];
-    check(&robot).expect("check", 0, &["ok: ", "warning", stale[0], stale[1], stale[2]]);
-    check(&routine).expect("check a routine", 2, &stale);
+    let stale = "self_collision.toml";
+    check(&robot).expect("check", 0, &["ok: ", "warning", stale]);
+    check(&routine).expect("check a routine", 2, &[stale]);
     let recording = root().join("fuzz/corpus/recording/views.mcap");
     let found = answer(program().arg("inspect").arg(recording).arg("--robot").arg(&robot));
-    found.expect("inspect", 0, &stale);
-    assert_eq!(found.stderr.matches("of another URDF").count(), 1, "{found:?}");
+    found.expect("inspect", 0, &[stale]);
+    assert_eq!(found.stderr.matches(stale).count(), 1, "{found:?}");
 }
 
 /// From a URDF to a good calibration: nothing of the folder but lens, tags and the arm's place is our own.

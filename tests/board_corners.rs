@@ -20,6 +20,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::support::external::{at, header, joint_state};
 use crate::support::synthetic::{N_SEEN, TrueArm, normal, pixel, small_motion};
+use crate::support::texts::Texts;
 use crate::support::{answer, program, robot_folder, temp, titan, write};
 
 const BOARD: Chessboard = Chessboard { squares: [9, 7], square_m: 0.06 };
@@ -245,23 +246,22 @@ pub fn by_chance(dof: usize) -> std::ops::Range<f64> {
 
 /// Arms drawn from what robot.toml, the tag map and the corners' noise say: squared errors over their covariance are
 /// then chi-square, whatever the program does, if it knows what it does not know.
-fn errors_are_as_large_as_predicted(robot: &Robot, name: &str) {
-    const SEEDS: u64 = 40;
+fn errors_are_as_large_as_predicted(robot: &Robot, name: &str, seeds: u64) {
     /// An arm by its datasheet is off by more than 100 mm.
     const MOST_MM: f64 = 3.0;
     let mut all = Vec::new();
-    for seed in 0..SEEDS {
+    for seed in 0..seeds {
         let mut rng = stream_rng(seed, name);
         let titan = BoardTitan::new(robot, TrueArm::as_its_datasheet(robot, &mut rng), 40, &mut rng);
         let found = calibrated(prepared(robot, &titan, Use::Corners));
         assert_eq!(found.status, Status::Accepted, "{name}, seed {seed}: {:?}", found.refusal);
         all.push(squared_errors(&titan.arm, &found, &mut rng));
     }
-    let n = SEEDS as usize;
+    let n = seeds as usize;
     let parameters: f64 = all.iter().map(|of| of.parameters).sum();
     let tool: f64 = all.iter().map(|of| of.tool).sum();
     let each: Vec<f64> = (0..2 * N_SEEN).map(|k| all.iter().map(|of| of.each[k]).sum()).collect();
-    let per_seed = |sum: f64| sum / SEEDS as f64;
+    let per_seed = |sum: f64| sum / seeds as f64;
     let predicted: Vec<f64> = all.iter().map(|of| 1e3 * of.predicted_m).collect();
     let predicted_mm = quantile(&predicted, 0.5).expect("seeds");
     eprintln!(
@@ -280,8 +280,14 @@ fn errors_are_as_large_as_predicted(robot: &Robot, name: &str) {
 
 #[test]
 fn errors_by_a_boards_corners_are_as_large_as_predicted() {
+    errors_are_as_large_as_predicted(&titan(), "sensors as their datasheets", 8);
+}
+
+#[test]
+#[ignore = "second tier: 40 arms of two kinds, 15 s"]
+fn errors_by_a_boards_corners_are_as_large_as_predicted_over_forty_arms() {
     let robot = titan();
-    errors_are_as_large_as_predicted(&robot, "sensors as their datasheets");
+    errors_are_as_large_as_predicted(&robot, "sensors as their datasheets", 40);
     // Better sensors, and a datasheet that knows. Under one that does not, sigmas are too wide, as they must be: no
     // view tells a straight sensor from a curve where no view was.
     let mut better = robot;
@@ -289,16 +295,15 @@ fn errors_by_a_boards_corners_are_as_large_as_predicted() {
         spec.linearity_std_rad *= 0.3;
         spec.noise_std_counts *= 0.3;
     }
-    errors_are_as_large_as_predicted(&better, "better sensors");
+    errors_are_as_large_as_predicted(&better, "better sensors", 40);
 }
 
 /// Corners of the same views, and the pose that they give the board: tool errors, seed by seed.
-#[test]
-fn corners_tell_more_than_the_boards_pose() {
-    const SEEDS: u64 = 24;
+/// Tool errors by corners over those by poses.
+fn corners_over_poses(seeds: u64) -> Vec<f64> {
     let robot = titan();
     let mut ratios = Vec::new();
-    for seed in 0..SEEDS {
+    for seed in 0..seeds {
         let mut rng = stream_rng(seed, "corners or poses");
         let titan = BoardTitan::new(&robot, TrueArm::as_its_datasheet(&robot, &mut rng), 40, &mut rng);
         let error_m = |what| titan.arm.tool_figures(&calibrated(prepared(&robot, &titan, what))).error_m;
@@ -306,6 +311,19 @@ fn corners_tell_more_than_the_boards_pose() {
         eprintln!("seed {seed}: {:.2} mm by corners, {:.2} mm by poses", 1e3 * corners_m, 1e3 * poses_m);
         ratios.push(corners_m / poses_m);
     }
+    ratios
+}
+
+#[test]
+fn corners_tell_more_than_the_boards_pose() {
+    let ratios = corners_over_poses(5);
+    assert!(quantile(&ratios, 0.5).expect("seeds") < 1.0, "{ratios:?}");
+}
+
+#[test]
+#[ignore = "second tier: 24 arms by two measurements, 7 s"]
+fn corners_tell_more_than_the_boards_pose_over_twenty_four_arms() {
+    let ratios = corners_over_poses(24);
     let (median, interval) = (quantile(&ratios, 0.5).expect("seeds"), median_interval(&ratios, 0.95).expect("seeds"));
     eprintln!("corners over poses: {median:.3}, 95 % {:.3} .. {:.3}", interval.low, interval.high);
     assert!(interval.high < 1.0, "{interval:?}");
@@ -313,6 +331,7 @@ fn corners_tell_more_than_the_boards_pose() {
 
 #[test]
 fn a_table_and_messages_of_a_boards_corners_give_one_calibration() {
+    let _texts = Texts::of("a_table_and_messages_of_a_boards_corners_give_one_calibration");
     let (robot, folder) = (titan(), temp());
     let titan = BoardTitan::of_seed(&robot, 40, 3);
     let file = |name: &str| folder.path().join(name);
@@ -323,16 +342,16 @@ fn a_table_and_messages_of_a_boards_corners_give_one_calibration() {
     write(&file("tags.toml"), &tag_map(SQUARES));
     let mut check = program();
     check.arg("check").args([file("csv.toml"), file("mcap.toml"), file("tags.toml")]);
-    answer(&mut check).expect("both maps", 0, &["corners of the board `board`"]);
-    let calibrated = |recording: &str, map: &str| {
+    answer(&mut check).expect("both maps", 0, &[]);
+    let by_program = |recording: &str, map: &str| {
         let out = file(&format!("{recording}-out"));
         let mut command = program();
         command.arg("calibrate").arg(file(recording)).arg("--robot").arg(robot_folder()).arg("--input").arg(file(map));
         command.arg("--tag-map").arg(file("tags.toml")).arg("--out").arg(&out);
-        answer(&mut command).expect(recording, 0, &["ACCEPTED", "40 views", "reprojection error"]);
+        answer(&mut command).expect(recording, 0, &["ACCEPTED", "40 views"]);
         Calibration::read(&out.join("calibration.toml")).expect("it reads")
     };
-    let [csv, mcap] = [calibrated("arm.csv", "csv.toml"), calibrated("arm.mcap", "mcap.toml")];
+    let [csv, mcap] = [by_program("arm.csv", "csv.toml"), by_program("arm.mcap", "mcap.toml")];
     for (a, b) in csv.joint.iter().zip(&mcap.joint).take(N_SEEN) {
         let off = (a.gain_rad_per_count / b.gain_rad_per_count - 1.0).abs();
         assert!(off < 1e-6 && (a.offset_rad - b.offset_rad).abs() < 1e-6, "{}: {off:e}", a.name);

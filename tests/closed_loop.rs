@@ -13,12 +13,9 @@ use armcal::streams::Arm;
 use nalgebra::Vector3;
 
 use crate::support::{
-    FinishedRun, Nowhere, ShortRoutine, answer, finished, program, read, root, run, shared_run, temp, titan,
-    vehicle_file,
+    Nowhere, ShortRoutine, Simulated, answer, program, root, shared, shared_run, temp, titan, vehicle_file, write,
 };
 
-/// None left out.
-const SEEDS: std::ops::RangeInclusive<u64> = 1..=5;
 /// m, median over the seeds of the median over the targets. 12 poses leave 6.0 mm over these seeds and 2.5 .. 7.4 mm
 /// for each of seeds 1 to 10: the sensors' nonlinearity and a camera mount that no number of views shows.
 const TOOL_ERROR_M: f64 = 0.008;
@@ -34,12 +31,15 @@ fn medians(summary: &RunSummary) -> [f64; 3] {
         .map(|s| s.expect("targets were reached").median)
 }
 
-#[test]
-fn calibration_brings_the_tool_where_it_is_told() {
+fn calibration_brings_the_tool_to_its_targets(seeds: std::ops::RangeInclusive<u64>) {
     let (mut tool_m, mut reach_m) = (Vec::new(), Vec::new());
-    for seed in SEEDS {
-        let folder = temp();
-        let summary = finished(&ShortRoutine { seed, ..ShortRoutine::default() }, folder.path()).summary();
+    for seed in seeds {
+        let summary = if seed == 1 {
+            shared(&ShortRoutine::default()).summary()
+        } else {
+            let folder = temp();
+            Simulated::of(&ShortRoutine { seed, ..ShortRoutine::default() }, folder.path()).finished().summary.clone()
+        };
         assert_eq!(summary.status, Status::Accepted);
         assert_eq!(summary.capture.collisions, Some(0), "seed {seed}");
         let [before_m, after_m, miss_m] = medians(&summary);
@@ -53,20 +53,29 @@ fn calibration_brings_the_tool_where_it_is_told() {
     assert!(reach_m < REACH_ERROR_M, "{reach_m}");
 }
 
+#[test]
+fn calibration_brings_the_tool_where_it_is_told() {
+    calibration_brings_the_tool_to_its_targets(1..=2);
+}
+
+#[test]
+#[ignore = "second tier: 5 seeds of the closed loop, 9 s"]
+fn calibration_brings_the_tool_where_it_is_told_for_each_of_five_seeds() {
+    calibration_brings_the_tool_to_its_targets(1..=5);
+}
+
 /// Runs a routine of the project.
-fn run_of(name: &str, out: &Path) -> FinishedRun {
-    let routine = root().join("routines").join(name);
-    run(&routine, out).expect(name, 0, &["ACCEPTED"]);
-    FinishedRun { routine, out: out.to_owned() }
+fn run_of(name: &str, out: &Path) -> Simulated {
+    Simulated::new(&root().join("routines").join(name), None, &[], out)
 }
 
 /// By the sensors alone this arm would be 7 mm off. What the simulator bends it by is not in what belief reads.
 #[test]
 fn an_arm_that_bends_is_calibrated_with_its_sag() {
     let folder = temp();
-    let finished = run_of("heavy-arm.toml", folder.path());
-    let summary = finished.summary();
-    let [before_m, after_m, _] = medians(&summary);
+    let run = run_of("heavy-arm.toml", folder.path());
+    let (summary, calibration) = (&run.finished().summary, &run.finished().calibration);
+    let [before_m, after_m, _] = medians(summary);
     eprintln!(
         "tool {:.1} to {:.2} mm, {} targets skipped",
         before_m * 1e3,
@@ -75,11 +84,11 @@ fn an_arm_that_bends_is_calibrated_with_its_sag() {
     );
     assert_eq!((summary.capture.collisions, summary.status), (Some(0), Status::Accepted));
     assert!(after_m < 2.5e-3 && summary.capture.targets_skipped <= 2, "{after_m}");
-    assert!(read(&finished.file("calibration.toml")).contains("[sag"), "no sag was estimated");
+    assert!(calibration.sag.is_some(), "no sag was estimated");
 
     let told =
         |bytes: &[u8]| ["payload", "compliance", "structure"].map(|word| String::from_utf8_lossy(bytes).contains(word));
-    let recording = finished.file("run.mcap");
+    let recording = run.file("run");
     for_each_raw(&recording, |raw| assert_eq!(told(raw.data), [false; 3], "{}", raw.topic())).expect("it reads");
     for (name, bytes) in read_attachments(&recording).expect("it reads") {
         assert_eq!(told(&bytes), [false; 3], "{name}");
@@ -94,7 +103,7 @@ fn an_arm_that_bends_is_calibrated_with_its_sag() {
         std::fs::read(saved).expect("written")
     };
     let straight = replayed(alone.path());
-    std::fs::copy(finished.file("calibration.toml"), alone.path().join("calibration.toml")).expect("copied");
+    write(&alone.path().join("calibration.toml"), &calibration.to_toml());
     assert!(replayed(alone.path()) != straight);
 }
 
@@ -102,8 +111,9 @@ fn an_arm_that_bends_is_calibrated_with_its_sag() {
 #[test]
 fn an_arm_on_a_parked_vehicle_is_calibrated() {
     let folder = temp();
-    let summary = run_of("parked.toml", folder.path()).summary();
-    let [before_m, after_m, _] = medians(&summary);
+    let run = run_of("parked.toml", folder.path());
+    let summary = &run.finished().summary;
+    let [before_m, after_m, _] = medians(summary);
     eprintln!("tool {:.1} to {:.2} mm", before_m * 1e3, after_m * 1e3);
     assert_eq!((summary.capture.collisions, summary.status), (Some(0), Status::Accepted));
     assert!(after_m < 3e-3 && after_m < RATIO * before_m, "{after_m}");

@@ -141,7 +141,10 @@ const CASES: &[Case] = &[
         code: Code::JointsMismatch,
         exit: 2,
         call: |f| {
-            calibrate(f, &sample("run.mcap"), &["--robot", &root().join("robots/kraft-predator").display().to_string()])
+            let robot = robot_copy(f);
+            edit(&robot.join("robot.toml"), "joint = \"wrist_yaw\"", "joint = \"wrist_sway\"");
+            edit(&robot.join("titan4.urdf"), "joint name=\"wrist_yaw\"", "joint name=\"wrist_sway\"");
+            calibrate(f, &sample("run.mcap"), &["--robot", &robot.display().to_string()])
         },
     },
     Case {

@@ -1,8 +1,12 @@
 //! One routine and one seed give one result, whatever the machine does meanwhile.
 
+use std::net::TcpListener;
+use std::path::PathBuf;
+use std::sync::OnceLock;
+
 use serde_json::Value;
 
-use crate::support::{ShortRoutine, answer, finished, program, read, shared_run, temp, write};
+use crate::support::{Answer, ShortRoutine, Simulated, answer, lasting_folder, program, read, shared_run, temp, write};
 
 /// summary.json without what the wall clock says.
 fn without_wall_time(summary: &[u8]) -> Value {
@@ -12,18 +16,35 @@ fn without_wall_time(summary: &[u8]) -> Value {
     value
 }
 
+/// The shared run again, on one thread, in another place, by other sines, and without the viewer that it asks for.
+pub struct Elsewhere {
+    pub out: PathBuf,
+    pub said: Answer,
+    /// Where no viewer listens.
+    pub viewer: String,
+}
+
+pub fn elsewhere() -> &'static Elsewhere {
+    static RUN: OnceLock<Elsewhere> = OnceLock::new();
+    RUN.get_or_init(|| {
+        let folder = lasting_folder();
+        let out = folder.join("again");
+        // The same files, spelled otherwise.
+        let text = read(&shared_run().routine).replace("/robots/", "/robots/../robots/./");
+        write(&folder.join("other.toml"), &text);
+        let viewer = TcpListener::bind("127.0.0.1:0").and_then(|port| port.local_addr()).expect("a port").to_string();
+        let mut again = program();
+        again.env("RAYON_NUM_THREADS", "1").env("TZ", "Pacific/Chatham").env("LC_ALL", "tr_TR.UTF-8");
+        again.env("GLIBC_TUNABLES", "glibc.cpu.hwcaps=-FMA,-AVX2,-AVX512F,-FMA4").current_dir(&folder);
+        let said = answer(again.args(["run", "other.toml"]).arg(format!("--live={viewer}")).arg("--out").arg(&out));
+        said.expect("again", 0, &["ACCEPTED"]);
+        Elsewhere { out, said, viewer }
+    })
+}
+
 #[test]
 fn a_routine_repeats_byte_for_byte_on_one_thread_and_in_another_place() {
-    let first = shared_run();
-    let folder = temp();
-    let out = folder.path().join("again");
-    // The same files, spelled otherwise.
-    let routine = folder.path().join("other.toml");
-    write(&routine, &read(&first.routine).replace("/robots/", "/robots/../robots/./"));
-    let mut again = program();
-    again.env("RAYON_NUM_THREADS", "1").env("TZ", "Pacific/Chatham").env("LC_ALL", "tr_TR.UTF-8");
-    again.current_dir(folder.path());
-    answer(again.arg("run").arg("other.toml").arg("--out").arg(&out)).expect("again", 0, &["ACCEPTED"]);
+    let (first, out) = (shared_run(), &elsewhere().out);
     for name in ["run.mcap", "truth.mcap", "run.rrd", "calibration.toml", "calibration.covariance.toml"] {
         assert!(first.bytes(name) == std::fs::read(out.join(name)).expect("written"), "{name} differs");
     }
@@ -42,13 +63,9 @@ fn a_routine_repeats_byte_for_byte_on_one_thread_and_in_another_place() {
 /// variable means nothing). Belief's fit and the sampling of noise would carry the last bit's difference everywhere.
 #[test]
 fn sines_are_not_the_platforms() {
-    let folder = temp();
-    let out = folder.path().join("out");
-    let mut other = program();
-    other.env("GLIBC_TUNABLES", "glibc.cpu.hwcaps=-FMA,-AVX2,-AVX512F,-FMA4");
-    answer(other.arg("run").arg(&shared_run().routine).arg("--out").arg(&out)).expect("run", 0, &["ACCEPTED"]);
     for name in ["run.mcap", "truth.mcap", "calibration.toml", "calibration.covariance.toml"] {
-        assert!(shared_run().bytes(name) == std::fs::read(out.join(name)).expect("written"), "{name} differs");
+        let of_others = std::fs::read(elsewhere().out.join(name)).expect("written");
+        assert!(shared_run().bytes(name) == of_others, "{name} differs");
     }
 }
 
@@ -80,11 +97,11 @@ fn calibrating_a_recording_twice_gives_the_same_bytes() {
 #[test]
 fn another_seed_gives_another_recording() {
     let folder = temp();
-    let tiny = ShortRoutine { poses: 10, held_out: 3, ..ShortRoutine::default() };
+    let tiny = ShortRoutine { poses: 4, held_out: 0, ..ShortRoutine::default() };
     let tiny = ShortRoutine { targets_m: tiny.targets_m[..1].to_vec(), ..tiny };
     let [first, second] = [1, 2].map(|seed| {
-        let run = finished(&ShortRoutine { seed, ..tiny.clone() }, &folder.path().join(seed.to_string()));
-        ["run.mcap", "truth.mcap", "calibration.toml"].map(|name| run.bytes(name))
+        let run = Simulated::of(&ShortRoutine { seed, ..tiny.clone() }, &folder.path().join(seed.to_string()));
+        [run.bytes("run"), run.bytes("truth"), run.finished().calibration.to_toml().into_bytes()]
     });
     for (a, b) in first.iter().zip(&second) {
         assert!(a != b);

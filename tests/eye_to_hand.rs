@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use armcal::calib::{Calibration, SagTable, covariance_file};
+use armcal::calib::{Calibration, SagTable, Status, covariance_file};
 use armcal::log::read_recording;
 use armcal::robot::{Robot, load};
 use armcal::stats::{quantile, stream_rng};
@@ -13,7 +13,8 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::support::external::{INPUT_MAP, Pose, write_poses};
 use crate::support::synthetic::{ToolFigures, TrueArm, normal};
-use crate::support::{Answer, FinishedRun, answer, calibrate, edit, program, read, robot_copy, root, run, temp, write};
+use crate::support::texts::Texts;
+use crate::support::{Answer, Simulated, answer, calibrate, edit, program, read, robot_copy, root, temp, write};
 
 const N_POSES: usize = 40;
 /// Of a measured pose, one sigma per axis.
@@ -109,11 +110,10 @@ fn off(std_m: f64, std_rad: f64, rng: &mut ChaCha8Rng) -> Isometry3<f64> {
 }
 
 /// All six joints: the board hangs behind the last.
-#[test]
-fn an_arm_before_a_standing_camera_is_calibrated_to_what_is_predicted() {
+fn expect_errors_before_a_standing_camera_as_predicted(seeds: u64) {
     let given = Given::new();
     let mut figures: Vec<ToolFigures> = Vec::new();
-    for seed in 0..8 {
+    for seed in 0..seeds {
         let arm = given.record(seed);
         let said = given.calibrate();
         said.expect(&format!("seed {seed}"), 0, &["ACCEPTED", "predicted"]);
@@ -133,6 +133,17 @@ fn an_arm_before_a_standing_camera_is_calibrated_to_what_is_predicted() {
     assert!((1.0..5.0).contains(&nees), "{nees}");
 }
 
+#[test]
+fn an_arm_before_a_standing_camera_is_calibrated_to_what_is_predicted() {
+    expect_errors_before_a_standing_camera_as_predicted(3);
+}
+
+#[test]
+#[ignore = "second tier: 8 arms, 6 s"]
+fn eight_arms_before_a_standing_camera_are_calibrated_to_what_is_predicted() {
+    expect_errors_before_a_standing_camera_as_predicted(8);
+}
+
 /// m, median over the targets; without a calibration some 90 mm.
 const CLOSED_LOOP_M: f64 = 0.003;
 
@@ -140,40 +151,38 @@ const CLOSED_LOOP_M: f64 = 0.003;
 /// that the recording alone gives again.
 #[test]
 fn an_arm_before_a_standing_camera_calibrates_itself() {
-    let (folder, routine) = (temp(), root().join("routines/titan4-watched.toml"));
-    let out = folder.path().join("run");
-    run(&routine, &out).expect("the loop", 0, &["ACCEPTED"]);
-    let done = FinishedRun { routine, out };
-    let summary = done.summary();
+    let folder = temp();
+    let routine = root().join("routines/titan4-watched.toml");
+    let run = Simulated::new(&routine, None, &[], &folder.path().join("run"));
+    let (summary, calibration) = (&run.finished().summary, &run.finished().calibration);
+    assert_eq!(summary.status, Status::Accepted);
     let score = summary.score.as_ref().expect("scored");
     let after = score.after.as_ref().expect("reached again");
     let [before_m, after_m] = [score.before.tool_error_m, after.tool_error_m].map(|s| s.expect("targets").median);
     eprintln!("tool {:.1} to {:.2} mm", before_m * 1e3, after_m * 1e3);
     assert_eq!((summary.capture.collisions, after.hits), (Some(0), after.targets));
     assert!(after_m < CLOSED_LOOP_M && before_m > 10.0 * after_m, "{before_m} {after_m}");
-    let calibration = Calibration::read(&done.file("calibration.toml")).expect("it reads");
     assert!(calibration.joint.iter().all(|joint| joint.gain_estimated && joint.offset_estimated));
 
     let again = folder.path().join("again");
     let robot = root().join("robots/titan4-watched");
-    calibrate(&done.file("run.mcap"), &robot, &again).expect("the recording alone", 0, &["ACCEPTED"]);
-    assert_eq!(read(&again.join("calibration.toml")), read(&done.file("calibration.toml")));
+    let recording = folder.path().join("run.mcap");
+    std::fs::copy(run.file("run"), &recording).expect("copied");
+    calibrate(&recording, &robot, &again).expect("the recording alone", 0, &["ACCEPTED"]);
+    assert_eq!(read(&again.join("calibration.toml")), calibration.to_toml());
 }
 
 /// Which tags there are is a message, and with it which link carries them.
 #[test]
 fn some_of_the_carried_tags_are_in_the_recording_with_their_link() {
     let (folder, robot) = (temp(), load(&root().join("robots/titan4-watched")).expect("the robot reads"));
-    let routine = read(&root().join("routines/titan4-watched.toml"));
-    let file = folder.path().join("some.toml");
-    let routine = routine.replace("\"../robots/", &format!("\"{}/", root().join("robots").display()));
-    write(
-        &file,
-        &routine.replace("[site]", "[site]\ntags = [0, 1, 2, 3, 4, 5, 6]").replace("poses = 30", "poses = 12"),
-    );
-    let out = folder.path().join("run");
-    run(&file, &out).expect("the loop", 0, &["ACCEPTED"]);
-    let recording = read_recording(out.join("run.mcap")).expect("it reads");
+    let some = [
+        ("site.tags", vec![0, 1, 2, 3, 4, 5, 6].into()),
+        ("capture.poses", 12.into()),
+        ("task.targets_m", vec![vec![1.074, 0.001, -0.008]].into()),
+    ];
+    let run = Simulated::new(&root().join("routines/titan4-watched.toml"), None, &some, folder.path());
+    let recording = read_recording(run.file("run")).expect("it reads");
     let surveys: Vec<_> = recording
         .messages
         .iter()
@@ -190,20 +199,21 @@ fn some_of_the_carried_tags_are_in_the_recording_with_their_link() {
 
 #[test]
 fn a_frame_that_does_not_fit_is_named_with_what_to_do() {
+    let _texts = Texts::of("a_frame_that_does_not_fit_is_named_with_what_to_do");
     let given = Given::new();
     given.record(0);
     let elsewhere = |frame: &str, words: &[&str]| {
         write(&given.file("board.toml"), &board(frame));
         given.calibrate().expect(frame, 2, &[&["board.toml", "frame", frame], words].concat());
     };
-    elsewhere("nowhere", &["base_link", "no link"]);
+    elsewhere("nowhere", &["base_link"]);
     let wrist = crate::support::robot_folder();
     write(&given.file("board.toml"), &board("manipulator_link"));
     let mut command = program();
     command.arg("calibrate").arg(given.file("arm.mcap")).arg("--robot").arg(wrist);
     command.arg("--input").arg(given.file("map.toml")).arg("--tag-map").arg(given.file("board.toml"));
     let answer = answer(command.arg("--out").arg(given.file("out")));
-    answer.expect("a camera on the arm", 2, &["frame", "stands still", "[camera] link"]);
+    answer.expect("a camera on the arm", 2, &["frame"]);
     let file = Path::new(&given.robot.folder).join("robot.toml");
     edit(&file, "position_m = [2.5, 0.4, 0.6]", "position_m = [2.5, 0.4, inf]");
     given.calibrate().expect("a camera nowhere", 2, &["robot.toml", "camera.position_m"]);
@@ -212,6 +222,7 @@ fn a_frame_that_does_not_fit_is_named_with_what_to_do() {
 /// Bending is known in a frame that turns with the wrist camera's arm: as a prior here it would be used in another.
 #[test]
 fn a_prior_that_knows_how_the_arm_bends_is_refused() {
+    let _texts = Texts::of("a_prior_that_knows_how_the_arm_bends_is_refused");
     let given = Given::new();
     given.record(0);
     given.calibrate().expect("without a prior", 0, &["ACCEPTED"]);
@@ -224,12 +235,12 @@ fn a_prior_that_knows_how_the_arm_bends_is_refused() {
         write(&file, &texts.calibration);
     };
     save(&prior);
-    again().expect("a prior that knows nothing of it", 4, &["the prior rests on these very messages"]);
+    again().expect("a prior that knows nothing of it", 4, &["[prior_reused]"]);
     let (mount_rad_per_nm, mount_std_rad_per_nm) = ([1e-6; 3], [1e-7; 3]);
     let (tool_load_n, tool_load_std_n, joint) = (0.0, 1.0, Vec::new());
     prior.sag = Some(SagTable { mount_rad_per_nm, mount_std_rad_per_nm, tool_load_n, tool_load_std_n, joint });
     save(&prior);
-    again().expect("a prior that knows", 2, &["bends under its weight", "--prior"]);
+    again().expect("a prior that knows", 2, &["--prior"]);
 }
 
 #[test]

@@ -33,8 +33,8 @@ const RESULTS: [&str; 7] = [
 
 /// A run that takes as little time as one can.
 fn quick() -> ShortRoutine {
-    let mut routine = ShortRoutine { poses: 12, held_out: 3, ..ShortRoutine::default() };
-    routine.targets_m.truncate(2);
+    let mut routine = ShortRoutine { poses: 10, held_out: 3, ..ShortRoutine::default() };
+    routine.targets_m.truncate(1);
     routine
 }
 
@@ -180,7 +180,7 @@ fn the_run_after_a_killed_one_keeps_its_recording() {
     wait_until_it_moves(&mut first, &partial);
 
     // Meanwhile nobody else may write there.
-    run(&routine, &out).expect("two runs at once", 1, &["another run", "--out"]);
+    run(&routine, &out).expect("two runs at once", 1, &["--out"]);
     first.kill().expect("killed");
     first.wait().expect("gone");
     let left = fs::read(&partial).expect("left");
@@ -197,7 +197,7 @@ fn the_run_after_a_killed_one_keeps_its_recording() {
     let (code, said) = end(second);
     assert_eq!(code, Some(1), "{said}");
     assert!(said.contains("run-cut-1.mcap"), "{said}");
-    assert!(said.contains("stopped on request") && said.contains("run-cut-2.mcap"), "{said}");
+    assert!(said.contains("[interrupted]") && said.contains("run-cut-2.mcap"), "{said}");
     assert_eq!(names(&out), ["run-cut-1.mcap", "run-cut-2.mcap", "truth-cut-1.mcap", "truth-cut-2.mcap"]);
     check_interrupted(&out.join("run-cut-2.mcap"));
     inspect(&out.join("truth-cut-2.mcap")).expect("the truth", 0, &["state        whole"]);
@@ -272,7 +272,7 @@ fn run_on_full_disk(limit: u64, reference: &FinishedRun, out: &Path) -> Answer {
 fn a_full_disk_is_told_and_costs_nothing_that_was_there() {
     let (reference, _) = reference();
     let folder = temp();
-    for (limit, is_early) in [(0, true), (200, false), (3000, false)] {
+    for (limit, is_early) in [(0, true), (200, false), (2400, false)] {
         let out = folder.path().join(format!("out{limit}"));
         fs::create_dir_all(&out).expect("a folder");
         for name in RESULTS {
@@ -280,7 +280,10 @@ fn a_full_disk_is_told_and_costs_nothing_that_was_there() {
         }
         let said = run_on_full_disk(limit, reference, &out);
         assert_eq!(said.code, 1, "limit {limit}: {said:#?}");
-        assert!(said.stderr.contains(".partial: cannot be written"), "limit {limit}: {said:#?}");
+        assert!(
+            said.stderr.contains(".partial") && said.stderr.contains("[file_unwritable]"),
+            "limit {limit}: {said:#?}"
+        );
         for name in RESULTS {
             assert_eq!(fs::read(out.join(name)).expect("there"), b"earlier", "limit {limit}: {name}");
         }
@@ -290,7 +293,7 @@ fn a_full_disk_is_told_and_costs_nothing_that_was_there() {
         if !is_early {
             let found = look(&kept, None).expect("it reads");
             assert!(found.messages > 500, "limit {limit}: {} messages", found.messages);
-            assert!(limit < 3000 || found.arm.views_fit > 0, "limit {limit}: no view");
+            assert!(limit < 2400 || found.arm.views_fit > 0, "limit {limit}: no view");
             assert!(found.completeness.state != State::Damaged, "limit {limit}: {:?}", found.completeness);
         }
     }
@@ -299,10 +302,8 @@ fn a_full_disk_is_told_and_costs_nothing_that_was_there() {
 /// A limit at any size up to that of the largest result, and just below and above that of each: `ARMCAL_FULL_DISKS` of
 /// them.
 #[cfg(unix)]
-#[test]
-fn a_disk_that_fills_at_any_size_loses_nothing() {
+fn expect_full_disks_to_lose_nothing(n: u64) {
     const BLOCK_BYTES: u64 = 512;
-    let n: u64 = std::env::var("ARMCAL_FULL_DISKS").ok().and_then(|n| n.parse().ok()).unwrap_or(4);
     let (reference, _) = reference();
     let sizes = RESULTS.map(|name| fs::metadata(reference.file(name)).expect("a result").len() / BLOCK_BYTES);
     // The last leaves room for all.
@@ -327,13 +328,13 @@ fn a_disk_that_fills_at_any_size_loses_nothing() {
             }
             let replay = fs::read(out.join("run.rrd")).ok();
             assert!(replay.as_deref() != Some(b"earlier"), "limit {limit}: an old replay beside new results");
-            assert_eq!(replay.is_none(), said.stderr.contains("there is no replay"), "limit {limit}: {said:#?}");
+            assert_eq!(replay.is_none(), said.stderr.contains("run.rrd"), "limit {limit}: {said:#?}");
             n_without_replay += u32::from(replay.is_none());
             continue;
         }
         n_stopped += 1;
         assert_eq!(said.code, 1, "limit {limit}: {said:#?}");
-        assert!(said.stderr.contains("cannot be written"), "limit {limit}: {said:#?}");
+        assert!(said.stderr.contains("[file_unwritable]"), "limit {limit}: {said:#?}");
         for name in RESULTS {
             assert_eq!(fs::read(out.join(name)).expect("there"), b"earlier", "limit {limit}: {name}");
         }
@@ -342,6 +343,21 @@ fn a_disk_that_fills_at_any_size_loses_nothing() {
     }
     eprintln!("{n_stopped} of {} stopped, {n_without_replay} without a replay", limits.len());
     assert!(n_stopped > 0 && n_stopped < limits.len());
+}
+
+#[cfg(unix)]
+#[test]
+fn a_disk_that_fills_on_the_way_loses_nothing() {
+    expect_full_disks_to_lose_nothing(2);
+}
+
+#[cfg(unix)]
+#[test]
+#[ignore = "second tier: disks of four sizes, 7 s"]
+fn a_disk_that_fills_at_any_size_loses_nothing() {
+    expect_full_disks_to_lose_nothing(
+        std::env::var("ARMCAL_FULL_DISKS").ok().and_then(|n| n.parse().ok()).unwrap_or(4),
+    );
 }
 
 /// The replay is larger than what is recorded: it alone does not fit, and costs nothing else.
@@ -353,9 +369,9 @@ fn a_replay_that_does_not_fit_is_a_warning() {
     let routine = ShortRoutine { tail, ..quick() }.write(folder.path());
     let out = folder.path().join("out");
     let mut shell = Command::new("sh");
-    let line = "ulimit -f 6000; exec \"$0\" run \"$1\" --out \"$2\"";
+    let line = "ulimit -f 5000; exec \"$0\" run \"$1\" --out \"$2\"";
     shell.arg("-c").arg(line).arg(env!("CARGO_BIN_EXE_armcal")).arg(&routine).arg(&out);
-    answer(&mut shell).expect("no replay", 0, &["warning: there is no replay", "run.rrd", "ACCEPTED"]);
+    answer(&mut shell).expect("no replay", 0, &["run.rrd", "ACCEPTED"]);
     let mut expected: Vec<&str> = RESULTS.into_iter().filter(|name| *name != "run.rrd").collect();
     expected.sort_unstable();
     assert_eq!(names(&out), expected);
@@ -392,7 +408,7 @@ fn a_folder_that_was_removed_is_named() {
     fs::remove_dir_all(&out).expect("removed");
     let (code, said) = end(child);
     assert_eq!(code, Some(1), "{said}");
-    assert!(said.contains("the output folder was removed") && said.contains("out"), "{said}");
+    assert!(said.contains("[file_unwritable]") && said.contains("out"), "{said}");
 }
 
 #[test]
@@ -421,15 +437,15 @@ fn an_output_that_cannot_take_a_run_is_refused_at_once() {
     fs::write(&file, "in the way").expect("written");
     let out = folder.path().join("out");
     fs::create_dir_all(out.join("summary.json")).expect("a folder in the way");
-    let mut cases = vec![(file, "cannot be made"), (out.clone(), "summary.json: cannot be put in place")];
+    let mut cases = vec![(file, "file"), (out.clone(), "summary.json")];
     if cfg!(target_os = "linux") {
         // Nobody can make files there, not even root.
-        cases.push((PathBuf::from("/proc/self"), "cannot write into this folder"));
+        cases.push((PathBuf::from("/proc/self"), "/proc/self"));
     }
     for (out, words) in cases {
         let began = Instant::now();
         let said = run(&reference.routine, &out);
-        said.expect("refused", 1, &[words, out.to_str().expect("UTF-8")]);
+        said.expect("refused", 1, &[words, out.to_str().expect("UTF-8"), "[file_unwritable]"]);
         assert!(began.elapsed() < took.mul_f64(0.5), "before anything is simulated");
     }
     assert_eq!(names(&out), ["summary.json"]);

@@ -13,6 +13,9 @@
 //! test writes; `touch` feels surveyed plates with the tool; `any_arm` makes robot folders for drawings of all sorts;
 //! `report` reads report.html; `work` works on a dive, `watch` follows recordings that grow; `live` moves arms behind
 //! ROS 2 topics; `repository` reads sources and pages.
+//!
+//! Tests that are ignored are a second tier: statistics over many seeds, routines and dives, of which the first tier
+//! has a small member. `cargo test --release -- --include-ignored` runs both.
 
 #![allow(clippy::print_stderr, reason = "figures of a test, for whoever reads its output")]
 

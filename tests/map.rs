@@ -1,5 +1,8 @@
 //! Tags that nobody has surveyed: the views themselves say where they are.
 
+use std::path::PathBuf;
+use std::sync::OnceLock;
+
 use armcal::calib::{Calibration, Status, SurveyCoverage, calibrate};
 use armcal::robot::Robot;
 use armcal::routine::Method;
@@ -9,9 +12,11 @@ use armcal::streams::CaptureSet;
 use rand_chacha::ChaCha8Rng;
 
 use crate::support::synthetic::{Shot, ToolFigures, TrueArm, add_noise};
-use crate::support::{ShortRoutine, calibrate as calibrate_file, read, robot_folder, run, temp, titan};
+use crate::support::texts::Texts;
+use crate::support::{
+    Answer, ShortRoutine, calibrate as calibrate_file, lasting_folder, read, robot_folder, run, temp, titan,
+};
 
-const SEEDS: std::ops::RangeInclusive<u64> = 1..=20;
 /// Of a mean over five frames, px.
 const NOISE_PX: f64 = 0.134;
 /// A machined seat, m and rad.
@@ -63,7 +68,7 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// Medians over the seeds: with the tags in `known` surveyed, and the base tag held to `base_std`.
-fn figures(known: &[u32], base_std: (f64, f64)) -> ToolFigures {
+fn figures(known: &[u32], base_std: (f64, f64), seeds: u64) -> ToolFigures {
     let truth = titan_with(base_std);
     let believed = knowing(&truth, known);
     let of_seed = |seed: u64| {
@@ -73,7 +78,7 @@ fn figures(known: &[u32], base_std: (f64, f64)) -> ToolFigures {
         assert_eq!(calibration.map.is_some(), known.len() < truth.tags.len());
         arm.tool_figures(&calibration)
     };
-    let all: Vec<ToolFigures> = SEEDS.map(of_seed).collect();
+    let all: Vec<ToolFigures> = (1..=seeds).map(of_seed).collect();
     ToolFigures {
         error_m: median(all.iter().map(|f| f.error_m)),
         predicted_m: median(all.iter().map(|f| f.predicted_m)),
@@ -81,15 +86,14 @@ fn figures(known: &[u32], base_std: (f64, f64)) -> ToolFigures {
     }
 }
 
-#[test]
-fn what_an_unknown_map_costs_is_foretold() {
+fn expect_the_cost_of_an_unknown_map(seeds: u64) {
     /// m. The map hangs on one tag of 0.15 m, whose direction its corners tell to a milliradian or two.
     const UNKNOWN_M: f64 = 0.004;
     let all: Vec<u32> = titan().tags.iter().map(|tag| tag.id).collect();
-    let surveyed = figures(&all, SURVEYED);
-    let unknown = figures(&[0], MACHINED);
-    let unmachined = figures(&[0], SURVEYED);
-    let partly = figures(&[0, 3, 6], SURVEYED);
+    let surveyed = figures(&all, SURVEYED, seeds);
+    let unknown = figures(&[0], MACHINED, seeds);
+    let unmachined = figures(&[0], SURVEYED, seeds);
+    let partly = figures(&[0, 3, 6], SURVEYED, seeds);
     for (name, f) in
         [("surveyed", surveyed), ("unknown", unknown), ("base as surveyed", unmachined), ("partly", partly)]
     {
@@ -105,6 +109,17 @@ fn what_an_unknown_map_costs_is_foretold() {
     assert!(unmachined.error_m > unknown.error_m, "{unmachined:?} {unknown:?}");
     assert!(unmachined.predicted_m > 1.2 * unknown.predicted_m, "{unmachined:?} {unknown:?}");
     assert!(partly.error_m < unmachined.error_m, "{partly:?} {unmachined:?}");
+}
+
+#[test]
+fn what_an_unknown_map_costs_is_foretold() {
+    expect_the_cost_of_an_unknown_map(7);
+}
+
+#[test]
+#[ignore = "second tier: 20 seeds of four maps, 4 s"]
+fn what_an_unknown_map_costs_is_foretold_over_twenty_seeds() {
+    expect_the_cost_of_an_unknown_map(20);
 }
 
 #[test]
@@ -137,17 +152,27 @@ fn tags_are_found_where_they_are_and_those_that_cannot_be_are_left_out() {
     }
 }
 
+/// A run that maps its tags, and what it said; made once.
+pub fn mapping_run() -> &'static (PathBuf, Answer) {
+    static RUN: OnceLock<(PathBuf, Answer)> = OnceLock::new();
+    RUN.get_or_init(|| {
+        let folder = lasting_folder();
+        let routine = ShortRoutine { tail: "[site]\nmap = \"unknown\"\n".to_owned(), ..ShortRoutine::default() };
+        let out = folder.join("out");
+        let said = run(&routine.write(&folder), &out);
+        assert!([0, 4].contains(&said.code), "{said:#?}");
+        (out, said)
+    })
+}
+
 /// The recording says what is known: the file alone gives the same result.
 #[test]
 fn a_run_that_maps_its_tags_can_be_done_again_from_its_recording() {
-    let folder = temp();
-    let text = ShortRoutine { tail: "[site]\nmap = \"unknown\"\n".to_owned(), ..ShortRoutine::default() };
-    let out = folder.path().join("out");
-    let said = run(&text.write(folder.path()), &out);
-    assert!([0, 4].contains(&said.code), "{said:#?}");
-    assert!(said.stdout.contains("tag map"), "{said:#?}");
-    let again = folder.path().join("again");
-    let said = calibrate_file(&out.join("run.mcap"), &robot_folder(), &again);
+    let (out, said) = mapping_run();
+    assert!(said.stdout.contains("tagmap.toml") || out.join("tagmap.toml").exists(), "{said:#?}");
+    let again = temp();
+    let again = again.path();
+    let said = calibrate_file(&out.join("run.mcap"), &robot_folder(), again);
     assert!([0, 4].contains(&said.code), "{said:#?}");
     for name in ["calibration.toml", "tagmap.toml"] {
         assert!(read(&out.join(name)) == read(&again.join(name)), "{name}");
@@ -157,12 +182,13 @@ fn a_run_that_maps_its_tags_can_be_done_again_from_its_recording() {
 
 #[test]
 fn what_the_site_says_of_the_map_is_checked() {
+    let _texts = Texts::of("what_the_site_says_of_the_map_is_checked");
     let folder = temp();
     for (site, words) in [
         ("map = \"partly\"", "site.known_tags"),
         ("map = \"unknown\"\nknown_tags = [0]", "site.known_tags"),
         ("map = \"partly\"\nknown_tags = [99]", "tag 99"),
-        ("map = \"some\"", "unknown variant"),
+        ("map = \"some\"", "[name_unknown]"),
         ("base_tag_position_std_m = -1.0", "site.base_tag_position_std_m"),
     ] {
         let text = ShortRoutine { tail: format!("[site]\n{site}\n"), ..ShortRoutine::default() };

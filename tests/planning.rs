@@ -11,6 +11,7 @@ use armcal::stats::stream_rng;
 use armcal::streams::JointAngles;
 use rand::RngExt;
 
+use crate::support::texts::Texts;
 use crate::support::{Answer, ShortRoutine, answer, edit, program, read, shared_run, temp, write};
 
 fn plan(routine: &Path, out: &Path, more: &[&str]) -> Answer {
@@ -30,6 +31,7 @@ fn short(folder: &Path, tail: &str) -> PathBuf {
 
 #[test]
 fn the_same_input_gives_the_same_bytes_and_check_reads_them() {
+    let _texts = Texts::of("the_same_input_gives_the_same_bytes_and_check_reads_them");
     let folder = temp();
     let routine = short(folder.path(), "");
     let outs = ["a", "b", "c"].map(|name| folder.path().join(name));
@@ -45,7 +47,7 @@ fn the_same_input_gives_the_same_bytes_and_check_reads_them() {
     assert_eq!((first.totals.poses, first.totals.stop_reason), (first.pose.len(), StopReason::Poses));
     assert_eq!(first.totals.poses + first.totals.left_out, 16);
     let file = outs[0].join("plan.toml");
-    answer(program().arg("check").arg(&file)).expect("check", 0, &["plan for `titan4`", "clear"]);
+    answer(program().arg("check").arg(&file)).expect("check", 0, &["clear"]);
     for (from, to, word) in [
         ("version = 1", "version = 2", "version"),
         ("number = 2", "number = 7", "pose 2: number"),
@@ -160,6 +162,7 @@ fn every_edge_keeps_its_proven_clearance_for_random_arms() {
 
 #[test]
 fn what_cannot_be_planned_is_named() {
+    let _texts = Texts::of("what_cannot_be_planned_is_named");
     let folder = temp();
     let out = folder.path().join("out");
     let far = ShortRoutine { targets_m: vec![[4.0, 0.0, 0.0], [0.0, 0.0, 5.0]], ..ShortRoutine::default() };
@@ -167,9 +170,9 @@ fn what_cannot_be_planned_is_named() {
         plan(routine, &out, more).expect("refused", 2, words);
         assert!(!out.join("plan.toml").exists(), "{words:?}");
     };
-    refused(&far.write(folder.path()), &[], &["none of the 2 targets", "target 1", "4.000"]);
+    refused(&far.write(folder.path()), &[], &["target 1", "4.000"]);
     let rock = "[[obstacle]]\nname = \"rock\"\nshape = \"sphere\"\nradius_m = 0.5\nposition_m = [2.6, -0.6, 0.2]\n";
-    refused(&short(folder.path(), rock), &[], &["the arm starts too close", "rock"]);
+    refused(&short(folder.path(), rock), &[], &["rock"]);
     let script = "[[step]]\ndo = \"move\"\nto_rad = [-2.4, -0.3, 0.0, 0.0, 0.0, 0.0]\n\
                   [[step]]\ndo = \"capture\"\n[[step]]\ndo = \"calibrate\"\n";
     let file = short(folder.path(), script);
@@ -181,7 +184,7 @@ fn what_cannot_be_planned_is_named() {
     let [x, y, z] = [tool.x + 1.7, tool.y - 0.6, tool.z + 0.1];
     let rock =
         format!("[[obstacle]]\nname = \"rock\"\nshape = \"sphere\"\nradius_m = 0.1\nposition_m = [{x}, {y}, {z}]\n");
-    refused(&short(folder.path(), &format!("{script}{rock}")), &[], &["step 1", "the goal is inside", "rock"]);
+    refused(&short(folder.path(), &format!("{script}{rock}")), &[], &["step 1", "rock"]);
     refused(&short(folder.path(), &script.replace("-0.3", "1.5")), &[], &["step 1", "shoulder_pitch", "stop"]);
     refused(&short(folder.path(), ""), &["--set", "capture.min_tags=60"], &["60", "tags"]);
     refused(&short(folder.path(), ""), &["--prior", "nowhere.toml"], &["nowhere.toml"]);

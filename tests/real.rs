@@ -19,6 +19,7 @@ use crate::support::external::{
     AS_IN_2018, INPUT_MAP, Noise, Pose, RealTitan, at, header, joint_state, transform, write_poses, write_stream,
 };
 use crate::support::synthetic::{N_SEEN, TrueArm, add_noise};
+use crate::support::texts::Texts;
 use crate::support::{Answer, answer, program, read, robot_folder, temp, titan, write};
 
 /// A folder with a recording and all that goes with it.
@@ -148,27 +149,47 @@ fn recovered(method: Method, seeds: u64) -> [f64; 4] {
     figures
 }
 
+/// A normal's errors are 0.67 sigma in the median and 1.96 (95 %). The mount's prior makes the sigmas larger than they
+/// need to be here, because the camera hangs as in the nominal model.
+#[track_caller]
+fn expect_known_errors_to_come_back(method: Method, seeds: u64) {
+    let [median, p95, ratio, refused] = recovered(method, seeds);
+    assert!((0.3..0.85).contains(&median) && p95 < 2.4, "{method}: median {median}, 95 % {p95}");
+    assert!(ratio < 0.25 && refused <= 2.0, "{method}: {ratio}, {refused}");
+}
+
 #[test]
 fn known_errors_come_back_within_what_the_result_says_of_itself() {
-    for (method, seeds) in [(Method::MinimumDistance, 24), (Method::Bundle, 12)] {
-        let [median, p95, ratio, refused] = recovered(method, seeds);
-        // A normal's are 0.67 and 1.96; the mount's prior makes the sigmas larger than needed here, where it hangs as
-        // drawn.
-        assert!((0.3..0.85).contains(&median) && p95 < 2.4, "{method}: median {median}, 95 % {p95}");
-        assert!(ratio < 0.25 && refused <= 2.0, "{method}: {ratio}, {refused}");
-    }
+    expect_known_errors_to_come_back(Method::MinimumDistance, 3);
+    expect_known_errors_to_come_back(Method::Bundle, 2);
+}
+
+#[test]
+#[ignore = "second tier: 24 arms by minimum distance, 12 by bundle, 20 s"]
+fn known_errors_of_many_arms_come_back() {
+    expect_known_errors_to_come_back(Method::MinimumDistance, 24);
+    expect_known_errors_to_come_back(Method::Bundle, 12);
+}
+
+/// Exact sensors need no calibration: how many of `seeds` were refused for that.
+fn n_refused_with_exact_sensors(seeds: u64) -> usize {
+    let is_refused = |seed: &u64| {
+        let titan = RealTitan::new(&titan(), 57, Noise { sensors: 0.0, ..AS_IN_2018 }, *seed);
+        let found = calibrate_data(prepared_titan(&titan), Method::MinimumDistance, None).expect("calibrated");
+        found.refusal.is_some_and(|why| why.contains("no better than with the datasheet"))
+    };
+    (0..seeds).filter(is_refused).count()
 }
 
 #[test]
 fn a_fit_that_does_not_beat_the_datasheet_is_refused_with_the_reason() {
-    const SEEDS: u64 = 12;
-    let mut refused = 0;
-    for seed in 0..SEEDS {
-        let titan = RealTitan::new(&titan(), 57, Noise { sensors: 0.0, ..AS_IN_2018 }, seed);
-        let found = calibrate_data(prepared_titan(&titan), Method::MinimumDistance, None).expect("calibrated");
-        refused += u64::from(found.refusal.is_some_and(|why| why.contains("no better than with the datasheet")));
-    }
-    assert!(refused + 2 >= SEEDS, "{refused} of {SEEDS}: exact sensors need no calibration");
+    assert!(n_refused_with_exact_sensors(3) >= 2);
+}
+
+#[test]
+#[ignore = "second tier: 12 arms with exact sensors, 4 s"]
+fn fits_of_many_arms_that_do_not_beat_the_datasheet_are_refused() {
+    assert!(n_refused_with_exact_sensors(12) >= 10);
 }
 
 #[test]
@@ -177,7 +198,7 @@ fn eight_poses_are_too_few_for_ten_parameters_however_many_tags() {
         let mut titan = RealTitan::new(&titan(), 8, AS_IN_2018, seed);
         titan.poses.iter_mut().for_each(|pose| pose.tags.truncate(tags));
         let given = Given::new(&titan);
-        let words = ["REFUSED", "8 views", "too few", "10 parameters"];
+        let words = ["REFUSED", "[too_few_views]"];
         given.calibrate(&["--method", "minimum_distance"]).expect("eight poses", 4, &words);
         let summary = given.summary();
         assert!(summary["status"] == "refused" && summary["refusal"].as_str().expect("why").contains("10 parameters"));
@@ -188,7 +209,7 @@ fn eight_poses_are_too_few_for_ten_parameters_however_many_tags() {
 fn order_of_joints_and_names_does_not_matter_and_what_hangs_behind_the_camera_may_be_absent() {
     let titan = RealTitan::new(&titan(), 30, AS_IN_2018, 5);
     let given = Given::new(&titan);
-    given.calibrate(&[]).expect("plain", 0, &["ACCEPTED", "replay.rrd to look at"]);
+    given.calibrate(&[]).expect("plain", 0, &["ACCEPTED"]);
     let plain = given.calibration();
     let mut other = titan.poses.clone();
     for pose in &mut other {
@@ -199,7 +220,7 @@ fn order_of_joints_and_names_does_not_matter_and_what_hangs_behind_the_camera_ma
     }
     write_poses(&given.file("arm.mcap"), &other);
     write(&given.file("map.toml"), &INPUT_MAP.replace("[tags]", "names = { forearm_pitch = \"joint_3\" }\n[tags]"));
-    given.calibrate(&[]).expect("another order", 0, &["ACCEPTED", "gripper", "no readings of wrist_rotate"]);
+    given.calibrate(&[]).expect("another order", 0, &["ACCEPTED", "gripper"]);
     let mut other = given.calibration();
     other.messages_hash.clone_from(&plain.messages_hash);
     // Nothing is seen of it in either.
@@ -235,6 +256,7 @@ fn transforms_may_come_the_other_way_round_with_slashes_and_one_by_one() {
 
 #[test]
 fn several_recordings_count_as_one_in_any_order() {
+    let _texts = Texts::of("several_recordings_count_as_one_in_any_order");
     let titan = RealTitan::new(&titan(), 57, AS_IN_2018, 7);
     let given = Given::new(&titan);
     given.calibrate(&[]).expect("one", 0, &["ACCEPTED"]);
@@ -245,7 +267,7 @@ fn several_recordings_count_as_one_in_any_order() {
         given.calibrate_of(&order, &[]).expect("two", 0, &["ACCEPTED", "57 poses"]);
         assert!(read(&given.file("out/calibration.toml")) == one, "{order:?}");
     }
-    given.calibrate_of(&["a.mcap", "b.mcap", "a.mcap"], &[]).expect("twice", 2, &["a.mcap", "duplicate recording"]);
+    given.calibrate_of(&["a.mcap", "b.mcap", "a.mcap"], &[]).expect("twice", 2, &["a.mcap"]);
 }
 
 #[test]
@@ -280,49 +302,50 @@ type Spoilt = (&'static str, fn(&mut Vec<Pose>), &'static [&'static str]);
 
 const SPOILT: &[Spoilt] = &[
     (
-        "NaN in a position",
+        "NaN-in-a-position",
         |poses| poses[4].joints[2].1 = f64::NAN,
         &["/joint_states", "message 5", "forearm_pitch", "NaN"],
     ),
     (
-        "infinite transform",
+        "infinite-transform",
         |poses| poses[6].tags[3].1.translation.x = f64::INFINITY,
         &["/tf", "message 7", "translation", "tag36h11:3", "inf"],
     ),
     ("backwards", |poses| poses[9].joints_at_s = 4.5, &["/joint_states", "message 10", "backwards"]),
-    ("camera backwards", |poses| poses[9].tags_at_s = 4.5, &["/tf", "message 10", "backwards"]),
+    ("camera-backwards", |poses| poses[9].tags_at_s = 4.5, &["/tf", "message 10", "backwards"]),
     (
-        "other joints",
+        "other-joints",
         |poses| poses.iter_mut().for_each(|pose| pose.joints[1].0 = "shoulder".into()),
         &["shoulder_pitch", "\"shoulder\"", "wrist_yaw"],
     ),
-    ("one view", |poses| poses.truncate(1), &["only 1", "view"]),
+    ("one-view", |poses| poses.truncate(1), &["only 1", "view"]),
     (
-        "other tags",
+        "other-tags",
         |poses| {
             poses.iter_mut().flat_map(|pose| &mut pose.tags).for_each(|(frame, _)| *frame = frame.replace(':', ":5"))
         },
-        &["no surveyed tag", "57"],
+        &["57"],
     ),
     (
-        "no tags",
+        "no-tags",
         |poses| poses.iter_mut().flat_map(|pose| &mut pose.tags).for_each(|(frame, _)| frame.insert(0, 'x')),
         &["/tf", "xtag36h11:0", "tag36h11:{id}"],
     ),
-    ("no messages with tags", |poses| poses.iter_mut().for_each(|pose| pose.tags.clear()), &["/tf", "empty"]),
+    ("no-messages-with-tags", |poses| poses.iter_mut().for_each(|pose| pose.tags.clear()), &["/tf", "empty"]),
     (
-        "one pose",
+        "one-pose",
         |poses| {
             let first = poses[0].joints.clone();
             poses.iter_mut().for_each(|pose| pose.joints.clone_from(&first));
         },
-        &["one pose", "20 views", "no joint"],
+        &["20 views"],
     ),
-    ("far apart", |poses| poses.iter_mut().for_each(|pose| pose.tags_at_s += 1000.0), &["no joint readings"]),
+    ("far-apart", |poses| poses.iter_mut().for_each(|pose| pose.tags_at_s += 1000.0), &[]),
 ];
 
 #[test]
 fn bad_data_is_refused_by_name() {
+    let _texts = Texts::of("bad_data_is_refused_by_name");
     let titan = RealTitan::new(&titan(), 20, AS_IN_2018, 8);
     let given = Given::new(&titan);
     given.calibrate(&[]).expect("as it was", 0, &["ACCEPTED"]);
@@ -401,6 +424,7 @@ fn streams_become_one_view_for_each_rest_of_the_arm() {
 
 #[test]
 fn corners_of_an_external_detector_are_used_as_our_own_are() {
+    let _texts = Texts::of("corners_of_an_external_detector_are_used_as_our_own_are");
     let robot = titan();
     let mut rng = stream_rng(10, "corners");
     let arm = TrueArm::with_sensor_errors(&robot, &mut rng);
@@ -431,7 +455,7 @@ fn corners_of_an_external_detector_are_used_as_our_own_are() {
     command.arg("calibrate").arg("--details").arg(given.file("arm.mcap")).arg("--robot").arg(robot_folder());
     command.arg("--input").arg(given.file("map.toml")).arg("--out").arg(given.file("out"));
     command.args(["--method", "minimum_distance"]);
-    answer(&mut command).expect("corners", 0, &["ACCEPTED", "24 poses", "reprojection error"]);
+    answer(&mut command).expect("corners", 0, &["ACCEPTED", "24 poses"]);
     for (j, joint) in given.calibration().joint.iter().enumerate().take(N_SEEN) {
         let off_rad = joint.offset_rad - arm.offset_rad[j];
         assert!(off_rad.abs() < 4.0 * joint.offset_std_rad, "{}: {off_rad} rad", joint.name);
@@ -439,7 +463,7 @@ fn corners_of_an_external_detector_are_used_as_our_own_are() {
     write(&given.file("map.toml"), &map.replace("wrist_optical", "stern"));
     answer(&mut command).expect("another camera", 2, &["/tags", "wrist_optical", "stern"]);
     write(&given.file("map.toml"), &map.replace("use = \"corners\"", "child_frame = \"{id}\"\nuse = \"pose\""));
-    answer(&mut command).expect("no poses there", 2, &["/tags", "corners in the image", "tags.use"]);
+    answer(&mut command).expect("no poses there", 2, &["/tags", "tags.use"]);
 }
 
 #[test]
@@ -479,6 +503,7 @@ fn poses_are_averaged_as_rotations() {
 
 #[test]
 fn task_and_prior_are_taken_from_files() {
+    let _texts = Texts::of("task_and_prior_are_taken_from_files");
     let titan = RealTitan::new(&titan(), 57, AS_IN_2018, 12);
     let given = Given::new(&titan);
     write(
@@ -487,7 +512,7 @@ fn task_and_prior_are_taken_from_files() {
     );
     let task = given.file("task.toml");
     let task = ["--task", task.to_str().expect("a path")];
-    given.calibrate(&[]).expect("without a task", 0, &["no task is named"]);
+    given.calibrate(&[]).expect("without a task", 0, &[]);
     assert!(given.summary()["calibration"]["predicted_tool_error_m"].is_null());
     given.calibrate(&task).expect("with one", 0, &["predicted"]);
     assert_eq!(given.summary()["calibration"]["predicted_tool_error_m"]["n"], 2);
@@ -497,14 +522,14 @@ fn task_and_prior_are_taken_from_files() {
         &given.file("task.toml"),
         "version = 1\ntolerance_m = 0.0001\nposes_rad = [[-1.3, -0.3, -0.4, 0.3, -0.6, 0.0]]\n",
     );
-    given.calibrate(&task).expect("too small a tolerance", 4, &["tolerance of 0.1 mm"]);
+    given.calibrate(&task).expect("too small a tolerance", 4, &["[beyond_tolerance]"]);
     let refused = given.file("out/calibration.toml");
-    given.calibrate(&["--prior", refused.to_str().expect("a path")]).expect("a refused prior", 2, &["refused itself"]);
+    given.calibrate(&["--prior", refused.to_str().expect("a path")]).expect("a refused prior", 2, &[]);
     given.calibrate(&[]).expect("again", 0, &[]);
     let prior = given.file("prior.toml");
     std::fs::copy(given.file("out/calibration.toml"), &prior).expect("copied");
     let alone = ["--prior", prior.to_str().expect("a path")];
-    given.calibrate(&alone).expect("without its covariance", 2, &["prior.covariance.toml", "is missing"]);
+    given.calibrate(&alone).expect("without its covariance", 2, &["prior.covariance.toml"]);
     std::fs::copy(given.file("out/calibration.covariance.toml"), given.file("prior.covariance.toml")).expect("copied");
     let with_prior = ["--prior", prior.to_str().expect("a path"), "--method", "minimum_distance"];
     given.calibrate(&with_prior).expect("the same views again", 0, &["ACCEPTED"]);
@@ -516,10 +541,11 @@ fn task_and_prior_are_taken_from_files() {
 
 #[test]
 fn check_reads_input_maps_tag_maps_and_tasks() {
+    let _texts = Texts::of("check_reads_input_maps_tag_maps_and_tasks");
     let given = Given::new(&RealTitan::new(&titan(), 1, AS_IN_2018, 13));
     write(&given.file("task.toml"), "version = 1\ntolerance_m = 0.02\ntargets_m = [[0.5, 1.6, 0.3]]\n");
     let check = |names: &[&str]| answer(program().arg("check").args(names.iter().map(|name| given.file(name))));
-    let words = ["input map", "tag36h11:{id}", "tag map", "9 landmarks", "task, 1 targets"];
+    let words = ["tag36h11:{id}", " 9 landmarks", " 1 targets"];
     check(&["map.toml", "tags.toml", "task.toml"]).expect("good", 0, &words);
     write(&given.file("map.toml"), &INPUT_MAP.replace("use = \"position\"", "use = \"place\""));
     check(&["map.toml"]).expect("wrong", 2, &["map.toml", "place", "position"]);
@@ -527,6 +553,7 @@ fn check_reads_input_maps_tag_maps_and_tasks() {
 
 #[test]
 fn several_recordings_of_our_own_are_pooled_in_any_order() {
+    let _texts = Texts::of("several_recordings_of_our_own_are_pooled_in_any_order");
     let folder = temp();
     let robot = titan();
     let mut rng = stream_rng(14, "pooled");
@@ -549,9 +576,9 @@ fn several_recordings_of_our_own_are_pooled_in_any_order() {
         command.args(["--method", "minimum_distance"]).arg("--robot").arg(robot_folder()).arg("--out").arg(&out);
         answer(&mut command)
     };
-    calibrate(["a.mcap", "b.mcap"]).expect("both", 0, &["ACCEPTED", "32 poses", "24 fitted views"]);
+    calibrate(["a.mcap", "b.mcap"]).expect("both", 0, &["ACCEPTED", "32 poses", " 24 fitted"]);
     let both = read(&out.join("calibration.toml"));
     calibrate(["b.mcap", "a.mcap"]).expect("the other way round", 0, &["ACCEPTED"]);
     assert!(read(&out.join("calibration.toml")) == both);
-    calibrate(["a.mcap", "a.mcap"]).expect("one twice", 2, &["a.mcap", "duplicate recording"]);
+    calibrate(["a.mcap", "a.mcap"]).expect("one twice", 2, &["a.mcap"]);
 }

@@ -11,6 +11,7 @@ use armcal::robot::Robot;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector2};
 
 use crate::support::external::{AS_IN_2018, INPUT_MAP, RealTitan, at, header, joint_state, transform, write_poses};
+use crate::support::texts::Texts;
 use crate::support::{answer, program, read, robot_folder, temp, titan, write};
 
 const CONDITIONS: &str = "[conditions]\noil_temperature = \"/oil\"\npressure = \"/depth\"\n";
@@ -88,7 +89,7 @@ fn slow_sensors_that_are_not_as_the_map_says_are_refused() {
     assert_eq!(left.values().sum::<u64>(), 24, "{left:?}");
     let exchanged = text.replace("\"/oil\"", "\"/x\"").replace("/depth", "/oil").replace("/x", "/depth");
     assert!(problem(&exchanged).contains("sensor_msgs/msg/"), "{}", problem(&exchanged));
-    assert!(problem(&text.replace("/oil", "/no_oil")).contains("no message on topic /no_oil"));
+    assert!(problem(&text.replace("/oil", "/no_oil")).contains("/no_oil"));
 }
 
 /// A pinhole camera that sees a wall with one tag.
@@ -190,10 +191,9 @@ fn image_map(topic: &str) -> String {
 }
 
 /// Without a family in the input map, that of the robot's tags is looked for.
-#[test]
-fn tags_of_the_family_that_the_input_map_names_are_found() {
+fn expect_tags_of_a_named_family_to_be_found(families: &[TagFamily]) {
     let (folder, robot) = (temp(), titan());
-    for family in TagFamily::ALL {
+    for &family in families {
         let recording = folder.path().join(format!("{family}.mcap"));
         Camera::before_a_tag_of(family).write(&recording, &robot);
         let with_family = image_map("/png").replace("[tags]", &format!("[tags]\nfamily = \"{family}\""));
@@ -214,6 +214,17 @@ fn tags_of_the_family_that_the_input_map_names_are_found() {
             (other, _) => panic!("{family}: {other:?}"),
         }
     }
+}
+
+#[test]
+fn tags_of_the_family_that_the_input_map_names_are_found() {
+    expect_tags_of_a_named_family_to_be_found(&[TagFamily::Tag36h11, TagFamily::Tag25h9]);
+}
+
+#[test]
+#[ignore = "second tier: all families, 4 s"]
+fn tags_of_each_family_that_the_input_map_names_are_found() {
+    expect_tags_of_a_named_family_to_be_found(&TagFamily::ALL);
 }
 
 #[test]
@@ -241,7 +252,7 @@ fn tags_are_found_in_recorded_images_of_each_form() {
         }
     }
     let problem = |topic: &str, lens: &CameraModel| read(topic, lens).expect_err(topic).to_string();
-    assert!(problem("/cut", &lens).contains("images that cannot be decoded"), "{}", problem("/cut", &lens));
+    assert!(problem("/cut", &lens).contains("decoded"), "{}", problem("/cut", &lens));
     let other = titan().camera.lens;
     let found = problem("/png", &other);
     assert!(["/png: message 1", "320 x 240", "camera_info"].iter().all(|word| found.contains(word)), "{found}");
@@ -252,6 +263,7 @@ fn tags_are_found_in_recorded_images_of_each_form() {
 
 #[test]
 fn a_proposed_input_map_works_and_overwrites_nothing() {
+    let _texts = Texts::of("a_proposed_input_map_works_and_overwrites_nothing");
     let folder = temp();
     let titan = RealTitan::new(&titan(), 30, AS_IN_2018, 23);
     let [recording, map, tags] = ["arm.mcap", "map.toml", "tags.toml"].map(|name| folder.path().join(name));
@@ -264,7 +276,7 @@ fn a_proposed_input_map_works_and_overwrites_nothing() {
     };
     inspect().expect("a map", 0, &["written", "map.toml"]);
     let proposed = read(&map);
-    inspect().expect("it is there", 2, &["map.toml", "is there"]);
+    inspect().expect("it is there", 2, &["map.toml"]);
     assert_eq!(read(&map), proposed);
     // The positions of these tags are all that the tag map knows.
     write(&map, &proposed.replace("use = \"pose\"", "use = \"position\""));

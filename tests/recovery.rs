@@ -1,6 +1,7 @@
 //! Known sensor errors go in; the estimator gets them back, and knows how well.
 
 use armcal::calib::{Calibration, Status, associate, calibrate, identify_scales};
+use armcal::codes::{Code, Coded};
 use armcal::log::{Recording, RecordingHeader, RecordingWriter, read_recording};
 use armcal::robot::Robot;
 use armcal::routine::Method;
@@ -15,7 +16,8 @@ use crate::support::{temp, titan};
 
 const N_FIT: usize = 30;
 const N_HELD_OUT: usize = 8;
-const SEEDS: std::ops::RangeInclusive<u64> = 1..=40;
+/// Of the first tier and of the second.
+const SEEDS: [u64; 2] = [12, 40];
 /// px per corner coordinate, the standard world's.
 const NOISE_PX: f64 = 0.3;
 
@@ -140,8 +142,7 @@ fn bound_m(arm: &TrueArm, shots: &[Shot]) -> Vec<f64> {
 }
 
 /// With pixel noise alone, and a robot.toml that promises no other errors.
-#[test]
-fn with_pixel_noise_errors_are_as_large_as_their_sigmas_say() {
+fn expect_errors_of_pixel_noise_as_predicted(seeds: u64) {
     /// Share of errors within two sigma. 95 % if the sigmas are right; they come from 30 views, and 400 parameters know
     /// the share to 1 %.
     const SHARE_WITHIN_2_SIGMA: std::ops::RangeInclusive<f64> = 0.85..=0.99;
@@ -152,7 +153,7 @@ fn with_pixel_noise_errors_are_as_large_as_their_sigmas_say() {
     (robot.camera.mount_std_m, robot.camera.mount_std_rad) = (0.0, 0.0);
     robot.tags.iter_mut().for_each(|tag| tag.position_std_m = 0.0);
     let (mut ratios, mut errors_m, mut bounds_m) = (Vec::new(), Vec::new(), Vec::new());
-    for seed in SEEDS {
+    for seed in 1..=seeds {
         let mut rng = stream_rng(seed, "pixel noise");
         let arm = TrueArm::with_sensor_errors(&robot, &mut rng);
         let mut shots = shots(&arm, &mut rng);
@@ -166,23 +167,33 @@ fn with_pixel_noise_errors_are_as_large_as_their_sigmas_say() {
     let (error_m, bound_m) = (median(&errors_m), median(&bounds_m));
     eprintln!("{within:.3} of {} within 2 sigma", ratios.len());
     eprintln!("tool {:.3} mm, bound {:.3} mm, {:.1} times", error_m * 1e3, bound_m * 1e3, error_m / bound_m);
-    assert_eq!(ratios.len(), SEEDS.count() * 2 * N_SEEN);
+    assert_eq!(ratios.len(), seeds as usize * 2 * N_SEEN);
     assert!(SHARE_WITHIN_2_SIGMA.contains(&within), "{within}");
     assert!(error_m < TIMES_BOUND * bound_m, "{error_m} {bound_m}");
     // Nobody beats the bound but by chance: a median over 40 seeds does not.
     assert!(error_m > 0.5 * bound_m, "{error_m} {bound_m}: too good to be true");
 }
 
-/// Camera and tags off as robot.toml says: sigmas must cover that, too.
 #[test]
-fn with_a_wrong_mount_and_survey_errors_are_as_large_as_their_sigmas_say() {
+fn with_pixel_noise_errors_are_as_large_as_their_sigmas_say() {
+    expect_errors_of_pixel_noise_as_predicted(SEEDS[0]);
+}
+
+#[test]
+#[ignore = "second tier: 40 arms, 2 s"]
+fn with_pixel_noise_errors_of_forty_arms_are_as_large_as_their_sigmas_say() {
+    expect_errors_of_pixel_noise_as_predicted(SEEDS[1]);
+}
+
+/// Camera and tags off as robot.toml says: sigmas must cover that, too.
+fn expect_errors_of_mount_and_survey_as_predicted(seeds: u64) {
     /// As above, but the ten parameters of a seed now share one camera mount: 40 of those know the share to 3 %.
     const SHARE_WITHIN_2_SIGMA: std::ops::RangeInclusive<f64> = 0.85..=1.0;
     /// m, median over seeds: 2 mm and 0.2 deg of the mount, 1 mm of each tag. 2.8 mm with these seeds.
     const TOOL_M: f64 = 0.004;
     let robot = titan();
     let (mut ratios, mut errors_m) = (Vec::new(), Vec::new());
-    for seed in SEEDS {
+    for seed in 1..=seeds {
         let mut rng = stream_rng(seed, "mount and survey");
         let mut arm = TrueArm::with_sensor_errors(&robot, &mut rng);
         arm.misplace(&mut rng);
@@ -199,16 +210,26 @@ fn with_a_wrong_mount_and_survey_errors_are_as_large_as_their_sigmas_say() {
     assert!(error_m < TOOL_M, "{error_m}");
 }
 
-/// In 5 % of the views one tag is seen a quarter of the image aside: a square still, but not there.
 #[test]
-fn a_few_far_outliers_change_little() {
+fn with_a_wrong_mount_and_survey_errors_are_as_large_as_their_sigmas_say() {
+    expect_errors_of_mount_and_survey_as_predicted(SEEDS[0]);
+}
+
+#[test]
+#[ignore = "second tier: 40 arms, 2 s"]
+fn with_wrong_mounts_and_surveys_errors_of_forty_arms_are_as_large_as_their_sigmas_say() {
+    expect_errors_of_mount_and_survey_as_predicted(SEEDS[1]);
+}
+
+/// In 5 % of the views one tag is seen a quarter of the image aside: a square still, but not there.
+fn expect_far_outliers_to_change_little(seeds: u64) {
     /// m at the tool. A sum of distances pulls at an outlier as hard as at any tag, however far it is. 0.1 mm here.
     const CHANGE_M: f64 = 0.0005;
     /// Least squares would pay for the distance, some 0.5 m.
     const SHIFT_PX: f64 = 250.0;
     let robot = titan();
     let mut changes_m = Vec::new();
-    for seed in 1..=20 {
+    for seed in 1..=seeds {
         let mut rng = stream_rng(seed, "outliers");
         let arm = TrueArm::with_sensor_errors(&robot, &mut rng);
         let mut clean = shots(&arm, &mut rng);
@@ -227,6 +248,17 @@ fn a_few_far_outliers_change_little() {
     assert!(change_m < CHANGE_M, "{change_m}");
 }
 
+#[test]
+fn a_few_far_outliers_change_little() {
+    expect_far_outliers_to_change_little(6);
+}
+
+#[test]
+#[ignore = "second tier: 20 arms with and without outliers, 2 s"]
+fn a_few_far_outliers_change_little_for_twenty_arms() {
+    expect_far_outliers_to_change_little(20);
+}
+
 /// Views that say too little are refused, and never without a reason.
 #[test]
 fn too_few_views_are_refused_with_a_reason() {
@@ -236,11 +268,11 @@ fn too_few_views_are_refused_with_a_reason() {
     let mut few = arm.shots(CaptureSet::Fit, 2, &mut rng);
     few.extend(arm.shots(CaptureSet::HeldOut, 4, &mut rng));
     let error = calibrate(&arm.recording(&few), &robot, Method::MinimumDistance).expect_err("two views");
-    assert!(error.to_string().contains("only 2 captured views"), "{error}");
+    assert_eq!(error.code(), Code::ViewsMissing, "{error}");
     few.extend(arm.shots(CaptureSet::Fit, 4, &mut rng));
     let refused = calibrated(&arm, &few);
     assert_eq!(refused.status, Status::Refused);
-    assert!(refused.refusal.as_ref().is_some_and(|why| why.contains("too few")), "{:?}", refused.refusal);
+    assert_eq!(refused.refusals[0].code(), Code::TooFewViews);
 }
 
 /// Views in which only one joint moves, of an arm whose other joints are wrong, too.
@@ -267,12 +299,11 @@ fn identify_messages(arm: &TrueArm, joint: usize, rng: &mut ChaCha8Rng) -> Recor
 
 /// The gain of one sensor is off by any factor and either sign; the other sensors, the camera and the tags are as wrong
 /// as their datasheets allow.
-#[test]
-fn an_unknown_scale_is_recovered_with_its_sign() {
+fn expect_unknown_scales_to_be_recovered(seeds: u64) {
     let robot = titan();
     let mut errors = Vec::new();
     let mut n_within = 0;
-    for seed in SEEDS {
+    for seed in 1..=seeds {
         let mut rng = stream_rng(seed, "identify");
         let mut arm = TrueArm::with_sensor_errors(&robot, &mut rng);
         arm.misplace(&mut rng);
@@ -293,6 +324,17 @@ fn an_unknown_scale_is_recovered_with_its_sign() {
 }
 
 #[test]
+fn an_unknown_scale_is_recovered_with_its_sign() {
+    expect_unknown_scales_to_be_recovered(SEEDS[0]);
+}
+
+#[test]
+#[ignore = "second tier: 40 arms, 2 s"]
+fn unknown_scales_of_forty_arms_are_recovered() {
+    expect_unknown_scales_to_be_recovered(SEEDS[1]);
+}
+
+#[test]
 fn a_scale_that_the_views_do_not_tell_is_refused_by_name() {
     let robot = titan();
     let mut rng = stream_rng(1, "identify");
@@ -308,7 +350,7 @@ fn a_scale_that_the_views_do_not_tell_is_refused_by_name() {
         }
     }
     let error = identify_scales(&associate(&recording, &robot), &robot).expect_err("a stuck sensor").to_string();
-    assert!(error.contains("forearm_pitch") && error.contains("did not change"), "{error}");
+    assert!(error.contains("forearm_pitch"), "{error}");
     let behind = identify_messages(&arm, 5, &mut rng);
     let error = identify_scales(&associate(&behind, &robot), &robot).expect_err("behind the camera").to_string();
     assert!(error.contains("wrist_rotate"), "{error}");

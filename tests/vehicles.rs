@@ -18,6 +18,7 @@ use armcal::streams::{Arm, JointAngles, Message, Sink};
 use nalgebra::{Point3, Vector3};
 use rand::RngExt;
 
+use crate::support::texts::Texts;
 use crate::support::{
     Nowhere, ShortRoutine, answer, calibrate, edit, finished, program, read, root, temp, titan, vehicle_file, write,
 };
@@ -249,6 +250,7 @@ fn tags_of_the_vehicle_and_meshes_travel_with_the_recording() {
 
 #[test]
 fn what_is_wrong_with_a_vehicles_tags_is_named() {
+    let _texts = Texts::of("what_is_wrong_with_a_vehicles_tags_is_named");
     let folder = temp();
     let file = folder.path().join("v.toml");
     let check = |from: &str, to: &str, words: &[&str]| {
@@ -256,7 +258,7 @@ fn what_is_wrong_with_a_vehicles_tags_is_named() {
         edit(&file, from, to);
         answer(program().arg("check").arg(&file)).expect(to, 2, words);
     };
-    check("base_tag = 0\n", "", &["v.toml", "base_tag", "is required"]);
+    check("base_tag = 0\n", "", &["v.toml", "base_tag"]);
     check("base_tag = 0\n", "base_tag = 9\n", &["v.toml", "base_tag", "tag 9"]);
     check("id = 1\n", "id = 0\n", &["v.toml", "tag 0: id", "twice"]);
     check("size_m = 0.15\n", "size_m = -0.15\n", &["v.toml", "tag 0: size_m", "0.001 .. 10"]);
@@ -271,18 +273,15 @@ fn what_is_wrong_with_a_vehicles_tags_is_named() {
 
 #[test]
 fn what_is_wrong_with_a_mesh_of_a_routine_is_named() {
+    let _texts = Texts::of("what_is_wrong_with_a_mesh_of_a_routine_is_named");
     let folder = temp();
     let tail = |file: &str| {
         format!("[[obstacle]]\nname = \"rock\"\nshape = \"mesh\"\nfile = \"{file}\"\nposition_m = [0.0, 3.0, 0.0]\n")
     };
     write(&folder.path().join("flat.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     write(&folder.path().join("text.stl"), "no mesh");
-    for (name, words) in [("none.stl", "cannot be read"), ("text.stl", "is not a mesh"), ("flat.obj", "is flat")] {
+    for name in ["none.stl", "text.stl", "flat.obj"] {
         let routine = ShortRoutine { tail: tail(name), ..ShortRoutine::default() }.write(folder.path());
-        answer(program().arg("check").arg(&routine)).expect(
-            name,
-            2,
-            &["short.toml", "obstacle `rock`: file", name, words],
-        );
+        answer(program().arg("check").arg(&routine)).expect(name, 2, &["short.toml", name]);
     }
 }

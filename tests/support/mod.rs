@@ -4,16 +4,22 @@
 pub mod bag;
 pub mod external;
 pub mod synthetic;
+pub mod texts;
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::OnceLock;
+use std::sync::{Mutex, OnceLock};
 use std::time::Duration;
 
+use armcal::Unwatched;
+use armcal::output::OutputFolder;
 use armcal::report::RunSummary;
 use armcal::robot::{Robot, load};
+use armcal::routine::{Override, Overrides};
+use armcal::run::{Failure, Finished, Keep, RunInputs, RunOutput, execute};
 use armcal::streams::{Arm, Message, Sink, SinkError};
 use armcal::time::Stamp;
 use tempfile::TempDir;
@@ -146,7 +152,9 @@ pub fn answer(command: &mut Command) -> Answer {
     let (stdout, stderr) = (text(&output.stdout), text(&output.stderr));
     assert!(!stderr.contains("panicked"), "{command:?}: {stderr}");
     let code = output.status.code().unwrap_or_else(|| panic!("{command:?}: killed: {}: {stderr}", output.status));
-    Answer { code, stdout, stderr }
+    let answer = Answer { code, stdout, stderr };
+    texts::note_answer(command, &answer);
+    answer
 }
 
 pub fn run(routine: &Path, out: &Path) -> Answer {
@@ -186,18 +194,61 @@ pub fn finished(routine: &ShortRoutine, folder: &Path) -> FinishedRun {
     run
 }
 
+/// The finished run of a routine, made once for all tests of this process, to be read only.
+#[track_caller]
+pub fn shared(routine: &ShortRoutine) -> &'static FinishedRun {
+    static RUNS: Mutex<BTreeMap<String, &'static OnceLock<FinishedRun>>> = Mutex::new(BTreeMap::new());
+    let run = *RUNS.lock().expect("no panic").entry(routine.text()).or_insert_with(|| Box::leak(Box::default()));
+    run.get_or_init(|| finished(routine, &lasting_folder()))
+}
+
+/// What a run recorded and found. It is made in this process, without the files that people look at: no replay, no
+/// report.
+pub struct Simulated {
+    pub done: Result<Finished, Failure>,
+    out: PathBuf,
+}
+
+impl Simulated {
+    /// Runs `routine` in `out`; `settings` are keys of the routine and their values.
+    pub fn new(routine: &Path, seed: Option<u64>, settings: &[(&str, toml::Value)], out: &Path) -> Self {
+        let set = settings.iter().map(|(key, value)| Override::new(key, value.clone()).expect("a key")).collect();
+        let inputs = RunInputs::load(routine, &Overrides { set, ..Overrides::default() }).expect("it reads");
+        let (folder, _) = OutputFolder::open(out).expect("a folder");
+        let output = RunOutput { folder: &folder, keep: Keep::StreamsAlone, listener: None };
+        let done = execute(&inputs, seed.unwrap_or(inputs.routine.seed), output, &mut Unwatched);
+        Self { done, out: out.to_owned() }
+    }
+
+    pub fn of(routine: &ShortRoutine, folder: &Path) -> Self {
+        fs::create_dir_all(folder).expect("a folder");
+        Self::new(&routine.write(folder), None, &[], &folder.join("run"))
+    }
+
+    /// A stream that was recorded: `run` or `truth`.
+    pub fn file(&self, name: &str) -> PathBuf {
+        let ending = if self.done.is_ok() { ".mcap.partial" } else { "-cut-1.mcap" };
+        self.out.join(format!("{name}{ending}"))
+    }
+
+    pub fn bytes(&self, name: &str) -> Vec<u8> {
+        fs::read(self.file(name)).expect("a stream of the run")
+    }
+
+    #[track_caller]
+    pub fn finished(&self) -> &Finished {
+        self.done.as_ref().expect("the run ends well")
+    }
+}
+
 /// Figures that nothing but the truth of [`shared_run`] holds.
 pub const SHARED_SEED: u64 = 7_215_503_169_846_213_077;
 pub const SHARED_PUMP_FLOW_L_MIN: f64 = 12.345_678_901;
 
-/// One run of the closed loop, made once for all tests of this process, to be read only.
+/// The run of the closed loop that most tests look at.
 pub fn shared_run() -> &'static FinishedRun {
-    static RUN: OnceLock<FinishedRun> = OnceLock::new();
-    RUN.get_or_init(|| {
-        let tail = format!("[world.hydraulics]\npump_flow_l_min = {SHARED_PUMP_FLOW_L_MIN}\n");
-        let routine = ShortRoutine { seed: SHARED_SEED, tail, ..ShortRoutine::default() };
-        finished(&routine, &lasting_folder())
-    })
+    let tail = format!("[world.hydraulics]\npump_flow_l_min = {SHARED_PUMP_FLOW_L_MIN}\n");
+    shared(&ShortRoutine { seed: SHARED_SEED, tail, ..ShortRoutine::default() })
 }
 
 /// A folder that outlives the tests, for nothing is called when they end; those of an hour ago are removed.
