@@ -281,7 +281,10 @@ fn cameras_that_cannot_be_told_apart_are_refused_by_name() {
     let map = |further: &str| write(&folder.path().join("input.toml"), &format!("{ONE}{further}"));
     for (further, words) in [
         ("[[further_tags]]\ncamera = \"knee\"\ntopic = \"/elbow/tags\"\n", &["further_tags.camera", "`knee`", "elbow"]),
-        ("[[further_tags]]\ncamera = \"elbow\"\ntopic = \"/wrist/tags\"\n", &["further_tags.topic", "apart", "camera"]),
+        (
+            "[[further_tags]]\ncamera = \"elbow\"\ntopic = \"/wrist/tags\"\n",
+            &["further_tags.topic", "input.toml", "[value_duplicate]"],
+        ),
         ("[[further_tags]]\ncamera = \"elbow\"\ntopic = \"/joint_states\"\n", &["further_tags.topic", "else", "too"]),
         ("[[further_tags]]\ncamera = \"elbow\"\ntopic = \"/nowhere\"\n", &["/nowhere", "/elbow/tags", "topic"]),
     ] {

@@ -201,7 +201,7 @@ mod tests {
     use crate::campaign::{RunStatus, compare, statistics};
     use armcal_core::routine::RegressSettings;
 
-    /// What a page says, a line for each element.
+    /// Text of a page, one line per element.
     fn words(page: &str) -> String {
         let (_, body) = page.split_once("</style>").expect("a page");
         let parts = body.split('<').filter_map(|part| Some(part.split_once('>')?.1.trim()));

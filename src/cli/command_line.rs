@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use std::sync::LazyLock;
 
 use anyhow::Result;
+use armcal_core::codes::Code;
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::layer::SubscriberExt;
@@ -196,9 +197,14 @@ fn ended(result: Result<exit::Exit>) -> ExitCode {
 
 /// The help that was asked for, on stdout; or, on stderr, what is wrong with the command line.
 fn clap_answer(answer: &clap::Error) -> ExitCode {
-    let printed = answer.print().and_then(|()| std::io::stdout().flush());
     if answer.use_stderr() {
+        let styled = answer.render();
+        let text = if std::io::stderr().is_terminal() { styled.ansi().to_string() } else { styled.to_string() };
+        // The code ends the first line; usage and hints follow.
+        let (problem, rest) = text.split_once('\n').unwrap_or((&text, ""));
+        let _ = write!(std::io::stderr().lock(), "{problem} [{}]\n{rest}", Code::UsageInvalid);
         return exit::Exit::InvalidInput.into();
     }
+    let printed = answer.print().and_then(|()| std::io::stdout().flush());
     ended(is_written(printed).map(|()| exit::Exit::Ok))
 }

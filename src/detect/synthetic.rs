@@ -169,7 +169,7 @@ fn draw(lens: &CameraModel, rendering: &Rendering, tags: &[Printed], [columns, r
     }
 }
 
-/// What N x N rays a pixel meet, line by line. The lens gives the bearings of points half a pixel apart; between them
+/// Values that N x N rays a pixel meet, line by line. The lens gives the bearings of points half a pixel apart; between them
 /// they are interpolated, which moves a ray by less than 2e-4 px.
 fn traced(
     lens: &CameraModel,

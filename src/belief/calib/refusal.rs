@@ -408,7 +408,7 @@ impl Refusal {
             Self::TooFewViews { views, parameters } => {
                 write!(
                     f,
-                    "{views} views cannot determine {parameters} parameters; at least {parameters} views are needed"
+                    "{views} views cannot determine {parameters} parameters, at least {parameters} views are needed"
                 )
             }
             Self::NotSolved { outcome, evaluations } => {
@@ -588,7 +588,7 @@ pub fn in_words(refusals: &[Refusal]) -> Option<String> {
     (!words.is_empty()).then(|| words.join("; also: "))
 }
 
-/// In files each refusal has its code and its sentence beside the evidence.
+/// Refusals in files: code, sentence and evidence.
 pub mod in_files {
     use super::{Code, Coded, Refusal};
     use serde::{Deserialize, Deserializer, Serialize, Serializer};

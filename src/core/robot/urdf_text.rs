@@ -137,7 +137,7 @@ fn text_of(bytes: &[u8]) -> Result<&str, String> {
 mod tests {
     use super::*;
 
-    /// What is said of a text that is refused.
+    /// Message about a refused text.
     fn told(text: &str) -> String {
         let problem = plain_urdf(text).expect_err("refused");
         assert!(problem.len() < 200, "{problem}");

@@ -81,7 +81,7 @@ mod tests {
     use super::*;
     use crate::stats::stream_rng;
 
-    /// Looked at after each of 2000 runs, 300 times over: at most 5 % of sequences may ever miss the truth. Equal counts
+    /// Looks after each of 2000 runs, 300 times over: at most 5 % of sequences may ever miss the truth. Equal counts
     /// have one interval.
     #[test]
     fn the_interval_holds_however_often_one_looks() {

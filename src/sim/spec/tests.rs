@@ -9,7 +9,7 @@ fn read(text: &str) -> Result<WorldSpec, SimError> {
     WorldSpec::from_table(&text.parse().expect("valid TOML"), Path::new("r.toml"))
 }
 
-/// What is said of tables that are refused.
+/// Messages about refused tables.
 fn told<const N: usize>(texts: [&str; N]) -> String {
     texts.map(|text| format!("{text:?}\n  {}\n", read(text).expect_err(text))).concat()
 }

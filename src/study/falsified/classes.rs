@@ -41,7 +41,7 @@ pub struct EquivalenceClasses {
     information: DMatrix<f64>,
 }
 
-/// Of these columns, by the views of one capture.
+/// Classes of these columns by the views of one capture.
 pub(super) fn equivalence_classes(oracle: &Oracle<'_>, columns: Vec<Column>) -> EquivalenceClasses {
     let columns: Vec<Column> = columns.into_par_iter().filter_map(|c| scaled(oracle, c)).collect();
     let cost = |of: &[Perturbation]| oracle.effect(of).non_centrality;

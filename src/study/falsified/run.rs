@@ -125,7 +125,7 @@ pub fn falsified_study(
     study_of(&Scene { routine, robot, vehicle }, cases, seeds, columns)
 }
 
-/// The same with classes of these directions.
+/// Runs the study with classes of these directions only.
 pub(super) fn study_of(
     scene: &Scene<'_>,
     cases: &[Case],

@@ -69,7 +69,7 @@ struct Scene<'a> {
     of: PoseGrid<'a>,
 }
 
-/// Criteria and numbers of poses; each estimate is the same whatever others there are.
+/// Criteria and numbers of poses; each estimate is independent of the others.
 #[derive(Clone, Copy, Debug)]
 pub struct PoseGrid<'a> {
     pub criteria: &'a [PoseCriterion],

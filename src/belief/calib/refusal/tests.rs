@@ -105,10 +105,10 @@ fn each_reason_says_a_figure_and_what_to_do_next() {
     for refusal in measured() {
         let words = refusal.to_string();
         assert!(words.contains(|c: char| c.is_ascii_digit()), "{words}");
-        assert!(words.ends_with(&format!("; {}", refusal.remedy())), "{words}");
+        assert!(words.ends_with(&format!("; {} [{}]", refusal.remedy(), refusal.code())), "{words}");
     }
     for refusal in [Refusal::PriorReused, Refusal::PriorSingular, Refusal::PriorUntested] {
-        assert!(refusal.to_string().ends_with(refusal.remedy()));
+        assert!(refusal.to_string().ends_with(&format!("; {} [{}]", refusal.remedy(), refusal.code())));
     }
 }
 

@@ -9,7 +9,7 @@ pub(super) fn parse(text: &str) -> Result<InputMap, String> {
     parse_input_map(Path::new("map.toml"), text).map_err(|error| error.to_string())
 }
 
-/// What is said of `good` after each replacement of a text by another.
+/// Messages about `good` after each replacement of a text.
 pub(super) fn told(good: &str, faults: &[(&str, &str)]) -> String {
     let one = |(from, to): &(&str, &str)| {
         assert!(good.contains(from), "{from}");

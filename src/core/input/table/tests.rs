@@ -24,7 +24,7 @@ fn read_with(map: &str, name: &str, text: &str) -> Result<ExternalRecording, Inp
     read_external(&file, &parse_input_map(Path::new("map.toml"), map).expect("a map"), &titan())
 }
 
-/// What is said of a file that is refused, without the folder's name.
+/// Message about a refused file, without the name of its folder.
 fn problem(map: &str, name: &str, text: &str) -> String {
     let told = read_with(map, name, text).expect_err("refused").to_string();
     let at = told.find(name).expect("the file's name");

@@ -15,7 +15,7 @@ use armcal_core::robot::Robot;
 
 static TITAN: LazyLock<Robot> = LazyLock::new(titan);
 
-/// How the arm differs from its nominal model.
+/// Change of the arm from its nominal model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Built {
     AsDrawn,

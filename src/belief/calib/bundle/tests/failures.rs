@@ -300,7 +300,7 @@ fn two_failed_sensors_are_told_apart_over_20_arms() {
     assert!(told_apart(80..100) >= 19);
 }
 
-/// Of how many arms both failed sensors are named.
+/// Counts the arms whose two failed sensors are both named.
 fn told_apart(seeds: std::ops::Range<u64>) -> usize {
     let mut told = 0;
     let all: Vec<u64> = seeds.collect();

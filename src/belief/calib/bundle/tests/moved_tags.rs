@@ -84,7 +84,7 @@ fn tags_that_were_moved_together_are_named_over_16_seeds() {
     groups_are_named(16, &[(0.01, 2), (0.01, 3), (0.04, 3)]);
 }
 
-/// Of each kind: by how much, m, and how many.
+/// Displacement, m, and number of tags for each kind.
 fn groups_are_named(n_seeds: u64, kinds: &[(f64, usize)]) {
     for &(moved_m, n) in kinds {
         // Where no tag departs, base and joints take all of it up.

@@ -160,7 +160,7 @@ fn an_unseen_change_moves_the_tool_as_its_reservation_says() {
 fn a_gripper_tag_shows_the_turn_that_nothing_else_shows() {
     let turns = |robot: &Robot| {
         let (reservations, _) = all_reservations(robot);
-        let of_mount = |reservation: &&Reservation| reservation.what.starts_with("camera mount, turn");
+        let of_mount = |reservation: &&Reservation| reservation.what.starts_with("camera mount, rotation");
         reservations.iter().filter(of_mount).map(|reservation| reservation.tool_error_m).fold(0.0, f64::max)
     };
     let (without, with) = (turns(&titan()), turns(&titan_with_gripper_tag()));

@@ -94,7 +94,7 @@ fn a_soft_arm_is_as_good_as_a_stiff_one_over_20_seeds() {
     soft_arms_are_as_good(20, &[(1e-5, 0.0), (3e-6, 500.0)], [1.3, 1.5]);
 }
 
-/// Of each kind: compliance, rad/(N m), and load, N. Errors of soft arms are at most `most` times those of stiff ones,
+/// Compliance, rad/(N m), and load, N, for each kind. Errors of soft arms are at most `most` times those of stiff ones,
 /// and as drawn at least `least` times.
 fn soft_arms_are_as_good(n_seeds: u64, kinds: &[(f64, f64)], [most, least]: [f64; 2]) {
     let robot = titan();
@@ -146,7 +146,7 @@ fn a_link_that_is_off_is_no_sag_over_24_arms() {
     assert!(n_links >= 23 && n_sag <= 1, "links {n_links}, sag {n_sag} of 24");
 }
 
-/// How many of four arms a seed, each with a link that is off, are said to have such links, and to bend.
+/// Counts, over four arms a seed with one wrong link each, those reported with wrong links and with compliance.
 fn links_and_sag(n_seeds: u64) -> [usize; 2] {
     let robot = titan();
     let [mut n_sag, mut n_links] = [0; 2];

@@ -93,7 +93,7 @@ fn measured(n_seeds: u64, n_views: usize, worse: [f64; 2]) -> [[f64; 3]; 2] {
     })
 }
 
-/// Of worn sensors each datasheet figure is a quarter of the truth.
+/// Worn sensors: each datasheet figure is a quarter of the truth.
 const WORN: [f64; 2] = [4.0, 4.0];
 
 #[test]

@@ -121,7 +121,7 @@ fn offsets_that_walk_are_found_over_40_seeds() {
     walks_are_found(40, &[(14, 5e-3, 30, 4.5), (14, 1e-2, 37, 3.29), (30, 5e-3, 40, 2.6)]);
 }
 
-/// Of each kind: views, size of the walk, rad, arms of which walks must be found, and error over predicted, 95 % of the
+/// Views, size of the walk for each kind, rad, arms of which walks must be found, and error over predicted, 95 % of the
 /// arms.
 fn walks_are_found(n_seeds: u64, kinds: &[(usize, f64, u64, f64)]) {
     for &(n_views, walk_rad, least_in, most) in kinds {

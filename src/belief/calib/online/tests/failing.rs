@@ -24,7 +24,7 @@ fn a_sensor_that_fails_now_and_then_is_named_over_10_seeds() {
     assert!(missed.len() <= 1, "{missed:?}");
 }
 
-/// Where it is not the one thing that is told: the seed, and what is told.
+/// Cases with any other report: the seed and the report.
 fn missed_failures(n_seeds: u64) -> Vec<(u64, Vec<String>)> {
     let robot = titan();
     let mut missed = Vec::new();
@@ -120,7 +120,7 @@ fn a_slip_is_named_while_another_view_is_looked_into_over_10_seeds() {
     assert!(missed.len() <= 2, "{missed:?}");
 }
 
-/// Where it is not the one thing that is told: the seed, the number of views between, and what is told.
+/// Cases with any other report: the seed, the number of views between, and the report.
 fn missed_slips(cases: impl IntoIterator<Item = (u64, usize)>) -> Vec<(u64, usize, Vec<String>)> {
     let robot = titan();
     let mut missed = Vec::new();

@@ -332,7 +332,7 @@ fn a_low_spot_is_named_by_looks_minutes_apart_over_10_seeds() {
     assert!(named >= 7 && told.len() <= 1, "{named} {told:?}");
 }
 
-/// What is told beside the fault, or where there is none: the seed, the fault's size, and the line.
+/// False reports, next to a fault or without one: the seed, the fault's size, and the line.
 type OtherEvents = Vec<(u64, f64, String)>;
 
 fn named_spots(seeds: Range<u64>) -> (usize, OtherEvents) {

@@ -159,14 +159,14 @@ fn every_refusal_has_a_code() {
         tolerance_m: Some(0.02),
     };
     let faults = [
-        (AcceptanceData { outcome: Outcome::Stalled, ..good }, "solver"),
-        (AcceptanceData { fit_views: 8, ..good }, "few_views"),
-        (AcceptanceData { held_out_views: 2, ..good }, "few_held_out"),
-        (AcceptanceData { held_out_rms_m: None, ..good }, "no_held_out"),
-        (AcceptanceData { held_out_rms_m: Some(0.09), ..good }, "no_better"),
-        (AcceptanceData { baseline: Some(by_chance(0.2)), ..good }, "no_better"),
+        (AcceptanceData { outcome: Outcome::Stalled, ..good }, "not_solved"),
+        (AcceptanceData { fit_views: 8, ..good }, "too_few_views"),
+        (AcceptanceData { held_out_views: 2, ..good }, "too_few_held_out_views"),
+        (AcceptanceData { held_out_rms_m: None, ..good }, "no_held_out_tag"),
+        (AcceptanceData { held_out_rms_m: Some(0.09), ..good }, "no_better_than_datasheet"),
+        (AcceptanceData { baseline: Some(by_chance(0.2)), ..good }, "no_better_than_baseline"),
         (AcceptanceData { held_out_rms_m: Some(0.011), ..good }, "overfitted"),
-        (AcceptanceData { predicted_tool_error_m: Some(0.03), ..good }, "tool_error"),
+        (AcceptanceData { predicted_tool_error_m: Some(0.03), ..good }, "beyond_tolerance"),
     ];
     for (fault, code) in faults {
         let full = calibration("titan4", &six(), refusal(&fault));
