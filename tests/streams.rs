@@ -100,7 +100,7 @@ fn expect_backlash_to_be_found(seeds: u64) {
         }
     }
     let of = |values: &[f64], q: f64| quantile(values, q).expect("values");
-    println!(
+    eprintln!(
         "half backlash of 6 mrad: off by {:.2} mrad in the median, {:.2} (95 %); in sigma {:.2}, {:.2}",
         1e3 * of(&errors_rad, 0.5),
         1e3 * of(&errors_rad, 0.95),
@@ -181,7 +181,7 @@ fn expect_the_clocks_offset_to_be_found(seeds: std::ops::Range<u64>) {
         in_sigmas.push(error_s.abs() / std_s);
         held_out_m.push(found.held_out.rms_m.expect("held-out views"));
     }
-    println!("clock off by {errors_s:?} s, {in_sigmas:?} sigma; held out {held_out_m:?} m");
+    eprintln!("clock off by {errors_s:?} s, {in_sigmas:?} sigma; held out {held_out_m:?} m");
     assert!(errors_s.iter().all(|error_s| *error_s < 1e-3), "{errors_s:?}");
     assert!(in_sigmas.iter().filter(|sigmas| **sigmas > 2.0).count() <= 1, "{in_sigmas:?}");
     // What is predicted of an image is of its time: 40 ms at 0.2 rad/s are 8 mrad.

@@ -169,8 +169,8 @@ fn draw(lens: &CameraModel, rendering: &Rendering, tags: &[Printed], [columns, r
     }
 }
 
-/// Values that N x N rays a pixel meet, line by line. The lens gives the bearings of points half a pixel apart; between them
-/// they are interpolated, which moves a ray by less than 2e-4 px.
+/// Values that N x N rays a pixel meet, line by line. The lens gives the bearings of points half a pixel apart; between
+/// them they are interpolated, which moves a ray by less than 2e-4 px.
 fn traced(
     lens: &CameraModel,
     rendering: &Rendering,

@@ -54,7 +54,8 @@ pub fn note(what: &str, text: &str) {
 
 /// Adds a text whose figures depend on the processor in their last digits.
 pub fn note_without_digits(what: &str, text: &str) {
-    note(what, &without_digits(text));
+    // Names of folders first: digits are part of them.
+    note(what, &without_digits(&plain(text)));
 }
 
 /// Adds an answer: all of it where it is the same on every machine, else its errors.
