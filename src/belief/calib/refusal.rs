@@ -417,7 +417,7 @@ impl Refusal {
             Self::TooFewHeldOutViews { views, needed } => {
                 write!(f, "only {views} held-out views show a tag; the verdict needs {needed}")
             }
-            Self::NoHeldOutTag => write!(f, "no held-out view shows a usable tag"),
+            Self::NoHeldOutTag => write!(f, "no held-out view shows a usable tag (0 seen)"),
             Self::NoBetterThanDatasheet { held_out_m, datasheet_m } => write!(
                 f,
                 "held-out tag error is no better than with the datasheet: {:.1} mm against {:.1} mm rms",

@@ -140,12 +140,15 @@ fn fields(words: &[&str]) -> Result<CompactCalibration, CompactError> {
     })
 }
 
+/// Letters of the longest code of a refusal, with room for later ones.
+const MAX_CODE: usize = 32;
+
 fn verdict(word: &str) -> Result<(Status, Option<String>), CompactError> {
     if word == "ok" {
         return Ok((Status::Accepted, None));
     }
     let code = word.strip_prefix("no:").filter(|code| {
-        (1..=16).contains(&code.len()) && code.bytes().all(|byte| byte.is_ascii_lowercase() || byte == b'_')
+        (1..=MAX_CODE).contains(&code.len()) && code.bytes().all(|byte| byte.is_ascii_lowercase() || byte == b'_')
     });
     let code = code.ok_or_else(|| bad("verdict", word, "`ok` or `no:` and a code"))?;
     Ok((Status::Refused, Some(code.to_owned())))
