@@ -80,7 +80,7 @@ fn a_served_arm_is_calibrated_and_reaches_its_targets() {
                   $ARMCAL run $ROUTINE --arm ros2:arm.toml --unattended --details --out out; CODE=$?; \
                   kill -INT $SERVER; wait $SERVER; exit $CODE";
     let said = in_namespace(out.path(), &routine, script);
-    said.expect("run --arm", 0, &["ACCEPTED", "of the arm's"]);
+    said.expect("run --arm", 0, &["ACCEPTED", "time  "]);
     assert!(said.stderr.contains("from a reading to its set-point"), "{}", said.stderr);
     let recording = out.path().join("out/run.mcap");
     let truth = read_truth(out.path().join("truth.mcap")).expect("the truth reads");
