@@ -187,7 +187,7 @@ fn an_operator_approves_holds_and_aborts() {
     let approved = logged(&kept, "approved: ");
     assert_eq!(approved.len(), 2, "{approved:?}");
     assert!(approved[0].2.contains("m clear") && approved[0].2.contains("deg"), "{approved:?}");
-    let held = logged(&kept, "held by");
+    let held = logged(&kept, "held ");
     assert_eq!(held.len(), 1);
     assert!(approved[1].0.since_s(held[0].0) >= 5.0, "it waits");
     assert_eq!(logged(&kept, "aborted").len(), 1);

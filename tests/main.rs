@@ -1,4 +1,5 @@
-//! Integration tests: one binary, for each further one would link the viewer's SDK again.
+//! Integration tests: one binary, for each further one would link the viewer's SDK again. Only `tests/live` is another:
+//! it needs a build with live arms, in which this one would have to be built again.
 //!
 //! `oracle` compares with tools that share no code with ours, `golden` with figures that others published; `property`
 //! holds for any input; `recovery` puts known errors in and gets them back, `gripper_tag` with a tag that ties tool to
@@ -11,8 +12,8 @@
 //! of a chessboard, `bags` the same as SQLite files, `recorded_inputs` their slow sensors and images, `streams` those
 //! that were recorded all the time, `cameras` those of arms with two cameras; `tagmap` maps tags in recordings that the
 //! test writes; `touch` feels surveyed plates with the tool; `any_arm` makes robot folders for drawings of all sorts;
-//! `report` reads report.html; `work` works on a dive, `watch` follows recordings that grow; `live` moves arms behind
-//! ROS 2 topics; `repository` reads sources and pages.
+//! `report` reads report.html; `work` works on a dive, `watch` follows recordings that grow; `repository` reads sources
+//! and pages.
 //!
 //! Tests that are ignored are a second tier: statistics over many seeds, routines and dives, of which the first tier
 //! has a small member. `cargo test --release -- --include-ignored` runs both.
@@ -35,8 +36,6 @@ mod failed;
 mod golden;
 mod gripper_tag;
 mod kill;
-#[cfg(feature = "live")]
-mod live;
 mod map;
 mod methods;
 mod mutations;

@@ -144,8 +144,7 @@ fn all_contents(path: &Path) -> Vec<u8> {
 }
 
 fn find(contents: &[u8], needle: &[u8]) -> bool {
-    let first = needle[0];
-    contents.windows(needle.len()).any(|window| window[0] == first && window == needle)
+    memchr::memmem::find(contents, needle).is_some()
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! What is believed of an arm, in words.
 
 use crate::cli::exit::{Exit, UsageError};
-use crate::cli::stdout::note;
+use crate::cli::stdout::warn;
 use armcal_belief::calib::online::{BeliefRow, Follower};
 use armcal_core::codes::Code;
 use armcal_core::stats::Summary;
@@ -27,7 +27,7 @@ pub(super) fn belief(follower: &Follower) -> Result<BeliefRow, UsageError> {
         )),
         Some(row) => {
             if !ids.is_empty() {
-                note(format!("note: nobody knows where {unknown} are: they are not used"));
+                warn(Code::TagsUnknown, format_args!("the place of {unknown} is not known: they are not used"));
             }
             Ok(row)
         }

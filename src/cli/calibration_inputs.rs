@@ -10,7 +10,7 @@ use anyhow::Result;
 use crate::cli::exit::UsageError;
 use crate::cli::file_kind::{FileKind, expect_kind, expect_option, expect_recording};
 use crate::cli::losses::{warn_of_external, warn_of_losses};
-use crate::cli::stdout::note;
+use crate::cli::stdout::warn;
 use crate::cli::waiting::Waiting;
 use armcal_belief::calib::online::{Batch, Follower, OnlineEvent, OnlineSettings};
 use armcal_belief::calib::{
@@ -237,7 +237,10 @@ impl CalibrationInputs<'_> {
         let (mut prepared, lost) = self.external_views(file, landmarks, task)?;
         let n = prepared.data.keep_first_camera();
         if n > 0 {
-            note(format_args!("note: {} of further cameras are left out: {what} knows one", counted(n, "view")));
+            warn(
+                Code::ViewsLeftOut,
+                format_args!("{what} uses one camera; left out: {} of others", counted(n, "view")),
+            );
         }
         Ok((prepared, lost))
     }
@@ -283,7 +286,7 @@ impl CalibrationInputs<'_> {
             recordings.push(recording);
         }
         if task.is_none() {
-            note("note: no task is named (--task), so that no tool error is predicted");
+            warn(Code::TaskMissing, "no task is named (--task), so that no tool error is predicted");
         }
         let context = ExternalContext { task, landmark_names: named.names, plain };
         Ok((prepare_external(&recordings, &map, &robot, context)?, lost))
@@ -396,7 +399,7 @@ pub(super) fn load_robot(folder: &Path, failed: &[String]) -> Result<Robot> {
     let robot = robot::load(folder)?;
     // Of no matter here, and refused where paths are planned.
     if let Some(stale) = robot.planning_issues.iter().find(|issue| issue.key == SELF_COLLISION_FILE) {
-        note(format_args!("note: {}: {}", stale.file.display(), stale.problem));
+        warn(Code::FileOutdated, format_args!("{}: {}", stale.file.display(), stale.problem));
     }
     let failed_joint = |text: &String| {
         let (joint, kind) = text.split_once('=').unwrap_or((text, ""));

@@ -145,7 +145,5 @@ mod tests {
                 assert!(line.starts_with(&format!("armcal {name}")) && understood.is_ok(), "{line}: {understood:?}");
             }
         }
-        let help = command.clone().find_subcommand_mut("run").expect("run").render_long_help().to_string();
-        assert!(help.contains("Examples:\n  armcal run routines/titan4-quickstart.toml\n"), "{help}");
     }
 }

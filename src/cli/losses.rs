@@ -3,7 +3,7 @@
 use armcal_core::codes::Code;
 use std::path::Path;
 
-use crate::cli::stdout::{note, warn};
+use crate::cli::stdout::warn;
 use armcal_core::input::ExternalRecording;
 use armcal_core::log::{ChunkOrder, Completeness, Recording};
 use armcal_core::robot::Robot;
@@ -70,16 +70,13 @@ pub(super) fn warn_of_external(recording: &ExternalRecording, robot: &Robot) -> 
         warn(Code::MessagesRejected, format_args!("{file}: {n} {what} left out"));
     }
     if !recording.extra_joints.is_empty() {
-        note(format_args!(
-            "note: {file}: joints that the robot lacks are ignored: {}",
-            recording.extra_joints.join(", ")
-        ));
+        let names = recording.extra_joints.join(", ");
+        warn(Code::JointsIgnored, format_args!("{file}: joints that the robot lacks are ignored: {names}"));
     }
     for &joint in &recording.absent_joints {
         let name = &robot.sensors[joint].joint;
-        note(format_args!(
-            "note: {file}: has no readings of {name}; the camera hangs before it, its angle is taken as the middle"
-        ));
+        let assumed = "it lies beyond the camera, and is assumed to stand mid-range";
+        warn(Code::JointAssumed, format_args!("{file}: has no readings of {name}; {assumed}"));
     }
     !is_whole || !recording.left_out.is_empty()
 }

@@ -10,7 +10,7 @@ use crate::cli::exit::{Exit, UsageError};
 use crate::cli::file_kind::{FileKind, expect_kind};
 use crate::cli::live_view::LiveViewArgs;
 use crate::cli::losses::warn_of_losses;
-use crate::cli::stdout::{note, say, warn};
+use crate::cli::stdout::{say, warn};
 use crate::output;
 use armcal_belief::calib::online::BeliefLog;
 use armcal_belief::calib::{Calibration, Status, surveyed};
@@ -91,7 +91,8 @@ fn say_what_is_left_out(recording: &Recording) {
     let left_out: Vec<String> = left_out.map(|(stream, n)| format!("{n} of {}", stream.topic())).collect();
     if !left_out.is_empty() {
         let file = recording.path.display();
-        note(format_args!("note: {file}: long; shown at a lower rate, without {}", left_out.join(", ")));
+        let left_out = left_out.join(", ");
+        warn(Code::ReplayIncomplete, format_args!("{file}: long; shown at a lower rate, without {left_out}"));
     }
 }
 

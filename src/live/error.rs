@@ -11,6 +11,11 @@ pub enum LiveError {
     File(#[from] RobotError),
     #[error("DDS: {what}: {problem}")]
     Dds { what: String, problem: String },
+    #[error(
+        "nobody was seen in ROS domain {domain} in {seconds} s; is the driver running there, and are --domain and \
+         --network right?"
+    )]
+    Nobody { domain: u16, seconds: f64 },
     #[error("rosbridge at {url}: {problem}")]
     Rosbridge { url: String, problem: String },
     #[error("the arm is not ready: {0}")]
@@ -36,7 +41,7 @@ impl Coded for LiveError {
     fn code(&self) -> Code {
         match self {
             Self::File(error) => error.code(),
-            Self::Dds { .. } | Self::Rosbridge { .. } => Code::ArmConnection,
+            Self::Dds { .. } | Self::Rosbridge { .. } | Self::Nobody { .. } => Code::ArmConnection,
             Self::NotReady(_) => Code::ArmNotReady,
             Self::Encode(_) | Self::Thread(_) => Code::Internal,
         }

@@ -6,6 +6,7 @@ use std::time::Duration;
 use crate::guard::{Guard, StopReason};
 use crate::tag_check::{TagCheck, check_tags};
 use crate::{Connection, Heard, LiveError, Wire};
+use armcal_core::codes::{Code, Coded};
 use armcal_core::robot::Robot;
 use armcal_core::streams::{
     Arm, ArmError, JointCounts, JointSensorSample, LogLevel, LogLine, Message, Sink, TagDetection,
@@ -185,7 +186,7 @@ impl<W: Wire> LiveArm<W> {
 
     fn refusal(&self) -> ArmError {
         let why = self.stopped.as_ref().map_or_else(String::new, ToString::to_string);
-        ArmError::Stopped { why }
+        ArmError::Stopped { why, code: self.stopped.as_ref().map_or(Code::ArmStopped, Coded::code) }
     }
 
     fn log_time(&self) -> Stamp {
@@ -229,7 +230,7 @@ impl<W: Wire> LiveArm<W> {
 
     /// Stops, and leaves the reason in the recording.
     fn halt_saying(&mut self, reason: StopReason, sink: &mut dyn Sink) -> ArmError {
-        let text = format!("the guard stopped the arm: {reason}");
+        let text = format!("the guard stopped the arm: {reason} [{}]", reason.code());
         let error = self.halt(reason);
         let line = LogLine { stamp: self.now, level: LogLevel::Error, name: "guard".to_owned(), text };
         match sink.record(self.log_time(), &Message::Log(line)) {

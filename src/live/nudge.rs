@@ -59,6 +59,8 @@ pub enum NudgeProblem {
     NotBack { joint: String, left_deg: f64 },
     #[error("stopped on request")]
     Stopped,
+    #[error("the operator did not say yes")]
+    Declined,
     #[error(transparent)]
     Arm(#[from] ArmError),
 }
@@ -181,7 +183,7 @@ impl Coded for NudgeProblem {
             Self::Another { .. } => Code::SetPointsExchanged,
             Self::Scale { .. } => Code::SetPointsScaled,
             Self::NotBack { .. } => Code::JointNotFollowing,
-            Self::Stopped => Code::Interrupted,
+            Self::Stopped | Self::Declined => Code::Interrupted,
             Self::Arm(error) => error.code(),
         }
     }

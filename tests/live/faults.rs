@@ -129,7 +129,7 @@ const END_LATER: &str = "is_on() { kill -0 $RUN 2>/dev/null; }; \
 struct Case {
     /// As the relay knows it.
     fault: String,
-    /// In the reason; `None` where the run goes on.
+    /// Code of the reason; `None` where the run goes on.
     stops_with: Option<&'static str>,
     /// By our clock, and by the arm's, s,
     within_s: [f64; 2],
@@ -149,13 +149,13 @@ fn cases() -> Vec<Case> {
     let jump = format!("jump joint=1 counts={}", counts(1, 30.0));
     let spike = format!("spike joint=1 counts={}", counts(1, 30.0));
     vec![
-        stops("cut s=1000", "no joint readings for", [STALE_S, PERIOD_S], 0.0),
-        stops("repeat", "no joint readings for", [STALE_S, PERIOD_S], 0.0),
-        stops("step s=0.8", "leapt by 0.8", [0.0, PERIOD_S], 0.0),
-        stops("step s=-30", "leapt by -", [0.0, PERIOD_S], 0.0),
+        stops("cut s=1000", "[readings_stale]", [STALE_S, PERIOD_S], 0.0),
+        stops("repeat", "[readings_stale]", [STALE_S, PERIOD_S], 0.0),
+        stops("step s=0.8", "[clock_jumped]", [0.0, PERIOD_S], 0.0),
+        stops("step s=-30", "[clock_jumped]", [0.0, PERIOD_S], 0.0),
         // The session may hold a joint meanwhile that seems not to follow: what it asked before counts.
-        stops("freeze", "stayed the same", [0.0, FROZEN_S + PERIOD_S], 1.2),
-        stops(&jump, "from where it was", [0.0, TRACKING_S + PERIOD_S], 0.0),
+        stops("freeze", "[readings_frozen]", [0.0, FROZEN_S + PERIOD_S], 1.2),
+        stops(&jump, "[reading_jumped]", [0.0, TRACKING_S + PERIOD_S], 0.0),
         goes_on("cut s=0.15"),
         goes_on("step s=0.3"),
         goes_on(&spike),
@@ -185,7 +185,7 @@ fn set_points_that_do_not_arrive_end_the_run() {
     assert!(seen.fault_s.is_finite(), "{}", said.stderr);
     seen.assert_safe("ignore");
     match said.code {
-        1 => said.expect("ignore", 1, &["from its set-point"]),
+        1 => said.expect("ignore", 1, &["[joint_not_following]"]),
         _ => said.expect("ignore", 4, &["REFUSED", "in vain"]),
     }
 }
@@ -209,7 +209,7 @@ fn judge(case: &Case) {
         }
         None => {
             eprintln!("{name}: went on, {n_later} set-points later");
-            assert!(said.stderr.contains("stopped on request") && n_later > 300, "{name}: {}", said.stderr);
+            assert!(said.stderr.contains("[interrupted]") && n_later > 300, "{name}: {}", said.stderr);
         }
     }
     let recording = out.path().join("out/run-cut-1.mcap");

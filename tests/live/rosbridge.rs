@@ -58,8 +58,8 @@ fn an_arm_behind_a_rosbridge_is_calibrated_and_reaches_its_targets() {
     write_map(out.path());
     let run = "$ARMCAL run $ROUTINE --arm rosbridge:arm.toml --unattended --details --out out;";
     let said = in_namespace(out.path(), &routine, &with_bridge(&format!("{run} {END}")));
-    said.expect("run --arm", 0, &["ACCEPTED", "from a reading to its set-point"]);
-    assert!(!said.stderr.contains("of no use"), "{}", said.stderr);
+    said.expect("run --arm", 0, &["ACCEPTED", " ms, 99 % "]);
+    assert!(!said.stderr.contains("[messages_rejected]"), "{}", said.stderr);
     let told = told(out.path());
     assert!(
         told.iter().all(|(_, line)| line["error"].is_null()),
@@ -88,9 +88,9 @@ fn an_arm_behind_a_rosbridge_is_calibrated_and_reaches_its_targets() {
 #[ignore = "needs user namespaces, and Python's cyclonedds and websockets"]
 fn a_bridge_that_dies_or_hangs_stops_the_run_and_a_stop_goes_over_it() {
     for (signal, limit_s, word) in [
-        ("KILL $BRIDGE", 0.0, "the connection is lost"),
-        ("STOP $BRIDGE", STALE_S, "no joint readings for"),
-        ("INT $RUN", 0.0, "stopped on request"),
+        ("KILL $BRIDGE", 0.0, "[arm_connection]"),
+        ("STOP $BRIDGE", STALE_S, "[readings_stale]"),
+        ("INT $RUN", 0.0, "[interrupted]"),
     ] {
         let out = temp();
         let routine = ShortRoutine::default().write(out.path());

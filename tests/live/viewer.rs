@@ -24,7 +24,7 @@ fn a_viewer_that_is_killed_does_not_disturb_the_arm() {
          kill -INT $SERVER; wait $SERVER; exit $CODE"
     );
     let said = in_namespace(out.path(), &routine, &script);
-    said.expect("run --live", 0, &["killed", "ACCEPTED", "the viewer went away", "from a reading to its set-point"]);
+    said.expect("run --live", 0, &["killed", "ACCEPTED", "[viewer_lost]", " ms, 99 % "]);
 }
 
 /// A simulated run writes the same bytes as without a viewer.
@@ -38,7 +38,7 @@ fn a_viewer_that_is_killed_changes_no_file() {
          sleep 1; kill -9 $VIEWER && kill -0 $RUN && echo killed; wait $RUN"
     );
     let said = in_namespace(out.path(), &run.routine, &script);
-    said.expect("run --live", 0, &["killed", "ACCEPTED", "the viewer went away"]);
+    said.expect("run --live", 0, &["killed", "ACCEPTED", "[viewer_lost]"]);
     for name in ["run.mcap", "truth.mcap", "run.rrd", "calibration.toml", "calibration.covariance.toml"] {
         let shown = std::fs::read(out.path().join("out").join(name)).expect("it reads");
         assert!(shown == run.bytes(name), "{name} differs");

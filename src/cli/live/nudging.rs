@@ -2,11 +2,11 @@
 
 use std::io::BufRead;
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 
 use crate::cli::interrupt::Interrupt;
 use crate::cli::stdout::note;
-use armcal_live::{LiveArm, Wire};
+use armcal_live::{LiveArm, NudgeProblem, Wire};
 
 /// Asks, moves the joint out and back, and asks whether that looked right.
 pub(super) fn nudge_one(
@@ -34,7 +34,7 @@ fn ask(answers: &mut impl BufRead, question: &str) -> Result<()> {
     let answer = answers.read_line(&mut line).map(|_| line.trim().to_lowercase());
     match answer.as_deref() {
         Ok("y" | "yes") => Ok(()),
-        _ => bail!("the operator did not say yes"),
+        _ => Err(NudgeProblem::Declined.into()),
     }
 }
 

@@ -7,7 +7,7 @@ use anyhow::Result;
 
 use super::ViewOf;
 use crate::cli::exit::UsageError;
-use crate::cli::stdout::note;
+use crate::cli::stdout::warn;
 use armcal_belief::session::MessageListener;
 use armcal_replay::{LiveDrawings, LiveView, LiveViewEnd};
 
@@ -35,15 +35,14 @@ impl OpenView {
         let Self { view, address } = self;
         let LiveViewEnd { was_seen, was_taken, left_out, failure } = view.end();
         if let Some(why) = failure {
-            note(format_args!("note: --live ended early: {why}"));
+            warn(Code::ViewerLost, format_args!("--live ended early: {why}"));
         } else if !was_seen {
-            note(format_args!(
-                "note: --live: no viewer listened at {address}; start one before with `rerun --bind 127.0.0.1`"
-            ));
+            let remedy = "start one before with `rerun --bind 127.0.0.1`";
+            warn(Code::ViewerLost, format_args!("--live: no viewer listened at {address}; {remedy}"));
         } else if left_out > 0 {
-            note(format_args!("note: --live: the viewer was too slow: {left_out} messages were not shown"));
+            warn(Code::ViewerLost, format_args!("--live: the viewer was too slow: {left_out} messages were not shown"));
         } else if !was_taken {
-            note(format_args!("note: --live: the viewer went away, or was too slow for the end"));
+            warn(Code::ViewerLost, "--live: the viewer went away, or was too slow for the end");
         }
     }
 }

@@ -193,6 +193,13 @@ codes! {
     ReplayMissing = "replay_missing",
     ReplayIncomplete = "replay_incomplete",
     RunLeftOver = "run_left_over",
+    TagsUnknown = "tags_unknown",
+    ViewsLeftOut = "views_left_out",
+    TaskMissing = "task_missing",
+    FileOutdated = "file_outdated",
+    JointsIgnored = "joints_ignored",
+    JointAssumed = "joint_assumed",
+    ViewerLost = "viewer_lost",
 }
 
 /// Types that have a code: errors, refusals, findings.

@@ -41,7 +41,7 @@ pub enum ArmError {
     NoSuchFault { number: usize, known: usize },
     /// The arm, or what guards it, has stopped; it takes no further set-points.
     #[error("the arm was stopped: {why}")]
-    Stopped { why: String },
+    Stopped { why: String, code: Code },
     #[error("the connection to the arm: {0}")]
     Connection(#[source] Box<dyn std::error::Error + Send + Sync>),
     #[error("the arm has no gripper that opens and closes")]
@@ -126,7 +126,7 @@ impl Coded for ArmError {
             }
             Self::NotFinite { .. } => Code::SimulationUnstable,
             Self::NoSuchFault { .. } => Code::ValueInvalid,
-            Self::Stopped { .. } => Code::ArmStopped,
+            Self::Stopped { code, .. } => *code,
             Self::Connection(_) => Code::ArmConnection,
         }
     }

@@ -8,6 +8,7 @@ use super::protocol::{Listener, greeting, set_point, stop};
 use crate::messages::Command;
 use crate::topics::newest_stamp;
 use crate::{Connection, Heard, LiveError, Rosbridge, Wire};
+use armcal_core::codes::Coded;
 use armcal_core::robot::Robot;
 use armcal_core::streams::{JointCounts, LogLevel, LogLine, Message};
 use armcal_core::time::Stamp;
@@ -78,7 +79,7 @@ impl Wire for RosbridgeWire {
             stamp: self.newest,
             level: LogLevel::Error,
             name: "rosbridge".to_owned(),
-            text: error.to_string(),
+            text: format!("{error} [{}]", error.code()),
         };
         heard.push(Heard::Other(Message::Log(line)));
         Ok(())

@@ -1,6 +1,6 @@
 //! A look around, and what is proposed of it.
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 use armcal_core::codes::Code;
 
 use super::DiscoverArgs;
@@ -10,7 +10,7 @@ use crate::cli::interrupt::Interrupt;
 use crate::cli::stdout::{note, say};
 use crate::output;
 use armcal_core::text::counted;
-use armcal_live::{Domain, look_around, propose_connection};
+use armcal_live::{Domain, LiveError, look_around, propose_connection};
 
 pub(super) fn discover(args: &DiscoverArgs) -> Result<Exit> {
     let robot = args.robot.as_ref().map(|folder| load_robot(folder, &[])).transpose()?;
@@ -23,12 +23,7 @@ pub(super) fn discover(args: &DiscoverArgs) -> Result<Exit> {
     let domain = Domain { number: args.domain, networks: args.networks.clone() };
     let seen = look_around(&domain, args.seconds, &|| interrupt.is_requested())?;
     if seen.topics.is_empty() {
-        bail!(
-            "nobody was seen in ROS domain {} in {} s; is the driver running there, and are --domain and --network \
-             right?",
-            args.domain,
-            args.seconds
-        );
+        return Err(LiveError::Nobody { domain: args.domain, seconds: args.seconds }.into());
     }
     let proposed = propose_connection(&seen, robot.as_ref());
     match &args.out {
