@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use armcal::robot::{Shape, load};
 
-use crate::support::external::{AS_IN_2018, INPUT_MAP, RealTitan, write_poses};
+use crate::support::external::{AS_IN_2018, INPUT_MAP, RealTitan, TAG_NOISE, write_poses};
 use crate::support::texts::Texts;
 use crate::support::{Answer, ShortRoutine, answer, edit, program, read, robot_copy, root, run, temp, titan, write};
 
@@ -420,7 +420,7 @@ fn a_recording_of_positions_needs_neither_lens_nor_stowed_pose_nor_tags() {
         let of = |out: &str| read(&folder.path().join(out).join("calibration.toml"));
         assert_eq!(of("with"), of("without"), "{method}");
     }
-    write(&map, &INPUT_MAP.replace("position", "corners"));
+    write(&map, &INPUT_MAP.replace("\"position\"", "\"corners\"").replace(TAG_NOISE, ""));
     calibrate(&bare, "bundle", "out").expect("corners", 2, &["lens", "model, resolution_px, focal_px"]);
 }
 

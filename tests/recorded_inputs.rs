@@ -278,8 +278,12 @@ fn a_proposed_input_map_works_and_overwrites_nothing() {
     let proposed = read(&map);
     inspect().expect("it is there", 2, &["map.toml"]);
     assert_eq!(read(&map), proposed);
-    // The positions of these tags are all that the tag map knows.
-    write(&map, &proposed.replace("use = \"pose\"", "use = \"position\""));
+    // The positions of these tags are all that the tag map knows, and their noise is known.
+    let stated =
+        proposed.replace("# position_std_m", "position_std_m").replace("# rotation_std_rad", "rotation_std_rad");
+    let stated =
+        stated.replace("position_std_m = 0.003", "position_std_m = 0.009").replace("_rad = 0.01 ", "_rad = 0.018 ");
+    write(&map, &stated.replace("use = \"pose\"", "use = \"position\""));
     let mut command = program();
     command
         .arg("calibrate")

@@ -3,6 +3,7 @@
 #![warn(missing_docs)]
 
 pub mod calib;
+pub mod judge;
 pub mod plan;
 pub mod session;
 #[cfg(test)]

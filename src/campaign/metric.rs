@@ -1,7 +1,7 @@
 //! The figures of a run that a campaign keeps: name, unit, which way is worse, and where in a finished run they stand.
 
 use crate::run::Finished;
-use crate::score::ScoreSide;
+use crate::score::{ScoreSide, TargetScore};
 use armcal_core::stats::Summary;
 use armcal_core::units::Unit;
 
@@ -96,9 +96,25 @@ metrics! {
     PredictedWithPriorsP95 = "predicted_tool_error_with_priors_p95_m", Metres, MoreIsWorse, |f| {
         Some(f.summary.calibration.predicted_tool_error_with_priors_m?.p95)
     };
+    U95Max = "u95_max_m", Metres, MoreIsWorse, |f| f.summary.u95_m.max;
+    TargetsWithU95 = "targets_with_u95", Count, LessIsWorse, |f| Some(errors_over_u95(f).len() as f64);
+    TargetsBeyondU95 = "targets_beyond_u95", Count, MoreIsWorse, |f| {
+        Some(errors_over_u95(f).into_iter().filter(|ratio| *ratio > 1.0).count() as f64)
+    };
+    WorstOverU95 = "worst_error_over_u95", None, MoreIsWorse, |f| errors_over_u95(f).into_iter().reduce(f64::max);
     Findings = "findings", Count, MoreIsWorse, |f| Some(f.summary.calibration.findings.len() as f64);
     Reservations = "reservations", Count, MoreIsWorse, |f| Some(f.summary.calibration.reservations.len() as f64);
     Nees = "nees", None, MoreIsWorse, |f| f.summary.score.as_ref()?.nees;
+}
+
+/// True tool error after calibration over U95, at each target that has both.
+fn errors_over_u95(finished: &Finished) -> Vec<f64> {
+    let targets = finished.summary.score.iter().flat_map(|score| &score.targets);
+    let ratio = |truth: &TargetScore| {
+        let u95 = finished.summary.u95_m.targets.iter().find(|u95| u95.index == truth.target)?;
+        Some(truth.tool_error_after_m? / u95.u95_m?)
+    };
+    targets.filter_map(ratio).collect()
 }
 
 impl Metric {

@@ -87,17 +87,54 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
     let Calibrated { calibration, lost, external } = given.calibrate()?;
     let (views, tags, steps) = (calibration.fit.views, calibration.fit.tags_seen, calibration.fit.evaluations);
     tracing::info!("{views} views with {tags} tag observations fitted in {steps} steps, method {:?}", args.method);
-    let summary = RunSummary::of_calibration(&calibration, started.elapsed().as_secs_f64());
+    let summary = RunSummary::of_calibration(&calibration, started.elapsed().as_secs_f64()).judged();
     // Before anything is written: what has no compact form shall leave no half of the answer.
     let compact = args.compact.then(|| CompactCalibration::of(&calibration)?.to_text()).transpose()?;
-    let json = serde_json::to_string_pretty(&summary).context("summary.json")?;
-    let (map_file, calibration_file) = (args.out.join("tagmap.toml"), args.out.join("calibration.toml"));
+    let (out, kept) = place_for(&args.out, &calibration)?;
+    write_results(&out, &args.recordings, &robot, (&calibration, &summary))?;
+    if let Some((views, robot)) = &external {
+        // What is calibrated is in place: a picture that does not come is a warning.
+        if let Err(error) = draw(&out, views, robot, (&calibration, &summary)) {
+            warn(Code::ReplayMissing, format_args!("no replay: {error:#}"));
+        }
+    }
+    let replay = external.map(|_| out.join("replay.rrd")).filter(|file| file.is_file());
+    match &compact {
+        Some(line) => say(line)?,
+        None => args.closing.say(&summary, &next_step(&out, replay.as_deref()))?,
+    }
+    if let Some(why) = kept {
+        warn(
+            Code::ResultKept,
+            format_args!(
+                "{}: the accepted calibration stays: the new one is {why}, and is in {}",
+                args.out.display(),
+                out.display()
+            ),
+        );
+    }
+    Ok(match (calibration.status, lost) {
+        (Status::Refused, _) => Exit::Refused,
+        (Status::Accepted, true) => Exit::DataLost,
+        (Status::Accepted, false) => Exit::Ok,
+    })
+}
+
+/// Calibration with its covariance, report, summary and, where tags were mapped, the map.
+fn write_results(
+    out: &Path,
+    recordings: &[PathBuf],
+    robot: &Robot,
+    (calibration, summary): (&Calibration, &RunSummary),
+) -> Result<()> {
+    let json = serde_json::to_string_pretty(summary).context("summary.json")?;
+    let (map_file, calibration_file) = (out.join("tagmap.toml"), out.join("calibration.toml"));
     let covariance_file = covariance_file(&calibration_file);
     let (map, texts) = (calibration.map.as_ref().map(MapResult::to_toml), calibration.to_files());
-    let (summary_file, json) = (args.out.join("summary.json"), format!("{json}\n"));
-    let about = About { recordings: names(&args.recordings), ..About::default() };
-    let report = Report { summary: &summary, calibration: &calibration, robot: &robot, online: None, about };
-    let (report_file, report) = (args.out.join("report.html"), html(&report));
+    let (summary_file, json) = (out.join("summary.json"), format!("{json}\n"));
+    let about = About { recordings: names(recordings), ..About::default() };
+    let report = Report { summary, calibration, robot, online: None, about };
+    let (report_file, report) = (out.join("report.html"), html(&report));
     let mut written: Vec<(&Path, &[u8])> = Vec::new();
     written.extend(map.iter().map(|map| (map_file.as_path(), map.as_bytes())));
     written.extend([
@@ -107,23 +144,30 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
         (summary_file.as_path(), json.as_bytes()),
     ]);
     output::write_together(&written)?;
+    // What our own reader refuses must not pass for a result.
+    Calibration::read(&calibration_file)?.sensors(robot)?;
     written.iter().for_each(|(path, bytes)| tracing::info!("{}: {} bytes written", path.display(), bytes.len()));
-    if let Some((views, robot)) = &external {
-        // What is calibrated is in place: a picture that does not come is a warning.
-        if let Err(error) = draw(&args.out, views, robot, (&calibration, &summary)) {
-            warn(Code::ReplayMissing, format_args!("no replay: {error:#}"));
-        }
-    }
-    let replay = external.map(|_| args.out.join("replay.rrd")).filter(|file| file.is_file());
-    match &compact {
-        Some(line) => say(line)?,
-        None => args.closing.say(&summary, &next_step(&args.out, replay.as_deref()))?,
-    }
-    Ok(match (calibration.status, lost) {
-        (Status::Refused, _) => Exit::Refused,
-        (Status::Accepted, true) => Exit::DataLost,
-        (Status::Accepted, false) => Exit::Ok,
-    })
+    Ok(())
+}
+
+/// A U95 larger than that of the result in place by more than this factor is worse.
+const WORSE: f64 = 1.1;
+
+/// Where a result goes, and why it does not replace the accepted one at `out`.
+fn place_for(out: &Path, new: &Calibration) -> Result<(PathBuf, Option<&'static str>)> {
+    let Ok(old) = Calibration::read(&out.join("calibration.toml")) else { return Ok((out.to_owned(), None)) };
+    let is_accepted = old.status == Status::Accepted && old.robot == new.robot;
+    let is_comparable = old.u95.tolerance_m.is_some() == new.u95.tolerance_m.is_some();
+    let u95_m = old.u95.max_m.zip(new.u95.max_m).filter(|_| is_comparable);
+    let is_worse = || u95_m.is_some_and(|(old_m, new_m)| new_m > WORSE * old_m);
+    let (name, why) = match new.status {
+        Status::Refused if is_accepted => ("refused", "refused"),
+        Status::Accepted if is_accepted && is_worse() => ("worse", "less certain (larger U95)"),
+        _ => return Ok((out.to_owned(), None)),
+    };
+    let folder = out.join(name);
+    output::make_folder(&folder)?;
+    Ok((folder, Some(why)))
 }
 
 /// Where the results are, and what to look at.

@@ -1,6 +1,6 @@
 //! `armcal check`: what is wrong with a file, before anything moves.
 
-use armcal_core::codes::{Code, Warning};
+use armcal_core::codes::{Code, Coded, Warning};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
@@ -14,7 +14,7 @@ use crate::cli::exit::{Exit, UsageError, chain_of, code_of};
 use crate::cli::file_kind::FileKind;
 use crate::cli::overrides::OverrideArgs;
 use crate::cli::stdout::say;
-use armcal_belief::calib::{Calibration, CalibrationFileError};
+use armcal_belief::calib::{Calibration, CalibrationFileError, Status};
 use armcal_belief::plan::{ClearanceModel, PlanFile, SceneCheck, SceneIssues, grips_at_first};
 use armcal_belief::tagmap::files::read_landmarks;
 use armcal_core::input::{InputMap, SeenColumns, Source, TagUse, Topics, read_input_map, read_task};
@@ -46,7 +46,12 @@ pub(super) fn check(args: &CheckArgs) -> Result<Exit> {
     } else {
         checked.map(|checked| say_wrapped(&checked.lines()).map(|()| checked)).collect::<Result<_>>()?
     };
-    Ok(if checked.iter().all(|checked| checked.ok) { Exit::Ok } else { Exit::InvalidInput })
+    let is_bad = |checked: &Checked| !checked.ok && !checked.refused;
+    Ok(match (checked.iter().any(is_bad), checked.iter().any(|checked| checked.refused)) {
+        (true, _) => Exit::InvalidInput,
+        (false, true) => Exit::Refused,
+        (false, false) => Exit::Ok,
+    })
 }
 
 /// What was found of one file.
@@ -54,6 +59,9 @@ pub(super) fn check(args: &CheckArgs) -> Result<Exit> {
 struct Checked {
     file: String,
     ok: bool,
+    /// A calibration that was refused; `error` says why.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    refused: bool,
     /// What it holds.
     #[serde(skip_serializing_if = "Option::is_none")]
     holds: Option<String>,
@@ -70,21 +78,26 @@ impl Checked {
     fn of(file: &Path, overrides: &Overrides) -> Self {
         let name = file.display().to_string();
         match check_one(file, overrides) {
-            Ok(Found { text, warnings }) => {
-                Self { file: name, ok: true, holds: Some(text), warnings, error: None, code: None }
+            Ok(Found { text, warnings, refusal }) => {
+                let (error, code) = refusal.unzip();
+                let refused = error.is_some();
+                Self { file: name, ok: !refused, refused, holds: Some(text), warnings, error, code }
             }
             Err(error) => {
                 let code = Some(code_of(&error));
-                Self { file: name, ok: false, holds: None, warnings: Vec::new(), error: Some(chain_of(&error)), code }
+                let (warnings, error) = (Vec::new(), Some(chain_of(&error)));
+                Self { file: name, ok: false, refused: false, holds: None, warnings, error, code }
             }
         }
     }
 
     fn lines(&self) -> String {
-        let Self { file, holds, warnings, error, code, .. } = self;
-        let found = holds.iter().map(|holds| format!("ok: {file}: {holds}"));
+        let Self { file, holds, warnings, error, code, refused, .. } = self;
+        let kind = if *refused { "REFUSED" } else { "ok" };
+        let found = holds.iter().map(|holds| format!("{kind}: {file}: {holds}"));
         let warnings = warnings.iter().map(|warning| format!("warning: {file}: {warning}"));
-        let errors = error.iter().zip(code).map(|(error, code)| format!("error: {error} [{code}]"));
+        let kind = if *refused { "because" } else { "error" };
+        let errors = error.iter().zip(code).map(|(error, code)| format!("{kind}: {error} [{code}]"));
         found.chain(warnings).chain(errors).collect::<Vec<_>>().join("\n")
     }
 }
@@ -93,6 +106,14 @@ impl Checked {
 struct Found {
     text: String,
     warnings: Vec<Warning>,
+    /// Reason why a calibration was refused, and its code.
+    refusal: Option<(String, Code)>,
+}
+
+impl Found {
+    fn whole(text: String) -> Self {
+        Self { text, warnings: Vec::new(), refusal: None }
+    }
 }
 
 fn check_one(file: &Path, overrides: &Overrides) -> Result<Found> {
@@ -107,7 +128,8 @@ fn check_one(file: &Path, overrides: &Overrides) -> Result<Found> {
     let table: toml::Table = robot::parse_toml(file, &text)?;
     match FileKind::of_table(&table) {
         Some(FileKind::Routine) => check_routine(file, overrides),
-        kind => Ok(Found { text: describe(file, &text, kind)?, warnings: Vec::new() }),
+        Some(FileKind::Calibration) => describe_calibration(file, &text),
+        kind => Ok(Found::whole(describe(file, kind)?)),
     }
 }
 
@@ -124,7 +146,7 @@ fn expect_toml(file: &Path) -> Result<()> {
 }
 
 /// What a file that is neither robot nor routine holds.
-fn describe(file: &Path, text: &str, kind: Option<FileKind>) -> Result<String> {
+fn describe(file: &Path, kind: Option<FileKind>) -> Result<String> {
     match kind {
         Some(FileKind::Plan) => {
             let plan = PlanFile::read(file)?;
@@ -148,7 +170,6 @@ fn describe(file: &Path, text: &str, kind: Option<FileKind>) -> Result<String> {
             let (targets, poses) = (task.targets_m.len(), task.poses_rad.len());
             Ok(format!("task, {targets} targets and {poses} poses, tolerance {} mm", task.tolerance_m * 1e3))
         }
-        Some(FileKind::Calibration) => describe_calibration(file, text),
         Some(FileKind::RoutineWithoutVehicle) => Err(UsageError::new(
             Code::KeyMissing,
             format!(
@@ -170,7 +191,7 @@ fn describe(file: &Path, text: &str, kind: Option<FileKind>) -> Result<String> {
 }
 
 /// One without its covariance still moves an arm; one beside another's is wrong.
-fn describe_calibration(file: &Path, text: &str) -> Result<String> {
+fn describe_calibration(file: &Path, text: &str) -> Result<Found> {
     let (calibration, without) = match Calibration::read(file) {
         Ok(calibration) => (calibration, String::new()),
         Err(CalibrationFileError::NoCovariance { file: covariance, .. }) => (
@@ -180,7 +201,10 @@ fn describe_calibration(file: &Path, text: &str) -> Result<String> {
         Err(error) => return Err(error.into()),
     };
     let (joints, valid) = (calibration.joint.len(), calibration.valid_for().join(", "));
-    Ok(format!("calibration of `{}`, {joints} joints; valid for {valid}{without}", calibration.robot))
+    let text = format!("calibration of `{}`, {joints} joints; valid for {valid}{without}", calibration.robot);
+    let refusal = calibration.refusals.first().map(|first| (first.cause(), first.code()));
+    let refusal = refusal.filter(|_| calibration.status == Status::Refused);
+    Ok(Found { refusal, ..Found::whole(text) })
 }
 
 fn describe_input(map: &InputMap) -> String {
@@ -220,7 +244,7 @@ fn check_robot(folder: &Path) -> Result<Found> {
         format!("base_tag: there is no [[tag]], so that tag {id} must be one of the vehicle's, or of a tag map")
     });
     let warnings = refused.chain(lost).map(|text| Warning::new(Code::PlanningIncomplete, text)).collect();
-    Ok(Found { text: describe_robot(&robot)?, warnings })
+    Ok(Found { warnings, ..Found::whole(describe_robot(&robot)?) })
 }
 
 fn describe_robot(robot: &Robot) -> Result<String> {
@@ -286,7 +310,7 @@ fn check_routine(file: &Path, overrides: &Overrides) -> Result<Found> {
         routine.steps.iter().map(described).collect::<Vec<_>>().join(", "),
         routine.task.targets_m.len()
     );
-    Ok(Found { text, warnings })
+    Ok(Found { warnings, ..Found::whole(text) })
 }
 
 fn described(step: &Step) -> String {

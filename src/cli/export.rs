@@ -39,7 +39,7 @@ pub(super) struct ExportArgs {
     points: Option<u16>,
     /// Also write a refused calibration
     #[arg(long)]
-    allow_refused: bool,
+    refused: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -69,11 +69,6 @@ enum Form {
 }
 
 impl Form {
-    /// An arm moves by these.
-    fn is_for_drivers(self) -> bool {
-        matches!(self, Self::Urdf | Self::Ros2Control | Self::RosParameters | Self::Table)
-    }
-
     fn name(self) -> String {
         self.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
     }
@@ -107,14 +102,11 @@ pub(super) fn export(args: &ExportArgs) -> Result<Exit> {
     expect_kind(&args.file, &[FileKind::Calibration])?;
     let robot = args.robot.as_deref().map(|folder| load_robot(folder, &[])).transpose()?;
     let input = read_input(&args.file)?;
-    if args.form.is_for_drivers()
-        && !args.allow_refused
+    if !args.refused
         && let Some(why) = input.refusal()
     {
         let (file, form) = (args.file.display(), args.form.name());
-        complain(format!(
-            "error: {file}: the calibration is refused: {why}; --allow-refused writes {form} nevertheless"
-        ));
+        complain(format!("error: {file}: the calibration is refused: {why}; --refused writes {form} nevertheless"));
         return Ok(Exit::Refused);
     }
     let text = match input {

@@ -73,8 +73,8 @@ fn legend(run: &ReplayScene, input: &ReplayInput) -> String {
     let nearest = input.clearance_m.map_or_else(String::new, |kept_m| {
         let kept_mm = 1e3 * kept_m;
         format!(
-            "- line from the arm to what is nearest to it: **red** below the {kept_mm:.0} mm that are kept clear, \
-             **amber** below twice, **green** below three times as much\n"
+            "- line from the arm to the nearest body: **red** below the required clearance of {kept_mm:.0} mm, \
+             **amber** below twice that, **green** below three times that\n"
         )
     });
     format!(

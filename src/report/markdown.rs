@@ -25,7 +25,7 @@ pub fn markdown(summary: &RunSummary) -> String {
 }
 
 /// As the kind of quotation that the viewer draws in green, amber or red.
-fn colored(Verdict { grade, headline, reasons, next }: &Verdict) -> String {
+fn colored(Verdict { grade, headline, reasons, next, .. }: &Verdict) -> String {
     let kind = match grade {
         Grade::Green => "TIP",
         Grade::Amber => "WARNING",
@@ -48,7 +48,8 @@ mod tests {
         let lines = |text: &str| vec![text.to_owned()];
         let (reasons, next) = (lines("elbow slipped."), lines("Fasten it."));
         for (grade, kind) in [(Grade::Green, "TIP"), (Grade::Amber, "WARNING"), (Grade::Red, "CAUTION")] {
-            let verdict = Verdict { grade, headline: "So it is", reasons: reasons.clone(), next: next.clone() };
+            let (reasons, next, codes) = (reasons.clone(), next.clone(), Vec::new());
+            let verdict = Verdict { grade, headline: "So it is", reasons, next, codes };
             let expected = format!(
                 "> [!{kind}]\n> **So it is**\n>\n> - elbow slipped.\n>\n> **Next steps**\n>\n> - Fasten it.\n\n"
             );

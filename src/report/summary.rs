@@ -7,10 +7,12 @@ use serde::{Deserialize, Serialize};
 use crate::score::{MarginSummary, Score};
 use armcal_belief::calib::online::OnlineEvent;
 use armcal_belief::calib::{
-    BaselineComparison, Calibration, CameraMount, FailedJointTable, Finding, FurtherCamera, JointResult, MapResult,
-    ObservabilityTable, PriorTable, Refusal, Reservation, Status, VerdictTable,
+    BaselineComparison, Calibration, CameraMount, FailedJointTable, Finding, FindingUnit, FurtherCamera, JointResult,
+    MapResult, ObservabilityTable, PriorTable, Refusal, Reservation, Status, VerdictTable,
 };
+use armcal_belief::judge::{TargetU95, U95Table};
 use armcal_belief::session::{AskedPoses, OnlineOutcome, SkippedTarget, StillReachable};
+use armcal_core::codes::Code;
 use armcal_core::numeric::Outcome;
 use armcal_core::robot::FailedKind;
 use armcal_core::routine::AssertFigure;
@@ -26,6 +28,12 @@ pub struct RunSummary {
     pub seed: Option<u64>,
     pub method: String,
     pub status: Status,
+    /// May the result be used, and by what rule; filled in once the summary is whole.
+    #[serde(default)]
+    pub verdict: VerdictSummary,
+    /// Radius that contains the tool error with 95 % probability, m.
+    #[serde(default)]
+    pub u95_m: U95Summary,
     /// All reasons in words.
     pub refusal: Option<String>,
     /// The same as data, the most telling first.
@@ -62,6 +70,43 @@ pub struct RunSummary {
     /// Of `work` steps that follow the online belief.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub online: Option<OnlineSummary>,
+}
+
+/// A verdict for programs.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct VerdictSummary {
+    /// `green`, `amber` or `refused`.
+    pub grade: String,
+    /// Reasons of the grade, the most telling first.
+    pub codes: Vec<Code>,
+    pub rule: String,
+    /// `None` without a task.
+    pub tolerance_m: Option<f64>,
+    /// Largest probability over the targets.
+    pub p_beyond_tolerance: Option<f64>,
+    /// Unobservable parameters that U95 includes by their stated sigmas.
+    pub conditions: Vec<Condition>,
+}
+
+/// Stated sigma that the result depends on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Condition {
+    pub what: String,
+    /// One stated sigma, in `unit`.
+    pub std: f64,
+    pub unit: FindingUnit,
+    /// Tool motion by one sigma, root mean square over the task, m.
+    pub tool_error_m: f64,
+    /// U95 includes it.
+    pub included: bool,
+}
+
+/// U95 over the task.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct U95Summary {
+    /// Largest of the targets, or of the recorded configurations without a task; `None` where it is not known.
+    pub max: Option<f64>,
+    pub targets: Vec<TargetU95>,
 }
 
 /// What was believed online at the end, and what happened until then; over time it is in belief.jsonl.
@@ -176,10 +221,14 @@ pub struct CalibrationSummary {
     /// The joint whose gain changed most, of those that were estimated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub largest_gain_change: Option<GainChange>,
+    /// One sigma; what people read is U95.
     pub predicted_tool_error_m: Option<Summary>,
     /// The same with what the drawing leaves open.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub predicted_tool_error_with_priors_m: Option<Summary>,
+    /// U95 and the decision by it, as calibration.toml has them; summary.json has them as `u95_m` and `verdict`.
+    #[serde(skip)]
+    pub u95: U95Table,
     /// By the tag on the gripper, where the robot has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera_mount: Option<CameraMount>,
@@ -280,6 +329,7 @@ impl CalibrationSummary {
             largest_gain_change: GainChange::largest(&calibration.joint),
             predicted_tool_error_m: calibration.predicted_tool_error_m,
             predicted_tool_error_with_priors_m: calibration.predicted_tool_error_with_priors_m,
+            u95: calibration.u95.clone(),
             camera_mount: calibration.camera_mount.clone(),
             further_camera: calibration.further_camera.clone(),
             time_offset_s: calibration.model.as_ref().and_then(|model| model.time_offset_s),
@@ -305,6 +355,8 @@ impl RunSummary {
             seed: None,
             method: calibration.method.to_string(),
             status: calibration.status,
+            verdict: VerdictSummary::default(),
+            u95_m: U95Summary { max: calibration.u95.max_m, targets: calibration.u95.target.clone() },
             refusal: calibration.refusal.clone(),
             refusals: calibration.refusals.clone(),
             simulated_s: None,

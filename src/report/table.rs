@@ -7,7 +7,7 @@ use crate::report::online::online_lines;
 use crate::report::summary::{
     AssertSummary, CalibrationSummary, CaptureSummary, GainChange, HeldJointSummary, RenewalSummary, RunSummary,
 };
-use crate::report::verdict::{beside_refusal, joint_remedy, repairs};
+use crate::report::verdict::{attention, beside_refusal, joint_remedy, repairs};
 use crate::score::{ReachScore, ScoreSide};
 use armcal_belief::calib::{
     CameraMount, FailedJointTable, FurtherCamera, MapResult, PriorTable, Status, SurveyCoverage,
@@ -217,28 +217,38 @@ fn accuracy_lines(summary: &RunSummary) -> Vec<String> {
             .rms_px
             .map_or_else(String::new, |px| format!(", reprojection error {} rms", Unit::Pixels.shown(px, 1))),
     ));
-    lines.extend(summary.calibration.predicted_tool_error_m.map(|predicted| {
-        format!(
-            "predicted    tool error {} median, {} worst of the targets (one sigma, from the recording and the \
-             datasheets)",
-            Unit::Metres.shown(predicted.median, 1),
-            Unit::Metres.shown(predicted.max, 1)
-        )
-    }));
-    lines.extend(summary.calibration.predicted_tool_error_with_priors_m.map(|predicted| {
-        format!(
-            "with priors  tool error {} median, {} worst, with unobservable parameters at one sigma of robot.toml",
-            Unit::Metres.shown(predicted.median, 1),
-            Unit::Metres.shown(predicted.max, 1)
-        )
-    }));
+    lines.extend(u95_in_words(summary).map(|words| format!("U95          {words}")));
     lines
+}
+
+/// U95 and the risk in words; `None` for a refused result, which states no error.
+pub(super) fn u95_in_words(summary: &RunSummary) -> Option<String> {
+    let u95 = &summary.calibration.u95;
+    let max = Unit::Metres.shown(u95.max_m.filter(|_| summary.status == Status::Accepted)?, 1);
+    Some(match u95.tolerance_m.zip(u95.p_beyond_tolerance) {
+        Some((tolerance_m, risk)) => format!(
+            "the tool is within {max} of each target with 95 % probability; P(error > {}) is {}",
+            Unit::Metres.shown(tolerance_m, 1),
+            risk_in_words(risk)
+        ),
+        None => format!("the tool is within {max} with 95 % probability over the recorded configurations"),
+    })
+}
+
+/// A small probability in percent; below what a normal distribution can promise it is only called small.
+pub(super) fn risk_in_words(risk: f64) -> String {
+    if risk < 1e-4 { "below 0.01 %".to_owned() } else { format!("at most {:.2} %", 100.0 * risk) }
 }
 
 /// What was found wrong and is taken as it is: the first of it, and what to do.
 fn repaired(summary: &RunSummary) -> String {
     let repairs = repairs(summary);
-    let Some(first) = repairs.first() else { return String::new() };
+    let points = attention(summary);
+    let Some(first) = repairs.first() else {
+        let Some(first) = points.first() else { return String::new() };
+        let more = if points.len() > 1 { format!("; and {} more", points.len() - 1) } else { String::new() };
+        return format!(", with points to look at: {first}{more}");
+    };
     let more = match repairs.len() - 1 {
         0 => String::new(),
         n => format!("; and {n} more"),
@@ -298,7 +308,7 @@ fn coverage_lines(calibration: &CalibrationSummary) -> Vec<String> {
         calibration.reservations.iter().map(|reservation| format!("reservation  {reservation}")).collect();
     if let Some(verdict) = &calibration.verdict {
         lines.extend(verdict.warnings.iter().map(|line| format!("warning      {line}")));
-        lines.extend(verdict.not_covered.iter().map(|line| format!("not covered  {line}")));
+        lines.extend(verdict.not_covered.iter().map(|line| format!("not covered  {line} [{}]", Code::NotCovered)));
     }
     lines.extend(calibration.unobservable.iter().map(|line| format!("unobservable {line}")));
     lines

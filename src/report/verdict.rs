@@ -1,7 +1,8 @@
 //! May the result be used, why, and what to do next: the same words for report.html, the replay and the terminal.
 
-use crate::report::summary::RunSummary;
-use armcal_belief::calib::{FailedJointTable, Finding, FindingKind, PriorTable, Refusal, Status};
+use crate::report::summary::{Condition, RunSummary, VerdictSummary};
+use armcal_belief::calib::{FailedJointTable, Finding, FindingKind, PriorTable, Refusal, Reservation, Status};
+use armcal_belief::judge::RULE;
 use armcal_core::codes::{Code, Coded};
 use armcal_core::robot::FailedKind;
 
@@ -14,6 +15,14 @@ pub(super) enum Grade {
 }
 
 impl Grade {
+    /// As summary.json has it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Green | Self::Amber => self.class(),
+            Self::Red => "refused",
+        }
+    }
+
     /// The class of a page's box.
     pub fn class(self) -> &'static str {
         match self {
@@ -29,6 +38,8 @@ pub(super) struct Verdict {
     pub headline: &'static str,
     pub reasons: Vec<String>,
     pub next: Vec<String>,
+    /// Codes of the reasons, in their order; some have none.
+    pub codes: Vec<Code>,
 }
 
 /// Of a run, or of a calibration alone.
@@ -45,18 +56,52 @@ pub(super) fn verdict(summary: &RunSummary) -> Verdict {
             }
         }
         next.push("Keep the previous sensor parameters, and calibrate again.".to_owned());
-        return Verdict { grade: Grade::Red, headline: "REFUSED: do not use this calibration", reasons, next };
+        let codes = summary.refusals.iter().map(Coded::code).chain(beside.iter().map(|repair| repair.code)).collect();
+        return Verdict { grade: Grade::Red, headline: "REFUSED: do not use this calibration", reasons, next, codes };
     }
     let repairs = repairs(summary);
     let mut reasons: Vec<String> = repairs.iter().map(|repair| sentence(&repair.cause)).collect();
     reasons.extend(attention(summary));
+    let contradicted =
+        summary.calibration.prior.as_ref().filter(|prior| !prior.agrees).map(|_| Code::PriorContradicted);
+    let without_task = summary.calibration.u95.tolerance_m.is_none().then_some(Code::TaskMissing);
+    let is_beyond = summary.calibration.verdict.as_ref().is_some_and(|verdict| !verdict.not_covered.is_empty());
+    let not_covered = is_beyond.then_some(Code::NotCovered);
+    let of_repairs = repairs.iter().map(|repair| repair.code);
+    let codes = of_repairs.chain(without_task).chain(contradicted).chain(not_covered).collect();
     let load = "Load calibration.toml, or export it for the arm's driver (armcal export).".to_owned();
     if reasons.is_empty() {
-        return Verdict { grade: Grade::Green, headline: "ACCEPTED: use it", reasons, next: vec![load] };
+        return Verdict { grade: Grade::Green, headline: "ACCEPTED: use it", reasons, next: vec![load], codes };
     }
     let mut next: Vec<String> = repairs.iter().map(|repair| sentence(&repair.remedy_and_result())).collect();
     next.extend([load, "Review each point above before you rely on the result.".to_owned()]);
-    Verdict { grade: Grade::Amber, headline: "ACCEPTED, with points to look at", reasons, next }
+    Verdict { grade: Grade::Amber, headline: "ACCEPTED, with points to look at", reasons, next, codes }
+}
+
+impl RunSummary {
+    /// States the verdict, once all else is known.
+    #[must_use]
+    pub fn judged(mut self) -> Self {
+        let found = verdict(&self);
+        let (grade, codes) = (found.grade.name().to_owned(), found.codes);
+        let calibration = &self.calibration;
+        let condition = |reservation: &Reservation| Condition {
+            what: reservation.what.clone(),
+            std: reservation.prior_std,
+            unit: reservation.unit,
+            tool_error_m: reservation.tool_error_m,
+            included: true,
+        };
+        self.verdict = VerdictSummary {
+            grade,
+            codes,
+            rule: RULE.to_owned(),
+            tolerance_m: calibration.u95.tolerance_m,
+            p_beyond_tolerance: calibration.u95.p_beyond_tolerance,
+            conditions: calibration.reservations.iter().map(condition).collect(),
+        };
+        self
+    }
 }
 
 /// What was wrong with the arm or its survey, and is taken as it was found.
@@ -221,8 +266,16 @@ pub(super) fn joint_remedy(failed: &FailedJointTable) -> String {
 }
 
 /// What else an accepted calibration leaves to be looked at.
-fn attention(summary: &RunSummary) -> Vec<String> {
+pub(super) fn attention(summary: &RunSummary) -> Vec<String> {
     let mut points: Vec<String> = Vec::new();
+    if summary.calibration.u95.tolerance_m.is_none() {
+        points.push("No tolerance is given: name targets and tolerance with --task.".to_owned());
+    }
+    let unjudged = summary.calibration.u95.kept_by_failed_joint();
+    if !unjudged.is_empty() {
+        let numbers: Vec<String> = unjudged.iter().map(ToString::to_string).collect();
+        points.push(format!("The failed joint keeps target {} out of reach: not judged.", numbers.join(", ")));
+    }
     for limit in summary.asserts.iter().filter(|limit| !limit.holds) {
         points.push(format!("A limit of the script is not met: step {}, {}.", limit.step, limit.key));
     }

@@ -254,7 +254,7 @@ impl Run<'_> {
         if self.source == Source::World {
             self.add_score(&mut summary, outcome, recording)?;
         }
-        Ok(summary)
+        Ok(summary.judged())
     }
 
     /// What only the truth knows.

@@ -16,13 +16,13 @@ fn calibrated(more: &[&str], out: &Path) -> Answer {
 }
 
 #[test]
-fn the_closing_lines_are_verdict_three_figures_and_the_next_step() {
-    let _texts = Texts::of("the_closing_lines_are_verdict_three_figures_and_the_next_step");
+fn the_closing_lines_are_verdict_two_figures_and_the_next_step() {
+    let _texts = Texts::of("the_closing_lines_are_verdict_two_figures_and_the_next_step");
     let folder = temp();
     let said = calibrated(&[], folder.path());
     let lines: Vec<&str> = said.stdout.lines().filter(|line| !line.starts_with("warning")).collect();
     note_without_digits("closing lines of calibrate", &lines.join("\n"));
-    assert_eq!(lines.len(), 6, "{said:#?}");
+    assert_eq!(lines.len(), 5, "{said:#?}");
     assert!(said.stdout.lines().count() < 8, "{said:#?}");
     let detailed = calibrated(&["--details"], folder.path());
     assert!(detailed.stdout.lines().count() > 2 * said.stdout.lines().count(), "{detailed:#?}");

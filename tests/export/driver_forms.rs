@@ -205,23 +205,29 @@ fn forms_that_need_the_drawing_ask_for_it() {
     told.expect("points", 2, &["--points", "table"]);
 }
 
-/// No arm is moved by a refused calibration unless somebody says so.
+/// A refused calibration leaves in no form unless somebody says so.
 #[test]
-fn refused_calibrations_are_exported_for_drivers_on_demand_only() {
-    let _texts = Texts::of("refused_calibrations_are_exported_for_drivers_on_demand_only");
+fn refused_calibrations_are_exported_on_demand_only() {
+    let _texts = Texts::of("refused_calibrations_are_exported_on_demand_only");
     let folder = temp();
     let refused = folder.path().join("refused.toml");
     let why = Some("too few views".to_owned());
     write(&refused, &Calibration { status: Status::Refused, refusal: why, ..calibration() }.to_toml());
     for form in ["urdf", "ros2-control", "ros-parameters", "table"] {
         let told = export(&refused, Some(&robot_folder()), form);
-        told.expect(form, 4, &["refused.toml", "--allow-refused"]);
+        told.expect(form, 4, &["refused.toml", "--refused"]);
         assert_eq!(told.stdout, "");
         let mut command = program();
-        command.arg("export").arg(&refused).args(["--as", form, "--allow-refused", "--robot"]).arg(robot_folder());
+        command.arg("export").arg(&refused).args(["--as", form, "--refused", "--robot"]).arg(robot_folder());
         assert!(answer(&mut command).code == 0);
     }
-    export(&refused, None, "yaml").expect("yaml", 0, &["status: refused"]);
+    export(&refused, None, "yaml").expect("yaml", 4, &["--refused"]);
+    let mut command = program();
+    answer(command.arg("export").arg(&refused).args(["--as", "yaml", "--refused"])).expect(
+        "yaml",
+        0,
+        &["status: refused"],
+    );
 }
 
 #[test]

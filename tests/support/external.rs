@@ -96,8 +96,11 @@ impl RealTitan {
     }
 }
 
+/// The lines of [`INPUT_MAP`] that state the noise of [`AS_IN_2018`].
+pub const TAG_NOISE: &str = "position_std_m = 0.009\nrotation_std_rad = 0.018\n";
 pub const INPUT_MAP: &str = "version = 1\n[joint_sensors]\ntopic = \"/joint_states\"\n[tags]\ntopic = \"/tf\"\n\
-    camera_frame = \"fisheye\"\nchild_frame = \"tag36h11:{id}\"\nuse = \"position\"\n";
+    camera_frame = \"fisheye\"\nchild_frame = \"tag36h11:{id}\"\nuse = \"position\"\n\
+    position_std_m = 0.009\nrotation_std_rad = 0.018\n";
 
 pub fn at(seconds: f64) -> Stamp {
     SIMULATION_EPOCH.plus_s(seconds)

@@ -313,12 +313,15 @@ pub fn predict_tool_error(
     task: Option<TaskRests<'_>>,
 ) -> Option<ToolErrorPrediction> {
     let sensors = at.sensors(robot);
-    let error_m = |angles: &JointAngles| covariance.tool_position_m2(robot, &sensors, angles).trace().max(0.0).sqrt();
-    let predict = |(target_idx, angles): (u32, JointAngles)| TargetPrediction {
-        target_idx: target_idx as usize,
-        angles,
-        error_m: error_m(&angles),
-        with_priors_m: None,
+    let predict = |(target_idx, angles): (u32, JointAngles)| {
+        let covariance_m2 = covariance.tool_position_m2(robot, &sensors, &angles);
+        TargetPrediction {
+            target_idx: target_idx as usize,
+            angles,
+            covariance_m2,
+            error_m: covariance_m2.trace().max(0.0).sqrt(),
+            with_priors_m: None,
+        }
     };
     let targets: Vec<TargetPrediction> = numbered_task_angles(robot, task?).into_iter().map(predict).collect();
     let errors: Vec<f64> = targets.iter().map(|target| target.error_m).collect();

@@ -1,9 +1,10 @@
 //! Accept or refuse: the held-out views decide, never the fit's own residuals.
 
 use crate::calib::baseline_comparison::BaselineComparison;
-use crate::calib::refusal::Refusal;
+use crate::calib::refusal::{HeldOutLimitSource, Refusal};
 use armcal_core::numeric::Outcome;
 use armcal_core::robot::Robot;
+use armcal_core::stats::chi_square_quantile;
 
 /// What the verdict rests on.
 #[derive(Clone, Copy, Debug)]
@@ -21,9 +22,33 @@ pub struct AcceptanceData {
     /// Wanted of the sensors that move the camera, whether these views determine them or not.
     pub n_parameters: usize,
     pub fit_views: usize,
-    /// 95th percentile over the task's targets; `None` without a task.
-    pub predicted_tool_error_m: Option<f64>,
-    pub tolerance_m: Option<f64>,
+    /// Largest held-out distance of positions and poses; `None` where all tags have corners.
+    pub held_out_limit: Option<HeldOutLimit>,
+}
+
+/// Largest held-out error of positions and poses, root mean square.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HeldOutLimit {
+    pub limit_m: f64,
+    pub source: HeldOutLimitSource,
+}
+
+impl HeldOutLimit {
+    /// Without a stated noise.
+    #[must_use]
+    pub fn without_noise(robot: &Robot, tolerance_m: Option<f64>) -> Self {
+        let by_reach = Self { limit_m: MAX_SHARE_OF_REACH * robot.reach_m(), source: HeldOutLimitSource::Reach };
+        tolerance_m.map_or(by_reach, |limit_m| Self { limit_m, source: HeldOutLimitSource::Tolerance })
+    }
+
+    /// Limit that `n_views` exceed with a probability of 1e-4, if a tag is off by `expected_m`, root mean square, for
+    /// its noise and the estimate's uncertainty. The tags of a view share most of it.
+    #[must_use]
+    pub fn by_noise(expected_m: f64, n_views: usize) -> Self {
+        let dof = 3 * n_views.max(1);
+        let ratio = (chi_square_quantile(1.0 - CONTRADICTION, dof) / dof as f64).sqrt();
+        Self { limit_m: expected_m * ratio, source: HeldOutLimitSource::StatedNoise }
+    }
 }
 
 /// Fewer views say nothing about views not seen.
@@ -32,6 +57,10 @@ pub const MIN_HELD_OUT_VIEWS: usize = 3;
 const MAX_HELD_OUT_OVER_FIT: f64 = 2.5;
 /// Held-out views this good are no sign of it, however well the others fit: tags are not surveyed better, m.
 const HARMLESS_HELD_OUT_M: f64 = 0.001;
+/// Held-out observations without a stated noise may be off by this share of the arm's reach: 19 mm for an arm of 1.9 m.
+const MAX_SHARE_OF_REACH: f64 = 0.01;
+/// A held-out error that a stated noise has with a smaller probability contradicts it.
+const CONTRADICTION: f64 = 1e-4;
 /// Each view adds about three numbers that do not share its camera-pose error; fewer views than parameters overfit.
 pub const MIN_VIEWS_PER_PARAMETER: f64 = 1.0;
 
@@ -63,12 +92,8 @@ pub fn refusal(e: &AcceptanceData) -> Option<Refusal> {
     if held_out_m > HARMLESS_HELD_OUT_M.max(MAX_HELD_OUT_OVER_FIT * e.fit_rms_m) {
         return Some(Refusal::Overfitted { held_out_m, fit_m: e.fit_rms_m });
     }
-    if let (Some(predicted_m), Some(tolerance_m)) = (e.predicted_tool_error_m, e.tolerance_m)
-        && (predicted_m > tolerance_m || predicted_m.is_nan())
-    {
-        return Some(Refusal::BeyondTolerance { predicted_m, tolerance_m });
-    }
-    None
+    let HeldOutLimit { limit_m, source } = e.held_out_limit?;
+    (held_out_m > limit_m).then_some(Refusal::HeldOutError { held_out_m, limit_m, source })
 }
 
 #[cfg(test)]
@@ -86,8 +111,7 @@ mod tests {
             fit_rms_m: 0.004,
             n_parameters: 10,
             fit_views: 30,
-            predicted_tool_error_m: Some(0.003),
-            tolerance_m: Some(0.02),
+            held_out_limit: Some(HeldOutLimit { limit_m: 0.012, source: HeldOutLimitSource::Tolerance }),
         }
     }
 
@@ -107,8 +131,7 @@ mod tests {
                 ..good()
             },
             AcceptanceData { held_out_rms_m: Some(0.011), ..good() },
-            AcceptanceData { predicted_tool_error_m: Some(0.03), ..good() },
-            AcceptanceData { predicted_tool_error_m: Some(f64::NAN), ..good() },
+            AcceptanceData { held_out_rms_m: Some(0.013), fit_rms_m: 0.013, ..good() },
         ];
         for fault in faults {
             assert!(refusal(&fault).is_some(), "{fault:?} must be refused");

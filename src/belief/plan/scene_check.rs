@@ -103,10 +103,10 @@ impl SceneCheck<'_> {
         for (tag, by) in robot.tags.iter().zip(&hidden).zip(&seen).filter_map(|(found, &seen)| (!seen).then_some(found))
         {
             let why = match by.iter().max_by_key(|(_, n)| **n) {
-                Some((name, n)) => format!("`{name}` hides it in {n} poses that have it in view"),
-                None => "it comes into view of the camera from none".to_owned(),
+                Some((name, n)) => format!("in {n} of them `{name}` hides it"),
+                None => "it is out of the camera's view in all".to_owned(),
             };
-            let text = format!("tag {} is seen from no pose that was tried: {why}", tag.id);
+            let text = format!("tag {} is visible from none of the tried poses: {why}", tag.id);
             issues.warnings.push(Warning::new(Code::TagHidden, text));
         }
         let n_seen = seen.iter().filter(|seen| **seen).count();

@@ -122,6 +122,8 @@ codes! {
     Overfitted = "overfitted",
     BeyondTolerance = "beyond_tolerance",
     PriorsBeyondTolerance = "priors_beyond_tolerance",
+    TargetsNotJudged = "targets_not_judged",
+    HeldOutError = "held_out_error",
     InputRotation = "input_rotation",
     InputOrder = "input_order",
     InputDirection = "input_direction",
@@ -200,6 +202,8 @@ codes! {
     JointsIgnored = "joints_ignored",
     JointAssumed = "joint_assumed",
     ViewerLost = "viewer_lost",
+    ResultKept = "result_kept",
+    NotCovered = "not_covered",
 }
 
 /// Types that have a code: errors, refusals, findings.

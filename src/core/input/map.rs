@@ -75,6 +75,15 @@ impl TagUse {
     }
 }
 
+/// Stated noise of a tag's pose in the camera frame, one sigma per axis; what all tags of a view share included.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TagNoise {
+    /// Position in the camera frame.
+    pub position_std_m: f64,
+    /// Direction of the camera: it moves a tag by this times its distance.
+    pub rotation_std_rad: f64,
+}
+
 /// What becomes of tags that were seen while the arm moved.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -240,6 +249,8 @@ pub struct InputMap {
     pub tag_family: Option<TagFamily>,
     /// What of a tag's measurement counts.
     pub tag_use: TagUse,
+    /// Stated noise of positions and poses of tags, where there is one.
+    pub tag_noise: Option<TagNoise>,
     /// Largest gap between a tag message and the nearest joint reading; a tag farther off is left out.
     pub max_gap_s: f64,
     /// What becomes of tags seen while the arm moved.
@@ -348,6 +359,31 @@ struct TagsToml {
     #[serde(default)]
     image_period_s: f64,
     camera_info: Option<String>,
+    position_std_m: Option<f64>,
+    rotation_std_rad: Option<f64>,
+}
+
+impl TagsToml {
+    fn noise(&self, file: &Path) -> Result<Option<TagNoise>, FileIssue> {
+        let stated = [("position_std_m", self.position_std_m, 10.0), ("rotation_std_rad", self.rotation_std_rad, 3.0)];
+        if let Some((key, ..)) = stated.iter().find(|(_, value, _)| value.is_some() && self.tag_use.needs_lens()) {
+            let problem = "is for positions and poses; the noise of corners is camera.corner_std_px of robot.toml";
+            return Err(FileIssue::new(Code::KeysConflict, file, format!("tags.{key}"), problem));
+        }
+        for (key, value, most) in stated {
+            value.map(|value| FileIssue::check_range(file, &format!("tags.{key}"), value, 1e-7..=most)).transpose()?;
+        }
+        let rotation_std_rad = self.rotation_std_rad.unwrap_or(0.0);
+        match (self.position_std_m, self.rotation_std_rad) {
+            (None, Some(_)) => {
+                let problem = "is missing; rotation_std_rad is given, and needs it";
+                Err(FileIssue::new(Code::KeyMissing, file, "tags.position_std_m", problem))
+            }
+            (position_std_m, _) => {
+                Ok(position_std_m.map(|position_std_m| TagNoise { position_std_m, rotation_std_rad }))
+            }
+        }
+    }
 }
 
 /// Assumed: half of what one pose a second leaves.
@@ -382,6 +418,7 @@ pub fn parse_input_map(file: &Path, text: &str) -> Result<InputMap, RobotError> 
         let problem = "must be the plain name of the board in the tag map; its corners have numbers of their own";
         return Err(FileIssue::new(Code::ValueInvalid, file, "tags.child_frame", problem).into());
     }
+    let tag_noise = raw.tags.noise(file)?;
     let source = match raw.table {
         Some(table) => {
             let tags = (raw.tags.tag_use, child_frame.as_ref());
@@ -402,6 +439,7 @@ pub fn parse_input_map(file: &Path, text: &str) -> Result<InputMap, RobotError> 
         child_frame,
         tag_family: tag_family.transpose()?,
         tag_use: raw.tags.tag_use,
+        tag_noise,
         max_gap_s: FileIssue::check_range(file, "max_gap_s", raw.max_gap_s, 1e-6..=60.0)?,
         while_moving: raw.while_moving,
         not_finite: raw.not_finite,

@@ -27,8 +27,8 @@ pub use images::{ImageDetector, ImageProblem, RecordedImage, TagCorners, read_ca
 pub use joints::Reading;
 pub use map::{
     ChildFrame, ConditionKind, ConditionTopics, Direction, FurtherTopic, InputMap, JointUnit, NotFinite, PoseColumns,
-    RotationColumns, RotationForm, SeenColumns, SlideUnit, Source, TableFormat, TableLayout, TagUse, TimeColumn,
-    Topics, WhileMoving, parse_input_map, read_input_map,
+    RotationColumns, RotationForm, SeenColumns, SlideUnit, Source, TableFormat, TableLayout, TagNoise, TagUse,
+    TimeColumn, Topics, WhileMoving, parse_input_map, read_input_map,
 };
 pub use recording::ExternalRecording;
 pub use tags::{ExternalDetection, RawMeasurement, TagFrame};

@@ -117,6 +117,16 @@ impl Robot {
         self.n_joints_seen_by(&self.camera)
     }
 
+    /// Farthest that the tool's point can be from the first joint, m: the links' lengths in one line.
+    #[must_use]
+    pub fn reach_m(&self) -> f64 {
+        let joints = &self.chain.joints()[..self.tool.mount.n_joints];
+        let links_m = joints.iter().skip(1).map(|joint| joint.parent_from_joint.translation.vector.norm());
+        let slides = joints.iter().filter(|joint| joint.kind.is_slide());
+        let slides_m = slides.filter_map(|joint| joint.limits).map(|l| l.lower_rad.abs().max(l.upper_rad.abs()));
+        links_m.chain(slides_m).sum::<f64>() + self.tool.mount.link_from_frame.translation.vector.norm()
+    }
+
     /// All cameras, the first one first.
     pub fn cameras(&self) -> impl Iterator<Item = &CameraSpec> {
         std::iter::once(&self.camera).chain(&self.further_cameras)

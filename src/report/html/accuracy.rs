@@ -7,9 +7,10 @@ use maud::{Markup, html as markup};
 
 use super::Report;
 use super::figure::{figure, panel, series};
-use crate::report::table::score_rows;
+use crate::report::table::{risk_in_words, score_rows};
 use crate::score::{Score, TargetScore};
-use armcal_belief::calib::TargetPrediction;
+use armcal_belief::calib::Status;
+use armcal_belief::judge::TargetU95;
 use armcal_core::units::Unit;
 
 pub(super) fn section(report: &Report<'_>) -> Markup {
@@ -43,7 +44,7 @@ fn reach_task(score: &Score) -> Markup {
 #[derive(Clone, Copy, Default)]
 struct Target<'a> {
     truth: Option<&'a TargetScore>,
-    predicted: Option<&'a TargetPrediction>,
+    u95: Option<&'a TargetU95>,
 }
 
 impl<'a> Target<'a> {
@@ -55,12 +56,12 @@ impl<'a> Target<'a> {
         self.truth?.tool_error_after_m
     }
 
-    fn predicted_m(self) -> Option<f64> {
-        Some(self.predicted?.error_m)
+    fn risk(self) -> Option<f64> {
+        self.u95?.p_beyond_tolerance
     }
 
-    fn with_priors_m(self) -> Option<f64> {
-        self.predicted?.with_priors_m
+    fn u95_m(self) -> Option<f64> {
+        self.u95?.u95_m
     }
 }
 
@@ -70,8 +71,9 @@ fn targets<'a>(report: &'a Report<'_>) -> BTreeMap<usize, Target<'a>> {
     for truth in report.summary.score.iter().flat_map(|score| &score.targets) {
         all.entry(truth.target + 1).or_default().truth = Some(truth);
     }
-    for predicted in &report.calibration.details.targets {
-        all.entry(predicted.target_idx + 1).or_default().predicted = Some(predicted);
+    let stated = report.summary.status == Status::Accepted;
+    for u95 in report.calibration.u95.target.iter().filter(|_| stated) {
+        all.entry(u95.index + 1).or_default().u95 = Some(u95);
     }
     all
 }
@@ -84,8 +86,7 @@ fn target_chart<'a>(targets: &BTreeMap<usize, Target<'a>>) -> Markup {
     let series = vec![
         series("true, before", Color::Red, Style::Crosses, points(Target::before_m)),
         series("true, after", Color::Green, Style::Dots, points(Target::after_m)),
-        series("predicted", Color::Blue, Style::Line, points(Target::predicted_m)),
-        series("predicted, with priors", Color::Grey, Style::Dashes, points(Target::with_priors_m)),
+        series("U95", Color::Blue, Style::Line, points(Target::u95_m)),
     ];
     let shown = series.into_iter().filter(|series| !series.points.is_empty()).collect();
     let chart = Panel {
@@ -94,7 +95,7 @@ fn target_chart<'a>(targets: &BTreeMap<usize, Target<'a>>) -> Markup {
         ..panel("Tool error at each target", "", "", shown)
     };
     let of_truth = if has_truth { " True errors come from the simulator." } else { "" };
-    figure(&chart, &format!("Predicted: one sigma of the position.{of_truth}"))
+    figure(&chart, &format!("U95: the error is smaller with 95 % probability.{of_truth}"))
 }
 
 fn target_table(targets: &BTreeMap<usize, Target<'_>>) -> Markup {
@@ -106,13 +107,13 @@ fn target_table(targets: &BTreeMap<usize, Target<'_>>) -> Markup {
                 tr {
                     th { "target" }
                     @if has_truth { th { "true, before" } th { "true, after" } }
-                    th { "predicted" } th { "with priors" }
+                    th { "U95" } th { "P(error > tolerance)" }
                 }
                 @for (number, target) in targets {
                     tr {
                         td { (number) }
                         @if has_truth { td { (mm(target.before_m())) } td { (mm(target.after_m())) } }
-                        td { (mm(target.predicted_m())) } td { (mm(target.with_priors_m())) }
+                        td { (mm(target.u95_m())) } td { (target.risk().map_or_else(String::new, risk_in_words)) }
                     }
                 }
             }

@@ -4,8 +4,8 @@ use maud::{Markup, html as markup};
 
 use super::Report;
 use crate::report::summary::RunSummary;
-use crate::report::table::{check_lines, labelled};
-use crate::report::verdict::verdict;
+use crate::report::table::{check_lines, labelled, u95_in_words};
+use crate::report::verdict::{sentence, verdict};
 use armcal_belief::calib::ValidRange;
 use armcal_core::time::utc;
 use armcal_core::units::Unit;
@@ -26,25 +26,12 @@ pub(super) fn section(report: &Report<'_>) -> Markup {
 
 /// The figure that matters, in words.
 fn in_one_sentence(report: &Report<'_>) -> String {
-    let calibration = report.calibration;
     let mm = |m: f64| Unit::Metres.shown(m, 1);
-    let mut words = match (calibration.predicted_tool_error_with_priors_m, calibration.predicted_tool_error_m) {
-        (Some(all), _) => {
-            format!(
-                "Predicted tool error, one sigma with unobservable parameters included: {} median of the targets, {} \
-                 worst.",
-                mm(all.median),
-                mm(all.max)
-            )
-        }
-        (None, Some(data)) => format!(
-            "Predicted tool error, one sigma: {} median of the targets, {} worst.",
-            mm(data.median),
-            mm(data.max)
-        ),
-        (None, None) => format!(
-            "No task was given, so no tool error is predicted. Tag position error of held-out views: {} rms.",
-            Unit::Metres.shown_if(calibration.held_out.rms_m, 1)
+    let mut words = match u95_in_words(report.summary) {
+        Some(words) => sentence(&words),
+        None => format!(
+            "Tag position error of held-out views: {} rms.",
+            Unit::Metres.shown_if(report.calibration.held_out.rms_m, 1)
         ),
     };
     let truth = report.summary.score.as_ref();

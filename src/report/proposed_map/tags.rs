@@ -73,7 +73,9 @@ fn of_transforms(contents: &Contents) -> Option<String> {
     let Candidate { topic, camera, child } = best;
     Some(format!(
         "topic = {}\ncamera_frame = {}\nchild_frame = {}\n\
-         use = \"pose\"   # or \"position\", where rotations are poor\n{}",
+         use = \"pose\"   # or \"position\", where rotations are poor\n\
+         # position_std_m = 0.003       # noise of a tag's position, one sigma per axis, as you know it\n\
+         # rotation_std_rad = 0.01      # noise of the camera's direction\n{}",
         quoted(topic),
         quoted(camera),
         quoted(child),

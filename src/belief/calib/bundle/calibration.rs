@@ -27,7 +27,7 @@ use crate::calib::methods::observability::{Unobservable, grouped_names};
 use crate::calib::methods::position_problem::PositionProblem;
 use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::refusal::Refusal;
-use crate::calib::result::assemble::{Evidence, Fit, Provenance, assemble};
+use crate::calib::result::assemble::{Evidence, Fit, Provenance, assemble, is_near, noise_dof};
 use crate::calib::result::calibration::{Calibration, Status};
 use crate::calib::result::map_table::MapResult;
 use crate::calib::result::metrics::HeldOutMetrics;
@@ -35,10 +35,13 @@ use crate::calib::tag_mapping::map_unknown_tags;
 use crate::calib::views::calibration_data::CalibrationData;
 use crate::calib::views::view::{ObservationRejection, Touch, View};
 use crate::calib::wrong_input::wrong_input;
+use crate::judge::{TargetError, TargetU95, U95Table};
+use armcal_core::codes::Code;
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::{JointSensorSpec, Robot, SurveyedTag};
 use armcal_core::routine::Method;
 use armcal_core::stats::Summary;
+use nalgebra::Matrix3;
 
 /// What an estimate is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -358,6 +361,7 @@ impl<'a> BundleCalibration<'a> {
             held_out: diagnosis.held_out.clone(),
             predicted: self.impact(estimated, diagnosis, &parameters).prediction(),
             n_parameters: setup.n_wanted(datasheet),
+            has_failed_joint: !estimated.failures.is_empty(),
         };
         let mut model = model_table(datasheet, estimate, selections);
         if let Some((offset_s, decided)) = &self.clock {
@@ -434,38 +438,63 @@ impl<'a> BundleCalibration<'a> {
     fn state_reservations(&self, estimated: &Estimated<'_>, diagnosis: &Diagnosis, calibration: &mut Calibration) {
         let parameters = estimated.estimate.parameters();
         let touches = estimated.touches.as_ref().map(|touched| &touched.update);
+        let dof = noise_dof(&diagnosis.views, estimated.setup.n_wanted(&self.data.robot));
         let by_priors =
             |at: &[JointAngles], median_m: f64| estimated.by_views().prior_impact_with(touches, at, median_m);
         let Some(by_data) = self.impact(estimated, diagnosis, &parameters).prediction() else {
+            if self.data.data.task.is_some() {
+                // No target is within reach: all are named.
+                return;
+            }
             // Without a task the views' own configurations stand for it, and there is no limit.
             let views = estimated.estimate.view_angles();
-            let error_m = |at: &JointAngles| {
-                let sensors = parameters.sensors(&diagnosis.robot);
-                diagnosis.covariance.tool_position_m2(&diagnosis.robot, &sensors, at).trace().max(0.0).sqrt()
-            };
-            let errors: Vec<f64> = views.iter().map(error_m).collect();
+            let sensors = parameters.sensors(&diagnosis.robot);
+            let by_data = views.iter().map(|at| diagnosis.covariance.tool_position_m2(&diagnosis.robot, &sensors, at));
+            let by_data: Vec<Matrix3<f64>> = by_data.collect();
+            let errors: Vec<f64> = by_data.iter().map(|m2| m2.trace().max(0.0).sqrt()).collect();
             let median_m = Summary::of(&errors).map_or(0.0, |summary| summary.median);
-            calibration.reservations = by_priors(&views, median_m).told();
+            let by_priors = by_priors(&views, median_m);
+            let both = by_data.into_iter().zip(&by_priors.covariances_m2).enumerate();
+            let errors = both.map(|(index, (by_data_m2, by_priors_m2))| TargetError {
+                index,
+                by_data_m2,
+                by_priors_m2: *by_priors_m2,
+            });
+            calibration.u95 = U95Table::of_configurations(&errors.collect::<Vec<_>>(), dof);
+            calibration.reservations = by_priors.told();
             return;
         };
         let targets: Vec<JointAngles> = by_data.targets.iter().map(|target| target.angles).collect();
         let by_priors = by_priors(&targets, by_data.error_m.median);
-        let both = by_data.targets.iter().zip(&by_priors.covariances_m2);
-        let both: Vec<f64> = both.map(|(at, by)| (at.error_m * at.error_m + by.trace()).max(0.0).sqrt()).collect();
+        let both = || by_data.targets.iter().zip(&by_priors.covariances_m2);
+        let errors = both().map(|(at, by_priors_m2)| TargetError {
+            index: at.target_idx,
+            by_data_m2: at.covariance_m2,
+            by_priors_m2: *by_priors_m2,
+        });
+        let errors: Vec<TargetError> = errors.collect();
+        let both: Vec<f64> = both().map(|(at, by)| (at.error_m * at.error_m + by.trace()).max(0.0).sqrt()).collect();
         let with_priors = Summary::of(&both);
         for (target, with_priors_m) in calibration.details.targets.iter_mut().zip(both) {
             target.with_priors_m = Some(with_priors_m);
         }
         calibration.predicted_tool_error_with_priors_m = with_priors;
         calibration.reservations = by_priors.told();
-        let task = self.data.data.task.as_ref();
-        if let (Some(predicted), Some(task)) = (with_priors, task)
-            && predicted.p95 > task.tolerance_m
-            && by_data.error_m.p95 <= task.tolerance_m
+        let Some(task) = &self.data.data.task else { return };
+        let by_data_alone = std::mem::replace(
+            &mut calibration.u95,
+            U95Table::of_task(task.targets_m.len(), task.tolerance_m, (&errors, dof), |index| {
+                let is_kept = !estimated.failures.is_empty() && is_near(&diagnosis.robot, &task.targets_m[index]);
+                if is_kept { Code::SensorFailed } else { Code::TargetOutOfReach }
+            }),
+        );
+        if by_data_alone.beyond().is_none()
+            && let Some(&TargetU95 { index, u95_m: Some(u95_m), p_beyond_tolerance: Some(probability), .. }) =
+                calibration.u95.beyond()
         {
             let most = calibration.reservations.first().map(|reservation| reservation.what.clone());
-            let (predicted_m, tolerance_m) = (predicted.p95, task.tolerance_m);
-            calibration.refuse_for([Refusal::PriorsBeyondTolerance { predicted_m, tolerance_m, most }]);
+            let (target, tolerance_m) = (index + 1, task.tolerance_m);
+            calibration.refuse_for([Refusal::PriorsBeyondTolerance { target, probability, u95_m, tolerance_m, most }]);
         }
     }
 

@@ -218,9 +218,13 @@ impl FailureImpact<'_> {
         {
             return Some(Refusal::TooFewViewsSinceSlip { joint, evidence: self.evidence(failure), views });
         }
-        let task = self.task?.task;
         let is_needed = failure.joint < self.robot.tool.mount.n_joints;
         if !failure.leaves_no_sensor() || failure.kind == FailedKind::Locked || !is_needed {
+            return None;
+        }
+        let tolerance_m = self.task.map(|task| task.task.tolerance_m);
+        // Without a task every joint is needed, but for those that the user declares.
+        if tolerance_m.is_none() && failure.found == FailureSource::Declared {
             return None;
         }
         let table = self.table(failure);
@@ -229,7 +233,7 @@ impl FailureImpact<'_> {
             kind: failure.kind,
             tool_error_m: table.tool_error_m.map(|s| s.p95),
             tool_error_by_camera_m: table.tool_error_by_camera_m.map(|s| s.p95),
-            tolerance_m: task.tolerance_m,
+            tolerance_m,
         })
     }
 }

@@ -107,14 +107,14 @@ impl VerdictInput<'_> {
     /// Whether offsets that walk make the tool error more than the task tolerates.
     fn walks(&self, calibration: &Calibration) -> Option<Refusal> {
         self.found.model.walk?;
-        let (predicted_m, tolerance_m) = calibration.refusals.iter().find_map(|refusal| match refusal {
-            Refusal::BeyondTolerance { predicted_m, tolerance_m } => Some((*predicted_m, *tolerance_m)),
+        let (u95_m, tolerance_m) = calibration.refusals.iter().find_map(|refusal| match refusal {
+            Refusal::BeyondTolerance { u95_m, tolerance_m, .. } => Some((*u95_m, *tolerance_m)),
             _ => None,
         })?;
         let (robot, walks) = (self.input.robot, self.found.scales().walk_std_rad);
         let most = (0..robot.n_seen_joints()).max_by(|a, b| walks[*a].total_cmp(&walks[*b]))?;
         let (joint, moves) = (robot.sensors[most].joint.clone(), robot.sensors[most].moves);
-        Some(Refusal::OffsetsWalk { joint, walked_rad: walks[most], moves, predicted_m, tolerance_m })
+        Some(Refusal::OffsetsWalk { joint, walked_rad: walks[most], moves, u95_m, tolerance_m })
     }
 
     /// Whether other links would explain the data better.

@@ -72,7 +72,8 @@ pub(crate) fn calibrate_positions(
         identified: &data.identified,
     };
     let fit = Fit { problem: &problem, solution: &solution, covariance: &covariance, linearity_scale };
-    let calibration = assemble(&source, &fit, Evidence { held_out, predicted, n_parameters });
+    let has_failed_joint = !start.robot.failed.is_empty();
+    let calibration = assemble(&source, &fit, Evidence { held_out, predicted, n_parameters, has_failed_joint });
     Ok(Calibration {
         unobservable: grouped_names(&start.robot, &unobservable),
         camera_mount: CameraMount::of(&start.robot, &start.mount),

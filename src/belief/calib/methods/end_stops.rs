@@ -38,7 +38,8 @@ pub(crate) fn calibrate(data: CalibrationData, prior: Option<&Calibration>) -> R
         identified: &identified,
     };
     let fit = Fit { problem: &problem, solution: &fitted.solution, covariance, linearity_scale };
-    let evidence = Evidence { held_out: held_out_metrics(&held_out, at), predicted, n_parameters: 0 };
+    let (held_out, has_failed_joint) = (held_out_metrics(&held_out, at), !robot.failed.is_empty());
+    let evidence = Evidence { held_out, predicted, n_parameters: 0, has_failed_joint };
     let unobservable = grouped_names(&robot, &fitted.left_out);
     Ok(Calibration { unobservable, ..assemble(&source, &fit, evidence) })
 }

@@ -1,3 +1,4 @@
+use super::words::told_apart_mm;
 use super::*;
 
 #[test]
@@ -76,8 +77,10 @@ fn measured() -> Vec<Refusal> {
         Refusal::NoBetterThanDatasheet { held_out_m: 0.02, datasheet_m: 0.019 },
         Refusal::NoBetterThanBaseline { held_out_m: 0.0201, baseline_m: 0.0203, p_value: 0.4 },
         Refusal::Overfitted { held_out_m: 0.011, fit_m: 0.004 },
-        Refusal::BeyondTolerance { predicted_m: 0.03, tolerance_m: 0.02 },
-        Refusal::PriorsBeyondTolerance { predicted_m: 0.03, tolerance_m: 0.02, most: None },
+        Refusal::BeyondTolerance { target: 3, probability: 0.31, u95_m: 0.03, tolerance_m: 0.02 },
+        Refusal::PriorsBeyondTolerance { target: 3, probability: 0.08, u95_m: 0.03, tolerance_m: 0.02, most: None },
+        Refusal::TargetsNotJudged { targets: vec![2, 5] },
+        Refusal::HeldOutError { held_out_m: 0.3, limit_m: 0.019, source: HeldOutLimitSource::Reach },
         Refusal::SensorError { joint: joint(), std_rad: 0.01, datasheet_std_rad: 0.002, moves: JointKind::Revolute },
         Refusal::Nonlinearity { joint: joint(), std_rad: 0.03, datasheet_std_rad: 0.002, moves: JointKind::Revolute },
         Refusal::CornerNoise { residual_px: 1.2, stated_px: 0.3, limit_px: 0.9 },
@@ -95,7 +98,7 @@ fn measured() -> Vec<Refusal> {
             kind: FailedKind::Dead,
             tool_error_m: Some(0.2),
             tool_error_by_camera_m: Some(0.01),
-            tolerance_m: 0.02,
+            tolerance_m: Some(0.02),
         },
     ]
 }

@@ -4,7 +4,8 @@ use crate::calib::covariance::{ParameterCovariance, ToolErrorPrediction};
 use crate::calib::methods::Solution;
 use crate::calib::methods::position_problem::PositionProblem;
 use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
-use crate::calib::refusal_conditions::{AcceptanceData, refusal};
+use crate::calib::refusal::Refusal;
+use crate::calib::refusal_conditions::{AcceptanceData, HeldOutLimit, refusal};
 use crate::calib::result::calibration::{Calibration, JointResult, Status};
 use crate::calib::result::covariance_file::CovarianceTable;
 use crate::calib::result::details::FitDetails;
@@ -14,11 +15,14 @@ use crate::calib::result::sag_table::SagTable;
 use crate::calib::result::terms_table::{ReferenceTable, TermsTable};
 use crate::calib::result::valid_range::ValidRange;
 use crate::calib::views::scale_identification::IdentifiedScale;
-use crate::calib::views::view::CaptureData;
-use crate::calib::views::view::EndStopReading;
+use crate::calib::views::view::{CaptureData, EndStopReading, TagMeasurement, View};
+use crate::judge::{TargetError, TargetU95, U95Table};
+use armcal_core::codes::Code;
+use armcal_core::input::TagNoise;
 use armcal_core::robot::Robot;
 use armcal_core::routine::Method;
 use armcal_core::sensor::{ConditionChange, SensorModel};
+use nalgebra::{Matrix3, Vector3};
 
 /// What a calibration was made from.
 pub(crate) struct Provenance<'a> {
@@ -47,18 +51,22 @@ pub(crate) struct Evidence {
     pub predicted: Option<ToolErrorPrediction>,
     /// Parameters of sensors that move the camera, determined or not.
     pub n_parameters: usize,
+    /// A joint or its sensor failed.
+    pub has_failed_joint: bool,
 }
 
 /// The tables that all methods fill, and the verdict by what all methods have.
 pub(crate) fn assemble(source: &Provenance<'_>, fit: &Fit<'_>, evidence: Evidence) -> Calibration {
     let at = &fit.solution.parameters;
     let metrics = fit_metrics(source, fit);
-    let Evidence { held_out, predicted, n_parameters } = evidence;
+    let Evidence { held_out, predicted, n_parameters, has_failed_joint } = evidence;
     let predicted_tool_error_m = predicted.as_ref().map(|predicted| predicted.error_m);
+    let u95 = u95_by_data(source, fit, predicted.as_ref(), (n_parameters, has_failed_joint));
     let details = FitDetails::of(fit.problem, at, predicted.map_or_else(Vec::new, |predicted| predicted.targets));
     // `bundle` knows how sure its parameters are, and judges by that whether they must be better.
     let must_improve = source.method != Method::Bundle;
-    let refusals: Vec<_> = refusal(&AcceptanceData {
+    let tolerance_m = source.data.task.as_ref().map(|task| task.tolerance_m);
+    let by_conditions = refusal(&AcceptanceData {
         outcome: fit.solution.outcome,
         evaluations: fit.solution.evaluations,
         held_out_views: held_out.views,
@@ -68,11 +76,9 @@ pub(crate) fn assemble(source: &Provenance<'_>, fit: &Fit<'_>, evidence: Evidenc
         fit_rms_m: metrics.rms_m,
         n_parameters,
         fit_views: metrics.views,
-        predicted_tool_error_m: predicted_tool_error_m.map(|p| p.p95),
-        tolerance_m: source.data.task.as_ref().map(|task| task.tolerance_m),
-    })
-    .into_iter()
-    .collect();
+        held_out_limit: held_out_limit(source, fit, tolerance_m, held_out.views),
+    });
+    let refusals: Vec<Refusal> = by_conditions.or_else(|| refusal_by_risk(&u95)).into_iter().collect();
     let mut calibration = Calibration {
         version: 1,
         robot: source.robot.name.clone(),
@@ -88,6 +94,7 @@ pub(crate) fn assemble(source: &Provenance<'_>, fit: &Fit<'_>, evidence: Evidenc
         held_out,
         predicted_tool_error_m,
         predicted_tool_error_with_priors_m: None,
+        u95,
         valid: ValidRange::of(source.data),
         reference: ReferenceTable::of(at, fit.covariance),
         camera_mount: None,
@@ -111,6 +118,92 @@ pub(crate) fn assemble(source: &Provenance<'_>, fit: &Fit<'_>, evidence: Evidenc
     };
     calibration.refuse_for(refusals);
     calibration
+}
+
+/// Largest held-out error of positions and poses; corners have a stated noise in robot.toml, and checks of their own.
+fn held_out_limit(
+    source: &Provenance<'_>,
+    fit: &Fit<'_>,
+    tolerance_m: Option<f64>,
+    n_views: usize,
+) -> Option<HeldOutLimit> {
+    let tags = || source.data.fit.iter().flat_map(|view| &view.tags);
+    if tags().all(|tag| tag.is_in_pixels()) {
+        return None;
+    }
+    let Some(TagNoise { position_std_m, rotation_std_rad }) = source.data.tag_noise else {
+        return Some(HeldOutLimit::without_noise(source.robot, tolerance_m));
+    };
+    let n = tags().count().max(1) as f64;
+    let distance_m2 = tags().map(|tag| tag.center_in_camera_m.norm_squared()).sum::<f64>() / n;
+    let noise_m2 = 3.0 * position_std_m.powi(2) + 2.0 * distance_m2 * rotation_std_rad.powi(2);
+    let at = &fit.solution.parameters;
+    let sensors = at.sensors(source.robot);
+    let estimate_m2 = fit.problem.views.iter().map(|view| {
+        let angles = fit.problem.angles(view, &view.conditions.departure_from(&at.reference), at);
+        fit.covariance.tool_position_m2(source.robot, &sensors, &angles).trace().max(0.0)
+    });
+    let estimate_m2 = estimate_m2.sum::<f64>() / fit.problem.views.len().max(1) as f64;
+    // The estimate's covariance grows with the residuals: it may excuse no more than the noise itself.
+    Some(HeldOutLimit::by_noise((noise_m2 + estimate_m2.min(noise_m2)).sqrt(), n_views))
+}
+
+/// Degrees of freedom of a noise that is fitted to views together with `n_parameters`, at least 1. The camera's pose
+/// has six coordinates in a view, however many corners show it.
+pub(crate) fn noise_dof(views: &[View], n_parameters: usize) -> f64 {
+    let coordinates = |view: &View| {
+        let of_tags = view.tags.iter().map(|tag| match tag.measured {
+            TagMeasurement::Position => 3,
+            TagMeasurement::Pose(_) | TagMeasurement::Corners(_) | TagMeasurement::Board(_) => 6,
+        });
+        of_tags.sum::<usize>().min(6)
+    };
+    let all: usize = views.iter().map(coordinates).sum();
+    all.saturating_sub(n_parameters).max(1) as f64
+}
+
+/// U95 from the recording alone; over the views' own configurations where there is no task.
+fn u95_by_data(
+    source: &Provenance<'_>,
+    fit: &Fit<'_>,
+    predicted: Option<&ToolErrorPrediction>,
+    (n_parameters, has_failed_joint): (usize, bool),
+) -> U95Table {
+    let dof = noise_dof(fit.problem.views, n_parameters);
+    let error = |index, by_data_m2| TargetError { index, by_data_m2, by_priors_m2: Matrix3::zeros() };
+    if let Some(task) = &source.data.task {
+        let targets = predicted.map_or(&[][..], |predicted| &predicted.targets);
+        let errors: Vec<TargetError> =
+            targets.iter().map(|target| error(target.target_idx, target.covariance_m2)).collect();
+        return U95Table::of_task(task.targets_m.len(), task.tolerance_m, (&errors, dof), |index| {
+            let is_kept = has_failed_joint && is_near(source.robot, &task.targets_m[index]);
+            if is_kept { Code::SensorFailed } else { Code::TargetOutOfReach }
+        });
+    }
+    let at = &fit.solution.parameters;
+    let sensors = at.sensors(source.robot);
+    let errors = fit.problem.views.iter().enumerate().map(|(view_idx, view)| {
+        let angles = fit.problem.angles(view, &view.conditions.departure_from(&at.reference), at);
+        error(view_idx, fit.covariance.tool_position_m2(source.robot, &sensors, &angles))
+    });
+    U95Table::of_configurations(&errors.collect::<Vec<_>>(), dof)
+}
+
+/// The links in one line are long enough for a target: with a failed joint the calibration is not to blame then.
+pub(crate) fn is_near(robot: &Robot, target_m: &[f64; 3]) -> bool {
+    let first_m = robot.chain.first_place().translation.vector;
+    (Vector3::from(*target_m) - first_m).norm() <= robot.reach_m()
+}
+
+/// The decision rule, by the recording alone.
+fn refusal_by_risk(u95: &U95Table) -> Option<Refusal> {
+    let targets = u95.unjudged();
+    if !targets.is_empty() {
+        return Some(Refusal::TargetsNotJudged { targets });
+    }
+    let TargetU95 { index, u95_m, p_beyond_tolerance, .. } = *u95.beyond()?;
+    let (u95_m, probability) = u95_m.zip(p_beyond_tolerance)?;
+    Some(Refusal::BeyondTolerance { target: index + 1, probability, u95_m, tolerance_m: u95.tolerance_m? })
 }
 
 fn fit_metrics(source: &Provenance<'_>, fit: &Fit<'_>) -> FitMetrics {

@@ -36,6 +36,7 @@ pub(in crate::calib) fn bare(robot: &str, method: Method) -> Calibration {
         },
         predicted_tool_error_m: None,
         predicted_tool_error_with_priors_m: None,
+        u95: Default::default(),
         valid: ValidRange { time_nanos: 0, oil_c: None, water_c: None, pressure_pa: None },
         reference: None,
         camera_mount: None,

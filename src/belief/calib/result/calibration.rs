@@ -20,6 +20,7 @@ use crate::calib::result::sag_table::SagTable;
 use crate::calib::result::terms_table::{ReferenceTable, TermsTable};
 use crate::calib::result::valid_range::ValidRange;
 use crate::calib::result::verdict_tables::{ObservabilityTable, VerdictTable};
+use crate::judge::U95Table;
 
 /// Whether the answer may be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -70,6 +71,9 @@ pub struct Calibration {
     /// The same with what the drawing leaves open: link geometry and tool point with their priors.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub predicted_tool_error_with_priors_m: Option<Summary>,
+    /// Radius that contains the tool error with 95 % probability, and the decision by that.
+    #[serde(default)]
+    pub u95: U95Table,
     /// Conditions that the captured views covered.
     pub valid: ValidRange,
     /// What the joints' terms are counted from, where there are any.

@@ -1,6 +1,6 @@
 //! What a fit left in each view, and what is expected at each target: for reports. It is in no file.
 
-use nalgebra::{Point3, Vector2};
+use nalgebra::{Matrix3, Point3, Vector2};
 
 use crate::calib::methods::position_problem::{PositionProblem, TagResidual};
 use crate::calib::parameters::JointParameters;
@@ -66,6 +66,8 @@ pub struct TargetPrediction {
     pub target_idx: usize,
     /// The arm's angles there, rad.
     pub angles: JointAngles,
+    /// Covariance of the tool's position in the base frame, m^2.
+    pub covariance_m2: Matrix3<f64>,
     /// Expected size of the tool's position error: `sqrt(trace(covariance))`, m.
     pub error_m: f64,
     /// The same with what the drawing leaves open, where that was asked for, m.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
+use armcal_core::input::TagNoise;
 use armcal_core::optics::square_corners;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::Conditions;
@@ -241,6 +242,8 @@ pub struct CaptureData {
     pub ids_seen: Vec<u32>,
     /// The largest column and row of any corner, px; zero without corners.
     pub largest_px: [f64; 2],
+    /// Stated noise of positions and poses of tags, where there is one.
+    pub tag_noise: Option<TagNoise>,
     /// Names of landmarks that are no numbered tags, by the number that stands for them.
     pub landmark_names: BTreeMap<u32, String>,
     /// Lowest and highest reading over the captured spans, C.

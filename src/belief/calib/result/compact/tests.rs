@@ -143,7 +143,8 @@ fn what_is_not_finite_is_unknown_or_refused() {
 #[test]
 fn every_refusal_has_a_code() {
     use crate::calib::baseline_comparison::BaselineComparison;
-    use crate::calib::refusal_conditions::{AcceptanceData, refusal};
+    use crate::calib::refusal::HeldOutLimitSource;
+    use crate::calib::refusal_conditions::{AcceptanceData, HeldOutLimit, refusal};
     let by_chance = |p_value| BaselineComparison { rms_m: 0.05, ratio: 0.08, p_value };
     let good = AcceptanceData {
         outcome: Outcome::Converged,
@@ -155,8 +156,7 @@ fn every_refusal_has_a_code() {
         fit_rms_m: 0.004,
         n_parameters: 10,
         fit_views: 30,
-        predicted_tool_error_m: Some(0.003),
-        tolerance_m: Some(0.02),
+        held_out_limit: Some(HeldOutLimit { limit_m: 0.012, source: HeldOutLimitSource::Tolerance }),
     };
     let faults = [
         (AcceptanceData { outcome: Outcome::Stalled, ..good }, "not_solved"),
@@ -166,7 +166,7 @@ fn every_refusal_has_a_code() {
         (AcceptanceData { held_out_rms_m: Some(0.09), ..good }, "no_better_than_datasheet"),
         (AcceptanceData { baseline: Some(by_chance(0.2)), ..good }, "no_better_than_baseline"),
         (AcceptanceData { held_out_rms_m: Some(0.011), ..good }, "overfitted"),
-        (AcceptanceData { predicted_tool_error_m: Some(0.03), ..good }, "beyond_tolerance"),
+        (AcceptanceData { held_out_rms_m: Some(0.013), fit_rms_m: 0.013, ..good }, "held_out_error"),
     ];
     for (fault, code) in faults {
         let full = calibration("titan4", &six(), refusal(&fault));

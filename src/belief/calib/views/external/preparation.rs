@@ -33,7 +33,12 @@ pub fn prepare_external(
     context: ExternalContext,
 ) -> Result<CalibrationData, CalibError> {
     let name = names_of(recordings);
-    let mut data = CaptureData { task: context.task, landmark_names: context.landmark_names, ..CaptureData::default() };
+    let mut data = CaptureData {
+        task: context.task,
+        tag_noise: map.tag_noise,
+        landmark_names: context.landmark_names,
+        ..CaptureData::default()
+    };
     let mut views: Vec<(View, [u8; 32])> = Vec::new();
     let mut digests: Vec<[u8; 32]> = Vec::new();
     for recording in recordings {
