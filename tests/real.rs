@@ -555,9 +555,9 @@ fn recordings_of_noise_are_refused() {
 }
 
 #[test]
-#[ignore = "second tier: noise as positions and poses, of two lengths"]
-fn recordings_of_noise_of_any_length_are_refused() {
-    let all = [(30, 10..14), (60, 30..31)];
+#[ignore = "second tier: noise as positions and as poses, stated and not"]
+fn recordings_of_noise_of_both_kinds_are_refused() {
+    let all = [(30, 10..12)];
     let each = all
         .into_iter()
         .flat_map(|(n, seeds)| ["position", "pose"].map(|of| noise_accepted(n, seeds.clone(), of, &[false, true])));
