@@ -20,15 +20,11 @@ from scipy.spatial.transform import Rotation
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests/oracle"))
 from compare_real_arms import read  # noqa: E402
+from real_arms import ARMS, prepare  # noqa: E402
 
 TOLERANCE_M = 0.02
-# Name, recording, drawing, base; mount, board with its sigmas, links, as in arms.py; reach, m.
-ARMS = [
-    ("FR3", "franka_114.mcap", "franka_nominal.urdf", "fr3_link0", [0.01, 0.05], [0.66025, -0.5905, -0.0097], [1.0, 0.0, 0.0, 0.0],
-     [0.01, 0.03], None, 0.855),
-    ("UR10e", "ur10/ur10_23.mcap", "ur10/ur10_nominal.urdf", "base_link", [0.03, 0.1], [0.0, 0.0, -0.9], [0.5 ** 0.5, 0.0, 0.0, 0.5 ** 0.5],
-     [0.1, 0.05], [2e-3, 5e-3], 1.3),
-]
+# Reach by the makers' datasheets, m.
+REACH_M = {"Franka FR3, 114 poses": 0.855, "UR10e, 23 poses": 1.3}
 
 
 class Table:
@@ -126,7 +122,7 @@ def kinds(table):
     return found
 
 
-def judge(armcal, folder, table, arm, with_task):
+def judge(armcal, folder, table, with_task):
     table.write(folder, "pose")
     more = ["--task", folder / "task.toml"] if with_task else []
     command = [armcal, "calibrate", folder / "arm.csv", "--robot", folder / "robot", "--input", folder / "map.toml", "--tag-map",
@@ -143,26 +139,19 @@ def judge(armcal, folder, table, arm, with_task):
 
 def main(armcal, data, out=None):
     data, wrong, right, rows = Path(data), 0, 0, []
-    for name, recording, urdf, base, mount, board_m, board_wxyz, board_std, links, reach_m in ARMS:
+    for arm in ARMS:
+        name, recording, reach_m = arm[0], arm[1], REACH_M[arm[0]]
         readings, seen = read(data / recording)
         joints = [joint for joint in readings[0]]
         table = Table(joints, [[row[joint] for joint in joints] for row in readings], np.array(seen))
         with tempfile.TemporaryDirectory() as folder:
             folder = Path(folder)
-            subprocess.run([armcal, "new-robot", data / urdf, "--out", folder / "robot"], check=True, capture_output=True)
-            text = (folder / "robot/robot.toml").read_text()
-            text = text.replace("mount_std_m = 0.01", f"mount_std_m = {mount[0]}").replace("mount_std_rad = 0.05", f"mount_std_rad = {mount[1]}")
-            if links:
-                text += f"\n[geometry]\nlink_position_std_m = {links[0]}\nlink_rotation_std_rad = {links[1]}\n"
-            (folder / "robot/robot.toml").write_text(text)
-            stds = [f"{key} = {[std] * 3}" for key, std in zip(("position_std_m", "rotation_std_rad"), board_std)]
-            tag = [f"position_m = {board_m}", f"quaternion_wxyz = {board_wxyz}", *stds]
-            (folder / "tags.toml").write_text("\n".join(["version = 1", f'frame = "{base}"', "[[tag]]", 'name = "board"', *tag]) + "\n")
+            prepare(armcal, data, arm, folder)
             poses = [[float(angle) for angle in row] for row in table.angles[:: max(1, len(table.angles) // 4)][:4]]
             (folder / "task.toml").write_text(f"version = 1\ntolerance_m = {TOLERANCE_M}\nposes_rad = {poses}\n")
             for kind, changed in kinds(table):
                 for with_task in (False, True):
-                    code, held_m, said = judge(armcal, folder, changed, name, with_task)
+                    code, held_m, said = judge(armcal, folder, changed, with_task)
                     limit_m = TOLERANCE_M if with_task else 0.01 * reach_m
                     is_wrong = code in (0, 3) and held_m is not None and held_m > limit_m
                     wrong += is_wrong
