@@ -586,7 +586,7 @@ fn a_worse_result_replaces_no_better_one() {
     }
     let refused = given.file("out/refused/calibration.toml");
     answer(program().arg("check").arg(refused)).expect("a refused one", 4, &["REFUSED", "[beyond_tolerance]"]);
-    // What replaces nothing better goes where it was asked for.
+    // An equal result takes the place of the first.
     given.calibrate_again(&["arm.mcap"], &[]).expect("the same again", 0, &["ACCEPTED"]);
     assert!(read(&given.file("out/calibration.toml")) == first);
 }

@@ -144,13 +144,14 @@ fn write_results(
         (summary_file.as_path(), json.as_bytes()),
     ]);
     output::write_together(&written)?;
-    // What our own reader refuses must not pass for a result.
+    // A result that our own reader refuses is an error.
     Calibration::read(&calibration_file)?.sensors(robot)?;
     written.iter().for_each(|(path, bytes)| tracing::info!("{}: {} bytes written", path.display(), bytes.len()));
     Ok(())
 }
 
-/// A U95 larger than that of the result in place by more than this factor is worse.
+/// A result is worse than the one in place if its U95 is larger by more than this factor. Assumed: views of another day
+/// change U95 by a few percent.
 const WORSE: f64 = 1.1;
 
 /// Where a result goes, and why it does not replace the accepted one at `out`.

@@ -106,7 +106,7 @@ pub(super) fn export(args: &ExportArgs) -> Result<Exit> {
         && let Some(why) = input.refusal()
     {
         let (file, form) = (args.file.display(), args.form.name());
-        complain(format!("error: {file}: the calibration is refused: {why}; --refused writes {form} nevertheless"));
+        complain(format!("error: {file}: the calibration is refused: {why}; add --refused to export it as {form}"));
         return Ok(Exit::Refused);
     }
     let text = match input {

@@ -91,7 +91,8 @@ impl ErrorDistribution {
         if x.is_infinite() {
             return 0.0;
         }
-        // Of |t| in one dimension, and what two more add (recurrence of the incomplete beta function).
+        // The tail of |t| in one dimension, and the term that two more dimensions add: a recurrence of the incomplete
+        // beta function.
         let nu = dof as f64;
         let share = x / (x + nu);
         2.0 * student_t_above(x.sqrt(), dof) + 2.0 * share.sqrt() * (1.0 - share).powf(0.5 * nu) / beta_with_half(dof)

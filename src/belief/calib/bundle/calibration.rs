@@ -27,7 +27,7 @@ use crate::calib::methods::observability::{Unobservable, grouped_names};
 use crate::calib::methods::position_problem::PositionProblem;
 use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::refusal::Refusal;
-use crate::calib::result::assemble::{Evidence, Fit, Provenance, assemble, is_near, noise_dof};
+use crate::calib::result::assemble::{Evidence, Fit, Provenance, assemble, is_near, noise_dof, refusal_by_priors};
 use crate::calib::result::calibration::{Calibration, Status};
 use crate::calib::result::map_table::MapResult;
 use crate::calib::result::metrics::HeldOutMetrics;
@@ -35,7 +35,7 @@ use crate::calib::tag_mapping::map_unknown_tags;
 use crate::calib::views::calibration_data::CalibrationData;
 use crate::calib::views::view::{ObservationRejection, Touch, View};
 use crate::calib::wrong_input::wrong_input;
-use crate::judge::{TargetError, TargetU95, U95Table};
+use crate::judge::{TargetError, U95Table};
 use armcal_core::codes::Code;
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::{JointSensorSpec, Robot, SurveyedTag};
@@ -488,14 +488,8 @@ impl<'a> BundleCalibration<'a> {
                 if is_kept { Code::SensorFailed } else { Code::TargetOutOfReach }
             }),
         );
-        if by_data_alone.beyond().is_none()
-            && let Some(&TargetU95 { index, u95_m: Some(u95_m), p_beyond_tolerance: Some(probability), .. }) =
-                calibration.u95.beyond()
-        {
-            let most = calibration.reservations.first().map(|reservation| reservation.what.clone());
-            let (target, tolerance_m) = (index + 1, task.tolerance_m);
-            calibration.refuse_for([Refusal::PriorsBeyondTolerance { target, probability, u95_m, tolerance_m, most }]);
-        }
+        let most = calibration.reservations.first().map(|reservation| reservation.what.clone());
+        calibration.refuse_for(refusal_by_priors(&by_data_alone, &calibration.u95, most));
     }
 
     /// Whether the views agree with the prior, and what that refuses for.

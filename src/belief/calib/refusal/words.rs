@@ -77,7 +77,7 @@ impl Refusal {
         }
     }
 
-    /// Decision rule and held-out error.
+    /// Causes by the decision rule and by the held-out error.
     fn fmt_of_decision(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mm = |m: f64| m * 1e3;
         match self {
@@ -102,7 +102,11 @@ impl Refusal {
             }
             Self::TargetsNotJudged { targets } => {
                 let numbers: Vec<String> = targets.iter().map(ToString::to_string).collect();
-                write!(f, "the tool error cannot be judged at target {}: out of reach", numbers.join(", "))
+                write!(
+                    f,
+                    "the tool error cannot be judged at target {}: out of reach or undetermined",
+                    numbers.join(", ")
+                )
             }
             Self::HeldOutError { held_out_m, limit_m, source } => {
                 let limit = match source {
@@ -121,7 +125,7 @@ impl Refusal {
         }
     }
 
-    /// What views and figures lack.
+    /// Causes in the data.
     fn fmt_of_data(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mm = |m: f64| m * 1e3;
         match self {
@@ -165,7 +169,7 @@ impl Refusal {
         }
     }
 
-    /// What is wrong with the arm.
+    /// Causes in the arm or in its files.
     fn fmt_of_arm(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::WrongInput(wrong) => write!(f, "{wrong}"),
@@ -211,7 +215,7 @@ impl Refusal {
         }
     }
 
-    /// What is not as it was predicted: by the fit, or by the prior.
+    /// Contradictions to what the fit or the prior predicts.
     fn fmt_of_prediction(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Innovations { quantity, per_dof, limit, expected: [low, high] } => write!(
@@ -266,7 +270,7 @@ impl Refusal {
     }
 }
 
-/// Two lengths in mm with one digit, or with as many as tell them apart, up to four.
+/// Two lengths in mm, with the fewest decimals, 1 to 4, that make them differ.
 pub(super) fn told_apart_mm(lengths_m: [f64; 2]) -> [String; 2] {
     let with = |digits: usize| lengths_m.map(|m| format!("{:.digits$}", m * 1e3));
     (1..4).map(with).find(|[a, b]| a != b).unwrap_or_else(|| with(4))

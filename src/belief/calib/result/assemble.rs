@@ -206,6 +206,19 @@ fn refusal_by_risk(u95: &U95Table) -> Option<Refusal> {
     Some(Refusal::BeyondTolerance { target: index + 1, probability, u95_m, tolerance_m: u95.tolerance_m? })
 }
 
+/// The decision rule with stated sigmas included, where the recording alone is within it; `most` is their largest part.
+pub(crate) fn refusal_by_priors(by_data: &U95Table, with_priors: &U95Table, most: Option<String>) -> Option<Refusal> {
+    // A gate whose input is missing has not passed.
+    let targets = with_priors.unjudged();
+    if by_data.unjudged().is_empty() && !targets.is_empty() {
+        return Some(Refusal::TargetsNotJudged { targets });
+    }
+    let beyond = with_priors.beyond().filter(|_| by_data.beyond().is_none())?;
+    let (u95_m, probability) = beyond.u95_m.zip(beyond.p_beyond_tolerance)?;
+    let (target, tolerance_m) = (beyond.index + 1, with_priors.tolerance_m?);
+    Some(Refusal::PriorsBeyondTolerance { target, probability, u95_m, tolerance_m, most })
+}
+
 fn fit_metrics(source: &Provenance<'_>, fit: &Fit<'_>) -> FitMetrics {
     let at = &fit.solution.parameters;
     FitMetrics {
