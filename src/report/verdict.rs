@@ -68,7 +68,8 @@ pub(super) fn verdict(summary: &RunSummary) -> Verdict {
     let is_beyond = summary.calibration.verdict.as_ref().is_some_and(|verdict| !verdict.not_covered.is_empty());
     let not_covered = is_beyond.then_some(Code::NotCovered);
     let of_repairs = repairs.iter().map(|repair| repair.code);
-    let codes = of_repairs.chain(without_task).chain(contradicted).chain(not_covered).collect();
+    let not_included = (!summary.calibration.u95.not_included.is_empty()).then_some(Code::NotIncluded);
+    let codes = of_repairs.chain(without_task).chain(contradicted).chain(not_covered).chain(not_included).collect();
     let load = "Load calibration.toml, or export it for the arm's driver (armcal export).".to_owned();
     if reasons.is_empty() {
         return Verdict { grade: Grade::Green, headline: "ACCEPTED: use it", reasons, next: vec![load], codes };
@@ -90,7 +91,7 @@ impl RunSummary {
             std: reservation.prior_std,
             unit: reservation.unit,
             tool_error_m: reservation.tool_error_m,
-            included: true,
+            included: reservation.included,
         };
         self.verdict = VerdictSummary {
             grade,
@@ -286,6 +287,11 @@ pub(super) fn attention(summary: &RunSummary) -> Vec<String> {
     points.extend(summary.calibration.prior.as_ref().filter(|prior| !prior.agrees).map(against_prior));
     let not_covered = summary.calibration.verdict.iter().flat_map(|verdict| &verdict.not_covered);
     points.extend(not_covered.map(|line| sentence(&format!("not covered by any view: {line}"))));
+    let not_included = &summary.calibration.u95.not_included;
+    if !not_included.is_empty() {
+        let keys = not_included.join(", ");
+        points.push(format!("U95 does not include unobservable geometry: state {keys} in [geometry] of robot.toml."));
+    }
     points
 }
 

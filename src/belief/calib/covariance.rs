@@ -280,8 +280,8 @@ pub fn task_angles(robot: &Robot, task: TaskRests<'_>) -> Vec<JointAngles> {
     numbered_task_angles(robot, task).into_iter().map(|(_, angles)| angles).collect()
 }
 
-/// The same with the number of each target.
-fn numbered_task_angles(robot: &Robot, TaskRests { task, rests }: TaskRests<'_>) -> Vec<(u32, JointAngles)> {
+/// Returns [`task_angles`] with the number of each target, from 0.
+pub(crate) fn numbered_task_angles(robot: &Robot, TaskRests { task, rests }: TaskRests<'_>) -> Vec<(u32, JointAngles)> {
     let open = JointLimits { lower_rad: -std::f64::consts::TAU, upper_rad: std::f64::consts::TAU };
     let settings = IkSettings {
         limits: robot.chain.joints().iter().map(|joint| joint.limits.unwrap_or(open)).collect(),

@@ -2,6 +2,7 @@
 
 use crate::calib::angles_by_camera::set_by_camera;
 use crate::calib::baseline_comparison::BaselineComparison;
+use crate::calib::bundle::baseline::N_BASELINES;
 use crate::calib::methods::position_problem::{PositionProblem, TagResidual};
 use crate::calib::parameters::JointParameters;
 use crate::calib::result::metrics::HeldOutMetrics;
@@ -20,13 +21,13 @@ pub(crate) fn fold_of(views: &[View], fold: usize) -> (Vec<View>, Vec<View>) {
     (of(false), of(true))
 }
 
-/// Each view by the parameters that `fit` and the arm that `baseline` estimate from the views of the other folds; a
+/// Each view by the parameters that `fit` and the arms that `baselines` estimate from the views of the other folds; a
 /// fold without an estimate does not count.
 pub(crate) fn cross_validate(
     robot: &Robot,
     views: &[View],
     fit: impl Fn(&[View]) -> Option<JointParameters>,
-    baseline: impl Fn(&[View]) -> Option<Robot>,
+    baselines: impl Fn(&[View]) -> [Option<Robot>; N_BASELINES],
 ) -> HeldOutMetrics {
     let mut sums = FoldSums::default();
     for fold in 0..FOLDS {
@@ -35,8 +36,8 @@ pub(crate) fn cross_validate(
             continue;
         }
         if let Some(at) = fit(&fitted) {
-            let baseline = baseline(&fitted);
-            sums.add(&Fold { views: &views, as_found: robot, at: &at, nominal: robot, baseline: baseline.as_ref() });
+            let baselines = &baselines(&fitted);
+            sums.add(&Fold { views: &views, as_found: robot, at: &at, nominal: robot, baselines });
         }
     }
     sums.metrics()
@@ -50,8 +51,8 @@ pub(crate) struct Fold<'a> {
     pub at: &'a JointParameters,
     /// The drawing.
     pub nominal: &'a Robot,
-    /// With mount and map fitted, the joints at the datasheet.
-    pub baseline: Option<&'a Robot>,
+    /// With the joints at the datasheet.
+    pub baselines: &'a [Option<Robot>; N_BASELINES],
 }
 
 /// Sums over the folds.
@@ -63,17 +64,43 @@ pub(crate) struct FoldSums {
     sum_m2: f64,
     sum_m: f64,
     nominal_m2: f64,
-    /// By the baseline: landmarks and squares of distances; of each view the mean logarithm of its distances over the
-    /// calibration's.
-    n_baseline: usize,
-    baseline_m2: f64,
-    log_ratios: Vec<f64>,
+    baselines: [BaselineSums; N_BASELINES],
     /// Of those, the ones with corners.
     n_corners: usize,
     sum_px2: f64,
     /// And the ones with poses.
     n_poses: usize,
     camera_sum_m: f64,
+}
+
+/// Sums over the folds of one baseline.
+#[derive(Clone, Debug, Default)]
+struct BaselineSums {
+    /// Landmarks seen, and squares of their distances.
+    n: usize,
+    sum_m2: f64,
+    /// Mean logarithm of each view's distances over the calibration's.
+    log_ratios: Vec<f64>,
+}
+
+impl BaselineSums {
+    fn add(&mut self, by_calibration: &ViewDistances, by_baseline: &ViewDistances) {
+        self.n += by_baseline.n.iter().sum::<usize>();
+        self.sum_m2 += by_baseline.sum_m2;
+        self.log_ratios.extend(by_calibration.log_ratios(by_baseline));
+    }
+
+    fn mean_m2(&self) -> f64 {
+        self.sum_m2 / self.n as f64
+    }
+}
+
+/// Compares the calibration with the baseline of the smallest error among those that predict the most landmarks.
+fn best_comparison(all: &[BaselineSums]) -> Option<BaselineComparison> {
+    let n = all.iter().map(|sums| sums.n).max().filter(|n| *n > 0)?;
+    let complete = all.iter().filter(|sums| sums.n == n);
+    let best = complete.min_by(|a, b| a.mean_m2().total_cmp(&b.mean_m2()))?;
+    BaselineComparison::new(best.mean_m2().sqrt(), &best.log_ratios)
 }
 
 /// The views with the angles that their tags show where a sensor says nothing.
@@ -87,7 +114,7 @@ fn by_camera(views: &[View], robot: &Robot, at: &JointParameters) -> Vec<View> {
 
 impl FoldSums {
     pub fn add(&mut self, fold: &Fold<'_>) {
-        let Fold { views, as_found, at, nominal, baseline } = *fold;
+        let Fold { views, as_found, at, nominal, baselines } = *fold;
         let datasheet = JointParameters::default();
         let (by_found, by_drawing) = (by_camera(views, as_found, at), by_camera(views, nominal, &datasheet));
         let problem = PositionProblem::new(as_found, &by_found);
@@ -107,18 +134,13 @@ impl FoldSums {
         self.sum_px2 += problem.reprojection_rms_px(at).map_or(0.0, |rms_px| rms_px * rms_px * seen);
         PositionProblem::new(nominal, &by_drawing).each(&datasheet, |o| self.nominal_m2 += o.residual_m.norm_squared());
         self.n_views += views.iter().filter(|view| !view.tags.is_empty()).count();
-        if let Some(baseline) = baseline {
+        for (sums, baseline) in self.baselines.iter_mut().zip(baselines) {
+            let Some(baseline) = baseline else { continue };
             let by_baseline = by_camera(views, baseline, &datasheet);
             let mut of_baseline = ViewDistances::new(views.len());
             PositionProblem::new(baseline, &by_baseline).each(&datasheet, |o| of_baseline.add(o));
-            self.n_baseline += of_baseline.n.iter().sum::<usize>();
-            self.baseline_m2 += of_baseline.sum_m2;
-            self.log_ratios.extend(distances.log_ratios(&of_baseline));
+            sums.add(&distances, &of_baseline);
         }
-    }
-
-    fn comparison(&self) -> Option<BaselineComparison> {
-        BaselineComparison::new((self.baseline_m2 / self.n_baseline as f64).sqrt(), &self.log_ratios)
     }
 
     pub fn metrics(&self) -> HeldOutMetrics {
@@ -131,22 +153,28 @@ impl FoldSums {
             camera_mean_m: mean(self.camera_sum_m, self.n_poses),
             rms_px: mean(self.sum_px2, self.n_corners).map(f64::sqrt),
             nominal_rms_m: mean(self.nominal_m2, self.n).map(f64::sqrt),
-            baseline: self.comparison(),
+            baseline: best_comparison(&self.baselines),
         }
     }
 }
 
-/// The same views, fitted by others, by a calibration and by the baseline; `None` below two views.
+/// Compares a calibration on `problem`'s views, which were not fitted, with the best of `baselines`; `None` below two
+/// views.
 pub(crate) fn compared(
     problem: &PositionProblem<'_>,
     at: &JointParameters,
-    baseline: &PositionProblem<'_>,
+    baselines: &[Option<Robot>; N_BASELINES],
 ) -> Option<BaselineComparison> {
-    let [mut by_calibration, mut by_baseline] = [0, 1].map(|_| ViewDistances::new(problem.views.len()));
+    let mut by_calibration = ViewDistances::new(problem.views.len());
     problem.each(at, |o| by_calibration.add(o));
-    baseline.each(&JointParameters::default(), |o| by_baseline.add(o));
-    let rms_m = (by_baseline.sum_m2 / baseline.n_observations() as f64).sqrt();
-    BaselineComparison::new(rms_m, &by_calibration.log_ratios(&by_baseline))
+    let sums = baselines.iter().flatten().map(|robot| {
+        let mut by_baseline = ViewDistances::new(problem.views.len());
+        PositionProblem::new(robot, problem.views).each(&JointParameters::default(), |o| by_baseline.add(o));
+        let mut sums = BaselineSums::default();
+        sums.add(&by_calibration, &by_baseline);
+        sums
+    });
+    best_comparison(&sums.collect::<Vec<_>>())
 }
 
 /// Distances between seen and surveyed landmarks, view by view.

@@ -130,15 +130,7 @@ impl Finding {
     /// The size in units that people measure in: `12.0 mm`.
     #[must_use]
     pub fn size_in_words(&self) -> Option<String> {
-        let size = self.size?;
-        Some(match self.unit? {
-            FindingUnit::Metre => format!("{:.1} mm", size * 1e3),
-            FindingUnit::Radian => format!("{:.2} deg", size.to_degrees()),
-            FindingUnit::One => format!("{size:.3}"),
-            FindingUnit::RadianPerNewtonMetre => format!("{:.3} deg per kN m", 1e3 * size.to_degrees()),
-            FindingUnit::MetrePerNewton => format!("{:.3} mm per kN", 1e6 * size),
-            FindingUnit::Newton => format!("{size:.0} N"),
-        })
+        Some(self.unit?.in_words(self.size?))
     }
 }
 
@@ -147,6 +139,19 @@ impl FindingUnit {
     #[must_use]
     pub fn of_joint(kind: JointKind) -> Self {
         if kind.is_slide() { Self::Metre } else { Self::Radian }
+    }
+
+    /// A value in the unit that people measure in: `12.0 mm`.
+    #[must_use]
+    pub fn in_words(self, value: f64) -> String {
+        match self {
+            Self::Metre => format!("{:.1} mm", value * 1e3),
+            Self::Radian => format!("{:.2} deg", value.to_degrees()),
+            Self::One => format!("{value:.3}"),
+            Self::RadianPerNewtonMetre => format!("{:.3} deg per kN m", 1e3 * value.to_degrees()),
+            Self::MetrePerNewton => format!("{:.3} mm per kN", 1e6 * value),
+            Self::Newton => format!("{value:.0} N"),
+        }
     }
 }
 

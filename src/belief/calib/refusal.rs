@@ -8,6 +8,7 @@ use armcal_core::numeric::Outcome;
 use armcal_core::robot::FailedKind;
 use serde::{Deserialize, Serialize};
 
+use crate::calib::finding::FindingUnit;
 use crate::calib::geometry_error::GeometryError;
 use crate::calib::wrong_input::WrongInput;
 
@@ -109,6 +110,20 @@ pub enum Refusal {
     WrongInput(WrongInput),
     /// Another link geometry explains the data, and joint sensors do not.
     Geometry(GeometryError),
+    /// An element of the geometry departs from its nominal pose by more than a repair may.
+    RepairTooLarge {
+        /// The link, mount or base.
+        element: String,
+        /// The estimated departure, in `unit`.
+        size: f64,
+        /// Metres or radians.
+        unit: FindingUnit,
+        /// One stated sigma.
+        stated_std: f64,
+        /// Length of the link, where the departure exceeds it.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        length_m: Option<f64>,
+    },
     /// A joint's error from view to view is beyond what such a sensor can have.
     SensorError {
         /// Name of the joint in the URDF.
@@ -343,6 +358,9 @@ impl Refusal {
             }
             Self::WrongInput(wrong) => wrong.remedy(),
             Self::Geometry(geometry) => geometry.remedy(),
+            Self::RepairTooLarge { .. } => {
+                "check the zeros, order and units of the joint readings; then measure this element and correct its file"
+            }
             Self::CornerNoise { .. } => "check lens, corner noise and tag sizes in robot.toml, and the tag map",
             Self::SensorError { .. } | Self::SensorFailed { .. } => "check that joint's sensor",
             Self::SensorLine { .. } => "swap its ends, or correct scale_counts_per_deg and its sign in robot.toml",
@@ -388,6 +406,7 @@ impl Coded for Refusal {
             Self::PriorsBeyondTolerance { .. } => Code::PriorsBeyondTolerance,
             Self::WrongInput(wrong) => wrong.code(),
             Self::Geometry(_) => Code::GeometryContradicted,
+            Self::RepairTooLarge { .. } => Code::RepairTooLarge,
             Self::SensorError { .. } => Code::SensorError,
             Self::OffsetsWalk { .. } => Code::OffsetsWalk,
             Self::Nonlinearity { .. } => Code::Nonlinearity,

@@ -21,6 +21,13 @@ pub struct Reservation {
     /// The same for each axis of `what`, where it has several that differ.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub by_axis_m: Vec<f64>,
+    /// U95 includes it: false where robot.toml states no sigma, and `prior_std` is the default.
+    #[serde(default = "is_included", skip_serializing_if = "Clone::clone")]
+    pub included: bool,
+}
+
+fn is_included() -> bool {
+    true
 }
 
 impl Reservation {
@@ -33,7 +40,7 @@ impl Reservation {
 
 impl fmt::Display for Reservation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { what, prior_std, unit, tool_error_m, by_axis_m } = self;
+        let Self { what, prior_std, unit, tool_error_m, by_axis_m, included } = self;
         let all_m = if by_axis_m.is_empty() { std::slice::from_ref(tool_error_m) } else { by_axis_m };
         // One unit that people measure in.
         let (scale, name) = match unit {
@@ -45,6 +52,11 @@ impl fmt::Display for Reservation {
             FindingUnit::Newton => (1.0, "N"),
         };
         let list = |factor: f64| all_m.iter().map(|m| format!("{:.1}", factor * m)).collect::<Vec<_>>().join(", ");
-        write!(f, "{what}: unobservable; ±{:.2} {name} (robot.toml) moves the tool {} mm", prior_std * scale, list(1e3))
+        let (size, moved) = (prior_std * scale, list(1e3));
+        if *included {
+            write!(f, "{what}: unobservable; ±{size:.2} {name} (robot.toml) moves the tool {moved} mm")
+        } else {
+            write!(f, "{what}: not included, no sigma is stated; ±{size:.2} {name} would move the tool {moved} mm")
+        }
     }
 }

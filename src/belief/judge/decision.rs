@@ -26,6 +26,9 @@ pub struct U95Table {
     /// Largest probability over the targets that the error exceeds the tolerance.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub p_beyond_tolerance: Option<f64>,
+    /// Keys of `[geometry]` that robot.toml lacks: U95 does not include the unobservable parameters that they are of.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub not_included: Vec<String>,
     /// Each target of the task.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub target: Vec<TargetU95>,
@@ -101,7 +104,13 @@ impl U95Table {
             tolerance_m: Some(tolerance_m),
             p_beyond_tolerance: target.iter().filter_map(|target| target.p_beyond_tolerance).reduce(f64::max),
             target,
+            not_included: Vec::new(),
         }
+    }
+
+    /// The table with the keys of unobservable parameters that it does not include.
+    pub(crate) fn without(self, keys: &[&str]) -> Self {
+        Self { not_included: keys.iter().map(|key| (*key).to_owned()).collect(), ..self }
     }
 
     /// Without a task: the largest of the configurations that the recording has.

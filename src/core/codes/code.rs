@@ -132,6 +132,7 @@ codes! {
     InputTagSize = "input_tag_size",
     InputTagIds = "input_tag_ids",
     InputTagMap = "input_tag_map",
+    RepairTooLarge = "repair_too_large",
     GeometryContradicted = "geometry_contradicted",
     SensorError = "sensor_error",
     OffsetsWalk = "offsets_walk",
@@ -204,6 +205,7 @@ codes! {
     ViewerLost = "viewer_lost",
     ResultKept = "result_kept",
     NotCovered = "not_covered",
+    NotIncluded = "not_included",
 }
 
 /// Types that have a code: errors, refusals, findings.

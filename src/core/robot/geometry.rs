@@ -8,9 +8,9 @@ use serde::Deserialize;
 use super::error::FileIssue;
 
 /// One sigma of each axis, about the drawing. `[geometry]` of robot.toml; the defaults are those of a machined arm that
-/// was never bent (assumed).
+/// was never bent (assumed): they weigh explanations, and are no statement on which an uncertainty could be based.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[serde(from = "GeometryTable")]
 pub struct GeometryPriors {
     /// Of each joint's place in its parent link, m.
     pub link_position_std_m: f64,
@@ -26,6 +26,67 @@ pub struct GeometryPriors {
     pub tool_load_std_n: f64,
     /// Against gravity, in the base frame; of any length.
     pub up: [f64; 3],
+    /// The sigmas that robot.toml states.
+    pub stated: StatedGeometry,
+}
+
+/// True for each sigma that robot.toml states; the others are defaults.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StatedGeometry {
+    /// `link_position_std_m`.
+    pub link_position: bool,
+    /// `link_rotation_std_rad`.
+    pub link_rotation: bool,
+    /// `tool_position_std_m`.
+    pub tool_position: bool,
+}
+
+/// `[geometry]` as it is written.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct GeometryTable {
+    link_position_std_m: Option<f64>,
+    link_rotation_std_rad: Option<f64>,
+    tool_position_std_m: Option<f64>,
+    joint_compliance_std_rad_per_nm: f64,
+    mount_compliance_std_rad_per_nm: f64,
+    tool_load_std_n: f64,
+    up: [f64; 3],
+}
+
+impl Default for GeometryTable {
+    fn default() -> Self {
+        let usual = GeometryPriors::default();
+        Self {
+            link_position_std_m: None,
+            link_rotation_std_rad: None,
+            tool_position_std_m: None,
+            joint_compliance_std_rad_per_nm: usual.joint_compliance_std_rad_per_nm,
+            mount_compliance_std_rad_per_nm: usual.mount_compliance_std_rad_per_nm,
+            tool_load_std_n: usual.tool_load_std_n,
+            up: usual.up,
+        }
+    }
+}
+
+impl From<GeometryTable> for GeometryPriors {
+    fn from(table: GeometryTable) -> Self {
+        let usual = Self::default();
+        Self {
+            link_position_std_m: table.link_position_std_m.unwrap_or(usual.link_position_std_m),
+            link_rotation_std_rad: table.link_rotation_std_rad.unwrap_or(usual.link_rotation_std_rad),
+            tool_position_std_m: table.tool_position_std_m.unwrap_or(usual.tool_position_std_m),
+            joint_compliance_std_rad_per_nm: table.joint_compliance_std_rad_per_nm,
+            mount_compliance_std_rad_per_nm: table.mount_compliance_std_rad_per_nm,
+            tool_load_std_n: table.tool_load_std_n,
+            up: table.up,
+            stated: StatedGeometry {
+                link_position: table.link_position_std_m.is_some(),
+                link_rotation: table.link_rotation_std_rad.is_some(),
+                tool_position: table.tool_position_std_m.is_some(),
+            },
+        }
+    }
 }
 
 impl Default for GeometryPriors {
@@ -38,6 +99,7 @@ impl Default for GeometryPriors {
             mount_compliance_std_rad_per_nm: 1e-6,
             tool_load_std_n: 200.0,
             up: [0.0, 0.0, 1.0],
+            stated: StatedGeometry::default(),
         }
     }
 }

@@ -3,18 +3,28 @@
 //! The joints stay at the datasheet; camera mount and tags are estimated about their priors from the same views. What
 //! the joints are off is an error of each view, whose size the evidence fits: first about the datasheet's own gain and
 //! offset, then about what the fit before found, until that stays, so that the datasheet does not hold it up.
+//!
+//! Plain least squares stands next to it: sensors as good as their datasheets, and an error of each view, or noise of
+//! the positions, that takes up all else, equal in all directions. The datasheet's arm itself is the third.
 
 use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::bundle::model::{Hyperparameters, Model, further_mounts, is_loose, reference};
+use crate::calib::bundle::model_selection::CAMERA_ERROR_STD;
 use crate::calib::parameters::JointParameters;
-use crate::calib::views::view::View;
+use crate::calib::views::view::{TagObservation, View};
 use armcal_core::robot::Robot;
+
+/// Ways to do without a calibration of joints: the datasheet's arm, least squares, and joint errors by the evidence.
+pub(crate) const N_BASELINES: usize = 3;
 
 /// Mount and map alone, with the sizes of errors that all views tell.
 pub(crate) struct Baseline {
     model: Model,
+    /// With the joints' errors by the evidence.
     scales: Hyperparameters,
+    /// Of plain least squares.
+    plain: Hyperparameters,
 }
 
 /// Passes over the sizes of errors; each brings exact sensors down by a factor of three.
@@ -27,7 +37,8 @@ impl Baseline {
     pub(crate) fn new(robot: &Robot, views: &[View]) -> Option<Self> {
         let (mut baseline, usual) = (Self::start(robot, views), Hyperparameters::datasheet(robot));
         for _ in 0..MAX_PASSES {
-            let mut next = baseline.estimate(robot, views, HyperparameterMode::Fitted)?.scales().clone();
+            let fitted = baseline.estimate(robot, views, &baseline.scales, HyperparameterMode::Fitted)?;
+            let mut next = fitted.scales().clone();
             for (std_rad, usual_rad) in next.joint_std_rad.iter_mut().zip(&usual.joint_std_rad) {
                 *std_rad = std_rad.max(*usual_rad);
             }
@@ -37,6 +48,10 @@ impl Baseline {
             if has_settled {
                 break;
             }
+        }
+        if let Some(plain) = baseline.estimate(robot, views, &baseline.plain, HyperparameterMode::Fitted) {
+            baseline.plain = plain.scales().clone();
+            baseline.plain.joint_std_rad = usual.joint_std_rad;
         }
         Some(baseline)
     }
@@ -56,23 +71,33 @@ impl Baseline {
             walk: None,
         };
         let mut scales = Hyperparameters::datasheet(robot);
+        let has_corners = views.iter().flat_map(|view| &view.tags).any(TagObservation::is_in_pixels);
+        let camera_error_std = has_corners.then_some(CAMERA_ERROR_STD);
+        let plain = Hyperparameters { camera_error_std, ..scales.clone() };
         for (std_rad, spec) in scales.joint_std_rad.iter_mut().zip(&robot.sensors) {
             *std_rad = std_rad.max(spec.offset_std_rad.hypot(spec.gain_std * spec.half_range_rad));
         }
-        Self { model, scales }
+        Self { model, scales, plain }
     }
 
-    /// The arm by `views`.
-    pub(crate) fn fit(&self, robot: &Robot, views: &[View]) -> Option<Robot> {
-        Some(self.estimate(robot, views, HyperparameterMode::Given)?.as_found(robot))
+    /// The arm by `views` under each of the baselines that determine it.
+    pub(crate) fn fit(&self, robot: &Robot, views: &[View]) -> [Option<Robot>; N_BASELINES] {
+        let by = |scales| Some(self.estimate(robot, views, scales, HyperparameterMode::Given)?.as_found(robot));
+        [Some(robot.clone()), by(&self.plain), by(&self.scales)]
     }
 
-    fn estimate<'a>(&self, robot: &'a Robot, views: &'a [View], evidence: HyperparameterMode) -> Option<Estimate<'a>> {
+    fn estimate<'a>(
+        &self,
+        robot: &'a Robot,
+        views: &'a [View],
+        scales: &Hyperparameters,
+        evidence: HyperparameterMode,
+    ) -> Option<Estimate<'a>> {
         estimate(&BundleInput {
             robot,
             views,
             model: self.model.clone(),
-            scales: self.scales.clone(),
+            scales: scales.clone(),
             guess: JointParameters { reference: reference(views), ..JointParameters::default() },
             joint_prior: None,
             evidence,

@@ -460,7 +460,8 @@ impl<'a> BundleCalibration<'a> {
                 by_data_m2,
                 by_priors_m2: *by_priors_m2,
             });
-            calibration.u95 = U95Table::of_configurations(&errors.collect::<Vec<_>>(), dof);
+            calibration.u95 =
+                U95Table::of_configurations(&errors.collect::<Vec<_>>(), dof).without(&by_priors.not_included);
             calibration.reservations = by_priors.told();
             return;
         };
@@ -479,6 +480,7 @@ impl<'a> BundleCalibration<'a> {
             target.with_priors_m = Some(with_priors_m);
         }
         calibration.predicted_tool_error_with_priors_m = with_priors;
+        let not_included = by_priors.not_included.clone();
         calibration.reservations = by_priors.told();
         let Some(task) = &self.data.data.task else { return };
         let by_data_alone = std::mem::replace(
@@ -486,7 +488,8 @@ impl<'a> BundleCalibration<'a> {
             U95Table::of_task(task.targets_m.len(), task.tolerance_m, (&errors, dof), |index| {
                 let is_kept = !estimated.failures.is_empty() && is_near(&diagnosis.robot, &task.targets_m[index]);
                 if is_kept { Code::SensorFailed } else { Code::TargetOutOfReach }
-            }),
+            })
+            .without(&not_included),
         );
         let most = calibration.reservations.first().map(|reservation| reservation.what.clone());
         calibration.refuse_for(refusal_by_priors(&by_data_alone, &calibration.u95, most));
@@ -601,7 +604,7 @@ fn cross_validated(
             as_found: &as_found,
             at: &found.parameters(),
             nominal: input.robot,
-            baseline: baseline.as_ref().and_then(|baseline| baseline.fit(datasheet, &fitted)).as_ref(),
+            baselines: &baseline.as_ref().map(|baseline| baseline.fit(datasheet, &fitted)).unwrap_or_default(),
         });
     }
     (sums.metrics(), innovations)

@@ -20,8 +20,13 @@ use armcal_core::joints::JointAngles;
 use armcal_core::robot::Robot;
 use armcal_core::spatial::log;
 
-/// Sigmas, of the drawing's prior and of the estimate alike, from which an element is named.
+/// Sigmas, of the stated size and of the estimate alike, from which an element is named: three axes together exceed 4 as
+/// seldom (0.1 %) as one axis 3.3.
 const NAMED_SIGMAS: f64 = 4.0;
+/// A repair may be this many stated sigmas and no longer than the link itself: beyond, something else is wrong.
+const MAX_REPAIR_SIGMAS: f64 = 10.0;
+/// Links whose joints meet have no length that could bound a repair, m.
+const LEAST_LENGTH_M: f64 = 0.02;
 
 /// A base that is off by less than this at arm's length refuses nothing, m.
 const WORTH_M: f64 = 0.004;
@@ -42,23 +47,16 @@ struct Departure {
     /// Over the drawing's prior.
     sigmas: f64,
     tool_m: Option<f64>,
+    /// Of the link, m.
+    length_m: Option<f64>,
 }
 
 impl Estimate<'_> {
     /// Writes what is not as drawn to `calibration`, the most telling first; `task`: angles at which the tool matters.
     pub(crate) fn report_drawing(&self, drawing: &Drawing, task: &[JointAngles], calibration: &mut Calibration) {
-        let mut found: Vec<Departure> = self.link_departures(task).collect();
-        if self.problem.layout.links.is_empty() {
-            found.clear();
-        } else {
-            found.extend(self.mount_departures());
-        }
-        // Their mounts are estimated in any case.
-        found.extend(self.further_mount_departures().filter(|departure| departure.weight() > NAMED_SIGMAS));
+        let all = self.link_departures(task).chain(self.mount_departures()).chain(self.further_mount_departures());
+        let mut found: Vec<Departure> = all.filter(|departure| departure.weight() > NAMED_SIGMAS).collect();
         found.sort_by(|a, b| b.weight().total_cmp(&a.weight()));
-        // Where links were freed, the likeliest is named in any case.
-        let n = found.iter().filter(|departure| departure.weight() > NAMED_SIGMAS).count();
-        found.truncate(n.max(1));
         let mut findings: Vec<Finding> = found.iter().map(Departure::finding).collect();
         let mut warnings: Vec<Warning> =
             found.iter().map(|departure| Warning::new(departure.kind.code(), departure.words())).collect();
@@ -66,6 +64,7 @@ impl Estimate<'_> {
             // Base or tags: the tool follows the one, and not the other.
             calibration.refuse_first_for([Refusal::Geometry(base.geometry_error(self.problem.robot))]);
         }
+        calibration.refuse_for(found.iter().find_map(Departure::beyond_bound));
         let of_tags = drawing.tags.iter().filter_map(|fault| self.tag_finding(fault));
         for (finding, words) in self.sag_findings(task).into_iter().chain(self.lens_finding()).chain(of_tags) {
             warnings.push(Warning::new(finding.code(), words));
@@ -98,9 +97,15 @@ impl Estimate<'_> {
                 std: std_along(&covariance, &size),
                 sure_sigmas: sigmas(&covariance, &size),
                 tool_m: Some(self.tool_moved_m(&tool, first, &size)),
+                length_m: (joint > 0).then(|| self.link_length_m(joint)),
                 size,
             }
         })
+    }
+
+    /// Distance of a joint from the one before it.
+    fn link_length_m(&self, joint: usize) -> f64 {
+        self.problem.robot.chain.joints()[joint].parent_from_joint.translation.vector.norm()
     }
 
     fn mount_departures(&self) -> impl Iterator<Item = Departure> {
@@ -136,6 +141,7 @@ impl Estimate<'_> {
                 sure_sigmas: sigmas(&covariance, &size),
                 size,
                 tool_m: None,
+                length_m: None,
             }
         })
     }
@@ -230,6 +236,19 @@ impl Departure {
         self.kind == FindingKind::Base
             && self.weight() > NAMED_SIGMAS
             && size_m.max(self.tool_m.unwrap_or(0.0)) > WORTH_M
+    }
+
+    /// The refusal of a departure that is too large for a repair.
+    fn beyond_bound(&self) -> Option<Refusal> {
+        let is_longer = self.unit == FindingUnit::Metre
+            && self.length_m.is_some_and(|length_m| self.size.norm() > length_m.max(LEAST_LENGTH_M));
+        (self.sigmas > MAX_REPAIR_SIGMAS || is_longer).then(|| Refusal::RepairTooLarge {
+            element: self.name.clone(),
+            size: self.size.norm(),
+            unit: self.unit,
+            stated_std: self.size.norm() / self.sigmas,
+            length_m: self.length_m.filter(|_| is_longer),
+        })
     }
 
     fn geometry_error(&self, robot: &Robot) -> GeometryError {

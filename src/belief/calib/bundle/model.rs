@@ -30,8 +30,18 @@ pub struct Model {
     pub gripper_tag: bool,
     /// How much later the joint sensors' stamps are than the camera's.
     pub time_offset: bool,
-    /// When the first and the last view end between which offsets walk at random; `None`: they do not.
-    pub walk: Option<[Stamp; 2]>,
+    /// Random walk of the offsets during the views; `None`: they do not walk.
+    pub walk: Option<Walk>,
+}
+
+/// A random walk of every joint's offset during the views.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Walk {
+    /// Ends of the first and the last view.
+    pub span: [Stamp; 2],
+    /// Probability of each joint's errors in time where its offset does not walk (`permutation_test`); one where no
+    /// view constrains the joint.
+    pub p_value: [f64; MAX_JOINTS],
 }
 
 /// Standard deviations that the data themselves may tell.

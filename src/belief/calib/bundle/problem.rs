@@ -6,7 +6,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector, Isometry3, Point3, SMatrix, Vector3};
 
 use crate::calib::bundle::input::BundleInput;
-use crate::calib::bundle::model::{Hyperparameters, Model};
+use crate::calib::bundle::model::{Hyperparameters, Model, Walk};
 use crate::calib::bundle::walk_modes::mode;
 use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::views::view::{BoardPoint, BoardPoints, MeanCorners, TagMeasurement, View};
@@ -535,10 +535,10 @@ fn view_data(
 }
 
 /// d(angle)/d(parameter) in a view that ends at `end`, of what tells of the sensor as it was; `None` for all else.
-pub(crate) fn past_derivative(kind: ParameterKind, walk: Option<[Stamp; 2]>, end: Stamp) -> Option<f64> {
+pub(crate) fn past_derivative(kind: ParameterKind, walk: Option<Walk>, end: Stamp) -> Option<f64> {
     match kind {
         ParameterKind::StepBefore(since) => Some(f64::from(end < since)),
-        ParameterKind::WalkMode(k) => Some(walk.map_or(0.0, |span| mode(k, span, end))),
+        ParameterKind::WalkMode(k) => Some(walk.map_or(0.0, |walk| mode(k, walk.span, end))),
         _ => None,
     }
 }

@@ -17,6 +17,7 @@ use crate::calib::finding::FindingUnit;
 use crate::calib::geometry_error::ErrorKind;
 use crate::calib::reservation::Reservation;
 use armcal_core::joints::JointAngles;
+use armcal_core::robot::GeometryPriors;
 
 /// Share of the prior's variance that the views leave, above which an element counts as unseen.
 const UNSEEN_SHARE: f64 = 0.5;
@@ -44,14 +45,18 @@ struct HeldElement {
     shifts: Vec<Vector3<f64>>,
     /// Whether the tool's covariance has it already: by the estimate's parameters, or by the lens's.
     is_counted: bool,
+    /// Key of robot.toml that would state `prior_std`, where it does not.
+    unstated: Option<&'static str>,
 }
 
 /// What priors alone say of the tool.
 pub(crate) struct PriorImpact {
     /// The largest first.
     pub reservations: Vec<Reservation>,
-    /// Added to the tool's covariance at each configuration, m^2.
+    /// Added to the tool's covariance at each configuration, m^2; without elements of which no sigma is stated.
     pub covariances_m2: Vec<Matrix3<f64>>,
+    /// Kinds of elements that are not in it: their keys in robot.toml.
+    pub not_included: Vec<&'static str>,
 }
 
 impl PriorImpact {
@@ -87,7 +92,7 @@ impl Estimate<'_> {
             if let Some(touches) = touches {
                 return touches.beside_parameters_m2(self.problem.robot, &tool[at]);
             }
-            let unmodelled = elements.iter().filter(|element| !element.is_counted);
+            let unmodelled = elements.iter().filter(|element| !element.is_counted && element.unstated.is_none());
             let by_drawing: Matrix3<f64> =
                 unmodelled.map(|element| element.shifts[at] * element.shifts[at].transpose()).sum();
             by_drawing + lens.as_ref().map_or_else(Matrix3::zeros, |lens| lens.covariance_m2(&tool[at]))
@@ -95,7 +100,11 @@ impl Estimate<'_> {
         let mut reservations: Vec<Reservation> =
             elements.chunk_by(|a, b| a.stem == b.stem).flat_map(|alike| reservations_of(alike, worth_m)).collect();
         reservations.sort_by(|a, b| b.tool_error_m.total_cmp(&a.tool_error_m));
-        PriorImpact { reservations, covariances_m2: (0..task.len()).map(covariance).collect() }
+        let mut not_included: Vec<&'static str> =
+            elements.iter().filter(|element| element.is_open()).filter_map(|element| element.unstated).collect();
+        not_included.sort_unstable();
+        not_included.dedup();
+        PriorImpact { reservations, covariances_m2: (0..task.len()).map(covariance).collect(), not_included }
     }
 
     fn held_elements(
@@ -154,6 +163,10 @@ impl Estimate<'_> {
         // The mount's prior is in the estimate, and is left there.
         let own_std = if is_estimated { 0.0 } else { prior_std };
         let touched_std = touches.map_or(f64::INFINITY, |touches| touches.std_of_trial(first, axis, own_std));
+        let unstated = match element {
+            GeometryElement::Mount => None,
+            GeometryElement::Joint(_) => unstated_link(priors, error),
+        };
         HeldElement {
             stem,
             axis: AXES[axis],
@@ -163,6 +176,7 @@ impl Estimate<'_> {
             touched_std,
             shifts,
             is_counted: is_estimated,
+            unstated,
         }
     }
 
@@ -211,7 +225,16 @@ impl Estimate<'_> {
             touched_std: touches.map_or(f64::INFINITY, |touches| touches.std_of_tool_point(robot, axis)),
             shifts: task.iter().map(shift).collect(),
             is_counted: false,
+            unstated: (!robot.geometry.stated.tool_position).then_some("tool_position_std_m"),
         }
+    }
+}
+
+/// Key of robot.toml that would state how well links are known, where it does not.
+fn unstated_link(priors: &GeometryPriors, error: ErrorKind) -> Option<&'static str> {
+    match error {
+        ErrorKind::Shift => (!priors.stated.link_position).then_some("link_position_std_m"),
+        ErrorKind::Turn => (!priors.stated.link_rotation).then_some("link_rotation_std_rad"),
     }
 }
 
@@ -236,6 +259,7 @@ fn reservations_of(elements: &[HeldElement], worth_m: f64) -> Option<Reservation
         unit: first.unit,
         tool_error_m: most,
         by_axis_m: if are_alike { Vec::new() } else { each },
+        included: first.unstated.is_none(),
     })
 }
 

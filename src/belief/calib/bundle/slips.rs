@@ -12,7 +12,7 @@ use crate::calib::bundle::failures::Failure;
 use crate::calib::bundle::model::STEP_STD_RAD;
 use crate::calib::bundle::model_selection::log_evidence_of_all;
 use crate::calib::bundle::problem::past_derivative;
-use crate::calib::bundle::step_test::{OffsetPrior, StepCandidate};
+use crate::calib::bundle::step_test::{MIN_SIDE, OffsetPrior, StepCandidate};
 use crate::calib::parameters::{Parameter, ParameterKind};
 use crate::calib::views::view::View;
 use armcal_core::joints::MAX_JOINTS;
@@ -23,6 +23,9 @@ const WORTH_A_FIT: f64 = 16.0;
 /// Good arms have 18 at most in 200 (measured), and chi-square's quantile at 1e-4 over some hundred joints and change
 /// points is 24.
 const MIN_LIKELIHOOD_RATIO: f64 = 24.0;
+/// Probability of as large a step in a random order of the views, above which the step may be an effect of the
+/// configurations (`permutation_test`).
+const MAX_P: f64 = 0.01;
 /// Smaller steps are drift, and do no harm, rad.
 const MIN_STEP_RAD: f64 = 0.05 * std::f64::consts::PI / 180.0;
 const MAX_STEPS: usize = 3;
@@ -49,6 +52,9 @@ impl FailureSearch<'_> {
         let Some(step) = candidates.max_by(|a, b| a.likelihood_ratio.total_cmp(&b.likelihood_ratio)) else {
             return known;
         };
+        if self.p_of_step(found, step.joint) > MAX_P {
+            return known;
+        }
         let baseline = Baseline { log_evidence: log_evidence_of_all(found), by_others: found.largest_other_chi2() };
         self.with_step(&known, &step, &baseline, (f64::NEG_INFINITY, MAX_MOVES)).unwrap_or(known)
     }
@@ -86,11 +92,21 @@ impl FailureSearch<'_> {
         is_clear.then(|| self.with_slips(with, &better))
     }
 
-    fn candidates(&self, found: &Estimate<'_>) -> Vec<StepCandidate> {
+    /// Probability of as large a step of that joint's errors in a random order of the views.
+    fn p_of_step(&self, found: &Estimate<'_>, joint: usize) -> f64 {
+        let errors = found.joint_errors(&self.in_time());
+        found.time_order(joint, &errors[joint]).p_of_step(MIN_SIDE)
+    }
+
+    fn in_time(&self) -> Vec<usize> {
         let mut order: Vec<usize> = (0..self.views.len()).collect();
         order.sort_by_key(|&view_idx| (self.views[view_idx].end, view_idx));
+        order
+    }
+
+    fn candidates(&self, found: &Estimate<'_>) -> Vec<StepCandidate> {
         let offsets = if self.prior.is_some() { OffsetPrior::Calibrated } else { OffsetPrior::Datasheet };
-        found.likeliest_steps(&order, offsets)
+        found.likeliest_steps(&self.in_time(), offsets)
     }
 
     fn slip(&self, step: &StepCandidate) -> Failure {

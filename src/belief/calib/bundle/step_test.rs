@@ -39,7 +39,7 @@ pub(crate) enum OffsetPrior {
 }
 
 /// Views on each side of a change point: one or two are a jump, not a step.
-const MIN_SIDE: usize = 3;
+pub(crate) const MIN_SIDE: usize = 3;
 /// Views that tell less of a joint's error than this share of its variance are on no side.
 const LEAST_TOLD: f64 = 0.01;
 /// More of a joint's errors than this share is no longer told apart from all of them.
@@ -56,7 +56,7 @@ pub(crate) struct JointError {
     /// Derivative by the common parameters.
     pub by_common: DVector<f64>,
     /// Share of the prior's variance that the view takes away.
-    told: f64,
+    pub told: f64,
 }
 
 impl Estimate<'_> {

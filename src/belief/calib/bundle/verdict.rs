@@ -10,7 +10,7 @@ use crate::calib::bundle::model::Hyperparameters;
 use crate::calib::bundle::model_selection::CAMERA_ERROR_STD;
 use crate::calib::bundle::observability::{Observability, observability};
 use crate::calib::bundle::score_test::{GeometryElement, ScoreTestResult};
-use crate::calib::covariance::task_angles;
+use crate::calib::covariance::numbered_task_angles;
 use crate::calib::finding::{Finding, FindingKind, FindingUnit};
 use crate::calib::geometry_error::{BASE, ErrorKind, GeometryError};
 use crate::calib::parameters::{Parameter, ParameterKind};
@@ -51,9 +51,8 @@ const NOISY: f64 = 2.0;
 /// Corners averaged over a view may be off by so many times what robot.toml says of one frame: averages are better than
 /// one frame, and what lenses and printed tags lack stays below it.
 const MAX_OVER_CORNER_NOISE: f64 = 3.0;
-/// Gains and offsets farther from the datasheet than this are no calibration any more; the paper's methods stop there,
-/// too.
-const MAX_SIGMAS_OFF: f64 = 6.0;
+/// Gains and offsets farther from the datasheet than this are no calibration any more.
+const MAX_SIGMAS_OFF: f64 = 5.0;
 /// Sensors that move the tool by more than this many times its predicted error claim more than chance.
 const MAX_UNCONFIRMED: f64 = 3.0;
 /// Share of the tag observations that may be outliers.
@@ -67,6 +66,8 @@ const FAR_BEYOND: f64 = 4.0;
 const UNSEEN_LINKS: &str = "links distal to the camera: errors are unobservable without a gripper tag";
 /// An offset that walks by more than so many times a sensor's usual error from view to view is named.
 const WALKED: f64 = 1.0;
+/// Probability of a joint's errors in a random order of the views below which its walk is named.
+const WALK_SIGNIFICANCE: f64 = 0.01;
 /// Standard deviation over the prior's above which the prior holds a parameter.
 const HELD: f64 = 0.7;
 
@@ -74,7 +75,8 @@ impl VerdictInput<'_> {
     /// Writes tables and findings into `calibration`, and refuses it where something does not hold.
     pub(crate) fn judge(&self, calibration: &mut Calibration) {
         let robot = self.input.robot;
-        let targets = self.task.map(|task| task_angles(robot, task)).unwrap_or_default();
+        let numbered = self.task.map(|task| numbered_task_angles(robot, task)).unwrap_or_default();
+        let targets: Vec<JointAngles> = numbered.iter().map(|(_, angles)| *angles).collect();
         // Without a task the views' own configurations stand for it.
         let configurations = if targets.is_empty() { self.found.view_angles() } else { targets.clone() };
         let mut table = VerdictTable { warnings: Vec::new(), not_covered: Vec::new(), checks: Vec::new() };
@@ -91,7 +93,7 @@ impl VerdictInput<'_> {
         ];
         self.whiteness(&mut table);
         table.warnings.extend(self.scales_at_bounds());
-        table.not_covered = not_covered(calibration, &targets);
+        table.not_covered = not_covered(calibration, &numbered);
         if self.has_unseen_links() {
             table.warnings.push(Warning::new(Code::LinksUnobservable, UNSEEN_LINKS));
         }
@@ -112,9 +114,15 @@ impl VerdictInput<'_> {
             _ => None,
         })?;
         let (robot, walks) = (self.input.robot, self.found.scales().walk_std_rad);
-        let most = (0..robot.n_seen_joints()).max_by(|a, b| walks[*a].total_cmp(&walks[*b]))?;
+        let walking = (0..robot.n_seen_joints()).filter(|&joint| self.walks_surely(joint));
+        let most = walking.max_by(|a, b| walks[*a].total_cmp(&walks[*b]))?;
         let (joint, moves) = (robot.sensors[most].joint.clone(), robot.sensors[most].moves);
         Some(Refusal::OffsetsWalk { joint, walked_rad: walks[most], moves, u95_m, tolerance_m })
+    }
+
+    /// Returns true where the views in a random order would not show this joint's walk.
+    fn walks_surely(&self, joint: usize) -> bool {
+        self.found.model.walk.is_some_and(|walk| walk.p_value[joint] < WALK_SIGNIFICANCE)
     }
 
     /// Whether other links would explain the data better.
@@ -241,7 +249,7 @@ impl VerdictInput<'_> {
                 let (joint, datasheet_std_rad) = (spec.joint.clone(), spec.linearity_std_rad);
                 calibration.findings.push(worn(spec, std_rad));
                 refusal = Some(Refusal::SensorError { joint, std_rad, datasheet_std_rad, moves: spec.moves });
-            } else if walked_rad > WALKED * stated.joint_std_rad[joint] {
+            } else if self.walks_surely(joint) && walked_rad > WALKED * stated.joint_std_rad[joint] {
                 let kind = FindingKind::OffsetWalks;
                 calibration.findings.push(Finding { kind, repaired: true, ..worn(spec, walked_rad) });
                 table.warnings.push(Warning::new(

@@ -9,18 +9,20 @@
 //! T = sum_k l_k (phi_k^T z)^2,   A = phi^T I phi,   mean sum_k l_k A_kk,   variance 2 sum_kl l_k l_l A_kl^2
 //! ```
 //!
-//! Then the evidence decides. What the offsets do afterwards no view tells: as much again as during the views is added
+//! Then the evidence and a permutation test decide: a walk is no walk where the views in another order have as much of
+//! it (`permutation_test`). What the offsets do afterwards no view tells: as much again as during the views is added
 //! to each joint's error.
 
 use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::input::BundleInput;
+use crate::calib::bundle::model::Walk;
 use crate::calib::bundle::model_selection::{OptionalTerm, Selection, evidence_gain_nats};
 use crate::calib::bundle::walk_modes::{N_WALK_MODES, mode, mode_std};
 use crate::calib::parameters::ParameterKind;
 use crate::calib::views::view::View;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::time::Stamp;
-use nalgebra::{DVector, SMatrix, SVector};
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 /// Fewer views do not tell a walk from anything else.
 const MIN_VIEWS: usize = 8;
@@ -34,6 +36,9 @@ const SCORE_WORTH_A_FIT: f64 = 3.0;
 /// A walk that is missed is an error beyond its bound, one too many a bound that is too wide. Good arms lose two nats
 /// or more by it (60 of 60); of 40 arms that walk by 0.29 deg in 14 views 34 gain some.
 const MIN_WALK_NATS: f64 = 0.0;
+/// Probability of the likeliest joint's errors in a random order of the views, times the number of joints: above it they
+/// may follow the configurations.
+const MAX_WALK_P: f64 = 0.05;
 
 /// When the first and the last of `views` end; `None` for views that all end together.
 pub(crate) fn span(views: &[View]) -> Option<[Stamp; 2]> {
@@ -63,7 +68,8 @@ impl<'a> Estimate<'a> {
         if self.scales().camera_error_std.is_some() {
             wider.scales.camera_error_std = self.scales().camera_error_std;
         }
-        wider.model.walk = Some(span);
+        let p_value = self.walk_p_values(input.views, span);
+        wider.model.walk = Some(Walk { span, p_value });
         wider.scales.walk_std_rad = self.first_walk_std_rad(input.views);
         for (joint, kinds) in wider.model.joints.iter_mut().enumerate() {
             if !kinds.is_empty() && has_sensor(joint) {
@@ -73,7 +79,8 @@ impl<'a> Estimate<'a> {
         let Some(found) = estimate(&wider) else { return (self, None) };
         let gain_nats = evidence_gain_nats(&found, &self);
         // One that rejects more explains less.
-        let is_in = gain_nats > MIN_WALK_NATS && found.outliers.len() <= self.outliers.len();
+        let least_p = p_value.iter().copied().fold(1.0, f64::min) * self.problem.n_seen_joints as f64;
+        let is_in = gain_nats > MIN_WALK_NATS && found.outliers.len() <= self.outliers.len() && least_p < MAX_WALK_P;
         let selection = Selection { term: OptionalTerm::Walk, is_in, gain_nats };
         (if is_in { found } else { self }, Some(selection))
     }
@@ -85,6 +92,24 @@ impl<'a> Estimate<'a> {
         let warmed_k = oil_c().fold(f64::NEG_INFINITY, f64::max) - oil_c().fold(f64::INFINITY, f64::min);
         let by_warmth_rad = self.scales().offset_std_rad_per_k * warmed_k.max(0.0);
         self.scales().joint_std_rad.map(|std_rad| (2.0 * std_rad).max(by_warmth_rad))
+    }
+
+    /// Probability of as large a walk of each joint's errors in a random order of the views.
+    pub(crate) fn walk_p_values(&self, views: &[View], span: [Stamp; 2]) -> [f64; MAX_JOINTS] {
+        let mut order: Vec<usize> = (0..views.len()).collect();
+        order.sort_by_key(|&view_idx| (views[view_idx].end, view_idx));
+        let weights: Vec<f64> = (0..N_WALK_MODES).map(|k| mode_std(k as u8).powi(2)).collect();
+        let mut p_values = [1.0; MAX_JOINTS];
+        for (joint, errors) in self.joint_errors(&order).iter().enumerate() {
+            if errors.len() < MIN_VIEWS {
+                continue;
+            }
+            let patterns = DMatrix::from_fn(errors.len(), N_WALK_MODES, |row, k| {
+                mode(k as u8, span, views[errors[row].view_idx].end)
+            });
+            p_values[joint] = self.time_order(joint, errors).p_of_patterns(&patterns, &weights);
+        }
+        p_values
     }
 
     fn walks_seem_likely(&self, views: &[View], span: [Stamp; 2]) -> bool {

@@ -91,13 +91,13 @@ fn held_out(
 ) -> HeldOutMetrics {
     let views = &data.data.fit;
     let baseline = Baseline::new(&start.robot, views);
-    let by_baseline = |views: &[View]| baseline.as_ref().and_then(|baseline| baseline.fit(&start.robot, views));
+    let by_baseline =
+        |views: &[View]| baseline.as_ref().map(|baseline| baseline.fit(&start.robot, views)).unwrap_or_default();
     match data.held_out {
         HeldOut::AsMarked => {
             let held_out = &data.data.held_out;
             let problem = PositionProblem::new(&start.robot, held_out);
-            let compare = |robot: Robot| compared(&problem, at, &PositionProblem::new(&robot, held_out));
-            HeldOutMetrics { baseline: by_baseline(views).and_then(compare), ..held_out_metrics(&problem, at) }
+            HeldOutMetrics { baseline: compared(&problem, at, &by_baseline(views)), ..held_out_metrics(&problem, at) }
         }
         HeldOut::CrossValidation => {
             let fit = |views: &[View]| {

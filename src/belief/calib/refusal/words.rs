@@ -26,6 +26,7 @@ impl Refusal {
         match self {
             Self::WrongInput(_)
             | Self::Geometry(_)
+            | Self::RepairTooLarge { .. }
             | Self::SensorError { .. }
             | Self::BeyondDatasheet { .. }
             | Self::Nonlinearity { .. }
@@ -174,6 +175,15 @@ impl Refusal {
         match self {
             Self::WrongInput(wrong) => write!(f, "{wrong}"),
             Self::Geometry(geometry) => write!(f, "{geometry}"),
+            Self::RepairTooLarge { element, size, unit, stated_std, length_m } => {
+                let sigmas = size / stated_std;
+                let [size, std] = [size, stated_std].map(|value| unit.in_words(*value));
+                write!(f, "{element} would be {size} from its nominal pose: {sigmas:.0} stated sigmas of {std}")?;
+                match length_m {
+                    Some(length_m) => write!(f, ", and longer than the link itself ({:.0} mm)", 1e3 * length_m),
+                    None => write!(f, ", a repair may be 10"),
+                }
+            }
             Self::SensorError { joint, std_rad, datasheet_std_rad, moves } => write!(
                 f,
                 "{joint} varies by {} between views; its datasheet linearity is {}: a slipping sensor or wrong link \

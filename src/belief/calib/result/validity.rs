@@ -39,19 +39,19 @@ impl Calibration {
     }
 }
 
-/// Joint by joint, how many of a task's postures go how far beyond what the views covered; nothing where all are within
-/// it.
-pub(crate) fn not_covered(calibration: &Calibration, postures: &[JointAngles]) -> Vec<String> {
+/// Names, joint by joint, the targets whose postures go beyond the angles that the views covered, and by how much.
+pub(crate) fn not_covered(calibration: &Calibration, postures: &[(u32, JointAngles)]) -> Vec<String> {
     let joints = calibration.joint.iter().enumerate().filter(|(_, j)| j.gain_estimated || j.offset_estimated);
     let of_joint = |(joint, result): (usize, &JointResult)| {
         let [low, high] = ordered(result.covered_rad);
-        let beyond = postures.iter().map(|angles| past(angles[joint], [low, high])).filter(|by| *by > MARGIN_RAD);
-        let (n, most) = beyond.fold((0usize, 0.0_f64), |(n, most), by| (n + 1, most.max(by)));
-        let (name, all) = (&result.name, postures.len());
+        let beyond = postures.iter().map(|(index, angles)| (index, past(angles[joint], [low, high])));
+        let beyond: Vec<(&u32, f64)> = beyond.filter(|(_, by)| *by > MARGIN_RAD).collect();
+        let most = beyond.iter().map(|(_, by)| *by).reduce(f64::max)?;
+        let numbers: Vec<String> = beyond.iter().map(|(index, _)| (*index + 1).to_string()).collect();
         let unit = result.moves.unit();
         let [most, low, high] = [unit.shown(most, 0), unit.number(low, 0), unit.shown(high, 0)];
-        let words = || format!("{name}: {n} of {all} targets lie up to {most} beyond {low} .. {high}");
-        (n > 0).then(words)
+        let (name, numbers) = (&result.name, numbers.join(", "));
+        Some(format!("{name}: target {numbers} up to {most} beyond {low} .. {high}"))
     };
     joints.filter_map(of_joint).collect()
 }

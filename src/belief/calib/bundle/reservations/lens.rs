@@ -110,6 +110,7 @@ impl HeldLens {
             touched_std: f64::INFINITY,
             shifts: shifts.iter().map(|of_tool| of_tool[k]).collect(),
             is_counted: true,
+            unstated: None,
         })
     }
 }
