@@ -177,7 +177,7 @@ fn calibration_poses_are_asked_for_where_a_task_would_miss() {
     let online = summary.online.expect("it was followed");
     assert!((1..=3).contains(&online.asked.len()), "{online:?}");
     for asked in &online.asked {
-        let [before_m, after_m] = asked.tool_error_p95_m.expect("of a target");
+        let [before_m, after_m] = asked.u95_m.expect("of a target");
         assert!(before_m > 0.008 && after_m < 0.008 && asked.views == 2, "{asked:?}");
     }
     let work = summary.score.expect("scored").work;
@@ -247,7 +247,7 @@ fn with_a_dead_sensor_the_arm_does_only_what_it_knows() {
     run(&routine, &out).expect("a dead wrist", 0, &["wrist_pitch (dead)"]);
     let summary: RunSummary = serde_json::from_str(&read(&out.join("summary.json"))).expect("a summary");
     let asked = summary.online.expect("it was followed").asked;
-    assert!(asked.iter().any(|asked| asked.tool_error_p95_m.is_none() && asked.views > 10), "looked for: {asked:?}");
+    assert!(asked.iter().any(|asked| asked.u95_m.is_none() && asked.views > 10), "looked for: {asked:?}");
     let (work, skipped) = (summary.score.expect("scored").work, summary.capture.skipped_targets);
     assert!(work.len() >= 3 && work.len() + skipped.len() == 5, "{work:?} {skipped:?}");
     assert!(work.iter().all(|task| task.tool_error_m < 0.03), "{work:?}");

@@ -12,7 +12,7 @@ use crate::cli::calibration_inputs::{Calibrated, CalibrationInputs, load_robot};
 use crate::cli::closing::ClosingArgs;
 use crate::cli::exit::Exit;
 use crate::cli::stdout::{say, warn};
-use crate::output;
+use crate::output::{self, accepted_kept};
 #[cfg(feature = "viewer")]
 use crate::report::markdown;
 use crate::report::{About, Report, RunSummary, html};
@@ -90,7 +90,9 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
     let summary = RunSummary::of_calibration(&calibration, started.elapsed().as_secs_f64()).judged();
     // Before anything is written: what has no compact form shall leave no half of the answer.
     let compact = args.compact.then(|| CompactCalibration::of(&calibration)?.to_text()).transpose()?;
-    let (out, kept) = place_for(&args.out, &calibration)?;
+    let kept = accepted_kept(&args.out, &calibration);
+    let out = kept.as_ref().map_or_else(|| args.out.clone(), |kept| kept.folder.clone());
+    output::make_folder(&out)?;
     write_results(&out, &args.recordings, &robot, (&calibration, &summary))?;
     if let Some((views, robot)) = &external {
         // What is calibrated is in place: a picture that does not come is a warning.
@@ -103,15 +105,8 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
         Some(line) => say(line)?,
         None => args.closing.say(&summary, &next_step(&out, replay.as_deref()))?,
     }
-    if let Some(why) = kept {
-        warn(
-            Code::ResultKept,
-            format_args!(
-                "{}: the accepted calibration stays: the new one is {why}, and is in {}",
-                args.out.display(),
-                out.display()
-            ),
-        );
+    if let Some(kept) = kept {
+        warn(Code::ResultKept, format_args!("{}: {kept}", args.out.display()));
     }
     Ok(match (calibration.status, lost) {
         (Status::Refused, _) => Exit::Refused,
@@ -148,27 +143,6 @@ fn write_results(
     Calibration::read(&calibration_file)?.sensors(robot)?;
     written.iter().for_each(|(path, bytes)| tracing::info!("{}: {} bytes written", path.display(), bytes.len()));
     Ok(())
-}
-
-/// A result is worse than the one in place if its U95 is larger by more than this factor. Assumed: views of another day
-/// change U95 by a few percent.
-const WORSE: f64 = 1.1;
-
-/// Where a result goes, and why it does not replace the accepted one at `out`.
-fn place_for(out: &Path, new: &Calibration) -> Result<(PathBuf, Option<&'static str>)> {
-    let Ok(old) = Calibration::read(&out.join("calibration.toml")) else { return Ok((out.to_owned(), None)) };
-    let is_accepted = old.status == Status::Accepted && old.robot == new.robot;
-    let is_comparable = old.u95.tolerance_m.is_some() == new.u95.tolerance_m.is_some();
-    let u95_m = old.u95.max_m.zip(new.u95.max_m).filter(|_| is_comparable);
-    let is_worse = || u95_m.is_some_and(|(old_m, new_m)| new_m > WORSE * old_m);
-    let (name, why) = match new.status {
-        Status::Refused if is_accepted => ("refused", "refused"),
-        Status::Accepted if is_accepted && is_worse() => ("worse", "less certain (larger U95)"),
-        _ => return Ok((out.to_owned(), None)),
-    };
-    let folder = out.join(name);
-    output::make_folder(&folder)?;
-    Ok((folder, Some(why)))
 }
 
 /// Where the results are, and what to look at.

@@ -93,9 +93,13 @@ pub(super) fn run(args: &RunArgs) -> Result<Exit> {
     if let Some(why) = &finished.replay_failure {
         warn(Code::ReplayMissing, format_args!("no replay was written, all other files are complete: {why}"));
     }
-    let shown = out.display();
+    let written = finished.kept.as_ref().map_or(&out, |kept| &kept.folder);
+    let shown = written.display();
     let next = format!("written      {shown}\nnext         {shown}/report.html; armcal replay {shown}/run.mcap");
     args.closing.say(&finished.summary, &next)?;
+    if let Some(kept) = &finished.kept {
+        warn(Code::ResultKept, format_args!("{}: {kept}", out.display()));
+    }
     Ok(of_summary(&finished.summary))
 }
 

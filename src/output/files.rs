@@ -61,11 +61,11 @@ pub(crate) fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
     PathBuf::from(name)
 }
 
-/// Puts a finished stream in its place.
+/// Puts the finished file `from` in the place `path`.
 #[cfg(feature = "sim")]
-pub(crate) fn complete(path: &Path) -> Result<(), OutputError> {
+pub(crate) fn complete(from: &Path, path: &Path) -> Result<(), OutputError> {
     check_replaceable(path)?;
-    std::fs::rename(partial(path), path).map_err(OutputError::of(path, "cannot be put in place"))
+    std::fs::rename(from, path).map_err(OutputError::of(path, "cannot be put in place"))
 }
 
 /// That nothing is at `path`: a file that is there goes.

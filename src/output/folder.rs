@@ -7,7 +7,7 @@
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
-use crate::output::{FolderLock, OutputError, check_replaceable, complete, partial, remove};
+use crate::output::{FolderLock, OutputError, check_replaceable, complete, make_folder, partial, remove};
 use armcal_core::log::{LogError, for_each_raw, topics};
 
 /// What a run leaves, in the order in which it is put in place.
@@ -88,6 +88,15 @@ impl OutputFolder {
     /// # Errors
     /// When a file cannot be written to disk or renamed.
     pub fn commit(&self) -> Result<(), OutputError> {
+        self.commit_into(&self.folder)
+    }
+
+    /// Puts every result into `folder`, which is made if need be, as [`Self::commit`] does into the run's own.
+    ///
+    /// # Errors
+    /// When a file cannot be written to disk or renamed.
+    pub fn commit_into(&self, folder: &Path) -> Result<(), OutputError> {
+        make_folder(folder)?;
         let has: Vec<bool> = RESULTS.iter().map(|name| self.partial(name).is_file()).collect();
         for (name, _) in RESULTS.iter().zip(&has).filter(|(_, has)| **has) {
             // On disk before it takes a name that promises so.
@@ -96,10 +105,10 @@ impl OutputFolder {
                 .and_then(|file| file.sync_all())
                 .map_err(OutputError::of(&path, "cannot be written to disk"))?;
         }
-        remove(&self.folder.join(SUMMARY))?;
+        remove(&folder.join(SUMMARY))?;
         for (name, has) in RESULTS.iter().zip(&has) {
-            let path = self.folder.join(name);
-            if *has { complete(&path)? } else { remove(&path)? }
+            let path = folder.join(name);
+            if *has { complete(&self.partial(name), &path)? } else { remove(&path)? }
         }
         Ok(())
     }

@@ -1,11 +1,15 @@
 //! Files that replace others only once they are whole, and the folder of a run.
 
+mod accepted;
 mod beside;
 mod files;
 #[cfg(feature = "sim")]
 mod folder;
 mod lock;
 
+#[cfg(feature = "sim")]
+pub use accepted::AcceptedKept;
+pub(crate) use accepted::accepted_kept;
 #[cfg(feature = "viewer")]
 pub(crate) use beside::Beside;
 #[cfg(feature = "sim")]

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use crate::output::{OutputError, OutputFolder};
+use crate::output::{AcceptedKept, OutputError, OutputFolder, accepted_kept};
 #[cfg(feature = "viewer")]
 use crate::report::markdown;
 use crate::report::{
@@ -51,6 +51,8 @@ pub struct Finished {
     pub corner_scatter_px: Option<f64>,
     /// Why there is no replay, though there should be one.
     pub replay_failure: Option<String>,
+    /// Where the results are, if the accepted ones in the run's folder stay.
+    pub kept: Option<AcceptedKept>,
 }
 
 /// Runs the closed loop with `seed` and scores it. The watcher's clock is taken to have started with the command: its
@@ -125,7 +127,10 @@ impl Run<'_> {
         self.finish_recording(recorder).map_err(Failure::at(Stage::Results))?;
         let finished = self.write_results(outcome, progress).map_err(Failure::at(Stage::Results))?;
         if self.keep == Keep::Everything {
-            self.output.commit().map_err(Failure::at(Stage::Results))?;
+            let kept = accepted_kept(self.output.path(), &finished.calibration);
+            let folder = kept.as_ref().map_or(self.output.path(), |kept| kept.folder.as_path());
+            self.output.commit_into(folder).map_err(Failure::at(Stage::Results))?;
+            return Ok(Finished { kept, ..finished });
         }
         Ok(finished)
     }
@@ -224,7 +229,7 @@ impl Run<'_> {
             self.write_texts(&outcome, &summary)?;
         }
         let corner_scatter_px = corner_scatter_px(&recording);
-        Ok(Finished { summary, calibration: outcome.calibration, corner_scatter_px, replay_failure })
+        Ok(Finished { summary, calibration: outcome.calibration, corner_scatter_px, replay_failure, kept: None })
     }
 
     fn summary(&self, outcome: &Outcome, recording: &Recording) -> Result<RunSummary, RunError> {

@@ -59,7 +59,7 @@ impl ScriptRunner<'_, '_> {
             self.ask_for_poses(settings.poses, &posture)?;
         }
         let tolerance_m = self.setup.routine.task.tolerance_m;
-        Ok(match self.tool_error_p95_m(&posture).filter(|error_m| *error_m > tolerance_m) {
+        Ok(match self.u95_m(&posture).filter(|error_m| *error_m > tolerance_m) {
             Some(error_m) => Err(format!(
                 "the tool may be off by up to {:.1} mm (95 %), {:.1} are allowed",
                 1e3 * error_m,
@@ -73,11 +73,11 @@ impl ScriptRunner<'_, '_> {
     /// sensor long ago is looked for again first.
     fn ask_for_poses(&mut self, poses: u32, posture: &JointAngles) -> Result<(), SessionError> {
         let (now, tolerance_m) = (self.driver.now(), self.setup.routine.task.tolerance_m);
-        let mut error_m = self.tool_error_p95_m(posture).unwrap_or(0.0);
+        let mut error_m = self.u95_m(posture).unwrap_or(0.0);
         if error_m > tolerance_m && self.standing.iter().any(|stands| stands.is_old(now)) {
             self.locate()?;
             self.take_up_news()?;
-            error_m = self.tool_error_p95_m(posture).unwrap_or(0.0);
+            error_m = self.u95_m(posture).unwrap_or(0.0);
         }
         if error_m <= tolerance_m {
             return Ok(());
@@ -92,14 +92,14 @@ impl ScriptRunner<'_, '_> {
         let (time_s, views) = self.capture_between(poses)?;
         self.known = None;
         self.take_up_news()?;
-        let after_m = self.tool_error_p95_m(posture).unwrap_or(error_m);
+        let after_m = self.u95_m(posture).unwrap_or(error_m);
         self.note_asked(time_s, views, Some([error_m, after_m]));
         Ok(())
     }
 
-    fn note_asked(&mut self, time_s: f64, views: usize, tool_error_p95_m: Option<[f64; 2]>) {
+    fn note_asked(&mut self, time_s: f64, views: usize, u95_m: Option<[f64; 2]>) {
         let arm_time_s = self.driver.elapsed_s() - time_s;
-        self.asked.push(AskedPoses { time_s, views, arm_time_s, tool_error_p95_m });
+        self.asked.push(AskedPoses { time_s, views, arm_time_s, u95_m });
     }
 
     /// A joint before the tool that was given up and was not found standing still.
@@ -185,8 +185,8 @@ impl ScriptRunner<'_, '_> {
         Ok(())
     }
 
-    fn tool_error_p95_m(&self, at: &JointAngles) -> Option<f64> {
-        self.driver.recorder.online.as_ref()?.tool_error_p95_at_m(at)
+    fn u95_m(&self, at: &JointAngles) -> Option<f64> {
+        self.driver.recorder.online.as_ref()?.u95_at_m(at)
     }
 
     /// A joint whose sensor says nothing any more is given up.

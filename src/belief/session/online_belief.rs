@@ -28,7 +28,7 @@ pub struct AskedPoses {
     /// Time that they took, s.
     pub arm_time_s: f64,
     /// Error of the tool that 5 % exceed at the next target, before and after, m; `None` where a joint was looked for.
-    pub tool_error_p95_m: Option<[f64; 2]>,
+    pub u95_m: Option<[f64; 2]>,
 }
 
 /// What was believed online.
@@ -78,8 +78,8 @@ impl OnlineBelief {
         self.follower.sensors()
     }
 
-    pub(crate) fn tool_error_p95_at_m(&self, angles: &JointAngles) -> Option<f64> {
-        self.follower.tool_error_p95_at_m(angles)
+    pub(crate) fn u95_at_m(&self, angles: &JointAngles) -> Option<f64> {
+        self.follower.u95_at_m(angles)
     }
 
     /// What is left of it at the end.

@@ -1,5 +1,6 @@
 //! A belief that is fed messages, and what it says over time.
 
+use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
 use crate::calib::covariance::{JointAt, ParameterCovariance, task_angles};
@@ -8,6 +9,7 @@ use crate::calib::online::event::OnlineEvent;
 use crate::calib::online::settings::OnlineSettings;
 use crate::calib::online::view_stream::ViewStream;
 use crate::calib::views::view::{TaskRests, View};
+use crate::judge::{ErrorDistribution, MAX_RISK};
 use armcal_core::robot::Robot;
 use armcal_core::sensor::{ArmSensors, Conditions};
 use armcal_core::stats::Summary;
@@ -16,8 +18,6 @@ use armcal_core::time::Stamp;
 
 /// How far ahead the error without any further view is predicted, h.
 const AHEAD_H: f64 = 1.0;
-/// The 95 % quantile of an error's length over its root mean square, alike in all directions: `sqrt(7.815 / 3)`.
-const P95_OVER_RMS: f64 = 1.614;
 
 /// Follows the messages of an arm: push messages, read belief, predicted tool error and events.
 ///
@@ -124,12 +124,17 @@ impl Follower {
         }
     }
 
-    /// Whether the tool is within the task's tolerance at each target, in 95 of 100 cases; `None` without a task or a
-    /// belief.
+    /// Returns true where the decision rule accepts every target of the task; `None` without a task or an estimate.
     #[must_use]
     pub fn is_good_enough(&self) -> Option<bool> {
-        let worst_m = self.tool_error_m(&self.conditions)?.max;
-        self.tolerance_m.map(|tolerance_m| P95_OVER_RMS * worst_m <= tolerance_m)
+        let covariance = self.estimator.covariance(&self.conditions)?;
+        let (sensors, tolerance_m) = (self.sensors(), self.tolerance_m?);
+        let is_accepted = |angles: &JointAngles| {
+            let covariance_m2 = self.tool_covariance_m2(&covariance, &sensors, angles, &self.conditions);
+            ErrorDistribution::new(&covariance_m2, f64::INFINITY)
+                .is_some_and(|error| error.beyond(tolerance_m) <= MAX_RISK)
+        };
+        Some(self.targets.iter().all(is_accepted))
     }
 
     /// A joint whose sensor is left out stands still where it is believed to stand, to one sigma, rad.
@@ -196,29 +201,30 @@ impl Follower {
         self.tool_error_under_m(&self.estimator.covariance(conditions)?, conditions)
     }
 
-    /// Error of the tool at believed `angles`, now, that is exceeded with a probability of 5 %, m.
+    /// U95 of the tool at estimated `angles`, now, m.
     #[must_use]
-    pub fn tool_error_p95_at_m(&self, angles: &JointAngles) -> Option<f64> {
+    pub fn u95_at_m(&self, angles: &JointAngles) -> Option<f64> {
         let covariance = self.estimator.covariance(&self.conditions)?;
-        let sensors = self.sensors();
-        Some(P95_OVER_RMS * self.one_sigma_m(&covariance, &sensors, angles, &self.conditions))
+        let covariance_m2 = self.tool_covariance_m2(&covariance, &self.sensors(), angles, &self.conditions);
+        Some(ErrorDistribution::new(&covariance_m2, f64::INFINITY)?.u95_m())
     }
 
-    fn one_sigma_m(
+    fn tool_covariance_m2(
         &self,
         covariance: &ParameterCovariance,
         sensors: &ArmSensors,
         angles: &JointAngles,
         conditions: &Conditions,
-    ) -> f64 {
+    ) -> Matrix3<f64> {
         // What drifts is in the covariance already.
         let at = Conditions { stamp: sensors.reference.stamp, ..*conditions };
-        covariance.tool_position_under_m2(&self.robot, sensors, angles, &at).trace().max(0.0).sqrt()
+        covariance.tool_position_under_m2(&self.robot, sensors, angles, &at)
     }
 
     fn tool_error_under_m(&self, covariance: &ParameterCovariance, conditions: &Conditions) -> Option<Summary> {
         let sensors = self.sensors();
-        let error_m = |angles| self.one_sigma_m(covariance, &sensors, angles, conditions);
+        let error_m =
+            |angles| self.tool_covariance_m2(covariance, &sensors, angles, conditions).trace().max(0.0).sqrt();
         Summary::of(&self.targets.iter().map(error_m).collect::<Vec<_>>())
     }
 }
