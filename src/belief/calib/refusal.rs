@@ -106,6 +106,16 @@ pub enum Refusal {
         /// Source of the limit.
         source: HeldOutLimitSource,
     },
+    /// Rotations of recorded poses contradict the positions and the joints.
+    RotationNoise {
+        /// Their noise as fitted, one sigma.
+        rotation_rad: f64,
+        /// The largest that is accepted.
+        limit_rad: f64,
+        /// The noise that the input map states.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        stated_rad: Option<f64>,
+    },
     /// A file is not as it is said to be, and the images show it without the arm.
     WrongInput(WrongInput),
     /// Another link geometry explains the data, and joint sensors do not.
@@ -118,8 +128,10 @@ pub enum Refusal {
         size: f64,
         /// Metres or radians.
         unit: FindingUnit,
-        /// One stated sigma.
+        /// One sigma, stated or the default.
         stated_std: f64,
+        /// The largest repair in these sigmas.
+        most_sigmas: f64,
         /// Length of the link, where the departure exceeds it.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         length_m: Option<f64>,
@@ -358,6 +370,9 @@ impl Refusal {
             }
             Self::WrongInput(wrong) => wrong.remedy(),
             Self::Geometry(geometry) => geometry.remedy(),
+            Self::RotationNoise { .. } => {
+                "check rotation form, order and direction in the input map, or use the positions only (tags.use)"
+            }
             Self::RepairTooLarge { .. } => {
                 "check the zeros, order and units of the joint readings; then measure this element and correct its file"
             }
@@ -407,6 +422,7 @@ impl Coded for Refusal {
             Self::WrongInput(wrong) => wrong.code(),
             Self::Geometry(_) => Code::GeometryContradicted,
             Self::RepairTooLarge { .. } => Code::RepairTooLarge,
+            Self::RotationNoise { .. } => Code::RotationNoise,
             Self::SensorError { .. } => Code::SensorError,
             Self::OffsetsWalk { .. } => Code::OffsetsWalk,
             Self::Nonlinearity { .. } => Code::Nonlinearity,

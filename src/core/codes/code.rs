@@ -132,6 +132,7 @@ codes! {
     InputTagSize = "input_tag_size",
     InputTagIds = "input_tag_ids",
     InputTagMap = "input_tag_map",
+    RotationNoise = "rotation_noise",
     RepairTooLarge = "repair_too_large",
     GeometryContradicted = "geometry_contradicted",
     SensorError = "sensor_error",

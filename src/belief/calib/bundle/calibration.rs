@@ -243,7 +243,8 @@ impl<'a> BundleCalibration<'a> {
                 let input = &BundleInput { views: &diagnosis.views, ..estimated.setup.input() };
                 let (found, innovations) = (estimated.by_views(), &diagnosis.innovations[..]);
                 let task = self.data.data.task_rests();
-                VerdictInput { input, found, innovations, task }.judge(&mut calibration);
+                let tag_noise = self.data.data.tag_noise;
+                VerdictInput { input, found, innovations, task, tag_noise }.judge(&mut calibration);
                 if let Some(touched) = &estimated.touches {
                     touched.update.judge(&self.data.robot, &mut calibration);
                 }

@@ -25,6 +25,8 @@ use armcal_core::spatial::log;
 const NAMED_SIGMAS: f64 = 4.0;
 /// A repair may be this many stated sigmas and no longer than the link itself: beyond, something else is wrong.
 const MAX_REPAIR_SIGMAS: f64 = 10.0;
+/// The same in default sigmas, where robot.toml states none: 20 mm and 1.1 deg, the largest that are tried.
+const MAX_UNSTATED_REPAIR_SIGMAS: f64 = 40.0;
 /// Links whose joints meet have no length that could bound a repair, m.
 const LEAST_LENGTH_M: f64 = 0.02;
 
@@ -49,6 +51,8 @@ struct Departure {
     tool_m: Option<f64>,
     /// Of the link, m.
     length_m: Option<f64>,
+    /// Largest repair in `sigmas`.
+    most_sigmas: f64,
 }
 
 impl Estimate<'_> {
@@ -81,6 +85,7 @@ impl Estimate<'_> {
         let tool = self.tool_jacobians(task);
         let links = self.problem.layout.links.clone();
         let priors = [robot.geometry.link_position_std_m, robot.geometry.link_rotation_std_rad];
+        let is_stated = [robot.geometry.stated.link_position, robot.geometry.stated.link_rotation];
         (0..links.len() / 3).map(move |k| {
             let (joint, kind, first) = (k / 2, k % 2, links.start + 3 * k);
             let covariance = self.covariance3(first);
@@ -98,6 +103,7 @@ impl Estimate<'_> {
                 sure_sigmas: sigmas(&covariance, &size),
                 tool_m: Some(self.tool_moved_m(&tool, first, &size)),
                 length_m: (joint > 0).then(|| self.link_length_m(joint)),
+                most_sigmas: if is_stated[kind] { MAX_REPAIR_SIGMAS } else { MAX_UNSTATED_REPAIR_SIGMAS },
                 size,
             }
         })
@@ -142,6 +148,7 @@ impl Estimate<'_> {
                 size,
                 tool_m: None,
                 length_m: None,
+                most_sigmas: MAX_REPAIR_SIGMAS,
             }
         })
     }
@@ -242,12 +249,13 @@ impl Departure {
     fn beyond_bound(&self) -> Option<Refusal> {
         let is_longer = self.unit == FindingUnit::Metre
             && self.length_m.is_some_and(|length_m| self.size.norm() > length_m.max(LEAST_LENGTH_M));
-        (self.sigmas > MAX_REPAIR_SIGMAS || is_longer).then(|| Refusal::RepairTooLarge {
+        (self.sigmas > self.most_sigmas || is_longer).then(|| Refusal::RepairTooLarge {
             element: self.name.clone(),
             size: self.size.norm(),
             unit: self.unit,
             stated_std: self.size.norm() / self.sigmas,
             length_m: self.length_m.filter(|_| is_longer),
+            most_sigmas: self.most_sigmas,
         })
     }
 

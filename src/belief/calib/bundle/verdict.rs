@@ -20,6 +20,7 @@ use crate::calib::result::validity::not_covered;
 use crate::calib::result::verdict_tables::{Check, ObservabilityTable, VerdictTable};
 use crate::calib::views::view::TaskRests;
 use armcal_core::codes::{Code, Warning};
+use armcal_core::input::TagNoise;
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::{JointSensorSpec, Robot};
 use armcal_core::sensor::ConditionChange;
@@ -32,6 +33,8 @@ pub(crate) struct VerdictInput<'a> {
     /// Of each fold.
     pub innovations: &'a [Innovations],
     pub task: Option<TaskRests<'a>>,
+    /// Noise of positions and poses that the input map states.
+    pub tag_noise: Option<TagNoise>,
 }
 
 /// Probability that a good arm fails any one check by chance.
@@ -51,6 +54,9 @@ const NOISY: f64 = 2.0;
 /// Corners averaged over a view may be off by so many times what robot.toml says of one frame: averages are better than
 /// one frame, and what lenses and printed tags lack stays below it.
 const MAX_OVER_CORNER_NOISE: f64 = 3.0;
+/// Noise of rotations, where none is stated, above which they are of another form: boards and tags are read to 0.05 rad
+/// or better. Assumed.
+const MAX_ROTATION_NOISE_RAD: f64 = 0.1;
 /// Gains and offsets farther from the datasheet than this are no calibration any more.
 const MAX_SIGMAS_OFF: f64 = 5.0;
 /// Sensors that move the tool by more than this many times its predicted error claim more than chance.
@@ -87,6 +93,7 @@ impl VerdictInput<'_> {
             self.sensors(calibration, &mut table),
             self.nonlinearity(calibration, &mut table),
             self.corner_noise(&mut table),
+            self.rotation_noise(&mut table),
             self.beyond_datasheet(&mut table),
             self.outliers(calibration, &mut table),
             self.innovations(&mut table),
@@ -330,6 +337,20 @@ impl VerdictInput<'_> {
         let check = Check::at_most("corners averaged over a view: residual, px", noise * mean_px, limit_px);
         let residual_px = check.value;
         let refusal = (!check.holds).then_some(Refusal::CornerNoise { residual_px, stated_px, limit_px });
+        table.checks.push(check);
+        refusal
+    }
+
+    /// Returns the refusal of poses whose rotations contradict their positions: another form or direction fits so.
+    fn rotation_noise(&self, table: &mut VerdictTable) -> Option<Refusal> {
+        if !self.found.has_poses() {
+            return None;
+        }
+        let stated_rad = self.tag_noise.map(|noise| noise.rotation_std_rad);
+        let limit_rad = stated_rad.map_or(MAX_ROTATION_NOISE_RAD, |stated_rad| MAX_SIGMAS_OFF * stated_rad);
+        let rotation_rad = self.found.scales().rotation_std_rad;
+        let check = Check::at_most("noise of rotations, rad", rotation_rad, limit_rad);
+        let refusal = (!check.holds).then_some(Refusal::RotationNoise { rotation_rad, limit_rad, stated_rad });
         table.checks.push(check);
         refusal
     }

@@ -43,6 +43,7 @@ impl Refusal {
             Self::BeyondTolerance { .. }
             | Self::PriorsBeyondTolerance { .. }
             | Self::TargetsNotJudged { .. }
+            | Self::RotationNoise { .. }
             | Self::HeldOutError { .. } => self.fmt_of_decision(f),
             Self::SensorFailed { .. } => self.fmt_of_failed_sensor(f),
             _ => self.fmt_of_data(f),
@@ -108,6 +109,16 @@ impl Refusal {
                     "the tool error cannot be judged at target {}: out of reach or undetermined",
                     numbers.join(", ")
                 )
+            }
+            Self::RotationNoise { rotation_rad, limit_rad, stated_rad } => {
+                let [rotation, limit] = [rotation_rad, limit_rad].map(|rad| rad.to_degrees());
+                write!(f, "rotations of the recorded poses vary by {rotation:.1} deg about the arm's; ")?;
+                match stated_rad {
+                    Some(rad) => {
+                        write!(f, "five times the stated noise of {:.2} deg is {limit:.1} deg", rad.to_degrees())
+                    }
+                    None => write!(f, "without a stated noise the limit is {limit:.1} deg"),
+                }
             }
             Self::HeldOutError { held_out_m, limit_m, source } => {
                 let limit = match source {
@@ -175,13 +186,13 @@ impl Refusal {
         match self {
             Self::WrongInput(wrong) => write!(f, "{wrong}"),
             Self::Geometry(geometry) => write!(f, "{geometry}"),
-            Self::RepairTooLarge { element, size, unit, stated_std, length_m } => {
+            Self::RepairTooLarge { element, size, unit, stated_std, most_sigmas, length_m } => {
                 let sigmas = size / stated_std;
                 let [size, std] = [size, stated_std].map(|value| unit.in_words(*value));
-                write!(f, "{element} would be {size} from its nominal pose: {sigmas:.0} stated sigmas of {std}")?;
+                write!(f, "{element} would be {size} from its nominal pose: {sigmas:.1} sigmas of {std}")?;
                 match length_m {
                     Some(length_m) => write!(f, ", and longer than the link itself ({:.0} mm)", 1e3 * length_m),
-                    None => write!(f, ", a repair may be 10"),
+                    None => write!(f, ", at most {most_sigmas:.0} are repaired"),
                 }
             }
             Self::SensorError { joint, std_rad, datasheet_std_rad, moves } => write!(

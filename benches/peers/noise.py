@@ -1,0 +1,79 @@
+"""Pure noise: random joint readings and random tag positions or poses. How many of them armcal accepts -> a table.
+
+    noise.py ARMCAL [SEEDS] [OUT.csv]
+
+A six-joint arm with three tags, 30, 60 and 200 views, without a task and with one of 20 mm. None may be accepted.
+"""
+
+import csv
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+sys.path.insert(0, str(Path(__file__).parent))
+from misread import SIMULATED, run, write_simulated  # noqa: E402
+from real_arms import prepare  # noqa: E402
+
+VIEWS = (30, 60, 200)
+INPUT = """version = 1
+[table]
+time = { column = "t", unit = "s" }
+[joint_sensors]
+unit = "rad"
+[tags]
+use = "USE"
+[tags.columns]
+direction = "camera_from_tag"
+position = ["x", "y", "z"]
+id = "id"
+"""
+ROTATION = 'rotation = ["qw", "qx", "qy", "qz"]\nrotation_form = "quaternion_wxyz"\n'
+
+
+def write_noise(folder, use, n_views, seed):
+    rng = np.random.default_rng([seed, n_views, use == "pose"])
+    heads = ["t", *[f"j{k + 1}" for k in range(6)], "id", "x", "y", "z", "qw", "qx", "qy", "qz"]
+    with open(folder / "noise.csv", "w", newline="") as file:
+        rows = csv.writer(file)
+        rows.writerow(heads)
+        for view in range(n_views):
+            angles = rng.uniform(-1.5, 1.5, 6)
+            for tag in (1, 2, 3):
+                rows.writerow([20 * view, *angles, tag, *rng.uniform([-0.5, -0.5, 0.3], [0.5, 0.5, 1.5]), *Rotation.random(rng=rng).as_quat()])
+    (folder / "input.toml").write_text(INPUT.replace("USE", use) + (ROTATION if use == "pose" else ""))
+    tags = [f"[[tag]]\nid = {k}\nposition_m = [{1.0 + 0.1 * k}, {0.2 * k - 0.4}, -0.4]\nposition_std_m = {[0.01] * 3}\n"
+            f"quaternion_wxyz = [0.0, 1.0, 0.0, 0.0]\nrotation_std_rad = {[0.03] * 3}\n" for k in (1, 2, 3)]
+    (folder / "tags.toml").write_text("version = 1\nframe = \"l0\"\n" + "".join(tags))
+    (folder / "task.toml").write_text("version = 1\ntolerance_m = 0.02\nposes_rad = [[0.0, 0.6, 0.4, 0.0, 0.5, 0.0], [0.3, 0.3, 0.6, 0.2, 0.3, 0.5]]\n")
+
+
+def main(armcal, seeds="3", out=None):
+    rows, accepted = [], 0
+    with tempfile.TemporaryDirectory() as folder:
+        folder = Path(folder)
+        write_simulated(folder, 1)
+        prepare(armcal, folder, ("", "", *SIMULATED), folder)
+        for n_views in VIEWS:
+            for use in ("position", "pose"):
+                for seed in range(int(seeds)):
+                    write_noise(folder, use, n_views, seed)
+                    for task in ([], ["--task", folder / "task.toml"]):
+                        began = time.monotonic()
+                        code, held_m, said = run(armcal, folder, [folder / "noise.csv", "--robot", folder / "robot", "--input", folder / "input.toml",
+                                                                  "--tag-map", folder / "tags.toml", *task])
+                        accepted += code in (0, 3)
+                        rows.append([n_views, use, seed, "task" if task else "no task", code, held_m, f"{time.monotonic() - began:.1f} s", said])
+                        print("| " + " | ".join(map(str, rows[-1])) + " |", flush=True)
+    print(f"\n{len(rows)} recordings of noise; accepted: {accepted}")
+    if out:
+        with open(out, "w", newline="") as file:
+            csv.writer(file).writerows(rows)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
