@@ -377,7 +377,9 @@ fn all_that_robot_toml_lacks_is_named_at_once() {
 fn bare_titan(folder: &Path) -> PathBuf {
     let robot = robot_copy(folder);
     let text = read(&robot.join("robot.toml"));
-    let text = &text[..text.find("\n# base_from_tag").expect("the tags")];
+    let (tags, geometry) = (text.find("\n# base_from_tag"), text.find("\n[geometry]"));
+    let (tags, geometry) = (&text[..tags.expect("the tags")], &text[geometry.expect("the sigmas")..]);
+    let text = format!("{tags}{geometry}");
     let dropped = [
         "model",
         "resolution_px",

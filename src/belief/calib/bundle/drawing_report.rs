@@ -20,8 +20,8 @@ use armcal_core::joints::JointAngles;
 use armcal_core::robot::Robot;
 use armcal_core::spatial::log;
 
-/// Sigmas, of the stated size and of the estimate alike, from which an element is named: three axes together exceed 4 as
-/// seldom (0.1 %) as one axis 3.3.
+/// Sigmas, of the stated size and of the estimate alike, from which an element is named: three axes together exceed
+/// four as seldom (0.1 %) as one axis 3.3.
 const NAMED_SIGMAS: f64 = 4.0;
 /// A repair may be this many stated sigmas and no longer than the link itself: beyond, something else is wrong.
 const MAX_REPAIR_SIGMAS: f64 = 10.0;

@@ -3,8 +3,8 @@
 //! Series are often captured in an order that goes through the configurations, so that every effect of the
 //! configuration that the model lacks looks like one of time. The errors y are regressed on smooth functions X of the
 //! angles; a statistic of the residual's order in time is compared with that of its permutations, each regressed
-//! again (Freedman and Lane 1983). Residuals are scaled to one
-//! variance by their leverages, statistics by the sum of squares. Where nothing depends on time, the p-value is uniform.
+//! again (Freedman and Lane 1983). Residuals are scaled to one variance by their leverages, statistics by the sum of
+//! squares. Where nothing depends on time, the p-value is uniform.
 
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::step_test::JointError;

@@ -36,8 +36,8 @@ const SCORE_WORTH_A_FIT: f64 = 3.0;
 /// A walk that is missed is an error beyond its bound, one too many a bound that is too wide. Good arms lose two nats
 /// or more by it (60 of 60); of 40 arms that walk by 0.29 deg in 14 views 34 gain some.
 const MIN_WALK_NATS: f64 = 0.0;
-/// Probability of the likeliest joint's errors in a random order of the views, times the number of joints: above it they
-/// may follow the configurations.
+/// Probability of the likeliest joint's errors in a random order of the views, times the number of joints: above it
+/// they may follow the configurations.
 const MAX_WALK_P: f64 = 0.05;
 
 /// When the first and the last of `views` end; `None` for views that all end together.
