@@ -7,9 +7,9 @@
 block. Finished blocks are skipped, a block that was broken off continues, and no block begins after --seconds. The program's hash is
 kept in FOLDER, and another program is refused. Run it from the root of the repository; it needs Python 3.11 and nothing else.
 
-`table` prints one line a stratum and case. The share beyond U95 should be 5 %. Its interval is the 99 % percentile bootstrap over runs,
-because targets of one run share one calibration. PIT: predicted probability of a smaller error than the true one, over the targets,
-in ten bins; each holds 10 % where the predicted distribution is right.
+`table` prints one line a stratum and case. The share beyond U95 should be 5 %. Its interval is the 99 % percentile bootstrap over
+runs, because targets of one run share one calibration; it is empty where no run has a target beyond. PIT: predicted probability of
+a smaller error than the true one, over the targets, in ten bins; each holds 10 % where the predicted distribution is right.
 """
 
 import argparse
@@ -177,7 +177,7 @@ def main():
     of_run.add_argument("--seconds", type=float)
     of_run.add_argument("--size", type=int, default=50, help="seeds a block")
     of_run.add_argument("--blocks", type=int, help="blocks of each stratum; as in strata.txt if absent")
-    of_run.add_argument("--first", type=int, help="first seed; as in strata.txt if absent")
+    of_run.add_argument("--first", type=int, help="first seed of every stratum, which then share draws; as in strata.txt if absent")
     of_run.add_argument("--strata", help="names, separated by commas; all if absent")
     of_run.add_argument("--threads", type=int, default=1)
     of_run.set_defaults(do=run)
