@@ -121,7 +121,7 @@ fn counts_twice_as_fine_halve_the_gains_and_change_nothing_else() {
 }
 
 /// Everything in a recording that a program could read: messages, types, channels, attachments, metadata, headers.
-fn all_contents(path: &Path) -> Vec<u8> {
+pub fn all_contents(path: &Path) -> Vec<u8> {
     let mut contents = Vec::new();
     for_each_raw(path, |message| {
         contents.extend_from_slice(message.data);
@@ -143,7 +143,7 @@ fn all_contents(path: &Path) -> Vec<u8> {
     contents
 }
 
-fn find(contents: &[u8], needle: &[u8]) -> bool {
+pub fn find(contents: &[u8], needle: &[u8]) -> bool {
     memchr::memmem::find(contents, needle).is_some()
 }
 

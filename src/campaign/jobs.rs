@@ -64,8 +64,9 @@ impl Prepared {
                 joints.push(name);
             }
         }
+        let n_targets = inputs.iter().map(|inputs| inputs.routine.task.targets_m.len()).max().unwrap_or_default();
         let fingerprint = fingerprint(&effective_table(file, &overrides.set)?, &inputs)?;
-        Ok(Self { routine, settings, inputs, columns: Columns::new(joints), fingerprint, request })
+        Ok(Self { routine, settings, inputs, columns: Columns::new(joints, n_targets), fingerprint, request })
     }
 
     /// The run of one seed under one setting.

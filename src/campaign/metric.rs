@@ -101,10 +101,18 @@ metrics! {
     TargetsBeyondU95 = "targets_beyond_u95", Count, MoreIsWorse, |f| {
         Some(errors_over_u95(f).into_iter().filter(|ratio| *ratio > 1.0).count() as f64)
     };
+    TargetsBeyond3U95 = "targets_beyond_3_u95", Count, MoreIsWorse, |f| {
+        Some(errors_over_u95(f).into_iter().filter(|ratio| *ratio > 3.0).count() as f64)
+    };
     WorstOverU95 = "worst_error_over_u95", None, MoreIsWorse, |f| errors_over_u95(f).into_iter().reduce(f64::max);
     Findings = "findings", Count, MoreIsWorse, |f| Some(f.summary.calibration.findings.len() as f64);
     Reservations = "reservations", Count, MoreIsWorse, |f| Some(f.summary.calibration.reservations.len() as f64);
     Nees = "nees", None, MoreIsWorse, |f| f.summary.score.as_ref()?.nees;
+    NeesWithPriors = "nees_with_priors", None, MoreIsWorse, |f| {
+        let targets = &f.summary.score.as_ref()?.targets;
+        let each: Vec<f64> = targets.iter().filter_map(|target| target.nees_with_priors).collect();
+        (!each.is_empty()).then(|| each.iter().sum::<f64>() / each.len() as f64)
+    };
 }
 
 /// True tool error after calibration over U95, at each target that has both.

@@ -61,6 +61,12 @@ pub struct TargetScore {
     pub reach_error_before_m: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reach_error_after_m: Option<f64>,
+    /// Predicted probability of an error larger than `tool_error_after_m`: evenly distributed where predictions hold.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub p_larger_error: Option<f64>,
+    /// Normalized squared error under the covariance of U95.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nees_with_priors: Option<f64>,
 }
 
 /// One task of a `work` step.

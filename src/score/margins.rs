@@ -13,10 +13,11 @@ pub(super) fn margins(visits: &[Visit], robot: &Robot, truth: &Truth) -> Option<
     let mut summary =
         MarginSummary { links: 0, exceeded_q99: 0, largest_m: 0.0, first_largest_m: None, by_views: Vec::new() };
     let mut by_views: BTreeMap<usize, [usize; 2]> = BTreeMap::new();
+    let arm = truth.header.as_built.arm(robot);
     for visit in visits {
         let Some(state) = truth.state_at(visit.at) else { continue };
         let believed = link_ends(robot, &robot.chain.link_poses(&visit.believed));
-        let there = link_ends(robot, &robot.chain.link_poses(&state.angles));
+        let there = link_ends(&arm, &arm.chain.link_poses(&state.angles));
         let mut largest_m = 0.0_f64;
         for ((believed, there), q99_m) in believed.iter().zip(&there).zip(&visit.link_q99_m) {
             let displacement_m = (believed - there).norm();

@@ -3,9 +3,10 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use crate::score::{JointScore, MarginSummary, ReachScore, Score, ScoreSide, TargetScore, TaskScore, margins, touch};
+use armcal_belief::calib::{Calibration, TargetPrediction};
 use armcal_belief::session::{AssertResult, Epoch, Outcome, ReachStep};
 use armcal_belief::verify::{Belief, ReachRest, reaches};
 use armcal_core::log::Recording;
@@ -65,7 +66,7 @@ pub fn score(input: &ScoreInput<'_>) -> Result<Scored, SimError> {
         after: last.is_some().then(|| figures(last, &after)),
         nees: nees(input, last.map_or(&[], |side| &side.rests)),
         joints: joint_scores(input, &before, &after),
-        targets: target_scores(first, last),
+        targets: target_scores(first, last, predictions(input, last)),
         compared_targets: common.into_iter().collect(),
         reaches,
         work: sides.iter().filter(|side| side.step.is_work).flat_map(|side| task_scores(input, side)).collect(),
@@ -138,20 +139,27 @@ fn common_targets(first: Option<&Side<'_>>, last: Option<&Side<'_>>) -> BTreeSet
 }
 
 /// Every target at which the arm came to rest in the first or the last reach.
-fn target_scores(first: Option<&Side<'_>>, last: Option<&Side<'_>>) -> Vec<TargetScore> {
+fn target_scores(
+    first: Option<&Side<'_>>,
+    last: Option<&Side<'_>>,
+    predictions: &[TargetPrediction],
+) -> Vec<TargetScore> {
     let rest = |side: Option<&Side<'_>>, target: usize| {
         let rests = side.into_iter().flat_map(|side| &side.rests);
-        rests.copied().find(|c| c.rest.target_idx == target).map(|c| (c.tool_error_m.norm(), c.reach_error_m))
+        rests.copied().find(|c| c.rest.target_idx == target).map(|c| (c.tool_error_m, c.reach_error_m))
     };
     let targets = first.into_iter().chain(last).flat_map(Side::targets).collect::<BTreeSet<usize>>();
     let score = |target: usize| {
         let (before, after) = (rest(first, target), rest(last, target));
+        let predicted = predictions.iter().find(|predicted| predicted.target_idx == target).zip(after);
         TargetScore {
             target,
-            tool_error_before_m: before.map(|(tool_m, _)| tool_m),
-            tool_error_after_m: after.map(|(tool_m, _)| tool_m),
+            tool_error_before_m: before.map(|(tool_m, _)| tool_m.norm()),
+            tool_error_after_m: after.map(|(tool_m, _)| tool_m.norm()),
             reach_error_before_m: before.map(|(_, reach_m)| reach_m),
             reach_error_after_m: after.map(|(_, reach_m)| reach_m),
+            p_larger_error: predicted.and_then(|(at, (tool_m, _))| Some(at.distribution?.beyond(tool_m.norm()))),
+            nees_with_priors: predicted.and_then(|(at, (tool_m, _))| normalized_square(&tool_m, &at.with_priors_m2?)),
         }
     };
     targets.into_iter().map(score).collect()
@@ -233,11 +241,28 @@ fn joint_scores(input: &ScoreInput<'_>, before: &[&Compared<'_>], after: &[&Comp
     input.outcome.calibration.joint.iter().enumerate().map(joint_score).collect()
 }
 
-/// Mean of `e^T P^-1 e` over the targets; `None` when the prediction has no inverse.
-fn nees(input: &ScoreInput<'_>, after: &[&Compared<'_>]) -> Option<f64> {
+/// The calibration that the arm believed in at these rests.
+fn calibration_at<'a>(input: &ScoreInput<'a>, after: &[&Compared<'_>]) -> Option<&'a Calibration> {
     let first = after.first()?;
     let epoch = input.outcome.epochs.iter().rev().find(|epoch| epoch.from <= first.rest.start)?;
-    let calibration = epoch.calibration.as_ref()?;
+    epoch.calibration.as_ref()
+}
+
+/// Errors that the calibration of the last reach predicts at the task's targets.
+fn predictions<'a>(input: &ScoreInput<'a>, last: Option<&Side<'_>>) -> &'a [TargetPrediction] {
+    let calibration = last.and_then(|side| calibration_at(input, &side.rests));
+    calibration.map_or(&[], |calibration| &calibration.details.targets)
+}
+
+/// `e^T P^-1 e`; `None` where `P` has no inverse.
+fn normalized_square(error_m: &Vector3<f64>, covariance_m2: &Matrix3<f64>) -> Option<f64> {
+    let inverse = covariance_m2.try_inverse().filter(|p| p.iter().all(|v| v.is_finite()))?;
+    Some(error_m.dot(&(inverse * error_m)))
+}
+
+/// Mean of `e^T P^-1 e` over the targets; `None` when the prediction has no inverse.
+fn nees(input: &ScoreInput<'_>, after: &[&Compared<'_>]) -> Option<f64> {
+    let calibration = calibration_at(input, after)?;
     let robot = calibration.scaled_robot(input.robot);
     let covariance = calibration.parameter_covariance(&robot);
     let sensors = calibration.sensors(&robot).ok()?;
@@ -245,8 +270,7 @@ fn nees(input: &ScoreInput<'_>, after: &[&Compared<'_>]) -> Option<f64> {
     for compared in after {
         let rest = compared.rest;
         let predicted = covariance.tool_position_under_m2(&robot, &sensors, &rest.believed, &rest.conditions);
-        let inverse = predicted.try_inverse().filter(|p| p.iter().all(|v| v.is_finite()))?;
-        sum += compared.tool_error_m.dot(&(inverse * compared.tool_error_m));
+        sum += normalized_square(&compared.tool_error_m, &predicted)?;
     }
     Some(sum / after.len() as f64)
 }

@@ -33,14 +33,14 @@ mod vehicle;
 mod world;
 
 pub use as_built::{
-    AsBuilt, AttitudeAsBuilt, GaugesAsBuilt, Harmonic, JointAsBuilt, LensAsBuilt, PlainPose, ResolverAsBuilt,
-    TagAsBuilt, WornSpot,
+    AsBuilt, AttitudeAsBuilt, GaugesAsBuilt, GeometryAsBuilt, Harmonic, JointAsBuilt, LensAsBuilt, PlaceError,
+    PlainPose, ResolverAsBuilt, TagAsBuilt, WornSpot,
 };
 pub use error::SimError;
 pub use fault::{Fault, ScheduledFault};
 pub use recorded_motion::{RecordedMotion, VehicleKinematics};
 pub use spec::{
-    CameraMode, CameraWorldSpec, ClockSpec, EngineKind, Figure, GroundSpec, HydraulicsSpec, ImageSpec,
+    CameraMode, CameraWorldSpec, ClockSpec, EngineKind, Figure, GeometrySpec, GroundSpec, HydraulicsSpec, ImageSpec,
     JointSensorsSpec, MotionKind, PhysicsSpec, Points, PortKind, StructureSpec, TagsSpec, TemperatureSpec,
     UnmodelledObstacles, VehicleMotionSpec, WaterKind, WaterSpec, WorldSpec,
 };

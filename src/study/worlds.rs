@@ -15,7 +15,7 @@ const MOST: f64 = 0.06;
 const ANYWHERE: f64 = 0.3;
 
 /// Keys with several values, or of tables that are not numbers throughout, with what is allowed.
-const CHOICES: [(&str, &[&str]); 9] = [
+const CHOICES: [(&str, &[&str]); 10] = [
     ("world.physics.engine", &["\"rapier\"", "\"featherstone\""]),
     ("world.vehicle.motion", &["\"swell\"", "\"free\"", "\"parked\""]),
     ("world.physics.step_s", &["0.001", "0.002", "0.0025"]),
@@ -25,6 +25,8 @@ const CHOICES: [(&str, &[&str]); 9] = [
     ("world.structure.payload_kg", &["5.0", "60.0", "10000.0"]),
     ("world.structure.mount_compliance_rad_per_nm", &["[1e-5, 1e-5, 1e-5]", "[1e-2, 1e-2, 1e-2]"]),
     ("capture.margins", &["\"belief\""]),
+    // Among these, so that it does not shift what is drawn for the other keys.
+    ("world.geometry.error_ratio", &["1.0", "3.0"]),
 ];
 
 /// One world: what to set beside the routine.

@@ -321,6 +321,8 @@ pub fn predict_tool_error(
             covariance_m2,
             error_m: covariance_m2.trace().max(0.0).sqrt(),
             with_priors_m: None,
+            with_priors_m2: None,
+            distribution: None,
         }
     };
     let targets: Vec<TargetPrediction> = numbered_task_angles(robot, task?).into_iter().map(predict).collect();

@@ -65,10 +65,15 @@ pub(crate) struct TargetError {
 }
 
 impl TargetError {
+    /// Total covariance, m^2.
+    pub(crate) fn total_m2(&self) -> Matrix3<f64> {
+        self.by_data_m2 + self.by_priors_m2
+    }
+
     /// Total covariance with its effective degrees of freedom (Welch-Satterthwaite, GUM G.4): the data's share has
     /// `dof_of_noise`, stated sigmas have infinitely many.
-    fn distribution(&self, dof_of_noise: f64) -> Option<ErrorDistribution> {
-        let total_m2 = self.by_data_m2 + self.by_priors_m2;
+    pub(crate) fn distribution(&self, dof_of_noise: f64) -> Option<ErrorDistribution> {
+        let total_m2 = self.total_m2();
         let share = self.by_data_m2.trace() / total_m2.trace();
         let dof = if share > 0.0 { dof_of_noise / (share * share) } else { f64::INFINITY };
         ErrorDistribution::new(&total_m2, dof)

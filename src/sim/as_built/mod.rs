@@ -10,6 +10,7 @@ mod dome_port;
 mod draw_joint;
 mod encoder;
 mod gauges;
+mod geometry;
 mod joint;
 mod lens;
 mod normal;
@@ -21,6 +22,7 @@ mod values;
 
 pub use attitude::AttitudeAsBuilt;
 pub use gauges::GaugesAsBuilt;
+pub use geometry::{GeometryAsBuilt, PlaceError};
 pub use joint::{Harmonic, JointAsBuilt, ResolverAsBuilt, WornSpot};
 pub use lens::LensAsBuilt;
 pub use pose::PlainPose;

@@ -1,5 +1,6 @@
 //! Tag poses as built: the survey's poses with random errors.
 
+use nalgebra::Isometry3;
 use serde::{Deserialize, Serialize};
 
 use crate::as_built::pose::{PlainPose, normal_twist};
@@ -24,6 +25,12 @@ impl TagAsBuilt {
     #[must_use]
     pub fn base_from_tag(&self) -> Pose<Base, Tag> {
         self.pose.to_pose()
+    }
+
+    /// Moves it in the survey's frame.
+    pub(super) fn move_by(&mut self, motion: &Isometry3<f64>) {
+        let moved = motion * self.base_from_tag().isometry();
+        self.pose = PlainPose::of(&Pose::<Base, Tag>::from_isometry(moved));
     }
 
     /// Where it is on the link that carries the tags, or on the base.

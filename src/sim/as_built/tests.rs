@@ -6,7 +6,7 @@ use crate::as_built::*;
 use crate::spec::WorldSpec;
 use armcal_core::robot::{Robot, SensorKind, load, load_vehicle};
 
-fn robot() -> Robot {
+pub(super) fn robot() -> Robot {
     let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots");
     let vehicle = load_vehicle(&root.join("vehicles/work-class-front.toml")).expect("it reads");
     load(&root.join("titan4")).expect("it reads").mounted_on(&vehicle).expect("it fits")
@@ -30,7 +30,7 @@ pub(super) fn assert_normal(what: &str, samples: &[f64], std: f64) {
 fn the_standard_world_writes_down_what_it_always_did() {
     let built = AsBuilt::draw(&robot(), &WorldSpec::default(), 5);
     let text = toml::to_string(&built).expect("text");
-    for key in ["worn_spot", "pressure", "eccentricity", "resolver", "gauges", "attitude", "lens", "dome"] {
+    for key in ["worn_spot", "pressure", "eccentricity", "resolver", "gauges", "attitude", "lens", "dome", "geometry"] {
         assert!(!text.contains(key), "{key} in {text}");
     }
     assert_eq!(toml::from_str::<AsBuilt>(&text).expect("it reads"), built);

@@ -7,6 +7,7 @@ use crate::as_built::camera_mount::draw_camera_mount;
 use crate::as_built::dome_port::draw_dome_center;
 use crate::as_built::draw_joint::draw_joint;
 use crate::as_built::gauges::GaugesAsBuilt;
+use crate::as_built::geometry::GeometryAsBuilt;
 use crate::as_built::joint::JointAsBuilt;
 use crate::as_built::lens::LensAsBuilt;
 use crate::as_built::pose::PlainPose;
@@ -40,23 +41,38 @@ pub struct AsBuilt {
     /// Of a dome port that is not about the lens's pupil; camera frame.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dome_center_m: Option<[f64; 3]>,
+    /// Errors of the arm's geometry; absent for an arm as in the URDF. The poses of `tags` include the survey's part.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub geometry: Option<GeometryAsBuilt>,
 }
 
 impl AsBuilt {
     /// Draws every value from a stream of its own, so that one more effect does not move the others.
     #[must_use]
     pub fn draw(robot: &Robot, spec: &WorldSpec, seed: u64) -> Self {
+        let geometry = GeometryAsBuilt::draw(robot, &spec.geometry, seed);
+        let mut tags = draw_tags(robot, &spec.tags, seed);
+        if let Some(geometry) = &geometry {
+            geometry.move_survey(robot, &mut tags);
+        }
         let joints = (0..robot.n_joints()).map(|joint| draw_joint(robot, joint, spec, seed)).collect();
         Self {
             joints,
             gripper_tag: draw_gripper_tag(robot, &spec.tags, seed),
             camera_mount: draw_camera_mount(robot, &spec.camera, seed),
-            tags: draw_tags(robot, &spec.tags, seed),
+            tags,
             gauges: GaugesAsBuilt::draw(spec, seed),
             attitude: AttitudeAsBuilt::draw(&spec.vehicle, seed),
             lens: LensAsBuilt::draw(&robot.camera.lens, &spec.camera, seed),
             dome_center_m: draw_dome_center(&spec.camera, seed),
+            geometry,
         }
+    }
+
+    /// The arm itself: the nominal one with its geometry errors.
+    #[must_use]
+    pub fn arm(&self, nominal: &Robot) -> Robot {
+        self.geometry.as_ref().map_or_else(|| nominal.clone(), |geometry| geometry.applied_to(nominal))
     }
 
     /// True pose of the camera on its link.

@@ -4,6 +4,7 @@
 //! Angles are rad, temperatures Celsius.
 
 mod camera;
+mod geometry;
 mod ground;
 mod hydraulics;
 mod image;
@@ -19,6 +20,7 @@ mod water;
 mod world_spec;
 
 pub use camera::{CameraWorldSpec, ClockSpec, CornerNoiseKind, PortKind, TagsSpec};
+pub use geometry::GeometrySpec;
 pub use ground::GroundSpec;
 pub use hydraulics::HydraulicsSpec;
 pub use image::{CameraMode, ImageSpec, WaterKind};

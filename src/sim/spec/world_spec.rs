@@ -12,6 +12,7 @@ use crate::error::SimError;
 use crate::fault::{self, ScheduledFault};
 use crate::recorded_motion::RecordedMotion;
 use crate::spec::camera::{CameraWorldSpec, ClockSpec, PortKind, TagsSpec};
+use crate::spec::geometry::GeometrySpec;
 use crate::spec::ground::GroundSpec;
 use crate::spec::hydraulics::HydraulicsSpec;
 use crate::spec::image::{CameraMode, ImageSpec};
@@ -56,6 +57,9 @@ pub struct WorldSpec {
     /// Soft ground under the vehicle; written out where it is not the standard's.
     #[serde(skip_serializing_if = "GroundSpec::is_default")]
     pub ground: GroundSpec,
+    /// Errors of the arm's geometry; written out where it is not as in the URDF.
+    #[serde(skip_serializing_if = "GeometrySpec::is_default")]
+    pub geometry: GeometrySpec,
     /// By joint: counts per radian over the datasheet's. Negative: they run the other way. The arm's own controller
     /// knows.
     pub gear_ratio: BTreeMap<String, f64>,
@@ -80,7 +84,7 @@ impl WorldSpec {
     /// # Errors
     /// [`SimError::Spec`] naming file, key and the allowed range; NaN is in no range.
     pub fn from_table(table: &toml::Table, file: &Path) -> Result<Self, SimError> {
-        const TABLES: [&str; 15] = [
+        const TABLES: [&str; 16] = [
             "physics",
             "joint_sensors",
             "temperature",
@@ -93,6 +97,7 @@ impl WorldSpec {
             "water",
             "structure",
             "ground",
+            "geometry",
             "gear_ratio",
             "obstacle",
             "fault",
@@ -115,6 +120,7 @@ impl WorldSpec {
             water: reader.read("water")?,
             structure: reader.read("structure")?,
             ground: reader.read("ground")?,
+            geometry: reader.read("geometry")?,
             gear_ratio: reader.parse("gear_ratio")?,
             recorded: None,
             by_datasheet: [false; 2],
@@ -156,6 +162,7 @@ impl WorldSpec {
             VehicleMotionSpec::figures("vehicle"),
             HydraulicsSpec::figures("hydraulics"),
             GroundSpec::figures("ground"),
+            GeometrySpec::figures("geometry"),
         ]
         .concat()
     }

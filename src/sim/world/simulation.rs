@@ -42,6 +42,7 @@ pub(super) enum Outgoing {
 /// it.
 pub struct World {
     pub(super) spec: WorldSpec,
+    /// As built.
     pub(super) robot: Robot,
     pub(super) header: TruthHeader,
     /// Of a vehicle whose motion is prescribed.
@@ -85,10 +86,16 @@ impl World {
     /// [`SimError`] when the robot lacks masses or effort limits, or is stowed inside something.
     pub fn new(mut input: WorldInput) -> Result<Self, SimError> {
         input.spec = input.spec.completed(input.robot);
-        let WorldInput { robot, vehicle, seed, .. } = input;
+        input.robot.require_masses()?;
+        let built = AsBuilt::draw(input.robot, &input.spec, input.seed);
+        let arm = built.arm(input.robot);
+        Self::of_arm(&WorldInput { robot: &arm, ..input }, built)
+    }
+
+    /// A world with this arm as built.
+    fn of_arm(input: &WorldInput, built: AsBuilt) -> Result<Self, SimError> {
+        let WorldInput { robot, vehicle, seed, .. } = *input;
         let spec = input.spec.clone();
-        robot.require_masses()?;
-        let built = AsBuilt::draw(robot, &spec, seed);
         let gear_ratios: Vec<f64> = built.joints.iter().map(|joint| joint.gear_ratio).collect();
         let step_s = CONTROL_PERIOD_S / spec.steps_per_period() as f64;
         let depth_m = spec.water.station_depth_m(0.0);
@@ -97,7 +104,7 @@ impl World {
         let mut sensor_surroundings = SensorSurroundings::new(&spec.joint_sensors);
         let around = sensor_surroundings.follow(oil_state(&spec, &temperatures, 0.0, depth_m), 0.0);
         let shafts = stowed_angles(robot, &mut joint_sensors, &around);
-        let (scene, solids) = &scenery(&input)?;
+        let (scene, solids) = &scenery(input)?;
         let motion = VehicleMotion::new(&spec.vehicle, spec.recorded.as_ref(), vehicle.vehicle_from_base, seed);
         let base = motion.at(0.0);
         let mut hydraulics = Hydraulics::new(&spec.hydraulics, &actuator_inputs(robot)?, step_s);
@@ -105,7 +112,7 @@ impl World {
         let Balance { angles, torques } = structure.settle(&shafts, &base.gravity);
         let mut chain = robot.chain.clone();
         chain.set_first_place(&structure.first_place());
-        let (physics, free) = arm_physics(&input, solids, &base, &chain, angles)?;
+        let (physics, free) = arm_physics(input, solids, &base, &chain, angles)?;
         hydraulics.balance(&shafts, &torques);
         let sea = Sea::new(&spec.water, seed);
         let measured = sample_joint_sensors(&mut joint_sensors, &shafts, &around, 0.0);
@@ -126,7 +133,7 @@ impl World {
             step: 0,
             timeline: Timeline::new(&spec.fault),
             truth: None,
-            header: header(&input, built)?,
+            header: header(input, built)?,
             robot: robot.clone(),
             spec,
             motion,

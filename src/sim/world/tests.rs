@@ -12,6 +12,7 @@ use armcal_core::streams::{Arm, JointAngles, MAX_JOINTS, Message, Sink, Thermome
 use armcal_core::time::{SIMULATION_EPOCH, Stamp};
 
 mod engines;
+mod geometry;
 
 const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
 

@@ -468,20 +468,15 @@ impl<'a> BundleCalibration<'a> {
         };
         let targets: Vec<JointAngles> = by_data.targets.iter().map(|target| target.angles).collect();
         let by_priors = by_priors(&targets, by_data.error_m.median);
-        let both = || by_data.targets.iter().zip(&by_priors.covariances_m2);
-        let errors = both().map(|(at, by_priors_m2)| TargetError {
+        let both = by_data.targets.iter().zip(&by_priors.covariances_m2);
+        let errors = both.map(|(at, by_priors_m2)| TargetError {
             index: at.target_idx,
             by_data_m2: at.covariance_m2,
             by_priors_m2: *by_priors_m2,
         });
         let errors: Vec<TargetError> = errors.collect();
-        let both: Vec<f64> = both().map(|(at, by)| (at.error_m * at.error_m + by.trace()).max(0.0).sqrt()).collect();
-        let with_priors = Summary::of(&both);
-        for (target, with_priors_m) in calibration.details.targets.iter_mut().zip(both) {
-            target.with_priors_m = Some(with_priors_m);
-        }
-        calibration.predicted_tool_error_with_priors_m = with_priors;
         let not_included = by_priors.not_included.clone();
+        calibration.predicted_tool_error_with_priors_m = calibration.details.keep_with_priors(&errors, dof);
         calibration.reservations = by_priors.told();
         let Some(task) = &self.data.data.task else { return };
         let by_data_alone = std::mem::replace(

@@ -5,8 +5,10 @@ use nalgebra::{Matrix3, Point3, Vector2};
 use crate::calib::methods::position_problem::{PositionProblem, TagResidual};
 use crate::calib::parameters::JointParameters;
 use crate::calib::views::view::View;
+use crate::judge::{ErrorDistribution, TargetError};
 use armcal_core::joints::JointAngles;
 use armcal_core::optics::square_corners;
+use armcal_core::stats::Summary;
 use armcal_core::time::Stamp;
 
 /// A fit view by view, and its task target by target.
@@ -72,11 +74,30 @@ pub struct TargetPrediction {
     pub error_m: f64,
     /// The same with what the drawing leaves open, where that was asked for, m.
     pub with_priors_m: Option<f64>,
+    /// Covariance with stated sigmas of the unobservable parameters, where that was asked for, m^2.
+    pub with_priors_m2: Option<Matrix3<f64>>,
+    /// Distribution of the error's size, from which U95 follows.
+    pub distribution: Option<ErrorDistribution>,
 }
 
 impl FitDetails {
     pub(crate) fn of(problem: &PositionProblem<'_>, at: &JointParameters, targets: Vec<TargetPrediction>) -> Self {
         Self { views: ViewResidual::all(problem, at), targets }
+    }
+
+    /// Keeps the errors with stated sigmas included, target by target in the same order; returns their sizes.
+    pub(crate) fn keep_with_priors(&mut self, errors: &[TargetError], dof_of_noise: f64) -> Option<Summary> {
+        let size_m = |error: &TargetError| {
+            let by_data_m = error.by_data_m2.trace().max(0.0).sqrt();
+            (by_data_m * by_data_m + error.by_priors_m2.trace()).max(0.0).sqrt()
+        };
+        let sizes_m: Vec<f64> = errors.iter().map(size_m).collect();
+        for ((target, error), size_m) in self.targets.iter_mut().zip(errors).zip(&sizes_m) {
+            target.with_priors_m = Some(*size_m);
+            target.with_priors_m2 = Some(error.total_m2());
+            target.distribution = error.distribution(dof_of_noise);
+        }
+        Summary::of(&sizes_m)
     }
 }
 
