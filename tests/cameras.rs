@@ -265,12 +265,20 @@ fn the_program_finds_both_mounts_and_hands_them_on() {
 #[test]
 fn a_camera_that_hangs_elsewhere_is_named() {
     let folder = temp();
-    files_of(folder.path(), Isometry3::translation(0.05, 0.0, 0.0));
+    files_of(folder.path(), Isometry3::translation(0.015, 0.0, 0.0));
     let found = calibrate_in(folder.path(), &["--out", "out", "--details"]);
-    found.expect("5 cm", 0, &["ACCEPTED", " 49.", "[49."]);
+    found.expect("1.5 cm", 0, &["ACCEPTED"]);
     let found = read(&folder.path().join("out/calibration.toml"));
     assert!(found.contains(" elbow\""), "{found}");
     assert_eq!(found.matches("[[findings]]").count(), 1, "{found}");
+}
+
+/// Ten of its stated sigmas are 2 cm.
+#[test]
+fn a_camera_that_hangs_farther_off_than_a_repair_may_refuses() {
+    let folder = temp();
+    files_of(folder.path(), Isometry3::translation(0.05, 0.0, 0.0));
+    calibrate_in(folder.path(), &["--out", "out"]).expect("5 cm", 4, &["elbow", "[repair_too_large]"]);
 }
 
 #[test]

@@ -50,6 +50,15 @@ pub(crate) struct LinkStart {
     mount_scale: [f64; 2],
     /// The same of each further camera.
     further_mount_scale: [[f64; 2]; MAX_FURTHER_CAMERAS],
+    /// Gain of these sizes over that of all links at their stated sigmas, nats.
+    beyond_stated_nats: f64,
+}
+
+impl LinkStart {
+    /// Returns true where the stated sigmas do not explain the links' departures.
+    pub(crate) fn is_beyond_stated(&self) -> bool {
+        self.beyond_stated_nats > MIN_GAIN_NATS
+    }
 }
 
 /// What an alternative must bring. Of 60 good arms one reached 5 (docs/theory/verdict.md).
@@ -220,13 +229,16 @@ impl Estimate<'_> {
             }
         }
         let all = (0..n_links).flat_map(|joint| [0, 1].map(|kind| three(6 * joint + 3 * kind, priors[kind]))).flatten();
-        consider(&score, &all.collect::<Vec<_>>(), Loosened::AllLinks);
+        let all: Vec<_> = all.collect();
+        consider(&score, &all, Loosened::AllLinks);
+        let by_stated = gain_nats(&score.score, &score.information, &all, 1.0);
         let (gain, element, multiple) = best;
         let mut start = LinkStart {
             n_links,
             multiples: [[1.0; 2]; MAX_JOINTS],
             mount_scale: [1.0; 2],
             further_mount_scale: [[1.0; 2]; MAX_FURTHER_CAMERAS],
+            beyond_stated_nats: gain - by_stated,
         };
         match element {
             Loosened::Element(GeometryElement::Joint(joint), kind) => start.multiples[joint][kind] = multiple,

@@ -6,7 +6,7 @@
 
 use nalgebra::{DVector, Matrix3, Vector3};
 
-use crate::calib::bundle::drawing::Drawing;
+use crate::calib::bundle::drawing::{Drawing, LinkStart};
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::score_test::ToolJacobian;
 use crate::calib::bundle::tags::identity::TagFault;
@@ -59,8 +59,12 @@ impl Estimate<'_> {
     /// Writes what is not as drawn to `calibration`, the most telling first; `task`: angles at which the tool matters.
     pub(crate) fn report_drawing(&self, drawing: &Drawing, task: &[JointAngles], calibration: &mut Calibration) {
         let all = self.link_departures(task).chain(self.mount_departures()).chain(self.further_mount_departures());
-        let mut found: Vec<Departure> = all.filter(|departure| departure.weight() > NAMED_SIGMAS).collect();
+        let mut found: Vec<Departure> = all.collect();
         found.sort_by(|a, b| b.weight().total_cmp(&a.weight()));
+        let n = found.iter().filter(|departure| departure.weight() > NAMED_SIGMAS).count();
+        // Several links may share what one of them has: the likeliest is named.
+        let is_beyond = drawing.links.as_ref().is_some_and(LinkStart::is_beyond_stated);
+        found.truncate(n.max(usize::from(is_beyond)));
         let mut findings: Vec<Finding> = found.iter().map(Departure::finding).collect();
         let mut warnings: Vec<Warning> =
             found.iter().map(|departure| Warning::new(departure.kind.code(), departure.words())).collect();
