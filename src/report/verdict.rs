@@ -159,7 +159,8 @@ fn repairs_of(findings: &[Finding], failed: &[FailedJointTable], since: &str) ->
 }
 
 /// Findings that a user can act on, in the order in which they are told.
-const REPAIRS: [FindingKind; 9] = [
+const REPAIRS: [FindingKind; 10] = [
+    FindingKind::SensorScale,
     FindingKind::SensorSlip,
     FindingKind::TagMoved,
     FindingKind::TagsMoved,
@@ -178,6 +179,11 @@ fn of_finding(found: &Finding, since: &str) -> Option<Repair> {
             format!("the sensor of {name} slipped{}{since}", by(found)),
             format!("fasten the sensor of {name}"),
             "the result holds for the sensor after the slip",
+        ),
+        FindingKind::SensorScale => (
+            format!("the sensor of {name} has {:.3} times its scale in robot.toml", found.size.unwrap_or(1.0).recip()),
+            format!("correct the scale of {name} in robot.toml"),
+            "the result uses the estimated scale",
         ),
         FindingKind::TagMoved => (
             format!("tag {name} is {} from its surveyed position", size(found)),
@@ -286,7 +292,7 @@ pub(super) fn attention(summary: &RunSummary) -> Vec<String> {
     points.extend(summary.stopped.iter().map(|why| sentence(&format!("the script stopped early: {why}"))));
     points.extend(summary.calibration.prior.as_ref().filter(|prior| !prior.agrees).map(against_prior));
     let not_covered = summary.calibration.verdict.iter().flat_map(|verdict| &verdict.not_covered);
-    points.extend(not_covered.map(|line| sentence(&format!("not covered by any view: {line}"))));
+    points.extend(not_covered.map(|line| sentence(line)));
     let not_included = &summary.calibration.u95.not_included;
     if !not_included.is_empty() {
         let keys = not_included.join(", ");

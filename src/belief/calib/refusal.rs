@@ -162,6 +162,16 @@ pub enum Refusal {
         /// The task's tolerance.
         tolerance_m: f64,
     },
+    /// A joint's readings are in another unit than the input map says.
+    SensorUnit {
+        /// Name of the joint in the URDF.
+        joint: String,
+        /// Angle or way over reading.
+        gain: f64,
+        /// Turns or slides.
+        #[serde(default, skip_serializing_if = "JointKind::is_turning")]
+        moves: JointKind,
+    },
     /// A sensor is farther from a straight line than one of its datasheet can be.
     Nonlinearity {
         /// The joint's name.
@@ -373,6 +383,7 @@ impl Refusal {
             Self::RotationNoise { .. } => {
                 "check rotation form, order and direction in the input map, or use the positions only (tags.use)"
             }
+            Self::SensorUnit { .. } => "convert the readings of this joint to the unit that the input map states",
             Self::RepairTooLarge { .. } => {
                 "check the zeros, order and units of the joint readings; then measure this element and correct its file"
             }
@@ -422,6 +433,7 @@ impl Coded for Refusal {
             Self::WrongInput(wrong) => wrong.code(),
             Self::Geometry(_) => Code::GeometryContradicted,
             Self::RepairTooLarge { .. } => Code::RepairTooLarge,
+            Self::SensorUnit { .. } => Code::SensorUnit,
             Self::RotationNoise { .. } => Code::RotationNoise,
             Self::SensorError { .. } => Code::SensorError,
             Self::OffsetsWalk { .. } => Code::OffsetsWalk,

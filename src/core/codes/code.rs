@@ -133,6 +133,7 @@ codes! {
     InputTagIds = "input_tag_ids",
     InputTagMap = "input_tag_map",
     RotationNoise = "rotation_noise",
+    SensorUnit = "sensor_unit",
     RepairTooLarge = "repair_too_large",
     GeometryContradicted = "geometry_contradicted",
     SensorError = "sensor_error",

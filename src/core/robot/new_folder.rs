@@ -363,7 +363,7 @@ mount_std_rad = 0.1
 ";
 
 const REST: &str = "
-# How well the drawing is known; the defaults.
+# How well links and tool point are known, one sigma per axis. Unstated, U95 does not include them.
 # [geometry]
 # link_position_std_m = 5e-4
 # link_rotation_std_rad = 5e-4

@@ -489,6 +489,7 @@ impl<'a> BundleCalibration<'a> {
         );
         let most = calibration.reservations.first().map(|reservation| reservation.what.clone());
         calibration.refuse_for(refusal_by_priors(&by_data_alone, &calibration.u95, most));
+        calibration.restate_risk();
     }
 
     /// Whether the views agree with the prior, and what that refuses for.

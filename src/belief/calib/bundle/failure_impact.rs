@@ -9,6 +9,7 @@ use crate::calib::parameters::JointParameters;
 use crate::calib::refusal::Refusal;
 use crate::calib::result::failed_joint::FailedJointTable;
 use crate::calib::views::view::{TaskRests, View};
+use armcal_core::kinematics::JointKind;
 use armcal_core::robot::{FailedJoint, FailedKind, Robot};
 use armcal_core::stats::Summary;
 
@@ -213,6 +214,10 @@ impl FailureImpact<'_> {
         if let Some(line) = failure.line.filter(|_| !self.is_calibrated_anew(failure)) {
             return Some(Refusal::SensorLine { joint, slope: line.slope });
         }
+        let gain = self.parameters.gain[failure.joint];
+        if failure.line.is_some() && is_of_another_unit(self.robot.sensors[failure.joint].moves, gain) {
+            return Some(Refusal::SensorUnit { joint, gain, moves: self.robot.sensors[failure.joint].moves });
+        }
         if let Some(views) = failure.n_views_since(self.views)
             && views < MIN_VIEWS_SINCE
         {
@@ -236,4 +241,13 @@ impl FailureImpact<'_> {
             tolerance_m,
         })
     }
+}
+
+/// A gain this close to a ratio of units is that ratio: no sensor of these units differs by so much.
+const UNIT_SHARE: f64 = 0.15;
+
+/// Returns true where the gain is the ratio of degrees and radians, or of millimetres and metres.
+fn is_of_another_unit(moves: JointKind, gain: f64) -> bool {
+    let ratio = if moves.is_slide() { 1e-3 } else { 1f64.to_radians() };
+    [ratio, ratio.recip()].iter().any(|unit| (gain / unit - 1.0).abs() < UNIT_SHARE)
 }

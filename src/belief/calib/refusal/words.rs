@@ -27,6 +27,7 @@ impl Refusal {
             Self::WrongInput(_)
             | Self::Geometry(_)
             | Self::RepairTooLarge { .. }
+            | Self::SensorUnit { .. }
             | Self::SensorError { .. }
             | Self::BeyondDatasheet { .. }
             | Self::Nonlinearity { .. }
@@ -186,6 +187,11 @@ impl Refusal {
         match self {
             Self::WrongInput(wrong) => write!(f, "{wrong}"),
             Self::Geometry(geometry) => write!(f, "{geometry}"),
+            Self::SensorUnit { joint, gain, moves } => {
+                let [small, large] = if moves.is_slide() { ["mm", "m"] } else { ["deg", "rad"] };
+                let [found, stated] = if *gain < 1.0 { [small, large] } else { [large, small] };
+                write!(f, "the readings of {joint} are in {found}, not in {stated}: {:.4} times its motion", 1.0 / gain)
+            }
             Self::RepairTooLarge { element, size, unit, stated_std, most_sigmas, length_m } => {
                 let sigmas = size / stated_std;
                 let [size, std] = [size, stated_std].map(|value| unit.in_words(*value));

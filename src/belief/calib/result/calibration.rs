@@ -148,6 +148,25 @@ impl Calibration {
         self.state_refusals();
     }
 
+    /// Gives the refusals by the decision rule the figures of the final table, which includes stated sigmas.
+    pub(crate) fn restate_risk(&mut self) {
+        let Some((worst, (risk, worst_m))) =
+            self.u95.beyond().and_then(|worst| Some((worst.index + 1, worst.p_beyond_tolerance.zip(worst.u95_m)?)))
+        else {
+            return;
+        };
+        for refusal in &mut self.refusals {
+            match refusal {
+                Refusal::BeyondTolerance { target, probability, u95_m, .. } => {
+                    (*target, *probability, *u95_m) = (worst, risk, worst_m);
+                }
+                Refusal::OffsetsWalk { u95_m, .. } => *u95_m = worst_m,
+                _ => {}
+            }
+        }
+        self.state_refusals();
+    }
+
     fn state_refusals(&mut self) {
         self.refusals.sort_by_key(Refusal::rank);
         self.refusal = in_words(&self.refusals);

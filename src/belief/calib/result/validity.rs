@@ -50,8 +50,10 @@ pub(crate) fn not_covered(calibration: &Calibration, postures: &[(u32, JointAngl
         let numbers: Vec<String> = beyond.iter().map(|(index, _)| (*index + 1).to_string()).collect();
         let unit = result.moves.unit();
         let [most, low, high] = [unit.shown(most, 0), unit.number(low, 0), unit.shown(high, 0)];
-        let (name, numbers) = (&result.name, numbers.join(", "));
-        Some(format!("{name}: target {numbers} up to {most} beyond {low} .. {high}"))
+        let (name, n) = (&result.name, numbers.len());
+        let (targets, lies) = if n == 1 { ("target", "lies") } else { ("targets", "lie up to") };
+        let numbers = numbers.join(", ");
+        Some(format!("{targets} {numbers} {lies} {most} beyond the captured range of {name}, {low} to {high}"))
     };
     joints.filter_map(of_joint).collect()
 }

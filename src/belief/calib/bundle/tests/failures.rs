@@ -12,9 +12,13 @@ use crate::calib::bundle::model::Hyperparameters;
 use crate::calib::bundle::model::model_for;
 use crate::calib::bundle::tests::data::{Noise, Truth, rng, titan, views};
 use crate::calib::bundle::tests::score_test::with_link;
+use crate::calib::calibrate_data;
 use crate::calib::parameters::JointParameters;
-use crate::calib::views::view::View;
+use crate::calib::refusal::Refusal;
+use crate::calib::views::calibration_data::{CalibrationData, HeldOut};
+use crate::calib::views::view::{CaptureData, View};
 use armcal_core::robot::{FailedKind, Robot};
+use armcal_core::routine::Method;
 use armcal_core::spatial::Pose;
 
 const N_VIEWS: usize = 20;
@@ -286,6 +290,29 @@ fn slopes_are_told(seeds: std::ops::Range<u64>) {
                 assert!(!is_suspicious(&found), "seed {seed}, factor {factor}: the rest fits");
             }
         }
+    }
+}
+
+/// One joint in degrees among others in radians, and the other way.
+#[test]
+fn readings_in_another_unit_refuse_and_are_named() {
+    for (seed, factor) in [(60, 1f64.to_degrees()), (61, 1f64.to_radians())] {
+        let joint = (seed % 5) as usize;
+        let mut case = case(seed, None);
+        rescale(&mut case, joint, factor);
+        let data = CalibrationData {
+            name: "synthetic".to_owned(),
+            messages_hash: String::new(),
+            data: CaptureData { n_marks: case.views.len(), fit: case.views, ..CaptureData::default() },
+            gripper_tag_data: None,
+            held_out: HeldOut::CrossValidation,
+            robot: case.robot,
+            identified: Vec::new(),
+        };
+        let found = calibrate_data(data, Method::Bundle, None).expect("a result");
+        let refused = found.refusals.first().expect("refused");
+        let Refusal::SensorUnit { gain, .. } = refused else { panic!("seed {seed}: {refused:?}") };
+        assert!((gain * factor - 1.0).abs() < 0.15, "{gain}");
     }
 }
 
