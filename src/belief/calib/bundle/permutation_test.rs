@@ -128,29 +128,28 @@ fn without(columns: &DMatrix<f64>, y: &DVector<f64>) -> DVector<f64> {
 fn smooth_functions(angles: &[JointAngles], joint: usize) -> DMatrix<f64> {
     let n_joints = angles.first().map_or(0, |at| at.len());
     let order = || std::iter::once(joint).chain((0..n_joints).filter(move |&other| other != joint));
-    let mut functions: Vec<Box<dyn Fn(&JointAngles) -> f64>> = vec![Box::new(|_| 1.0)];
+    let values = |f: &dyn Fn(&JointAngles) -> f64| DVector::from_iterator(angles.len(), angles.iter().map(f));
+    let mut functions = vec![values(&|_| 1.0)];
     for multiple in [1.0, 2.0] {
         for of in order() {
-            functions.push(Box::new(move |at| (multiple * at[of]).sin()));
-            functions.push(Box::new(move |at| (multiple * at[of]).cos()));
+            functions.push(values(&|at| (multiple * at[of]).sin()));
+            functions.push(values(&|at| (multiple * at[of]).cos()));
         }
     }
     for a in order() {
         for b in order().filter(|&b| b > a) {
-            for quarter in 0..4u8 {
-                let (in_a, in_b) = (quarter % 2 == 0, quarter < 2);
-                let one = |angle: f64, is_sine: bool| if is_sine { angle.sin() } else { angle.cos() };
-                functions.push(Box::new(move |at| one(at[a], in_a) * one(at[b], in_b)));
-            }
+            functions.push(values(&|at| at[a].sin() * at[b].sin()));
+            functions.push(values(&|at| at[a].cos() * at[b].sin()));
+            functions.push(values(&|at| at[a].sin() * at[b].cos()));
+            functions.push(values(&|at| at[a].cos() * at[b].cos()));
         }
     }
     let most = (angles.len() / VIEWS_PER_FUNCTION).clamp(1, MAX_FUNCTIONS);
     let mut columns: Vec<DVector<f64>> = Vec::with_capacity(most);
-    for function in functions {
+    for whole in functions {
         if columns.len() == most {
             break;
         }
-        let whole = DVector::from_iterator(angles.len(), angles.iter().map(function));
         let mut left = whole.clone();
         columns.iter().for_each(|column| left.axpy(-column.dot(&whole), column, 1.0));
         if left.norm_squared() > LEAST_NEW * whole.norm_squared() {
