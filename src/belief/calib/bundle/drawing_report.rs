@@ -49,7 +49,7 @@ struct Departure {
     /// Over the drawing's prior.
     sigmas: f64,
     tool_m: Option<f64>,
-    /// Of the link, m.
+    /// Length of the link, m.
     length_m: Option<f64>,
     /// Largest repair in `sigmas`.
     most_sigmas: f64,

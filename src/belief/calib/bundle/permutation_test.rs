@@ -66,14 +66,14 @@ impl TimeOrder {
         DVector::from_fn(self.residual.len(), |row, _| self.residual[row] / left(row).sqrt())
     }
 
-    /// Of the weighted sum of squares of the scores along `patterns`, one row a view.
+    /// Returns the p-value of the weighted squares of the scores along `patterns`, one row a view.
     pub(crate) fn p_of_patterns(&self, patterns: &DMatrix<f64>, weights: &[f64]) -> f64 {
         self.p_value("permutations/patterns", |y| {
             patterns.column_iter().zip(weights).map(|(pattern, weight)| weight * pattern.dot(y).powi(2)).sum()
         })
     }
 
-    /// Of the largest step between two views, with at least `min_side` of them on each side.
+    /// Returns the p-value of the largest step between two views, with at least `min_side` views on each side.
     pub(crate) fn p_of_step(&self, min_side: usize) -> f64 {
         let n = self.residual.len();
         let mut explained = DVector::zeros(self.by_configuration.ncols());
