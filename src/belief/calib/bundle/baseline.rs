@@ -21,9 +21,9 @@ pub(crate) const N_BASELINES: usize = 3;
 /// Mount and map alone, with the sizes of errors that all views tell.
 pub(crate) struct Baseline {
     model: Model,
-    /// With the joints' errors by the evidence.
+    /// Sizes for which the evidence fits the joints' errors.
     scales: Hyperparameters,
-    /// Of plain least squares.
+    /// Sizes for plain least squares.
     plain: Hyperparameters,
 }
 

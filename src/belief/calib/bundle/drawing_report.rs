@@ -25,7 +25,7 @@ use armcal_core::spatial::log;
 const NAMED_SIGMAS: f64 = 4.0;
 /// A repair may be this many stated sigmas and no longer than the link itself: beyond, something else is wrong.
 const MAX_REPAIR_SIGMAS: f64 = 10.0;
-/// The same in default sigmas, where robot.toml states none: 20 mm and 1.1 deg, the largest that are tried.
+/// Largest repair in default sigmas, where robot.toml states none: 20 mm and 1.1 deg, the largest sizes tried.
 const MAX_UNSTATED_REPAIR_SIGMAS: f64 = 40.0;
 /// Links whose joints meet have no length that could bound a repair, m.
 const LEAST_LENGTH_M: f64 = 0.02;

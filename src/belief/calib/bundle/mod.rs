@@ -22,6 +22,7 @@ pub(crate) mod linearize;
 mod marginal;
 pub(crate) mod model;
 mod model_selection;
+mod noise_checks;
 mod observability;
 mod observation_term;
 pub(crate) mod outliers;

@@ -77,7 +77,7 @@ impl TimeOrder {
     pub(crate) fn p_of_step(&self, min_side: usize) -> f64 {
         let n = self.residual.len();
         let mut explained = DVector::zeros(self.by_configuration.ncols());
-        // What the configurations leave of a step before each view.
+        // Square of a step before each view after the regression.
         let left: Vec<f64> = (0..n)
             .map(|at| {
                 let left = at as f64 - explained.norm_squared();

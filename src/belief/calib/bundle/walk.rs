@@ -10,7 +10,7 @@
 //! ```
 //!
 //! Then the evidence and a permutation test decide: a walk is no walk where the views in another order have as much of
-//! it (`permutation_test`). What the offsets do afterwards no view tells: as much again as during the views is added
+//! it (`permutation_test`). No view constrains the offsets afterwards: as much again as during the views is added
 //! to each joint's error.
 
 use crate::calib::bundle::estimate::{Estimate, estimate};
