@@ -17,7 +17,7 @@ const MAX_OVER_CORNER_NOISE: f64 = 3.0;
 const MAX_ROTATION_NOISE_RAD: f64 = 0.1;
 
 impl VerdictInput<'_> {
-    /// Returns the refusal of corners that are farther off than robot.toml says: their fitted noise hides other errors.
+    /// Returns the refusal of corners with a larger error than robot.toml says: their fitted noise hides other errors.
     pub(crate) fn corner_noise(&self, table: &mut VerdictTable) -> Option<Refusal> {
         let stated_px = self.input.robot.camera.corner_std_px;
         let mean_px = self.found.mean_corner_std_px()?;
