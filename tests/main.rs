@@ -25,6 +25,7 @@ mod bags;
 mod board_corners;
 mod bumps;
 mod cameras;
+mod cases;
 mod cli;
 mod closed_loop;
 mod codes;

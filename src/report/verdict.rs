@@ -49,7 +49,7 @@ pub(super) fn verdict(summary: &RunSummary) -> Verdict {
         let mut next: Vec<String> = Vec::new();
         let beside = beside_refusal(summary);
         reasons.extend(beside.iter().map(|repair| sentence(&repair.cause)));
-        let remedies = summary.refusals.iter().map(|refusal| sentence(refusal.remedy()));
+        let remedies = summary.refusals.iter().map(|refusal| sentence(&refusal.remedy()));
         for remedy in remedies.chain(beside.iter().map(|repair| sentence(&repair.remedy))) {
             if !next.contains(&remedy) {
                 next.push(remedy);
@@ -255,7 +255,7 @@ fn of_joint(failed: &FailedJointTable) -> Repair {
     let colon = if evidence.is_empty() { "" } else { ": " };
     let cause = match evidence.strip_prefix("the sensor ").filter(|_| since_pose.is_some()) {
         Some(slipped) => format!("the sensor of {joint} {slipped}"),
-        None if *kind == FailedKind::Locked => format!("{joint} is locked{colon}{evidence}"),
+        None if kind.stands_still() => format!("{joint} {}{colon}{evidence}", kind.predicate()),
         None => format!("the sensor of {joint} {}{colon}{evidence}", kind.predicate()),
     };
     let code = if since_pose.is_some() { Code::SensorSlip } else { Code::SensorFailed };
@@ -268,6 +268,7 @@ pub(super) fn joint_remedy(failed: &FailedJointTable) -> String {
     match (failed.kind, failed.since_pose) {
         (_, Some(_)) => format!("fasten the sensor of {joint}: the result holds since the slip"),
         (FailedKind::Locked, None) => format!("targets that need {joint} are out of reach; free it"),
+        (FailedKind::NotMoved, None) => format!("capture views that move {joint}; it is calibrated at this angle only"),
         (_, None) => format!("check the sensor of {joint}, its shaft and its cable"),
     }
 }

@@ -66,7 +66,8 @@ pub(crate) fn seen_angles(robot: &Robot, view: &View, joints: &[usize], at: &Joi
     best
 }
 
-fn distance_cost(robot: &Robot, view: &View, angles: &JointAngles) -> f64 {
+/// Sum over the tags of Cauchy losses of their distances from the survey.
+pub(crate) fn distance_cost(robot: &Robot, view: &View, angles: &JointAngles) -> f64 {
     let base_from_camera = robot.tags_from(robot.camera_at(view.camera), angles);
     let of_tag = |tag: &TagObservation| {
         let predicted_m = base_from_camera * nalgebra::Point3::from(tag.center_in_camera_m);

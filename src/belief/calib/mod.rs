@@ -21,6 +21,7 @@ mod interim;
 mod methods;
 pub mod online;
 mod parameters;
+mod reading_error;
 mod refusal;
 mod refusal_conditions;
 mod reservation;
@@ -43,6 +44,7 @@ pub use methods::{
     free_parameters, least_squares, minimum_distance, mount_by_gripper_tag,
 };
 pub use parameters::{JointParameters, Parameter, ParameterKind, WornSpot};
+pub use reading_error::{JointZero, MisreadReadings, ReadingError};
 pub use refusal::{InnovationQuantity, Refusal, in_files as refusals_in_files};
 pub use refusal_conditions::{MIN_HELD_OUT_VIEWS, MIN_VIEWS_PER_PARAMETER, fewest_views};
 pub use reservation::Reservation;

@@ -1,5 +1,6 @@
 //! Why a calibration is refused: cause, evidence and remedy as data. Their words are made in `words` and nowhere else.
 
+use std::borrow::Cow;
 use std::fmt;
 
 use armcal_core::codes::{Code, Coded};
@@ -10,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::calib::finding::FindingUnit;
 use crate::calib::geometry_error::GeometryError;
+use crate::calib::reading_error::MisreadReadings;
 use crate::calib::wrong_input::WrongInput;
 
 mod words;
@@ -97,6 +99,13 @@ pub enum Refusal {
         /// Their numbers, from 1.
         targets: Vec<usize>,
     },
+    /// Targets that need angles far beyond the captured views.
+    TargetsNotCovered {
+        /// Their numbers, from 1.
+        targets: Vec<usize>,
+        /// How far beyond which joint's range, in words.
+        ranges: Vec<String>,
+    },
     /// Held-out positions or poses are off by more than their stated noise explains, or than may be without one.
     HeldOutError {
         /// Root mean square distance between predicted and surveyed tags.
@@ -118,6 +127,8 @@ pub enum Refusal {
     },
     /// A file is not as it is said to be, and the images show it without the arm.
     WrongInput(WrongInput),
+    /// Joint readings mean something else than the input map and robot.toml say.
+    MisreadReadings(MisreadReadings),
     /// Another link geometry explains the data, and joint sensors do not.
     Geometry(GeometryError),
     /// An element of the geometry departs from its nominal pose by more than a repair may.
@@ -135,6 +146,19 @@ pub enum Refusal {
         /// Length of the link, where the departure exceeds it.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         length_m: Option<f64>,
+    },
+    /// The focal length differs from the stated one by more than a repair may.
+    Lens {
+        /// Estimated focal length over that of robot.toml.
+        ratio: f64,
+        /// One sigma of `ratio`.
+        std: f64,
+        /// One sigma of the stated focal length, as a share of it.
+        stated_std: f64,
+        /// The largest repair in these sigmas.
+        most_sigmas: f64,
+        /// As estimated, px.
+        focal_px: [f64; 2],
     },
     /// A joint's error from view to view is beyond what such a sensor can have.
     SensorError {
@@ -199,6 +223,10 @@ pub enum Refusal {
         parameter: String,
         /// Distance from the datasheet in its prior's standard deviations.
         sigmas: f64,
+        /// Estimated departure: a share of a gain; an offset, rad, of a slide, m.
+        off: f64,
+        /// Share, radians or metres.
+        unit: FindingUnit,
     },
     /// Too many tag observations do not fit.
     Outliers {
@@ -343,19 +371,41 @@ impl Refusal {
     pub(crate) fn rank(&self) -> u8 {
         match self {
             Self::TooFewViews { .. } | Self::TooFewViewsSinceSlip { .. } => 0,
-            Self::WrongInput(_) | Self::PriorReused => 1,
+            Self::WrongInput(_) | Self::MisreadReadings(_) | Self::Lens { .. } | Self::PriorReused => 1,
             // Under a prior that does not hold, links and sensors seem to be off.
             Self::PriorContradicted { .. } => 2,
             // Where hardly any observation fits, the solver's end and every test of the rest say nothing.
             Self::Outliers { outliers, observations } if 2 * outliers > *observations => 3,
-            _ => 4,
+            // Another scale makes offsets and links seem off.
+            Self::SensorLine { .. } | Self::SensorUnit { .. } => 4,
+            _ => 5,
         }
     }
 
     /// What to do about it.
     #[must_use]
-    pub fn remedy(&self) -> &'static str {
+    pub fn remedy(&self) -> Cow<'static, str> {
         match self {
+            Self::MisreadReadings(misread) => misread.remedy().into(),
+            Self::WrongInput(wrong) => wrong.remedy(),
+            Self::SensorLine { joint, slope } if *slope > 0.0 => format!(
+                "correct the scale of {joint}: scale_counts_per_deg in robot.toml times {:.4}, or the unit of its readings",
+                1.0 / slope
+            )
+            .into(),
+            Self::Lens { focal_px: [x, y], .. } => format!(
+                "measure the intrinsics in the water or air that the arm works in; these views show focal_px = [{x:.1}, \
+                 {y:.1}] for [camera] of robot.toml"
+            )
+            .into(),
+            _ => self.usual_remedy().into(),
+        }
+    }
+
+    /// Advice without figures of this result.
+    fn usual_remedy(&self) -> &'static str {
+        match self {
+            Self::MisreadReadings(_) | Self::WrongInput(_) | Self::Lens { .. } => "",
             Self::TooFewViews { .. } | Self::PriorUntested => "capture more views",
             Self::TooFewViewsSinceSlip { .. } => "fasten the sensor on its shaft, then capture more views",
             Self::NotSolved { .. } => "capture views that move each joint over more of its range",
@@ -374,11 +424,11 @@ impl Refusal {
             }
             Self::BeyondTolerance { .. } => "capture more views, or put a tag on the gripper",
             Self::TargetsNotJudged { .. } => "remove these targets from the task, or free the joints that they need",
+            Self::TargetsNotCovered { .. } => "capture views that move these joints as far as the targets need",
             Self::HeldOutError { .. } => {
                 "check units, rotation form, joint order and directions in the input map, and the tag map; state the \
                  noise with tags.position_std_m"
             }
-            Self::WrongInput(wrong) => wrong.remedy(),
             Self::Geometry(geometry) => geometry.remedy(),
             Self::RotationNoise { .. } => {
                 "check rotation form, order and direction in the input map, or use the positions only (tags.use)"
@@ -389,7 +439,7 @@ impl Refusal {
             }
             Self::CornerNoise { .. } => "check lens, corner noise and tag sizes in robot.toml, and the tag map",
             Self::SensorError { .. } | Self::SensorFailed { .. } => "check that joint's sensor",
-            Self::SensorLine { .. } => "swap its ends, or correct scale_counts_per_deg and its sign in robot.toml",
+            Self::SensorLine { .. } => "swap its ends, or change the sign of scale_counts_per_deg in robot.toml",
             Self::Nonlinearity { .. } => "replace the sensor, or state its linearity in robot.toml",
             Self::OffsetsWalk { .. } => {
                 "calibrate right before the work and again during it, follow the estimate online, or replace the sensor"
@@ -428,11 +478,14 @@ impl Coded for Refusal {
             Self::Overfitted { .. } => Code::Overfitted,
             Self::BeyondTolerance { .. } => Code::BeyondTolerance,
             Self::TargetsNotJudged { .. } => Code::TargetsNotJudged,
+            Self::TargetsNotCovered { .. } => Code::TargetsNotCovered,
             Self::HeldOutError { .. } => Code::HeldOutError,
             Self::PriorsBeyondTolerance { .. } => Code::PriorsBeyondTolerance,
             Self::WrongInput(wrong) => wrong.code(),
+            Self::MisreadReadings(misread) => misread.code(),
             Self::Geometry(_) => Code::GeometryContradicted,
             Self::RepairTooLarge { .. } => Code::RepairTooLarge,
+            Self::Lens { .. } => Code::LensContradicted,
             Self::SensorUnit { .. } => Code::SensorUnit,
             Self::RotationNoise { .. } => Code::RotationNoise,
             Self::SensorError { .. } => Code::SensorError,

@@ -9,6 +9,8 @@
 //! Where a view has one landmark with its rotation, the arm by its datasheet tells where that stands: the rotations of
 //! `base_from_tag` over the views must agree but for what sensors may be off.
 
+use std::borrow::Cow;
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 use std::fmt;
 
 use nalgebra::{Isometry3, Point3, Quaternion, UnitQuaternion, Vector3};
@@ -60,6 +62,8 @@ pub enum WrongInputKind {
     LensModel,
     /// All tags are of so many times their stated size.
     TagSize(f64),
+    /// All tags of the map are turned alike: the rotation, w, x, y, z, that follows each `quaternion_wxyz`.
+    TagFrames([f64; 4]),
     /// These tags hang in one another's places.
     ExchangedIds(Vec<u32>),
     /// The tags do not stand to one another as the map says, whatever is tried.
@@ -147,6 +151,11 @@ fn by_pairs(views: &[&View], tags: &[SurveyedTag], robot: &Robot, as_written: &P
         consider(WrongInputKind::ImageScale(scale), mismatch(views, tags, &scaled(lens, 1.0 / scale)));
     }
     consider(WrongInputKind::LensModel, mismatch(views, tags, &of_other_model(lens)));
+    for turn in quarter_turns() {
+        let turned: Vec<SurveyedTag> = tags.iter().map(|tag| turned_by(tag, &turn)).collect();
+        let [x, y, z] = [turn.i, turn.j, turn.k];
+        consider(WrongInputKind::TagFrames([turn.w, x, y, z]), mismatch(views, &turned, lens));
+    }
     let wrong = |(input, otherwise): (WrongInputKind, Option<f64>)| WrongInput {
         input,
         mismatch: as_written.mismatch,
@@ -187,6 +196,20 @@ fn of_other_model(lens: &CameraModel) -> CameraModel {
         _ => Radtan::new(focal_px, center_px, [0.0; 5], resolution_px).into(),
     };
     CameraModel { port: lens.port, ..other }
+}
+
+/// The 23 rotations that take a cube to itself and are not the identity, w at least 0: the conventions of tag frames
+/// differ by one of them, whichever corner is the first and wherever z points.
+fn quarter_turns() -> impl Iterator<Item = UnitQuaternion<f64>> {
+    let about = |axis: Vector3<f64>, n: u8| UnitQuaternion::from_scaled_axis(axis * (f64::from(n) * FRAC_PI_2));
+    let faces = (0..4).map(move |n| about(Vector3::x(), n)).chain([1, 3].map(|n| about(Vector3::y(), n)));
+    let all = faces.flat_map(move |face| (0..4).map(move |n| face * about(Vector3::z(), n)));
+    all.filter(|turn| turn.angle() > FRAC_PI_4)
+        .map(|turn| if turn.w < 0.0 { UnitQuaternion::new_unchecked(-turn.into_inner()) } else { turn })
+}
+
+fn turned_by(tag: &SurveyedTag, turn: &UnitQuaternion<f64>) -> SurveyedTag {
+    SurveyedTag { base_from_tag: Pose::from_isometry(tag.base_from_tag.isometry() * turn), ..tag.clone() }
 }
 
 /// A tag whose quaternion was written x, y, z, w.
@@ -382,6 +405,7 @@ impl Coded for WrongInput {
             WrongInputKind::LensModel => Code::InputLensModel,
             WrongInputKind::TagSize(_) => Code::InputTagSize,
             WrongInputKind::ExchangedIds(_) => Code::InputTagIds,
+            WrongInputKind::TagFrames(_) => Code::InputTagFrames,
             WrongInputKind::OtherMap => Code::InputTagMap,
         }
     }
@@ -390,8 +414,15 @@ impl Coded for WrongInput {
 impl WrongInput {
     /// What to do about it.
     #[must_use]
-    pub fn remedy(&self) -> &'static str {
+    pub fn remedy(&self) -> Cow<'static, str> {
+        let WrongInputKind::TagFrames(turn) = &self.input else { return self.usual_remedy().into() };
+        let [w, x, y, z] = turn.map(|value| format!("{value:.4}"));
+        format!("multiply quaternion_wxyz of each tag in the tag map by [{w}, {x}, {y}, {z}] from the right").into()
+    }
+
+    fn usual_remedy(&self) -> &'static str {
         match &self.input {
+            WrongInputKind::TagFrames(_) => "",
             WrongInputKind::MapQuaternions => "write quaternion_wxyz of the tag map in the order w, x, y, z",
             WrongInputKind::RecordedQuaternions => {
                 "set the other one of quaternion_wxyz and quaternion_xyzw as \
@@ -464,6 +495,10 @@ impl fmt::Display for WrongInput {
                 write!(f, "the size of all tags differs by {:+.1} % from the stated size", 100.0 * (ratio - 1.0))?;
                 self.size_hint.as_ref().map_or(Ok(()), |hint| write!(f, ", {hint}"))
             }
+            WrongInputKind::TagFrames(turn) => {
+                write!(f, "the frames of all tags are turned alike against the tag map, by {}: ", turn_in_words(turn))?;
+                write!(f, "turned so, the tags of a view fit each other within {of_pairs}")
+            }
             WrongInputKind::ExchangedIds(ids) => {
                 let ids: Vec<String> = ids.iter().map(ToString::to_string).collect();
                 write!(f, "the tag map has the ids {} exchanged: corrected, ", ids.join(", "))?;
@@ -477,6 +512,23 @@ impl fmt::Display for WrongInput {
             ),
         }
     }
+}
+
+/// `180 deg about x`, `120 deg about (1, 1, -1)`.
+fn turn_in_words([w, x, y, z]: &[f64; 4]) -> String {
+    let turn = UnitQuaternion::new_normalize(Quaternion::new(*w, *x, *y, *z));
+    let axis = turn.axis().map_or(Vector3::z(), |axis| axis.into_inner() / axis.amax());
+    let signs = [axis.x, axis.y, axis.z].map(|along| along.round() as i32);
+    let name = match signs {
+        [1, 0, 0] => "x".to_owned(),
+        [-1, 0, 0] => "-x".to_owned(),
+        [0, 1, 0] => "y".to_owned(),
+        [0, -1, 0] => "-y".to_owned(),
+        [0, 0, 1] => "z".to_owned(),
+        [0, 0, -1] => "-z".to_owned(),
+        [a, b, c] => format!("({a}, {b}, {c})"),
+    };
+    format!("{:.0} deg about {name}", turn.angle().to_degrees())
 }
 
 #[cfg(test)]

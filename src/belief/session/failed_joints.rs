@@ -70,13 +70,15 @@ impl ScriptRunner<'_, '_> {
         let names = self.robot.joint_names();
         let found = |table: &FailedJointTable| {
             let joint = names.iter().position(|name| *name == table.joint)?;
-            let is_lost = matches!(table.kind, FailedKind::Dead | FailedKind::Stuck | FailedKind::Locked);
+            let is_lost = table.kind != FailedKind::Jumps;
             let is_needed = joint < self.robot.tool.mount.n_joints;
             let is_new = self.driver.held.iter().all(|held| held.joint != joint);
             (is_lost && is_needed && is_new).then_some((joint, table.kind))
         };
         let found: Vec<(usize, FailedKind)> = calibration.failed_joint.iter().filter_map(found).collect();
         for &(joint, kind) in &found {
+            // The arm was told to move it.
+            let kind = if kind.stands_still() { FailedKind::Locked } else { kind };
             self.driver.hold_joint(joint, kind)?;
             if kind != FailedKind::Locked
                 && let Some(held) = self.driver.held.last_mut()

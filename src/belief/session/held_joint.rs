@@ -46,7 +46,7 @@ impl HeldJoint {
 /// How long a joint may have run before a failure is noticed, s.
 fn unnoticed_s(kind: FailedKind) -> f64 {
     match kind {
-        FailedKind::Locked | FailedKind::Jumps => 0.0,
+        FailedKind::Locked | FailedKind::NotMoved | FailedKind::Jumps => 0.0,
         FailedKind::Stuck => 0.6,
         FailedKind::Dead => 0.8,
     }

@@ -197,7 +197,7 @@ impl<'b> Driver<'b> {
         let what = match kind {
             FailedKind::Stuck => "its reading stands still to the count while its set-point moves",
             FailedKind::Dead => "its reading jumped farther than a joint can move, and stayed there",
-            FailedKind::Locked => "it does not leave the place where it rested",
+            FailedKind::Locked | FailedKind::NotMoved => "it does not leave the place where it rested",
             FailedKind::Jumps => "its readings jump",
         };
         let name = &self.robot.sensors[joint].joint;

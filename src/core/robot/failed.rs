@@ -8,6 +8,8 @@ use serde::{Deserialize, Serialize};
 pub enum FailedKind {
     /// The joint is stuck at an unknown angle, whatever its sensor reads.
     Locked,
+    /// The joint was not moved while its sensor read one angle: it may be sound.
+    NotMoved,
     /// The sensor's output does not depend on the joint angle.
     Dead,
     /// The sensor's output stays constant while the joint moves.
@@ -17,7 +19,7 @@ pub enum FailedKind {
 }
 
 impl FailedKind {
-    /// Every kind once.
+    /// Every kind that a user may declare, once.
     pub const ALL: [Self; 4] = [Self::Locked, Self::Dead, Self::Stuck, Self::Jumps];
 
     /// As files and the command line write it.
@@ -25,6 +27,7 @@ impl FailedKind {
     pub fn name(self) -> &'static str {
         match self {
             Self::Locked => "locked",
+            Self::NotMoved => "not_moved",
             Self::Dead => "dead",
             Self::Stuck => "stuck",
             Self::Jumps => "jumps",
@@ -36,10 +39,17 @@ impl FailedKind {
     pub fn predicate(self) -> &'static str {
         match self {
             Self::Locked => "is locked",
+            Self::NotMoved => "was not moved",
             Self::Dead => "is dead",
             Self::Stuck => "is stuck",
             Self::Jumps => "slips",
         }
+    }
+
+    /// Returns true for a joint that stood at one angle in all views.
+    #[must_use]
+    pub fn stands_still(self) -> bool {
+        matches!(self, Self::Locked | Self::NotMoved)
     }
 
     /// The kind of that name.

@@ -12,6 +12,7 @@ use crate::calib::bundle::innovations::Innovations;
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::bundle::model_selection::{OptionalTerm, Selection};
 use crate::calib::bundle::outliers::Outlier;
+use crate::calib::bundle::reading_search::ReadingSearch;
 use crate::calib::bundle::setup::{BundleSetup, Clocks, declared};
 use crate::calib::bundle::tables::{
     add_clock, camera_mount_table, covariance_with_mount, further_camera_tables, map_table, model_table, prior_table,
@@ -69,6 +70,8 @@ pub(crate) struct BundleCalibration<'a> {
     clock: Option<(f64, Selection)>,
     /// Who is told of the last estimate by the views.
     listener: Option<&'a mut EstimateListener<'a>>,
+    /// The views with the readings as they were read.
+    as_read: Vec<View>,
 }
 
 /// Is told of an estimate and what it was made from.
@@ -151,6 +154,7 @@ impl<'a> BundleCalibration<'a> {
             drawing: Drawing::default(),
             clock: None,
             listener: None,
+            as_read: Vec::new(),
         })
     }
 
@@ -216,6 +220,7 @@ impl<'a> BundleCalibration<'a> {
             EstimatePurpose::Interim => &[],
         };
         let estimated = estimated.with_touches(touches, &self.data.robot);
+        self.as_read.clone_from(&views);
         self.finish(estimated)
     }
 
@@ -253,18 +258,37 @@ impl<'a> BundleCalibration<'a> {
                 let targets = task.map(|task| task_angles(&diagnosis.robot, task)).unwrap_or_default();
                 let at = if targets.is_empty() { found.view_angles() } else { targets };
                 found.report_drawing(&self.drawing, &at, &mut calibration);
-                self.blame_input(&mut calibration);
+                self.blame_input(estimated.failures, &mut calibration);
             }
         }
         Ok(calibration)
     }
 
-    /// Where the calibration is refused and the images contradict a file, that comes first.
-    fn blame_input(&self, calibration: &mut Calibration) {
-        if calibration.status == Status::Refused {
-            let wrong = wrong_input(&self.data.data, &self.surveyed, &self.data.robot);
-            calibration.refuse_first_for(wrong.map(Refusal::WrongInput));
+    /// Where the calibration is refused and the images contradict a file, or the readings mean something else than the
+    /// input map says, that comes first.
+    fn blame_input(&self, failures: &[Failure], calibration: &mut Calibration) {
+        if calibration.status != Status::Refused {
+            return;
         }
+        let is_of_lens = calibration.refusals.iter().any(|refusal| matches!(refusal, Refusal::Lens { .. }));
+        if is_of_lens {
+            return;
+        }
+        if let Some(wrong) = wrong_input(&self.data.data, &self.surveyed, &self.data.robot) {
+            calibration.refuse_first_for([Refusal::WrongInput(wrong)]);
+            return;
+        }
+        // A scale or unit has been named.
+        let is_of_line = |refusal: &Refusal| matches!(refusal, Refusal::SensorLine { .. } | Refusal::SensorUnit { .. });
+        if calibration.refusals.iter().any(is_of_line) {
+            return;
+        }
+        // A repair beyond its bound explains nothing.
+        let is_unbounded = |refusal: &Refusal| matches!(refusal, Refusal::RepairTooLarge { .. });
+        let nominal = Drawing::default();
+        let drawing = if calibration.refusals.iter().any(is_unbounded) { &nominal } else { &self.drawing };
+        let search = ReadingSearch { robot: &self.data.robot, views: &self.as_read, failures, drawing };
+        calibration.refuse_first_for(search.find().map(Refusal::MisreadReadings));
     }
 
     /// The offset between the clocks, where it is found for the first time; from then on the readings are at the times
@@ -315,10 +339,15 @@ impl<'a> BundleCalibration<'a> {
         let Estimated { setup, estimate, .. } = estimated;
         let robot = &self.data.robot;
         let without_failed = setup.without_failed(&estimate.parameters());
-        let with_steps = setup.with_estimated_angles(estimate, &without_failed);
+        let mut with_steps = setup.with_estimated_angles(estimate, &without_failed);
+        let mut datasheet = setup.applied.robot.clone();
+        if estimate.problem.layout.lens.is_some() {
+            datasheet.camera.lens = estimate.as_found(robot).camera.lens;
+            with_steps.iter_mut().for_each(|view| view.see_through(&datasheet));
+        }
         let input = BundleInput { views: &with_steps, ..setup.input() };
         let (held_out, innovations) = match self.purpose {
-            EstimatePurpose::Final => cross_validated(&input, estimate, &setup.applied.robot),
+            EstimatePurpose::Final => cross_validated(&input, estimate, &datasheet),
             EstimatePurpose::Interim => (FoldSums::default().metrics(), Vec::new()),
         };
         let views = estimate.as_read_now(&with_steps);
@@ -592,6 +621,9 @@ fn cross_validated(
             .collect();
         // Where no sensor tells an angle, the view's own tags tell where to linearize, with nothing of other folds.
         for (_, view) in &mut with_places {
+            if all.model.lens {
+                view.see_through(&as_found);
+            }
             set_by_camera(&as_found, view, &found.parameters());
         }
         let held_out: Vec<View> = with_places.iter().map(|(_, view)| view.clone()).collect();
@@ -600,7 +632,7 @@ fn cross_validated(
             views: &found.as_read_now(&held_out),
             as_found: &as_found,
             at: &found.parameters(),
-            nominal: input.robot,
+            nominal: datasheet,
             baselines: &baseline.as_ref().map(|baseline| baseline.fit(datasheet, &fitted)).unwrap_or_default(),
         });
     }

@@ -20,7 +20,7 @@ use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::refusal::{MIN_USED_SHARE, Refusal};
 use crate::calib::result::calibration::Calibration;
 use crate::calib::views::view::View;
-use armcal_core::robot::{FailedKind, JointSensorSpec, Robot};
+use armcal_core::robot::{JointSensorSpec, Robot};
 use armcal_core::sensor::Conditions;
 use armcal_core::time::Stamp;
 
@@ -115,7 +115,7 @@ impl CalibrationPrior {
             guess.reference = reference(views);
         }
         // What the prior knows of a sensor is nothing about where a locked joint stands.
-        let is_locked = |failure: &&Failure| failure.kind == FailedKind::Locked && failure.leaves_no_sensor();
+        let is_locked = |failure: &&Failure| failure.kind.stands_still() && failure.leaves_no_sensor();
         let locked: Vec<usize> = applied.failures.iter().filter(is_locked).map(|failure| failure.joint).collect();
         for &joint in &locked {
             for parameter in ParameterKind::all().map(|kind| Parameter { joint, kind }) {

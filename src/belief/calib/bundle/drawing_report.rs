@@ -73,6 +73,7 @@ impl Estimate<'_> {
             calibration.refuse_first_for([Refusal::Geometry(base.geometry_error(self.problem.robot))]);
         }
         calibration.refuse_for(found.iter().find_map(Departure::beyond_bound));
+        calibration.refuse_first_for(self.lens_beyond_bound());
         let of_tags = drawing.tags.iter().filter_map(|fault| self.tag_finding(fault));
         for (finding, words) in self.sag_findings(task).into_iter().chain(self.lens_finding()).chain(of_tags) {
             warnings.push(Warning::new(finding.code(), words));
@@ -154,6 +155,24 @@ impl Estimate<'_> {
                 length_m: None,
                 most_sigmas: MAX_REPAIR_SIGMAS,
             }
+        })
+    }
+
+    /// A focal length that differs from robot.toml's by more than a repair may.
+    fn lens_beyond_bound(&self) -> Option<Refusal> {
+        let at = self.problem.layout.lens?;
+        let (lens, stated) = (&self.solved.state.lens, &self.problem.prior.lens);
+        let ([found_px, stated_px], stated_std) =
+            ([lens, stated].map(|lens| lens.focal_px()[0]), self.problem.robot.camera.lens_priors.focal_std);
+        let ratio = found_px / stated_px;
+        let std = self.posterior.covariance[(at, at)].max(0.0).sqrt() / stated_px;
+        let most_sigmas = MAX_REPAIR_SIGMAS;
+        ((ratio - 1.0).abs() > most_sigmas * stated_std).then(|| Refusal::Lens {
+            ratio,
+            std,
+            stated_std,
+            most_sigmas,
+            focal_px: lens.focal_px(),
         })
     }
 

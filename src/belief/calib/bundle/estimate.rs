@@ -299,6 +299,9 @@ impl Estimate<'_> {
     pub fn as_found(&self, robot: &Robot) -> Robot {
         let (mount, covariance) = self.mount();
         let mut found = self.parameters().with_links(robot.clone()).with_camera_at(mount, &covariance);
+        if self.problem.layout.lens.is_some() {
+            found.camera.lens = self.solved.state.lens;
+        }
         let mounts = self.solved.state.further_mounts.iter();
         mounts.zip(&mut found.further_cameras).for_each(|(at, camera)| camera.mount.link_from_frame = *at);
         for (tag_idx, tag) in found.tags.iter_mut().enumerate() {

@@ -199,11 +199,10 @@ impl FailureSearch<'_> {
         let all = Failure::without_sensor(joint, FailedKind::Dead, found, self.views.len());
         let evidence = readings.in_words(&self.robot.sensors[joint], pattern, self.views);
         match pattern {
-            FailurePattern::Locked(SensorUse::Used) => {
-                let (kind, reading) = (FailedKind::Locked, SensorUse::Used);
-                Failure { kind, reading, views: Vec::new(), evidence, ..all }
+            FailurePattern::Still(kind, SensorUse::Used) => {
+                Failure { kind: *kind, reading: SensorUse::Used, views: Vec::new(), evidence, ..all }
             }
-            FailurePattern::Locked(SensorUse::Ignored) => Failure { kind: FailedKind::Locked, evidence, ..all },
+            FailurePattern::Still(kind, SensorUse::Ignored) => Failure { kind: *kind, evidence, ..all },
             FailurePattern::Reversed(line) => Failure { line: Some(*line), evidence, ..all },
             FailurePattern::Scaled(line) => {
                 Failure { line: Some(*line), reading: SensorUse::Used, views: Vec::new(), evidence, ..all }
@@ -263,7 +262,7 @@ fn explains_most(without: &Estimate<'_>, better: &Estimate<'_>) -> bool {
 }
 
 /// What the data cost under an estimate, see the module.
-fn score(found: &Estimate<'_>) -> f64 {
+pub(crate) fn score(found: &Estimate<'_>) -> f64 {
     let problem = &found.problem;
     let observations = problem.observations.iter().zip(&found.solved.normal.chi2);
     let of_observation = |(seen, chi2): (&ObservationTerm, &f64)| {

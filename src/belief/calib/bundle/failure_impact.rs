@@ -58,7 +58,7 @@ impl FailureImpact<'_> {
     fn table(&self, failure: &Failure) -> FailedJointTable {
         let joint = failure.joint;
         let pose = |&view_idx: &usize| self.views[view_idx].pose_idx;
-        let is_locked = failure.kind == FailedKind::Locked;
+        let is_locked = failure.kind.stands_still();
         let has_no_sensor = failure.leaves_no_sensor();
         let angle = self.locked_angle(failure);
         FailedJointTable {
@@ -98,7 +98,7 @@ impl FailureImpact<'_> {
 
     /// Where a locked joint stands and one sigma, rad: the mean over the views, which all show one angle.
     fn locked_angle(&self, failure: &Failure) -> Option<(f64, f64)> {
-        if failure.kind != FailedKind::Locked {
+        if !failure.kind.stands_still() {
             return None;
         }
         let joint = failure.joint;
@@ -114,7 +114,7 @@ impl FailureImpact<'_> {
         let freed: Vec<f64> = failure
             .views
             .iter()
-            .filter(|&&k| failure.kind != FailedKind::Locked && self.found.uses(k))
+            .filter(|&&k| !failure.kind.stands_still() && self.found.uses(k))
             .map(|&k| self.found.angle(k, failure.joint).1.powi(2))
             .collect();
         (!freed.is_empty()).then(|| (freed.iter().sum::<f64>() / freed.len() as f64).sqrt())
@@ -134,7 +134,7 @@ impl FailureImpact<'_> {
             let known = if j == joint { known } else { AngleSource::AsItIs };
             let spec = &mut robot.sensors[j];
             match known {
-                AngleSource::AsItIs if failure.kind == FailedKind::Locked => {
+                AngleSource::AsItIs if failure.kind.stands_still() => {
                     let declared = FailedJoint { joint: j, kind: FailedKind::Locked };
                     if let Some((angle_rad, _)) = self.locked_angle(failure) {
                         robot.stowed[j] = angle_rad;
@@ -218,13 +218,16 @@ impl FailureImpact<'_> {
         if failure.line.is_some() && is_of_another_unit(self.robot.sensors[failure.joint].moves, gain) {
             return Some(Refusal::SensorUnit { joint, gain, moves: self.robot.sensors[failure.joint].moves });
         }
+        if failure.line.is_some() {
+            return Some(Refusal::SensorLine { joint, slope: gain });
+        }
         if let Some(views) = failure.n_views_since(self.views)
             && views < MIN_VIEWS_SINCE
         {
             return Some(Refusal::TooFewViewsSinceSlip { joint, evidence: self.evidence(failure), views });
         }
         let is_needed = failure.joint < self.robot.tool.mount.n_joints;
-        if !failure.leaves_no_sensor() || failure.kind == FailedKind::Locked || !is_needed {
+        if !failure.leaves_no_sensor() || failure.kind.stands_still() || !is_needed {
             return None;
         }
         let tolerance_m = self.task.map(|task| task.task.tolerance_m);

@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::failures::{FAR_RAD, FAR_SIGMAS, SensorLine, SensorUse, slip_in_words};
 use crate::calib::views::view::View;
-use armcal_core::robot::{JointSensorSpec, Robot};
+use armcal_core::robot::{FailedKind, JointSensorSpec, Robot};
 use armcal_core::sensor::wrap_symmetric;
 use armcal_core::stats::quantile;
 
@@ -24,8 +24,8 @@ pub(crate) struct Readings {
 /// How the readings go with the angles.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum FailurePattern {
-    /// The angle is always the same.
-    Locked(SensorUse),
+    /// The angle is always the same: the joint is locked where its reading moves, and was not moved otherwise.
+    Still(FailedKind, SensorUse),
     /// The reading is the same in so many views up to the last, the angle is not.
     Stuck(usize),
     /// They have nothing to do with each other.
@@ -104,7 +104,10 @@ impl Readings {
         let spread_rad = deviation(&self.angle_rad);
         let own_rad = rms(&self.std_rad);
         if spread_rad < LOCKED_RAD.max(LOCKED_SIGMAS * own_rad) {
-            return Some(FailurePattern::Locked(self.sensor_of_locked(robot, noise_rad)));
+            let moves = deviation(&self.travel_rad) > noise_rad;
+            let kind = if moves { FailedKind::Locked } else { FailedKind::NotMoved };
+            let is_right = !moves && self.is_as_stated(robot);
+            return Some(FailurePattern::Still(kind, if is_right { SensorUse::Used } else { SensorUse::Ignored }));
         }
         let n_still = n_still(&self.travel_rad, spec);
         let shown_rad = deviation(&self.angle_rad[self.len() - n_still..]);
@@ -141,14 +144,13 @@ impl Readings {
         (n > 0 && n as f64 <= MAX_SINGLE * self.len() as f64).then_some(FailurePattern::Single(single))
     }
 
-    /// A locked joint's sensor may well be sound: it then stands still where the datasheet allows it.
-    fn sensor_of_locked(&self, robot: &Robot, noise_rad: f64) -> SensorUse {
+    /// Returns true where the sensor of a joint that stands still reads an angle that its datasheet allows.
+    fn is_as_stated(&self, robot: &Robot) -> bool {
         let spec = &robot.sensors[self.joint];
         let travel_rad = quantile(&self.travel_rad, 0.5).unwrap_or(0.0);
         let off_rad = quantile(&self.angle_rad, 0.5).unwrap_or(0.0) - spec.center_rad - travel_rad;
         let allowed_rad = RIGHT_SIGMAS * spec.offset_std_rad.hypot(spec.gain_std * travel_rad);
-        let moves = deviation(&self.travel_rad) > noise_rad;
-        if !moves && off_rad.abs() < allowed_rad { SensorUse::Used } else { SensorUse::Ignored }
+        off_rad.abs() < allowed_rad
     }
 
     /// The slip that explains the most, if it explains nearly all (least squares of 1, reading and a step).
@@ -216,10 +218,10 @@ impl Readings {
         let n = self.len();
         let number = |k: usize| views[k].pose_idx + 1;
         match pattern {
-            FailurePattern::Locked(SensorUse::Used) => {
+            FailurePattern::Still(_, SensorUse::Used) => {
                 format!("the camera shows one angle in {n} views (within {}), as the sensor says", shown(2))
             }
-            FailurePattern::Locked(SensorUse::Ignored) => {
+            FailurePattern::Still(_, SensorUse::Ignored) => {
                 format!(
                     "the camera shows one angle in {n} views (within {}); the sensor reads {} apart, or elsewhere",
                     shown(2),

@@ -98,7 +98,7 @@ impl Failure {
         let all = Self::without_sensor(joint, kind, FailureSource::Declared, n_views);
         match kind {
             FailedKind::Jumps => Self { reading: SensorUse::Used, views: Vec::new(), ..all },
-            FailedKind::Locked | FailedKind::Dead | FailedKind::Stuck => all,
+            FailedKind::Locked | FailedKind::NotMoved | FailedKind::Dead | FailedKind::Stuck => all,
         }
     }
 
@@ -162,7 +162,7 @@ impl FailureAdjusted {
         for view in &mut applied.views {
             set_by_camera(robot, view, at);
         }
-        for failure in failures.iter().filter(|f| f.kind == FailedKind::Locked && f.leaves_no_sensor()) {
+        for failure in failures.iter().filter(|f| f.kind.stands_still() && f.leaves_no_sensor()) {
             applied.lock(failure.joint);
         }
         for failure in failures.iter().filter(|failure| failure.line.is_some() && !failure.leaves_no_sensor()) {
@@ -197,7 +197,7 @@ impl FailureAdjusted {
     /// Takes the columns of sensors that say nothing from `model`.
     pub fn restrict(&self, model: &mut Model) {
         for failure in self.failures.iter().filter(|failure| failure.leaves_no_sensor()) {
-            let is_locked = failure.kind == FailedKind::Locked;
+            let is_locked = failure.kind.stands_still();
             model.joints[failure.joint] = if is_locked { vec![ParameterKind::Offset] } else { Vec::new() };
         }
         for (failure, since) in self.failures.iter().filter_map(|failure| Some((failure, failure.since?))) {

@@ -87,7 +87,7 @@ impl BundleSetup {
             .failures
             .iter()
             .filter(|failure| failure.leaves_no_sensor())
-            .map(|failure| if failure.kind == FailedKind::Locked { 1 } else { 2 });
+            .map(|failure| if failure.kind.stands_still() { 1 } else { 2 });
         let cold = per_joint.saturating_sub(lost.sum());
         self.usable_prior().map_or(cold, |prior| prior.n_unknown(robot).min(cold))
     }
@@ -140,6 +140,7 @@ impl BundleSetup {
         let of = |failure: &Failure| {
             let reason = match failure.kind {
                 FailedKind::Locked => "the joint is locked: its sensor is not looked at",
+                FailedKind::NotMoved => "the joint was not moved",
                 FailedKind::Dead | FailedKind::Stuck | FailedKind::Jumps => "its sensor says nothing",
             };
             [ParameterKind::Gain, ParameterKind::Offset].map(|kind| Unobservable {

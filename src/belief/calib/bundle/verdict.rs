@@ -14,7 +14,7 @@ use crate::calib::geometry_error::{BASE, ErrorKind, GeometryError};
 use crate::calib::parameters::{Parameter, ParameterKind};
 use crate::calib::refusal::{InnovationQuantity, Refusal};
 use crate::calib::result::calibration::Calibration;
-use crate::calib::result::validity::not_covered;
+use crate::calib::result::validity::Extrapolation;
 use crate::calib::result::verdict_tables::{Check, ObservabilityTable, VerdictTable};
 use crate::calib::views::view::TaskRests;
 use armcal_core::codes::{Code, Warning};
@@ -90,7 +90,12 @@ impl VerdictInput<'_> {
         ];
         self.whiteness(&mut table);
         table.warnings.extend(self.scales_at_bounds());
-        table.not_covered = not_covered(calibration, &numbered);
+        let extrapolation = Extrapolation::new(calibration, robot, &numbered);
+        table.not_covered = extrapolation.in_words();
+        let targets = extrapolation.not_judged();
+        if !targets.is_empty() {
+            calibration.refuse_for([Refusal::TargetsNotCovered { targets, ranges: table.not_covered.clone() }]);
+        }
         if self.has_unseen_links() {
             table.warnings.push(Warning::new(Code::LinksUnobservable, UNSEEN_LINKS));
         }
@@ -315,12 +320,15 @@ impl VerdictInput<'_> {
         let of_sensor = linear.filter(|p| matches!(p.kind, ParameterKind::Gain | ParameterKind::Offset));
         let sigmas = of_sensor.map(|p| {
             let nominal = if p.kind == ParameterKind::Gain { 1.0 } else { 0.0 };
-            (*p, (at.get(*p) - nominal).abs() / p.prior_std(robot))
+            let off = at.get(*p) - nominal;
+            (*p, off.abs() / p.prior_std(robot), off)
         });
-        let (worst, sigmas) = sigmas.max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let (worst, sigmas, off) = sigmas.max_by(|a, b| a.1.total_cmp(&b.1))?;
         let parameter = worst.name(robot);
+        let is_gain = worst.kind == ParameterKind::Gain;
+        let unit = if is_gain { FindingUnit::One } else { FindingUnit::of_joint(robot.sensors[worst.joint].moves) };
         let check = Check::at_most(format!("{parameter}: sigma from its datasheet"), sigmas, MAX_SIGMAS_OFF);
-        let refusal = (!check.holds).then_some(Refusal::BeyondDatasheet { parameter, sigmas });
+        let refusal = (!check.holds).then_some(Refusal::BeyondDatasheet { parameter, sigmas, off, unit });
         table.checks.push(check);
         refusal
     }

@@ -1,5 +1,6 @@
 use super::words::told_apart_mm;
 use super::*;
+use crate::calib::reading_error::{JointZero, ReadingError};
 
 #[test]
 fn figures_that_differ_are_told_apart() {
@@ -66,6 +67,11 @@ fn touch() -> Refusal {
     }
 }
 
+fn misread(found: ReadingError) -> Refusal {
+    let alternatives = vec![ReadingError::Exchanged { joints: ["elbow".to_owned(), "wrist_yaw".to_owned()] }];
+    Refusal::MisreadReadings(MisreadReadings { found, alternatives, tag_error_m: 0.9, corrected_m: Some(0.002) })
+}
+
 /// One of each kind that says something measured.
 fn measured() -> Vec<Refusal> {
     let joint = || "wrist_yaw".to_owned();
@@ -84,7 +90,15 @@ fn measured() -> Vec<Refusal> {
         Refusal::SensorError { joint: joint(), std_rad: 0.01, datasheet_std_rad: 0.002, moves: JointKind::Revolute },
         Refusal::Nonlinearity { joint: joint(), std_rad: 0.03, datasheet_std_rad: 0.002, moves: JointKind::Revolute },
         Refusal::CornerNoise { residual_px: 1.2, stated_px: 0.3, limit_px: 0.9 },
-        Refusal::BeyondDatasheet { parameter: "wrist_yaw offset".to_owned(), sigmas: 9.0 },
+        Refusal::BeyondDatasheet {
+            parameter: "wrist_yaw offset".to_owned(),
+            sigmas: 9.0,
+            off: 0.18,
+            unit: FindingUnit::Radian,
+        },
+        Refusal::TargetsNotCovered { targets: vec![4], ranges: vec!["target 4 lies 80 deg beyond".to_owned()] },
+        Refusal::Lens { ratio: 1.333, std: 3e-4, stated_std: 2e-3, most_sigmas: 10.0, focal_px: [900.1, 900.2] },
+        Refusal::SensorLine { joint: joint(), slope: 0.5 },
         Refusal::Outliers { outliers: 40, observations: 100 },
         Refusal::Innovations {
             quantity: InnovationQuantity::Coordinates,
@@ -92,6 +106,13 @@ fn measured() -> Vec<Refusal> {
             limit: 1.7,
             expected: [0.9, 1.1],
         },
+        misread(ReadingError::Exchanged { joints: ["shoulder".to_owned(), joint()] }),
+        misread(ReadingError::Reversed { joints: vec!["shoulder".to_owned(), joint()] }),
+        misread(ReadingError::Coupled { joint: joint(), with: "shoulder".to_owned(), sign: -1.0 }),
+        misread(ReadingError::OtherTurns { joints: vec![joint()], wrap_counts: 6.283_185 }),
+        misread(ReadingError::Zeros {
+            joints: vec![JointZero { joint: joint(), off_rad: 1.57, moves: JointKind::Revolute, offset_counts: -1.57 }],
+        }),
         Refusal::TooFewViewsSinceSlip { joint: joint(), evidence: "it slipped".to_owned(), views: 4 },
         Refusal::SensorFailed {
             joint: joint(),

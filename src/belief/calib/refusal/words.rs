@@ -5,6 +5,11 @@ use std::fmt;
 use crate::calib::baseline_comparison::SIGNIFICANCE;
 use crate::calib::refusal::{HeldOutLimitSource, MIN_USED_SHARE, Refusal};
 
+/// Refractive index of sea water, by which a flat window in front of the lens multiplies the focal length (Treibitz et
+/// al. 2012), and how near to it a ratio is taken for it.
+const WATER: f64 = 1.34;
+const NEAR_WATER: f64 = 0.04;
+
 /// A refusal without its remedy.
 struct Cause<'a>(&'a Refusal);
 
@@ -25,6 +30,8 @@ impl Refusal {
     pub(super) fn fmt_cause(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::WrongInput(_)
+            | Self::MisreadReadings(_)
+            | Self::Lens { .. }
             | Self::Geometry(_)
             | Self::RepairTooLarge { .. }
             | Self::SensorUnit { .. }
@@ -44,6 +51,7 @@ impl Refusal {
             Self::BeyondTolerance { .. }
             | Self::PriorsBeyondTolerance { .. }
             | Self::TargetsNotJudged { .. }
+            | Self::TargetsNotCovered { .. }
             | Self::RotationNoise { .. }
             | Self::HeldOutError { .. } => self.fmt_of_decision(f),
             Self::SensorFailed { .. } => self.fmt_of_failed_sensor(f),
@@ -110,6 +118,12 @@ impl Refusal {
                     "the tool error cannot be judged at target {}: out of reach or undetermined",
                     numbers.join(", ")
                 )
+            }
+            Self::TargetsNotCovered { targets, ranges } => {
+                let numbers: Vec<String> = targets.iter().map(ToString::to_string).collect();
+                let numbers = numbers.join(", ");
+                write!(f, "the tool error cannot be judged at target {numbers}, far from the captured views: ")?;
+                write!(f, "{}", ranges.join("; "))
             }
             Self::RotationNoise { rotation_rad, limit_rad, stated_rad } => {
                 let [rotation, limit] = [rotation_rad, limit_rad].map(|rad| rad.to_degrees());
@@ -186,7 +200,25 @@ impl Refusal {
     fn fmt_of_arm(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::WrongInput(wrong) => write!(f, "{wrong}"),
+            Self::MisreadReadings(misread) => write!(f, "{misread}"),
             Self::Geometry(geometry) => write!(f, "{geometry}"),
+            Self::Lens { ratio, std, stated_std, most_sigmas, .. } => {
+                let [std, stated] = [std, stated_std].map(|share| 100.0 * share);
+                write!(
+                    f,
+                    "the lens is not that of robot.toml: its focal length is {ratio:.3} times the stated one (sigma "
+                )?;
+                write!(f, "{std:.2} %; stated sigma {stated:.1} %, at most {most_sigmas:.0} of these are repaired)")?;
+                match ratio {
+                    r if (r / WATER - 1.0).abs() < NEAR_WATER => {
+                        write!(f, ". A lens of air shows this factor in water")
+                    }
+                    r if (r * WATER - 1.0).abs() < NEAR_WATER => {
+                        write!(f, ". A lens of water shows this factor in air")
+                    }
+                    _ => Ok(()),
+                }
+            }
             Self::SensorUnit { joint, gain, moves } => {
                 let [small, large] = if moves.is_slide() { ["mm", "m"] } else { ["deg", "rad"] };
                 let [found, stated] = if *gain < 1.0 { [small, large] } else { [large, small] };
@@ -208,11 +240,14 @@ impl Refusal {
                 moves.unit().shown(*std_rad, 2),
                 moves.unit().shown(*datasheet_std_rad, 2)
             ),
-            Self::BeyondDatasheet { parameter, sigmas } => write!(
-                f,
-                "{parameter} is {sigmas:.0} sigma from its datasheet: joint or sensor failed, or another sensor is \
-                 installed"
-            ),
+            Self::BeyondDatasheet { parameter, sigmas, off, unit } => {
+                let [off, std] = [*off, off.abs() / sigmas].map(|value| unit.in_words(value));
+                write!(
+                    f,
+                    "{parameter} is {off} from its datasheet, {sigmas:.0} sigmas of {std}: joint or sensor failed, or \
+                     another sensor is installed"
+                )
+            }
             Self::Nonlinearity { joint, std_rad, datasheet_std_rad, moves } => write!(
                 f,
                 "the nonlinearity of {joint} is {}, {:.1} times the {} of its datasheet",

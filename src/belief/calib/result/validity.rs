@@ -1,7 +1,10 @@
 //! Where a calibration holds: what a configuration, a task or the conditions have beyond the captured views.
 
+use std::collections::BTreeSet;
+
 use crate::calib::result::calibration::{Calibration, JointResult};
 use crate::calib::result::valid_range::{ordered, past};
+use armcal_core::robot::Robot;
 use armcal_core::sensor::Conditions;
 use armcal_core::streams::JointAngles;
 
@@ -39,21 +42,69 @@ impl Calibration {
     }
 }
 
-/// Names, joint by joint, the targets whose postures go beyond the angles that the views covered, and by how much.
-pub(crate) fn not_covered(calibration: &Calibration, postures: &[(u32, JointAngles)]) -> Vec<String> {
-    let joints = calibration.joint.iter().enumerate().filter(|(_, j)| j.gain_estimated || j.offset_estimated);
-    let of_joint = |(joint, result): (usize, &JointResult)| {
-        let [low, high] = ordered(result.covered_rad);
-        let beyond = postures.iter().map(|(index, angles)| (index, past(angles[joint], [low, high])));
-        let beyond: Vec<(&u32, f64)> = beyond.filter(|(_, by)| *by > MARGIN_RAD).collect();
-        let most = beyond.iter().map(|(_, by)| *by).reduce(f64::max)?;
-        let numbers: Vec<String> = beyond.iter().map(|(index, _)| (*index + 1).to_string()).collect();
-        let unit = result.moves.unit();
-        let [most, low, high] = [unit.shown(most, 0), unit.number(low, 0), unit.shown(high, 0)];
-        let (name, n) = (&result.name, numbers.len());
-        let (targets, lies) = if n == 1 { ("target", "lies") } else { ("targets", "lie up to") };
-        let numbers = numbers.join(", ");
-        Some(format!("{targets} {numbers} {lies} {most} beyond the captured range of {name}, {low} to {high}"))
-    };
-    joints.filter_map(of_joint).collect()
+/// Excess over the captured range, in widths of that range, from which a target is not judged: a sensor's curve is
+/// known only where it was seen. Assumed.
+const MAX_EXTRAPOLATION: f64 = 0.5;
+/// A joint that moves the tool by less than this matters to no target, m/rad; slides always do. Assumed.
+const MIN_LEVER_M: f64 = 0.01;
+
+/// Postures at the targets of a task, by number from 0, against the angles that the views covered.
+pub(crate) struct Extrapolation<'a> {
+    calibration: &'a Calibration,
+    postures: &'a [(u32, JointAngles)],
+    /// Of each posture, whether each joint moves the tool.
+    matters: Vec<Vec<bool>>,
+}
+
+impl<'a> Extrapolation<'a> {
+    pub(crate) fn new(calibration: &'a Calibration, robot: &Robot, postures: &'a [(u32, JointAngles)]) -> Self {
+        let tool = |angles: &JointAngles| robot.chain.frame(angles, &robot.tool.mount).translation.vector;
+        let moves = |angles: &JointAngles, joint: usize| {
+            let mut moved = *angles;
+            moved[joint] += 1e-3;
+            robot.sensors[joint].moves.is_slide() || (tool(&moved) - tool(angles)).norm() > 1e-3 * MIN_LEVER_M
+        };
+        let of_posture =
+            |(_, angles): &(u32, JointAngles)| (0..angles.len()).map(|joint| moves(angles, joint)).collect();
+        Self { calibration, postures, matters: postures.iter().map(of_posture).collect() }
+    }
+
+    /// Numbers of the targets beyond the range of `joint`, and by how much.
+    fn beyond(&self, joint: usize) -> Vec<(u32, f64)> {
+        let range = ordered(self.calibration.joint[joint].covered_rad);
+        let all = self.postures.iter().zip(&self.matters).filter(|(_, matters)| matters[joint]);
+        let beyond = all.map(|((index, angles), _)| (*index, past(angles[joint], range)));
+        beyond.filter(|(_, by)| *by > MARGIN_RAD).collect()
+    }
+
+    fn joints(&self) -> impl Iterator<Item = (usize, &JointResult)> {
+        self.calibration.joint.iter().enumerate().filter(|(_, j)| j.gain_estimated || j.offset_estimated)
+    }
+
+    /// Numbers, from 1, of the targets that are too far beyond the range of a joint to be judged.
+    pub(crate) fn not_judged(&self) -> Vec<usize> {
+        let mut numbers = BTreeSet::new();
+        for (joint, result) in self.joints() {
+            let [low, high] = ordered(result.covered_rad);
+            let far = self.beyond(joint).into_iter().filter(|(_, by)| *by > MAX_EXTRAPOLATION * (high - low));
+            numbers.extend(far.map(|(index, _)| index as usize + 1));
+        }
+        numbers.into_iter().collect()
+    }
+
+    /// Names, joint by joint, the targets whose postures go beyond the angles that the views covered, and by how much.
+    pub(crate) fn in_words(&self) -> Vec<String> {
+        let of_joint = |(joint, result): (usize, &JointResult)| {
+            let beyond = self.beyond(joint);
+            let most = beyond.iter().map(|(_, by)| *by).reduce(f64::max)?;
+            let numbers: Vec<String> = beyond.iter().map(|(index, _)| (*index + 1).to_string()).collect();
+            let ([low, high], unit) = (ordered(result.covered_rad), result.moves.unit());
+            let [most, low, high] = [unit.shown(most, 0), unit.number(low, 0), unit.shown(high, 0)];
+            let (name, n) = (&result.name, numbers.len());
+            let (targets, lies) = if n == 1 { ("target", "lies") } else { ("targets", "lie up to") };
+            let numbers = numbers.join(", ");
+            Some(format!("{targets} {numbers} {lies} {most} beyond the captured range of {name}, {low} to {high}"))
+        };
+        self.joints().filter_map(of_joint).collect()
+    }
 }

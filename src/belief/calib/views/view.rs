@@ -6,7 +6,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use armcal_core::input::TagNoise;
-use armcal_core::optics::square_corners;
+use armcal_core::optics::{solve_square, square_corners};
 use armcal_core::robot::Robot;
 use armcal_core::sensor::Conditions;
 use armcal_core::streams::{JointAngles, MAX_JOINTS, ReachTask, RejectReason};
@@ -60,6 +60,20 @@ impl View {
     pub(crate) fn read_later(&mut self, by_s: f64) {
         for (travel_rad, rate_rad_s) in self.travel_rad.iter_mut().zip(self.rate_rad_s.iter()) {
             *travel_rad += rate_rad_s * by_s;
+        }
+    }
+
+    /// Places the tags in the first camera's frame by the lens of `robot`; a square that this lens does not show stays.
+    pub(crate) fn see_through(&mut self, robot: &Robot) {
+        if self.camera != 0 {
+            return;
+        }
+        for tag in &mut self.tags {
+            let TagMeasurement::Corners(seen) = &tag.measured else { continue };
+            let size_m = robot.tags[tag.tag_idx].size_m;
+            if let Ok(solved) = solve_square(&robot.camera.lens, size_m, &seen.corners_px) {
+                tag.center_in_camera_m = solved.camera_from_tag.origin().vector();
+            }
         }
     }
 

@@ -12,6 +12,7 @@ mod failures;
 mod growth;
 mod lenses;
 mod moved_tags;
+mod readings;
 mod reservations;
 mod sag;
 mod score_test;

@@ -1,0 +1,104 @@
+//! Joint readings that mean something else than robot.toml says: named, with the joints concerned.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use crate::calib::bundle::tests::failures::{Case, case};
+use crate::calib::reading_error::ReadingError;
+use crate::calib::refusal::Refusal;
+use armcal_core::robot::Robot;
+use armcal_core::streams::JointAngles;
+
+/// Changes what robot.toml reads as angles, view by view.
+fn changed(case: &mut Case, change: impl Fn(&Robot, &JointAngles, &mut JointAngles)) {
+    for view in &mut case.views {
+        let center = |joint: usize| case.robot.sensors[joint].center_rad;
+        let angles = JointAngles::from_fn(view.travel_rad.len(), |joint| center(joint) + view.travel_rad[joint]);
+        let mut read = angles;
+        change(&case.robot, &angles, &mut read);
+        view.travel_rad = JointAngles::from_fn(view.travel_rad.len(), |joint| read[joint] - center(joint));
+    }
+}
+
+/// What joint `a` reads of an angle of joint `b` in counts of its own.
+fn counts_as(robot: &Robot, a: usize, b: usize, angle_rad: f64) -> f64 {
+    let (own, other) = (&robot.sensors[a], &robot.sensors[b]);
+    (other.offset_counts + other.counts_per_rad * angle_rad - own.offset_counts) / own.counts_per_rad
+}
+
+fn found(case: Case) -> ReadingError {
+    let name = |refusal: Option<&Refusal>| format!("{refusal:?}");
+    let calibration = case.calibrated();
+    match calibration.refusals.first() {
+        Some(Refusal::MisreadReadings(misread)) => misread.found.clone(),
+        other => panic!("{}", name(other)),
+    }
+}
+
+#[test]
+fn exchanged_readings_are_named() {
+    for (seed, [a, b]) in [(0, [0, 1]), (1, [1, 3]), (2, [3, 4]), (3, [0, 4])] {
+        let mut case = case(seed, None);
+        changed(&mut case, |robot, angles, read| {
+            (read[a], read[b]) = (counts_as(robot, a, b, angles[b]), counts_as(robot, b, a, angles[a]));
+        });
+        let names = [a, b].map(|joint| case.robot.sensors[joint].joint.clone());
+        assert_eq!(found(case), ReadingError::Exchanged { joints: names }, "seed {seed}");
+    }
+}
+
+#[test]
+fn a_reading_that_contains_the_angle_of_a_neighbour_is_named() {
+    for (seed, [of, with], of_sign) in [(4, [2, 1], 1.0), (5, [1, 2], -1.0), (6, [4, 3], 1.0)] {
+        let mut case = case(seed, None);
+        changed(&mut case, |_, angles, read| read[of] += of_sign * angles[with]);
+        match found(case) {
+            ReadingError::Coupled { joint, with: other, sign } => {
+                let names = crate::calib::bundle::tests::data::titan().joint_names();
+                assert_eq!((joint, other, sign), (names[of].clone(), names[with].clone(), of_sign), "seed {seed}");
+            }
+            other => panic!("seed {seed}: {other:?}"),
+        }
+    }
+}
+
+#[test]
+fn zeros_by_another_convention_are_named_with_their_size() {
+    for (seed, joint, by_rad) in [(7, 1, FRAC_PI_2), (8, 3, -FRAC_PI_2), (9, 2, 0.6), (10, 0, PI)] {
+        let mut case = case(seed, None);
+        changed(&mut case, |_, _, read| read[joint] += by_rad);
+        let name = case.robot.sensors[joint].joint.clone();
+        let ReadingError::Zeros { joints } = found(case) else { panic!("seed {seed}: no zeros") };
+        let [zero] = &joints[..] else { panic!("seed {seed}: {joints:?}") };
+        let off_rad = armcal_core::sensor::wrap_symmetric(zero.off_rad + by_rad, 2.0 * PI);
+        // The sensor's own offset is part of it.
+        assert!(zero.joint == name && off_rad.abs() < 0.15, "seed {seed}: {zero:?}");
+    }
+}
+
+#[test]
+fn readings_of_0_to_360_deg_are_named() {
+    for (seed, joint) in [(18, 0), (19, 3)] {
+        let mut case = case(seed, None);
+        changed(&mut case, |_, _, read| read[joint] = read[joint].rem_euclid(2.0 * PI));
+        match found(case) {
+            ReadingError::OtherTurns { joints, .. } => assert_eq!(joints.len(), 1, "seed {seed}: {joints:?}"),
+            other => panic!("seed {seed}: {other:?}"),
+        }
+    }
+}
+
+/// Arms that are read as they should be, with faults that have other names.
+#[test]
+fn other_faults_are_not_called_misread() {
+    for seed in 11..17 {
+        let mut case = case(seed, None);
+        if seed % 2 == 0 {
+            let joint = (seed % 5) as usize;
+            let first_rad = case.views[0].travel_rad[joint];
+            case.views.iter_mut().for_each(|view| view.travel_rad[joint] = first_rad);
+        }
+        let calibration = case.calibrated();
+        let misread = calibration.refusals.iter().find(|refusal| matches!(refusal, Refusal::MisreadReadings(_)));
+        assert_eq!(misread, None, "seed {seed}");
+    }
+}

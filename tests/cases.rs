@@ -1,0 +1,149 @@
+//! Recordings, maps and tables as people bring them, each with the answer that helps: folders of `tests/cases`.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+use crate::support::{Answer, answer, edit, program, read, root, temp};
+
+/// A copy of a case's folder.
+struct Case {
+    folder: TempDir,
+}
+
+impl Case {
+    fn new(name: &str) -> Self {
+        let case = Self { folder: temp() };
+        copy(&root().join("tests/cases").join(name), case.folder.path());
+        case
+    }
+
+    fn file(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn calibrate(&self, recording: &str, task: &str) -> Answer {
+        let mut command = program();
+        command.arg("calibrate").arg(self.file(recording)).arg("--robot").arg(self.file("robot"));
+        command.arg("--input").arg(self.file("input.toml")).arg("--tag-map").arg(self.file("tags.toml"));
+        if !task.is_empty() {
+            command.arg("--task").arg(self.file(task));
+        }
+        answer(command.arg("--out").arg(self.file("out")))
+    }
+
+    fn summary(&self) -> Value {
+        serde_json::from_str(&read(&self.file("out/summary.json"))).expect("summary.json reads")
+    }
+
+    /// The first code of a refusal, and the figures behind it.
+    fn refused(&self, task: &str) -> Value {
+        self.calibrate("run.mcap", task).expect("refused", 4, &[]);
+        self.summary()["calibration"]["refusals"][0].clone()
+    }
+
+    fn accepted(&self) {
+        self.calibrate("run.mcap", "task.toml").expect("accepted after the advice", 0, &[]);
+    }
+}
+
+fn copy(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).expect("made");
+    for entry in std::fs::read_dir(from).expect("a folder") {
+        let entry = entry.expect("an entry");
+        let there = to.join(entry.file_name());
+        if entry.file_type().expect("a type").is_dir() {
+            copy(&entry.path(), &there);
+        } else {
+            std::fs::copy(entry.path(), there).expect("copied");
+        }
+    }
+}
+
+#[test]
+fn the_baseline_of_a_laser_tracker_is_plain_least_squares() {
+    let case = Case::new("laser_tracker_baseline");
+    case.calibrate("offset.csv", "").expect("accepted", 0, &[]);
+    let held_out = &case.summary()["held_out"];
+    let baseline_m = held_out["baseline"]["rms_m"].as_f64().expect("a figure");
+    assert!(baseline_m < 0.0036, "{held_out}");
+}
+
+#[test]
+fn zeros_of_another_convention_are_named_with_both_explanations() {
+    let case = Case::new("zero_convention_90deg");
+    let refused = case.refused("task.toml");
+    assert_eq!(refused["code"], "joint_zeros", "{refused}");
+    let zeros = refused["found"]["joints"].as_array().expect("joints");
+    let names: Vec<&str> = zeros.iter().filter_map(|zero| zero["joint"].as_str()).collect();
+    assert_eq!(names, ["lift", "elbow"]);
+    let codes: Vec<Value> = case.summary()["calibration"]["refusals"].as_array().expect("all").clone();
+    assert!(codes.iter().any(|refusal| refusal["code"] == "repair_too_large"), "the links are the other explanation");
+}
+
+#[test]
+fn one_joint_in_degrees_is_named_with_its_unit() {
+    let refused = Case::new("one_joint_in_degrees").refused("task.toml");
+    assert_eq!((&refused["code"], &refused["joint"]), (&"sensor_unit".into(), &"j6".into()), "{refused}");
+}
+
+#[test]
+fn exchanged_readings_are_named_and_the_advice_works() {
+    let case = Case::new("joint_names_swapped");
+    let refused = case.refused("task.toml");
+    assert_eq!(refused["code"], "joints_exchanged", "{refused}");
+    let text = refused["text"].as_str().expect("text");
+    let line = text.rsplit("input map: ").next().expect("a line");
+    edit(&case.file("input.toml"), "[joint_sensors]\n", &format!("[joint_sensors]\n{line}\n"));
+    case.accepted();
+}
+
+#[test]
+fn tags_that_are_turned_alike_are_named_and_the_advice_works() {
+    let case = Case::new("tag_frame_z_into_tag");
+    let refused = case.refused("task.toml");
+    assert_eq!(refused["code"], "input_tag_frames", "{refused}");
+    let turn = refused["input"]["tag_frames"].as_array().expect("a quaternion");
+    let turn: Vec<f64> = turn.iter().filter_map(Value::as_f64).collect();
+    let turn = quaternion(&turn);
+    let path = case.file("tags.toml");
+    let mut map: toml::Table = toml::from_str(&read(&path)).expect("TOML");
+    for tag in map["tag"].as_array_mut().expect("tags") {
+        let was: Vec<f64> =
+            tag["quaternion_wxyz"].as_array().expect("four").iter().filter_map(toml::Value::as_float).collect();
+        let turned = quaternion(&was) * turn;
+        tag["quaternion_wxyz"] = toml::Value::try_from([turned.w, turned.i, turned.j, turned.k]).expect("numbers");
+    }
+    std::fs::write(&path, map.to_string()).expect("written");
+    case.accepted();
+}
+
+fn quaternion(wxyz: &[f64]) -> nalgebra::Quaternion<f64> {
+    nalgebra::Quaternion::new(wxyz[0], wxyz[1], wxyz[2], wxyz[3])
+}
+
+#[test]
+fn a_lens_of_air_in_water_is_named_with_the_focal_length() {
+    let case = Case::new("air_lens_in_water");
+    let refused = case.refused("task.toml");
+    assert_eq!(refused["code"], "lens_contradicted", "{refused}");
+    let ratio = refused["ratio"].as_f64().expect("a ratio");
+    assert!((ratio / 1.333 - 1.0).abs() < 0.002, "{ratio}");
+    // Held-out views are judged by the lens that was found.
+    let held_out_m = case.summary()["held_out"]["rms_m"].as_f64().expect("a figure");
+    assert!(held_out_m < 0.003, "{held_out_m}");
+}
+
+#[test]
+fn targets_out_of_reach_refuse_by_their_numbers() {
+    let case = Case::new("targets_out_of_reach");
+    for (task, numbers) in [("task.toml", vec![1, 2]), ("half.toml", vec![2])] {
+        let refused = case.refused(task);
+        assert_eq!(
+            (&refused["code"], &refused["targets"]),
+            (&"targets_not_judged".into(), &numbers.into()),
+            "{refused}"
+        );
+    }
+}
