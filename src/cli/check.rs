@@ -243,7 +243,8 @@ fn check_robot(folder: &Path) -> Result<Found> {
     let lost = lost.map(|id| {
         format!("base_tag: there is no [[tag]], so that tag {id} must be one of the vehicle's, or of a tag map")
     });
-    let warnings = refused.chain(lost).map(|text| Warning::new(Code::PlanningIncomplete, text)).collect();
+    let for_planning = refused.chain(lost).map(|text| Warning::new(Code::PlanningIncomplete, text));
+    let warnings = robot.urdf_warnings.iter().cloned().chain(for_planning).collect();
     Ok(Found { warnings, ..Found::whole(describe_robot(&robot)?) })
 }
 

@@ -23,6 +23,7 @@ use super::shape::{PlacedShape, Shape};
 use super::survey::{SurveyedTag, TagFile, check_tags};
 use super::urdf::{UrdfChain, UrdfModel};
 use super::urdf_mesh::{CollisionMeshes, MeshFolders};
+use super::urdf_notes;
 use crate::joints::JointAngles;
 use crate::kinematics::{ArmLoads, Attachment, JointKind};
 use crate::optics::TagFamily;
@@ -162,6 +163,7 @@ fn planning_issues(file: &Path, raw: &RobotFile, camera: &CameraSpec, arm: &Urdf
     if !camera.lens.is_known() {
         issues.push(lens_issue(file));
     }
+    issues.extend(urdf_notes::planning_issues(arm));
     if let Some(slide) = arm.chain.joints().iter().find(|joint| joint.kind.is_slide()) {
         let problem = "is prismatic, and an arm with slides is neither simulated nor planned for yet: `armcal \
                        calibrate` works on recordings of it; where it is a lift that stands still, name the link on \
@@ -218,8 +220,12 @@ fn robot_of(folder: &Path, raw: RobotFile, urdf: UrdfModel, meshes: Meshes) -> R
     gripper_tag.iter().try_for_each(|tag| check_gripper_tag(&file, tag, (&tags, family), tag_frame.as_ref()))?;
     let geometry = raw.geometry.check(&file)?;
     let buoyancy_fraction = FileIssue::check_range(&file, "buoyancy_fraction", raw.buoyancy_fraction, 0.0..=0.95)?;
+    let urdf_warnings = urdf_notes::warnings(&arm);
+    let efforts_n_m = chain.joints().iter().map(|joint| urdf.effort_n_m(&joint.name)).collect();
     Ok(Robot {
         failed: Vec::new(),
+        urdf_warnings,
+        efforts_n_m,
         name: raw.name,
         serial: raw.serial,
         folder: folder.to_owned(),
