@@ -10,6 +10,8 @@ use crate::joints::MAX_JOINTS;
 /// Joints before a place where a chain branches, at the least, for what follows to be taken for fingers; and joints of
 /// its own that make another chain another arm.
 const FEW_JOINTS: usize = 3;
+/// Branches next to each other that only a hand has: a parallelogram has two rods.
+const MANY_FINGERS: usize = 3;
 /// A slide of less travel at the end of an arm is a gripper's jaw, m. Assumed: the strokes of SCARA arms begin there.
 const JAW_TRAVEL_M: f64 = 0.12;
 
@@ -92,7 +94,7 @@ fn check_roots(urdf: &UrdfModel, ends: &Ends<'_>) -> Result<(), RobotError> {
         return Ok(());
     }
     let problem = format!(
-        "{} separate trees of links have moving joints, from {}. Connect them by a joint, or name the arm's with --base",
+        "{} separate trees of links have moving joints, from {}. Connect them by a joint, or name one with --base",
         roots.len(),
         roots.join(", ")
     );
@@ -163,8 +165,8 @@ fn path(urdf: &UrdfModel, link: &str) -> Vec<usize> {
     path
 }
 
-/// Returns the longest chain on the way from the root to `leaf`; to a leaf that was named, the last one, and from a base
-/// that was named, the first one.
+/// Returns the longest chain on the way from the root to `leaf`: the last one to a leaf that was named, the first one
+/// from a base that was named.
 fn candidate(urdf: &UrdfModel, leaf: &str, ends: &Ends<'_>) -> Option<Candidate> {
     let mut path = path(urdf, leaf);
     if let Some(base) = ends.base {
@@ -174,8 +176,9 @@ fn candidate(urdf: &UrdfModel, leaf: &str, ends: &Ends<'_>) -> Option<Candidate>
     }
     let root = path.first().map(|joint| urdf.robot.joints[*joint].parent.clone())?;
     let (mut base, mut joints) = piece(urdf, &path, root.clone(), ends)?;
-    if ends.base.is_none() && base == root && root == "world" {
-        base.clone_from(&urdf.robot.joints[*path.first()?].child);
+    let first = &urdf.robot.joints[*path.first()?];
+    if ends.base.is_none() && base == root && root == "world" && first.is_fixed() {
+        base.clone_from(&first.child);
     }
     let mut fingers = Vec::new();
     if ends.tip.is_none() {
@@ -248,6 +251,9 @@ fn is_hand_after(urdf: &UrdfModel, joints: &[usize], n: usize) -> bool {
     let moving = (0..urdf.robot.joints.len()).filter(|&joint| !urdf.robot.joints[joint].is_fixed());
     let lengths: Vec<usize> = moving.filter(is_finger).map(|joint| n_joints_from(urdf, joint)).collect();
     let Some(&longest) = lengths.iter().max() else { return false };
+    if lengths.len() >= MANY_FINGERS {
+        return true;
+    }
     // Fingers of one hand differ by a joint at most.
     longest >= n_following || (longest + 1 == n_following && (longest > 1 || lengths.len() > 1))
 }

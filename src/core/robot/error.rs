@@ -35,14 +35,14 @@ pub enum RobotError {
     #[error(transparent)]
     Value(#[from] FileIssue),
     #[error(
-        "{}: {place}: joint `{joint}` closes a loop at link `{link}`; the arm's chain must be a tree. Delete one of the \
-         joints that hold the link",
+        "{}: {place}: joint `{joint}` closes a loop at link `{link}`; the arm's chain must be a tree. Delete one of \
+         the joints that hold the link",
         file.display()
     )]
     Loop { file: PathBuf, place: String, link: String, joint: String },
     #[error(
-        "{}: {place}: joint `{joint}` names the link `{link}`, which the file does not define. Correct the name, or add \
-         <link name=\"{link}\"/>",
+        "{}: {place}: joint `{joint}` names the link `{link}`, which the file does not define. Correct the name, or \
+         add <link name=\"{link}\"/>",
         file.display()
     )]
     MissingLink { file: PathBuf, place: String, joint: String, link: String },

@@ -135,7 +135,7 @@ impl UrdfModel {
         Ok(())
     }
 
-    /// Adds links that only joints name, where there is no doubt which link is meant.
+    /// Adds links that only joints name, where the joints leave no doubt about the link.
     fn add_implied_links(&mut self) -> Result<(), RobotError> {
         let defined: BTreeSet<String> = self.robot.links.iter().map(|link| link.name.clone()).collect();
         let n_roots = defined.iter().filter(|link| !self.joint_of_child.contains_key(*link)).count();
@@ -286,8 +286,9 @@ impl UrdfModel {
         }
         if let Some(leader) = &joint.mimic {
             let problem = format!(
-                "follows the joint `{leader}` (mimic), and calibration needs a sensor on each joint of the chain. If it \
-                 has one, delete its <mimic>. Otherwise name a base behind it or a tool in front of it (--base, --tip)"
+                "follows the joint `{leader}` (mimic), and calibration needs a sensor on each joint of the chain. If \
+                 it has one, delete its <mimic>. Otherwise name a base behind it or a tool in front of it (--base, \
+                 --tip)"
             );
             return Err(FileIssue::new(Code::UrdfStructure, file, key(), problem).into());
         }

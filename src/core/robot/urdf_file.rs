@@ -1,7 +1,7 @@
 //! Links and joints of a URDF file, with what was skipped.
 //!
-//! Values that kinematics need and that are wrong become defects of their joint: they refuse the file where the joint is
-//! on the arm's chain. Everything else that is wrong is skipped, and the skip is noted by link or joint.
+//! Values that kinematics need and that are wrong become defects of their joint: they refuse the file where the joint
+//! is on the arm's chain. Everything else that is wrong is skipped, and the skip is noted by link or joint.
 
 use super::xml_tree::{Place, XmlLimits, XmlTree};
 

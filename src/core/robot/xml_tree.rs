@@ -1,7 +1,7 @@
 //! Elements of a bounded XML text, each with its line and column.
 //!
-//! A pull parser reads the text within the given limits, which are checked before anything is stored; nothing is read by
-//! recursion. Document types that declare anything are refused, and so are entities other than XML's own. The text
+//! A pull parser reads the text within the given limits, which are checked before anything is stored; nothing is read
+//! by recursion. Document types that declare anything are refused, and so are entities other than XML's own. The text
 //! after the root element is not read.
 
 use quick_xml::Reader;
@@ -81,7 +81,7 @@ impl Element {
         self.attributes.iter().find(|(key, _)| key == name).map(|(_, value)| value.as_str())
     }
 
-    /// All attributes without a namespace prefix, by name.
+    /// Names and values of all attributes without a namespace prefix.
     pub fn attributes(&self) -> impl Iterator<Item = (&str, &str)> {
         self.attributes.iter().map(|(key, value)| (key.as_str(), value.as_str()))
     }
@@ -259,7 +259,8 @@ mod tests {
 
     #[test]
     fn elements_have_their_prefix_attributes_and_place() {
-        let text = "\u{feff}<?xml version=\"1.0\"?><!-- <a> -->\n<!-- é --><robot name='a&lt;\"&#65;' xmlns:x=\"u\" x:y=\"z\">\n\
+        let text = "\u{feff}<?xml version=\"1.0\"?><!-- <a> -->\n<!-- é -->\
+            <robot name='a&lt;\"&#65;' xmlns:x=\"u\" x:y=\"z\">\n\
             text &amp; more <![CDATA[<b>]]><x:sensor><link name=\"no\"/></x:sensor>\n  <link name=\"b\"/></robot><c>";
         let tree = parse(text).expect("it reads");
         let robot = tree.element(0);

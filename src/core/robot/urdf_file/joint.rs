@@ -211,8 +211,8 @@ fn note_range(scan: &mut Scan<'_>, owner: &str, at: usize, range: &Range, joint_
             format!("limits of {lower:?} and {upper:?} m mean none: the slide is used without limits")
         }
         (Range::Unlimited([lower, upper]), _) => format!(
-            "limits of {lower:?} and {upper:?} rad are more than 20 turns apart: the joint is used as continuous. Write \
-             limits that are in degrees in rad"
+            "limits of {lower:?} and {upper:?} rad are more than 20 turns apart: the joint is used as continuous. \
+             Write limits that are in degrees in rad"
         ),
         _ => return,
     };

@@ -77,7 +77,7 @@ impl<'a> Scan<'a> {
         first
     }
 
-    /// Notes the elements that are none of `known`.
+    /// Notes the elements that `known` does not list.
     pub fn skip_unknown(&mut self, owner: &str, at: usize, known: &[&str]) {
         for child in self.children(at) {
             let name = &self.element(child).name;
