@@ -379,12 +379,14 @@ fn xacro_is_named_with_the_command_that_expands_it() {
             ("lower=\"-1.6\"", "lower=\"${-pi / 2}\""),
             ("<joint name=\"j1\"", "<joint name=\"${prefix}j1\""),
             ("</robot>", "<xacro:include filename=\"hand.xacro\"/></robot>"),
-            ("</robot>", "<xacro:hand parent=\"tool\"/></robot>"),
+            ("</robot>", "<xacro:macro name=\"hand\"/><xacro:hand parent=\"tool\"/></robot>"),
         ] {
             Bench::new(&text.replacen(from, to, 1)).refused(&[], &words);
         }
         let unused = "<xacro:property name=\"a\" value=\"1\"/></robot>";
         Bench::new(&text.replacen("</robot>", unused, 1)).made(&[], &[]);
+        let left_over = "<xacro:sensors/></robot>";
+        Bench::new(&text.replacen("</robot>", left_over, 1)).made(&[], &["urdf_skipped", "sensors"]);
     }
 }
 
@@ -448,6 +450,9 @@ fn options_are_obeyed_or_refused() {
     // A root called world that moves is of the arm.
     let world = text.replace("base_link", "world");
     assert_eq!(Bench::new(&world).made(&[], &[]).base_link, "world");
+    // A root that only joints name is the only one.
+    let implied = text.replace("<link name=\"base_link\"></link>", "");
+    assert_eq!(Bench::new(&implied).made(&[], &["`base_link`", "urdf_skipped"]).n_joints(), 6);
     // One that stands still is not, unless it is named.
     let on_world =
         text.replace("</robot>", &(joint("w", "fixed", ["world", "base_link"], "") + "<link name=\"world\"/></robot>"));

@@ -46,7 +46,7 @@ pub(super) fn new_robot(args: &NewRobotArgs) -> Result<Exit> {
         touching: &[],
         clear_rad: None,
     };
-    let DraftedRobot { files, fingers } = draft_robot(&wanted, DraftedMeshes::Read)?;
+    let DraftedRobot { files, left_out } = draft_robot(&wanted, DraftedMeshes::Read)?;
     let (files, robot) = match trial(&files, &args.out)? {
         Ok(robot) => with_shapes(&wanted, robot, &args.out)?,
         Err(why) => {
@@ -59,7 +59,7 @@ pub(super) fn new_robot(args: &NewRobotArgs) -> Result<Exit> {
         }
     };
     write(&files, &args.out)?;
-    say_wrapped(&described(&files, &robot, &fingers, &args.out))?;
+    say_wrapped(&described(&files, &robot, &left_out, &args.out))?;
     Ok(Exit::Ok)
 }
 
@@ -120,7 +120,7 @@ fn write(files: &[NewFile], folder: &Path) -> Result<()> {
     Ok(output::write_together(&files)?)
 }
 
-fn described(files: &[NewFile], robot: &Robot, fingers: &[String], out: &Path) -> String {
+fn described(files: &[NewFile], robot: &Robot, left_out: &[String], out: &Path) -> String {
     let camera = &robot.camera.name;
     let mut text = format!(
         "{}: robot `{}`, {} joints from `{}`: {}; camera `{camera}`; {} files",
@@ -131,9 +131,11 @@ fn described(files: &[NewFile], robot: &Robot, fingers: &[String], out: &Path) -
         robot.joint_names().join(", "),
         files.len()
     );
-    if !fingers.is_empty() {
-        let (fingers, tip) = (fingers.join(", "), "name the tool's link with --tip where they are the arm's");
-        text.push_str(&format!("\nassumed: the last joints are a gripper's and left out: {fingers}; {tip}"));
+    if !left_out.is_empty() {
+        let joints = left_out.join(", ");
+        text.push_str(&format!(
+            "\nassumed: left out as a gripper's or a carriage's joints: {joints}. Name --base and --tip to keep them"
+        ));
     }
     for warning in &robot.urdf_warnings {
         text.push_str(&format!("\nwarning: {warning}"));

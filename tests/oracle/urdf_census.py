@@ -34,7 +34,7 @@ def other_readers(path):
         import yourdfpy
 
         model = yourdfpy.URDF.load(str(path), load_meshes=False, build_scene_graph=False, mesh_dir="")
-        n_moving = sum(joint.type not in ("fixed", "floating", "planar") for joint in model.robot.joints)
+        n_moving = sum(joint.type in ("revolute", "continuous", "prismatic") for joint in model.robot.joints)
         readers.append("yourdfpy")
     except BaseException:  # of any kind: the file is not read
         pass
@@ -81,8 +81,8 @@ def pose_of(model, joints, angles, tool):
     return pose
 
 
-def wrong(programs, path, folder):
-    """What is wrong with a folder; None where nothing is."""
+def wrong(programs, path, folder, said):
+    """What is wrong with a folder of which armcal said something; None where nothing is."""
     import yourdfpy
 
     robot = tomllib.loads((folder / "robot.toml").read_text())
@@ -94,6 +94,14 @@ def wrong(programs, path, folder):
         return f"joints {joints}, expected {max(chains, key=len)}"
     if any(joint.mimic for joint in other_chain(model, base, tool)):
         return "a joint of the chain follows another"
+    held = {joint.child: joint for joint in model.robot.joints}
+    above, at = [], base
+    while at in held:
+        above.append(held[at])
+        at = held[at].parent
+    turning = [joint.name for joint in above if joint.type in ("revolute", "continuous")]
+    if any(name not in said for name in turning) and all(joint.type not in ("floating", "planar") for joint in above):
+        return f"the base leaves out {turning}"
     holds = {joint.child: joint for joint in model.robot.joints}
     way, at = [], tool
     while at != base:
@@ -132,7 +140,7 @@ def judge(work):
         said = " ".join((answer.stderr if answer.returncode else answer.stdout).split())
         if answer.returncode == 0:
             try:
-                problem = wrong(programs, path, folder) if "yourdfpy" in readers else None
+                problem = wrong(programs, path, folder, said) if "yourdfpy" in readers else None
             except Exception as error:  # a comparison that cannot be made is shown, not hidden
                 problem = f"not compared: {error!r}"
             return name, path, readers, n_moving, "wrong" if problem else "made", problem or said

@@ -30,8 +30,8 @@ pub(super) struct FoundArm {
     pub tip: String,
     /// `None` where no link of the chain is called a camera.
     pub camera: Option<String>,
-    /// Joints behind the tip that were taken for those of a gripper.
-    pub fingers: Vec<String>,
+    /// Joints on the same way that were taken for those of a gripper or of what carries the arm.
+    pub left_out: Vec<String>,
 }
 
 /// One chain of joints.
@@ -41,8 +41,8 @@ struct Candidate {
     /// Numbers of the joints.
     joints: Vec<usize>,
     tip: String,
-    /// Numbers of the joints behind the tip that were taken for those of a gripper.
-    fingers: Vec<usize>,
+    /// Numbers of the joints on the same way that are not the arm's.
+    left_out: Vec<usize>,
 }
 
 /// Returns the arm of `urdf` between the links that the user names, as far as they are named.
@@ -59,8 +59,8 @@ pub(super) fn find_arm(urdf: &UrdfModel, ends: &Ends<'_>) -> Result<FoundArm, Ro
     candidates.sort_by_key(|candidate| std::cmp::Reverse(candidate.joints.len()));
     let best = single_arm(urdf, &candidates, ends)?;
     let camera = ends.camera.map(str::to_owned).or_else(|| camera_link(urdf, best));
-    let fingers = best.fingers.iter().map(|&joint| urdf.robot.joints[joint].name.clone()).collect();
-    Ok(FoundArm { base: best.base.clone(), tip: best.tip.clone(), camera, fingers })
+    let left_out = best.left_out.iter().map(|&joint| urdf.robot.joints[joint].name.clone()).collect();
+    Ok(FoundArm { base: best.base.clone(), tip: best.tip.clone(), camera, left_out })
 }
 
 fn issue(urdf: &UrdfModel, key: &str, problem: String) -> RobotError {
@@ -180,13 +180,12 @@ fn candidate(urdf: &UrdfModel, leaf: &str, ends: &Ends<'_>) -> Option<Candidate>
     if ends.base.is_none() && base == root && root == "world" && first.is_fixed() {
         base.clone_from(&first.child);
     }
-    let mut fingers = Vec::new();
     if ends.tip.is_none() {
         if let Some(n) = (FEW_JOINTS..joints.len()).find(|n| is_hand_after(urdf, &joints, *n)) {
-            fingers = joints.split_off(n);
+            joints.truncate(n);
         }
         while joints.len() > FEW_JOINTS && is_jaw(urdf, *joints.last()?) {
-            fingers.insert(0, joints.pop()?);
+            joints.pop();
         }
     }
     // What carries too long an arm on slides is not of the arm.
@@ -199,7 +198,9 @@ fn candidate(urdf: &UrdfModel, leaf: &str, ends: &Ends<'_>) -> Option<Candidate>
     }
     let last = *joints.last()?;
     let tip = ends.tip.map_or_else(|| deepest_fixed(urdf, &urdf.robot.joints[last].child), str::to_owned);
-    Some(Candidate { base, joints, tip, fingers })
+    let is_left_out = |joint: &usize| !urdf.robot.joints[*joint].is_fixed() && !joints.contains(joint);
+    let left_out = path.iter().copied().filter(is_left_out).collect();
+    Some(Candidate { base, joints, tip, left_out })
 }
 
 /// Cuts the path at joints of several degrees of freedom and returns the base and the joints of one piece. Between two

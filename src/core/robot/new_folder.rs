@@ -57,8 +57,8 @@ pub struct NewFile {
 pub struct DraftedRobot {
     /// The URDF, its collision meshes and robot.toml, the last.
     pub files: Vec<NewFile>,
-    /// Joints behind the tool's link that were taken for those of a gripper and left out.
-    pub fingers: Vec<String>,
+    /// Joints that were taken for those of a gripper, or of what carries the arm, and left out.
+    pub left_out: Vec<String>,
 }
 
 /// Folders above the URDF's in which packages are looked for.
@@ -79,7 +79,7 @@ pub fn draft_robot(wanted: &NewRobot<'_>, meshes: DraftedMeshes<'_>) -> Result<D
     let name = wanted.name.unwrap_or(&urdf.robot.name);
     let draft = Draft { wanted, urdf: &urdf, urdf_name: &urdf_name, name, arm: &arm, chain: &chain, meshes };
     files.push(NewFile { path: "robot.toml".into(), bytes: draft.text().into_bytes() });
-    Ok(DraftedRobot { files, fingers: arm.fingers })
+    Ok(DraftedRobot { files, left_out: arm.left_out })
 }
 
 /// The URDF, and the arm in it.
@@ -234,10 +234,12 @@ impl Draft<'_> {
              # Assumed: the tool point is that link's origin.\npoint_m = [0.0, 0.0, 0.0]\n",
             quoted(&self.arm.tip)
         );
-        if !self.arm.fingers.is_empty() {
-            let fingers = on_line(&self.arm.fingers.join(", "));
-            let _ =
-                writeln!(out, "# Assumed: these joints behind it are a gripper's: {fingers}. Otherwise name --tip.");
+        if !self.arm.left_out.is_empty() {
+            let joints = on_line(&self.arm.left_out.join(", "));
+            let _ = writeln!(
+                out,
+                "# Assumed: not the arm's, but a gripper's or a carriage's: {joints}. Or name --base, --tip."
+            );
         }
     }
 

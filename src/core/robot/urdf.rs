@@ -138,15 +138,17 @@ impl UrdfModel {
     /// Adds links that only joints name, where the joints leave no doubt about the link.
     fn add_implied_links(&mut self) -> Result<(), RobotError> {
         let defined: BTreeSet<String> = self.robot.links.iter().map(|link| link.name.clone()).collect();
-        let n_roots = defined.iter().filter(|link| !self.joint_of_child.contains_key(*link)).count();
+        let parents = self.robot.joints.iter().map(|joint| joint.parent.clone());
+        let links: BTreeSet<String> = defined.iter().cloned().chain(parents).collect();
+        let n_roots = links.iter().filter(|link| !self.joint_of_child.contains_key(*link)).count();
         let mut added: BTreeMap<String, UrdfLink> = BTreeMap::new();
         for joint in &self.robot.joints {
             for link in [&joint.parent, &joint.child] {
                 if defined.contains(link) || added.contains_key(link) {
                     continue;
                 }
-                // A wrong name leaves the link that was meant without a joint above it.
-                if n_roots > 1 || !self.joint_of_child.contains_key(link) {
+                // A wrong name tears the tree apart.
+                if n_roots > 1 {
                     return Err(RobotError::MissingLink {
                         file: self.file.clone(),
                         place: joint.place.to_string(),

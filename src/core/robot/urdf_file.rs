@@ -48,8 +48,14 @@ impl UrdfFile {
         let colors = link::named_colors(&mut scan);
         let name = root.attribute("name").filter(|name| !name.is_empty()).unwrap_or("arm").to_owned();
         let mut file = Self { name, links: Vec::new(), joints: Vec::new(), skipped: Vec::new() };
-        for at in tree.children(0).filter(|&at| tree.element(at).prefix.is_empty()) {
+        for at in tree.children(0) {
             let element = tree.element(at);
+            if element.prefix == "xacro" && !["property", "arg", "macro"].contains(&element.name.as_str()) {
+                scan.skip("robot", at, format!("xacro left `xacro:{}` over: skipped", element.name));
+            }
+            if !element.prefix.is_empty() {
+                continue;
+            }
             match element.name.as_str() {
                 "link" => file.add_link(&mut scan, at, &colors),
                 "joint" => file.joints.push(joint::read_joint(&mut scan, at)?),
@@ -76,15 +82,18 @@ impl UrdfFile {
     }
 }
 
-/// Refuses a file whose values only xacro can compute.
+/// Refuses a file that only xacro can expand. What an expanded file has left over, such as unused definitions and calls
+/// of macros that are defined nowhere, is skipped.
 fn refuse_xacro(tree: &XmlTree) -> Result<(), String> {
     let advice = "Run xacro first: `xacro ARM.urdf.xacro > ARM.urdf`";
     let has_joints = tree.children(0).any(|at| tree.element(at).prefix.is_empty() && tree.element(at).name == "joint");
-    for element in tree.elements() {
-        // Definitions that nothing refers to change nothing.
-        let is_unused = has_joints && ["property", "arg", "macro"].contains(&element.name.as_str());
-        if element.prefix == "xacro" && !is_unused {
-            let (place, name) = (element.place, &element.name);
+    let of_xacro = || tree.elements().iter().filter(|element| element.prefix == "xacro");
+    let macros = of_xacro().filter(|element| element.name == "macro");
+    let macros: Vec<&str> = macros.filter_map(|element| element.attribute("name")).collect();
+    for element in of_xacro() {
+        let (place, name) = (element.place, element.name.as_str());
+        let expands = ["include", "if", "unless", "insert_block", "call"].contains(&name) || macros.contains(&name);
+        if expands || !has_joints {
             return Err(format!("{place}: `xacro:{name}` is xacro, not URDF. {advice}"));
         }
     }
