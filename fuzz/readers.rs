@@ -104,9 +104,9 @@ fn new_robot(scratch: &Scratch, bytes: &[u8]) -> bool {
     let urdf = scratch.write("given/arm.urdf", bytes);
     let wanted =
         NewRobot { urdf: &urdf, base: None, tip: None, camera: None, name: None, touching: &[], clear_rad: None };
-    let Ok(files) = draft_robot(&wanted, DraftedMeshes::Read) else { return false };
+    let Ok(drafted) = draft_robot(&wanted, DraftedMeshes::Read) else { return false };
     let made = tempfile::tempdir_in(scratch.folder.path()).expect("a folder");
-    for file in files {
+    for file in drafted.files {
         let path = made.path().join(&file.path);
         assert!(file.path.is_relative(), "{}", path.display());
         // A mesh's name from the URDF may be longer than the system has it: the program says so and ends.

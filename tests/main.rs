@@ -12,8 +12,8 @@
 //! recordings of real arms, `board_corners` those of a chessboard, `bags` the same as SQLite files, `recorded_inputs`
 //! their slow sensors and images, `streams` those that were recorded all the time, `cameras` those of arms with two
 //! cameras; `tagmap` maps tags in recordings that the test writes; `touch` feels surveyed plates with the tool;
-//! `any_arm` makes robot folders for drawings of all sorts; `report` reads report.html; `work` works on a dive, `watch`
-//! follows recordings that grow; `repository` reads sources and pages.
+//! `any_arm` makes robot folders for drawings of all sorts, `urdf` for URDFs that are wrong in parts; `report` reads
+//! report.html; `work` works on a dive, `watch` follows recordings that grow; `repository` reads sources and pages.
 //!
 //! Tests that are ignored are a second tier: statistics over many seeds, routines and dives, of which the first tier
 //! has a small member. `cargo test --release -- --include-ignored` runs both.
@@ -58,6 +58,7 @@ mod support;
 mod tagmap;
 mod touch;
 mod uncalibrated;
+mod urdf;
 mod vehicles;
 mod wall;
 mod watch;

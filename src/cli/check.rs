@@ -3,7 +3,7 @@
 use armcal_core::codes::{Code, Coded, Warning};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context as _, Result};
 use clap::Args;
 use serde::Serialize;
 
@@ -37,8 +37,8 @@ pub(super) struct CheckArgs {
 }
 
 pub(super) fn check(args: &CheckArgs) -> Result<Exit> {
-    let overrides = args.overrides.overrides();
-    let checked = args.files.iter().map(|file| Checked::of(file, &overrides));
+    let context = Context { overrides: args.overrides.overrides(), robot: only_robot(&args.files) };
+    let checked = args.files.iter().map(|file| Checked::of(file, &context));
     let checked: Vec<Checked> = if args.json {
         let checked: Vec<Checked> = checked.collect();
         say(&serde_json::to_string_pretty(&checked).context("the answer has no JSON form")?)?;
@@ -52,6 +52,19 @@ pub(super) fn check(args: &CheckArgs) -> Result<Exit> {
         (false, true) => Exit::Refused,
         (false, false) => Exit::Ok,
     })
+}
+
+/// Settings for all files, and the robot that the tasks among them are for.
+struct Context {
+    overrides: Overrides,
+    robot: Option<Robot>,
+}
+
+/// Returns the robot of the only robot folder among `files`; `None` where there are several or where it does not read.
+fn only_robot(files: &[PathBuf]) -> Option<Robot> {
+    let mut folders = files.iter().filter(|file| FileKind::of(file) == Some(FileKind::RobotFolder));
+    let folder = folders.next().filter(|_| folders.next().is_none())?;
+    robot::load(folder).ok()
 }
 
 /// What was found of one file.
@@ -75,9 +88,9 @@ struct Checked {
 }
 
 impl Checked {
-    fn of(file: &Path, overrides: &Overrides) -> Self {
+    fn of(file: &Path, context: &Context) -> Self {
         let name = file.display().to_string();
-        match check_one(file, overrides) {
+        match check_one(file, context) {
             Ok(Found { text, warnings, refusal }) => {
                 let (error, code) = refusal.unzip();
                 let refused = error.is_some();
@@ -116,7 +129,7 @@ impl Found {
     }
 }
 
-fn check_one(file: &Path, overrides: &Overrides) -> Result<Found> {
+fn check_one(file: &Path, context: &Context) -> Result<Found> {
     if file.is_dir() {
         return check_robot(file);
     }
@@ -127,8 +140,9 @@ fn check_one(file: &Path, overrides: &Overrides) -> Result<Found> {
     let text = robot::read_text(file)?;
     let table: toml::Table = robot::parse_toml(file, &text)?;
     match FileKind::of_table(&table) {
-        Some(FileKind::Routine) => check_routine(file, overrides),
+        Some(FileKind::Routine) => check_routine(file, &context.overrides),
         Some(FileKind::Calibration) => describe_calibration(file, &text),
+        Some(FileKind::Task) => describe_task(file, context.robot.as_ref()),
         kind => Ok(Found::whole(describe(file, kind)?)),
     }
 }
@@ -165,11 +179,6 @@ fn describe(file: &Path, kind: Option<FileKind>) -> Result<String> {
             let map = read_landmarks(file)?;
             Ok(format!("tag map in the frame `{}`, {}", map.frame, counted(map.landmarks.len(), "landmark")))
         }
-        Some(FileKind::Task) => {
-            let task = read_task(file)?;
-            let (targets, poses) = (task.targets_m.len(), task.poses_rad.len());
-            Ok(format!("task, {targets} targets and {poses} poses, tolerance {} mm", task.tolerance_m * 1e3))
-        }
         Some(FileKind::RoutineWithoutVehicle) => Err(UsageError::new(
             Code::KeyMissing,
             format!(
@@ -188,6 +197,17 @@ fn describe(file: &Path, kind: Option<FileKind>) -> Result<String> {
         )
         .into()),
     }
+}
+
+/// Describes a task, which is also held against the robot's joints where one is checked with it.
+fn describe_task(file: &Path, robot: Option<&Robot>) -> Result<Found> {
+    let task = read_task(file)?;
+    if let Some(robot) = robot {
+        task.check_poses(file, robot)?;
+    }
+    let (targets, poses) = (task.targets_m.len(), task.poses_rad.len());
+    let text = format!("task, {targets} targets and {poses} poses, tolerance {} mm", task.tolerance_m * 1e3);
+    Ok(Found::whole(text))
 }
 
 /// One without its covariance still moves an arm; one beside another's is wrong.
@@ -243,7 +263,8 @@ fn check_robot(folder: &Path) -> Result<Found> {
     let lost = lost.map(|id| {
         format!("base_tag: there is no [[tag]], so that tag {id} must be one of the vehicle's, or of a tag map")
     });
-    let warnings = refused.chain(lost).map(|text| Warning::new(Code::PlanningIncomplete, text)).collect();
+    let for_planning = refused.chain(lost).map(|text| Warning::new(Code::PlanningIncomplete, text));
+    let warnings = robot.urdf_warnings.iter().cloned().chain(for_planning).collect();
     Ok(Found { warnings, ..Found::whole(describe_robot(&robot)?) })
 }
 

@@ -11,7 +11,7 @@ use crate::cli::exit::{Exit, UsageError};
 use crate::cli::file_kind::{FileKind, expect_kind};
 use crate::output;
 use armcal_belief::plan::{always_near, clear_angles};
-use armcal_core::robot::{self, DraftedMeshes, NewFile, NewRobot, Robot, RobotError, draft_robot};
+use armcal_core::robot::{self, DraftedMeshes, DraftedRobot, NewFile, NewRobot, Robot, RobotError, draft_robot};
 
 #[derive(Debug, Args)]
 pub(super) struct NewRobotArgs {
@@ -46,11 +46,11 @@ pub(super) fn new_robot(args: &NewRobotArgs) -> Result<Exit> {
         touching: &[],
         clear_rad: None,
     };
-    let files = draft_robot(&wanted, DraftedMeshes::Read)?;
+    let DraftedRobot { files, left_out } = draft_robot(&wanted, DraftedMeshes::Read)?;
     let (files, robot) = match trial(&files, &args.out)? {
         Ok(robot) => with_shapes(&wanted, robot, &args.out)?,
         Err(why) => {
-            let without = draft_robot(&wanted, DraftedMeshes::Ignored(&why.to_string()))?;
+            let without = draft_robot(&wanted, DraftedMeshes::Ignored(&why.to_string()))?.files;
             let robot = trial(&without, &args.out)??;
             if robot.planning_issues.iter().all(|issue| issue.key != "collision_meshes") {
                 return Err(why.into());
@@ -59,7 +59,7 @@ pub(super) fn new_robot(args: &NewRobotArgs) -> Result<Exit> {
         }
     };
     write(&files, &args.out)?;
-    say_wrapped(&described(&files, &robot, &args.out))?;
+    say_wrapped(&described(&files, &robot, &left_out, &args.out))?;
     Ok(Exit::Ok)
 }
 
@@ -74,7 +74,7 @@ const STOWED_MARGIN_M: f64 = 0.03;
 /// where no others are.
 fn with_shapes(wanted: &NewRobot<'_>, robot: Robot, out: &Path) -> Result<(Vec<NewFile>, Robot)> {
     let read = |wanted: &NewRobot<'_>| -> Result<(Vec<NewFile>, Robot)> {
-        let files = draft_robot(wanted, DraftedMeshes::Read)?;
+        let files = draft_robot(wanted, DraftedMeshes::Read)?.files;
         let robot = trial(&files, out)??;
         Ok((files, robot))
     };
@@ -120,7 +120,7 @@ fn write(files: &[NewFile], folder: &Path) -> Result<()> {
     Ok(output::write_together(&files)?)
 }
 
-fn described(files: &[NewFile], robot: &Robot, out: &Path) -> String {
+fn described(files: &[NewFile], robot: &Robot, left_out: &[String], out: &Path) -> String {
     let camera = &robot.camera.name;
     let mut text = format!(
         "{}: robot `{}`, {} joints from `{}`: {}; camera `{camera}`; {} files",
@@ -131,6 +131,15 @@ fn described(files: &[NewFile], robot: &Robot, out: &Path) -> String {
         robot.joint_names().join(", "),
         files.len()
     );
+    if !left_out.is_empty() {
+        let joints = left_out.join(", ");
+        text.push_str(&format!(
+            "\nassumed: left out as a gripper's or a carriage's joints: {joints}. Name --base and --tip to keep them"
+        ));
+    }
+    for warning in &robot.urdf_warnings {
+        text.push_str(&format!("\nwarning: {warning}"));
+    }
     for issue in &robot.planning_issues {
         text.push_str(&format!("\nleft for run and plan: {}: {}", issue.key, issue.problem));
     }

@@ -196,6 +196,7 @@ codes! {
     MessagesRejected = "messages_rejected",
     ChunksDisordered = "chunks_disordered",
     InputUnitDoubtful = "input_unit_doubtful",
+    UrdfSkipped = "urdf_skipped",
     PlanningIncomplete = "planning_incomplete",
     TagHidden = "tag_hidden",
     TargetSkipped = "target_skipped",

@@ -14,6 +14,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use crate::joints::JointAngles;
+use crate::kinematics::{ChainJoint, JointKind};
 use crate::robot::{FileIssue, Robot, RobotError, parse_toml, read_text};
 use crate::streams::ReachTask;
 use crate::time::Stamp;
@@ -78,6 +79,38 @@ pub fn parse_task(file: &Path, text: &str) -> Result<TaskFile, RobotError> {
 }
 
 impl TaskFile {
+    /// Checks that each pose lies within the joints' limits.
+    ///
+    /// # Errors
+    /// [`FileIssue`] naming `file`, the pose, the joint and its limits; also whether the pose is in degrees.
+    pub fn check_poses(&self, file: &Path, robot: &Robot) -> Result<(), FileIssue> {
+        self.for_robot(file, robot)?;
+        let is_within = |joint: &ChainJoint, angle: f64| {
+            joint.limits.is_none_or(|limits| (limits.lower_rad..=limits.upper_rad).contains(&angle))
+        };
+        for (k, pose) in self.poses_rad.iter().enumerate() {
+            let joints = || robot.chain.joints().iter().zip(pose.iter().copied());
+            let Some((joint, angle)) = joints().find(|(joint, angle)| !is_within(joint, *angle)) else { continue };
+            let Some(limits) = joint.limits else { continue };
+            let (lower, upper, unit) = (limits.lower_rad, limits.upper_rad, joint.kind.si());
+            let mut problem =
+                format!("{angle} {unit} of joint `{}` is beyond its limits of {lower} to {upper} {unit}", joint.name);
+            let in_degrees = joints().map(|(joint, angle)| match joint.kind {
+                JointKind::Revolute => (joint, angle.to_radians()),
+                JointKind::Prismatic => (joint, angle),
+            });
+            let in_degrees: Vec<(&ChainJoint, f64)> = in_degrees.collect();
+            if in_degrees.iter().all(|(joint, angle)| is_within(joint, *angle)) {
+                let angles: Vec<String> = in_degrees.iter().map(|(_, angle)| format!("{angle:.4}")).collect();
+                problem += &format!(". The pose looks like degrees; write it in rad: [{}]", angles.join(", "));
+            } else {
+                problem += ". Give an angle within the limits, or correct the limits in the URDF";
+            }
+            return Err(FileIssue::new(Code::JointLimit, file, format!("poses_rad[{k}]"), problem));
+        }
+        Ok(())
+    }
+
     /// The task for `robot`: the targets, and where its tool is at the poses by the drawing.
     ///
     /// # Errors

@@ -1,15 +1,17 @@
 //! The arm in a URDF: its longest serial chain of revolute joints and slides, without a gripper's fingers.
 
 use crate::codes::Code;
-use urdf_rs::JointType;
 
-use super::error::FileIssue;
+use super::error::{FileIssue, RobotError};
 use super::urdf::UrdfModel;
+use super::urdf_file::{JointType, Range, UrdfJoint};
 use crate::joints::MAX_JOINTS;
 
 /// Joints before a place where a chain branches, at the least, for what follows to be taken for fingers; and joints of
 /// its own that make another chain another arm.
 const FEW_JOINTS: usize = 3;
+/// Branches next to each other that only a hand has: a parallelogram has two rods.
+const MANY_FINGERS: usize = 3;
 /// A slide of less travel at the end of an arm is a gripper's jaw, m. Assumed: the strokes of SCARA arms begin there.
 const JAW_TRAVEL_M: f64 = 0.12;
 
@@ -28,6 +30,8 @@ pub(super) struct FoundArm {
     pub tip: String,
     /// `None` where no link of the chain is called a camera.
     pub camera: Option<String>,
+    /// Joints on the same way that were taken for those of a gripper or of what carries the arm.
+    pub left_out: Vec<String>,
 }
 
 /// One chain of joints.
@@ -37,36 +41,85 @@ struct Candidate {
     /// Numbers of the joints.
     joints: Vec<usize>,
     tip: String,
+    /// Numbers of the joints on the same way that are not the arm's.
+    left_out: Vec<usize>,
 }
 
-/// The arm of `urdf`.
+/// Returns the arm of `urdf` between the links that the user names, as far as they are named.
 ///
 /// # Errors
-/// [`FileIssue`] where there is none, where there are several and no tip is named, or where a named link is missing.
-pub(super) fn find_arm(urdf: &UrdfModel, ends: &Ends<'_>) -> Result<FoundArm, FileIssue> {
-    for (option, link) in [("--base", ends.base), ("--tip", ends.tip), ("--camera-link", ends.camera)] {
-        if let Some(link) = link.filter(|link| !urdf.has_link(link)) {
-            let ends = leaves(urdf).take(20).collect::<Vec<_>>().join(", ");
-            let problem = format!("`{link}` is not a link of the URDF; some that are: {ends}");
-            return Err(FileIssue::new(Code::ValueInvalid, &urdf.file, option, problem));
-        }
-    }
+/// [`RobotError`] where there is none, where there are several and no tip is named, or where a named link is missing.
+pub(super) fn find_arm(urdf: &UrdfModel, ends: &Ends<'_>) -> Result<FoundArm, RobotError> {
+    check_named(urdf, ends)?;
+    check_roots(urdf, ends)?;
     let mut candidates: Vec<Candidate> = match ends.tip {
         Some(tip) => candidate(urdf, tip, ends).into_iter().collect(),
         None => leaves(urdf).filter_map(|leaf| candidate(urdf, leaf, ends)).collect(),
     };
     candidates.sort_by_key(|candidate| std::cmp::Reverse(candidate.joints.len()));
+    let best = single_arm(urdf, &candidates, ends)?;
+    let camera = ends.camera.map(str::to_owned).or_else(|| camera_link(urdf, best));
+    let left_out = best.left_out.iter().map(|&joint| urdf.robot.joints[joint].name.clone()).collect();
+    Ok(FoundArm { base: best.base.clone(), tip: best.tip.clone(), camera, left_out })
+}
+
+fn issue(urdf: &UrdfModel, key: &str, problem: String) -> RobotError {
+    FileIssue::new(Code::ValueInvalid, &urdf.file, key, problem).into()
+}
+
+fn check_named(urdf: &UrdfModel, ends: &Ends<'_>) -> Result<(), RobotError> {
+    for (option, link) in [("--base", ends.base), ("--tip", ends.tip), ("--camera-link", ends.camera)] {
+        if let Some(link) = link.filter(|link| !urdf.has_link(link)) {
+            let ends = leaves(urdf).take(20).collect::<Vec<_>>().join(", ");
+            return Err(issue(urdf, option, format!("`{link}` is not a link of the URDF; some that are: {ends}")));
+        }
+    }
+    if let (Some(base), Some(tip)) = (ends.base, ends.tip) {
+        urdf.path(base, tip)?;
+    }
+    Ok(())
+}
+
+/// Asks for an option where moving joints are on several trees: one of them may be a torn part of the other.
+fn check_roots(urdf: &UrdfModel, ends: &Ends<'_>) -> Result<(), RobotError> {
+    if ends.base.is_some() || ends.tip.is_some() {
+        return Ok(());
+    }
+    let has_joints = |root: &&str| {
+        let mut moving = urdf.robot.joints.iter().filter(|joint| joint.is_single());
+        moving.any(|joint| root_of(urdf, &joint.parent) == *root)
+    };
+    let roots: Vec<&str> = urdf.roots().filter(has_joints).collect();
+    if roots.len() < 2 {
+        return Ok(());
+    }
+    let problem = format!(
+        "{} separate trees of links have moving joints, from {}. Connect them by a joint, or name one with --base",
+        roots.len(),
+        roots.join(", ")
+    );
+    Err(issue(urdf, "link", problem))
+}
+
+fn root_of<'a>(urdf: &'a UrdfModel, link: &'a str) -> &'a str {
+    path(urdf, link).first().map_or(link, |joint| urdf.robot.joints[*joint].parent.as_str())
+}
+
+/// Returns the longest candidate, where no other one is an arm of its own.
+fn single_arm<'a>(urdf: &UrdfModel, candidates: &'a [Candidate], ends: &Ends<'_>) -> Result<&'a Candidate, RobotError> {
     let Some(best) = candidates.first() else {
         let problem = match (ends.base, ends.tip) {
             (Some(base), Some(tip)) => {
                 format!("no revolute, continuous or prismatic joint lies between `{base}` and `{tip}`")
             }
-            _ => "no chain of revolute, continuous or prismatic joints was found".to_owned(),
+            (Some(base), None) => format!("no revolute, continuous or prismatic joint is carried by `{base}`"),
+            (None, Some(tip)) => format!("no revolute, continuous or prismatic joint carries `{tip}`"),
+            (None, None) => "no chain of revolute, continuous or prismatic joints was found".to_owned(),
         };
-        return Err(FileIssue::new(Code::ValueInvalid, &urdf.file, "joint", problem));
+        return Err(issue(urdf, "joint", problem));
     };
     let mut arms: Vec<&Candidate> = vec![best];
-    for other in &candidates {
+    for other in candidates {
         let is_apart = |arm: &&Candidate| {
             let own = other.joints.iter().filter(|joint| !arm.joints.contains(joint)).count();
             own >= FEW_JOINTS && 2 * other.joints.len() >= best.joints.len()
@@ -78,22 +131,9 @@ pub(super) fn find_arm(urdf: &UrdfModel, ends: &Ends<'_>) -> Result<FoundArm, Fi
     if arms.len() > 1 {
         let each = arms.iter().map(|arm| format!("{} ({} joints)", arm.tip, arm.joints.len())).collect::<Vec<_>>();
         let problem = format!("{} arms end at {}: name one with --tip", arms.len(), each.join(", "));
-        return Err(FileIssue::new(Code::ValueInvalid, &urdf.file, "joint", problem));
+        return Err(issue(urdf, "joint", problem));
     }
-    let camera = ends.camera.map(str::to_owned).or_else(|| camera_link(urdf, best));
-    Ok(FoundArm { base: best.base.clone(), tip: best.tip.clone(), camera })
-}
-
-fn is_moving(urdf: &UrdfModel, joint: usize) -> bool {
-    urdf.robot.joints[joint].joint_type != JointType::Fixed
-}
-
-/// Revolute, continuous or prismatic, and not driven by another joint.
-fn is_of_arm(urdf: &UrdfModel, joint: usize) -> bool {
-    let joint = &urdf.robot.joints[joint];
-    let turns_or_slides =
-        matches!(joint.joint_type, JointType::Revolute | JointType::Continuous | JointType::Prismatic);
-    turns_or_slides && joint.mimic.is_none()
+    Ok(best)
 }
 
 fn is_slide(urdf: &UrdfModel, joint: usize) -> bool {
@@ -101,12 +141,15 @@ fn is_slide(urdf: &UrdfModel, joint: usize) -> bool {
 }
 
 fn is_jaw(urdf: &UrdfModel, joint: usize) -> bool {
-    let limit = &urdf.robot.joints[joint].limit;
-    is_slide(urdf, joint) && limit.upper - limit.lower < JAW_TRAVEL_M
+    let is_short = match &urdf.robot.joints[joint].range {
+        Range::Limits(limits) => limits.upper_rad - limits.lower_rad < JAW_TRAVEL_M,
+        Range::Endless | Range::Unlimited(_) | Range::Unknown(_) => false,
+    };
+    is_slide(urdf, joint) && is_short
 }
 
 fn leaves(urdf: &UrdfModel) -> impl Iterator<Item = &str> {
-    let is_leaf = |link: &&str| urdf.robot.joints.iter().all(|joint| joint.parent.link != **link);
+    let is_leaf = |link: &&str| urdf.robot.joints.iter().all(|joint| joint.parent != **link);
     urdf.robot.links.iter().map(|link| link.name.as_str()).filter(is_leaf)
 }
 
@@ -116,57 +159,68 @@ fn path(urdf: &UrdfModel, link: &str) -> Vec<usize> {
     let mut at = link;
     while let Some(&joint) = urdf.joint_of_child.get(at) {
         path.push(joint);
-        at = &urdf.robot.joints[joint].parent.link;
+        at = &urdf.robot.joints[joint].parent;
     }
     path.reverse();
     path
 }
 
-/// The longest chain on the way from the root to `leaf`; to a leaf that was named, the last one.
+/// Returns the longest chain on the way from the root to `leaf`: the last one to a leaf that was named, the first one
+/// from a base that was named.
 fn candidate(urdf: &UrdfModel, leaf: &str, ends: &Ends<'_>) -> Option<Candidate> {
     let mut path = path(urdf, leaf);
     if let Some(base) = ends.base {
-        let is_first = |joint: &usize| urdf.robot.joints[*joint].parent.link == base;
+        let is_first = |joint: &usize| urdf.robot.joints[*joint].parent == base;
         let first = path.iter().position(is_first)?;
         path.drain(..first);
     }
-    let root = path.first().map(|joint| urdf.robot.joints[*joint].parent.link.clone())?;
-    // Cut at joints that are no joints of an arm.
-    let mut pieces = vec![(root.clone(), Vec::new())];
-    for &joint in &path {
-        if is_of_arm(urdf, joint) {
-            pieces.last_mut()?.1.push(joint);
-        } else if is_moving(urdf, joint) {
-            pieces.push((urdf.robot.joints[joint].child.link.clone(), Vec::new()));
+    let root = path.first().map(|joint| urdf.robot.joints[*joint].parent.clone())?;
+    let (mut base, mut joints) = piece(urdf, &path, root.clone(), ends)?;
+    let first = &urdf.robot.joints[*path.first()?];
+    if ends.base.is_none() && base == root && root == "world" && first.is_fixed() {
+        base.clone_from(&first.child);
+    }
+    if ends.tip.is_none() {
+        if let Some(n) = (FEW_JOINTS..joints.len()).find(|n| is_hand_after(urdf, &joints, *n)) {
+            joints.truncate(n);
         }
-    }
-    let (mut base, mut joints) = match ends.tip {
-        Some(_) => pieces.pop()?,
-        None => pieces.into_iter().rev().max_by_key(|(_, joints)| joints.len())?,
-    };
-    if ends.base.is_none() && base == root && root == "world" {
-        base.clone_from(&urdf.robot.joints[*path.first()?].child.link);
-    }
-    if ends.tip.is_none()
-        && let Some(n) =
-            (FEW_JOINTS..joints.len()).find(|n| branches_after(urdf, joints[n - 1]) && joints.len() <= 2 * n)
-    {
-        joints.truncate(n);
-    }
-    while ends.tip.is_none() && joints.len() > FEW_JOINTS && is_jaw(urdf, *joints.last()?) {
-        joints.pop();
+        while joints.len() > FEW_JOINTS && is_jaw(urdf, *joints.last()?) {
+            joints.pop();
+        }
     }
     // What carries too long an arm on slides is not of the arm.
     while ends.base.is_none()
         && joints.len() > MAX_JOINTS
         && let Some(slide) = joints.iter().position(|joint| is_slide(urdf, *joint))
     {
-        base.clone_from(&urdf.robot.joints[joints[slide]].child.link);
+        base.clone_from(&urdf.robot.joints[joints[slide]].child);
         joints.drain(..=slide);
     }
     let last = *joints.last()?;
-    let tip = ends.tip.map_or_else(|| deepest_fixed(urdf, &urdf.robot.joints[last].child.link), str::to_owned);
-    Some(Candidate { base, joints, tip })
+    let tip = ends.tip.map_or_else(|| deepest_fixed(urdf, &urdf.robot.joints[last].child), str::to_owned);
+    let is_left_out = |joint: &usize| !urdf.robot.joints[*joint].is_fixed() && !joints.contains(joint);
+    let left_out = path.iter().copied().filter(is_left_out).collect();
+    Some(Candidate { base, joints, tip, left_out })
+}
+
+/// Cuts the path at joints of several degrees of freedom and returns the base and the joints of one piece. Between two
+/// named links nothing is cut, so that such a joint refuses.
+fn piece(urdf: &UrdfModel, path: &[usize], root: String, ends: &Ends<'_>) -> Option<(String, Vec<usize>)> {
+    let mut pieces = vec![(root, Vec::new())];
+    for &joint in path {
+        let of_urdf = &urdf.robot.joints[joint];
+        let is_whole = ends.base.is_some() && ends.tip.is_some();
+        if of_urdf.is_single() || (is_whole && !of_urdf.is_fixed()) {
+            pieces.last_mut()?.1.push(joint);
+        } else if !of_urdf.is_fixed() {
+            pieces.push((of_urdf.child.clone(), Vec::new()));
+        }
+    }
+    match (ends.base, ends.tip) {
+        (Some(_), _) => pieces.into_iter().next(),
+        (None, Some(_)) => pieces.pop(),
+        (None, None) => pieces.into_iter().rev().max_by_key(|(_, joints)| joints.len()),
+    }
 }
 
 /// Links that are fixed to `link`, itself included, each with the number of joints between.
@@ -174,20 +228,51 @@ fn fixed_to<'a>(urdf: &'a UrdfModel, link: &'a str) -> Vec<(usize, &'a str)> {
     let mut found = vec![(0, link)];
     let mut at = 0;
     while let Some(&(depth, parent)) = found.get(at) {
-        let fixed = urdf.robot.joints.iter().filter(|j| j.joint_type == JointType::Fixed && j.parent.link == parent);
-        found.extend(fixed.map(|joint| (depth + 1, joint.child.link.as_str())));
+        let is_held = |joint: &&UrdfJoint| joint.is_fixed() && joint.parent == parent && joint.defects.is_empty();
+        found.extend(urdf.robot.joints.iter().filter(is_held).map(|joint| (depth + 1, joint.child.as_str())));
         at += 1;
     }
     found
 }
 
-/// Whether several moving joints hang on what `joint` carries.
-fn branches_after(urdf: &UrdfModel, joint: usize) -> bool {
-    let carried = fixed_to(urdf, &urdf.robot.joints[joint].child.link);
-    let hangs_there = |joint: &&urdf_rs::Joint| {
-        joint.joint_type != JointType::Fixed && carried.iter().any(|(_, link)| *link == joint.parent.link)
+/// Returns true where the first `n` joints carry a hand: joints of similar number next to those that follow. A short
+/// branch next to a longer chain is a balancer or a cable guide, and so is one that follows a joint of the arm.
+fn is_hand_after(urdf: &UrdfModel, joints: &[usize], n: usize) -> bool {
+    let n_following = joints.len() - n;
+    if n_following > n {
+        return false;
+    }
+    let carried = fixed_to(urdf, &urdf.robot.joints[joints[n - 1]].child);
+    let of_arm = |name: &str| joints[..n].iter().any(|joint| urdf.robot.joints[*joint].name == name);
+    let is_finger = |&joint: &usize| {
+        let of_urdf = &urdf.robot.joints[joint];
+        let follows_arm = of_urdf.mimic.as_ref().is_some_and(|leader| of_arm(leader));
+        joint != joints[n] && !follows_arm && carried.iter().any(|(_, link)| *link == of_urdf.parent)
     };
-    urdf.robot.joints.iter().filter(hangs_there).count() > 1
+    let moving = (0..urdf.robot.joints.len()).filter(|&joint| !urdf.robot.joints[joint].is_fixed());
+    let lengths: Vec<usize> = moving.filter(is_finger).map(|joint| n_joints_from(urdf, joint)).collect();
+    let Some(&longest) = lengths.iter().max() else { return false };
+    if lengths.len() >= MANY_FINGERS {
+        return true;
+    }
+    // Fingers of one hand differ by a joint at most.
+    longest >= n_following || (longest + 1 == n_following && (longest > 1 || lengths.len() > 1))
+}
+
+/// Returns the largest number of moving joints on a way from `joint` on, itself included.
+fn n_joints_from(urdf: &UrdfModel, joint: usize) -> usize {
+    let mut most = 0;
+    let mut open = vec![(joint, 0)];
+    while let Some((at, before)) = open.pop() {
+        let of_urdf = &urdf.robot.joints[at];
+        let n = before + usize::from(!of_urdf.is_fixed());
+        most = most.max(n);
+        let next = urdf.robot.joints.iter().enumerate().filter(|(next, joint)| {
+            joint.parent == of_urdf.child && urdf.joint_of_child.get(&joint.child) == Some(next)
+        });
+        open.extend(next.map(|(next, _)| (next, n)));
+    }
+    most
 }
 
 /// The link farthest along fixed joints, no camera's where there is another.
@@ -205,7 +290,7 @@ fn is_camera(link: &str) -> bool {
 
 /// A link on the chain that is called a camera; one with an optical frame first, then the most distal.
 fn camera_link(urdf: &UrdfModel, arm: &Candidate) -> Option<String> {
-    let carried = arm.joints.iter().rev().flat_map(|joint| fixed_to(urdf, &urdf.robot.joints[*joint].child.link));
+    let carried = arm.joints.iter().rev().flat_map(|joint| fixed_to(urdf, &urdf.robot.joints[*joint].child));
     let cameras: Vec<&str> = carried.map(|(_, name)| name).filter(|name| is_camera(name)).collect();
     let optical = cameras.iter().find(|name| name.to_lowercase().contains("optical"));
     optical.or(cameras.first()).map(|name| (*name).to_owned())

@@ -8,12 +8,15 @@ use std::collections::BTreeMap;
 use nalgebra::{Matrix4, Point3, Rotation3, Translation3, Unit, Vector3, Vector4};
 
 use super::triangles::{MAX_VERTICES, Mesh, MeshBuilder};
-use super::xml_tree::{Element, XmlTree};
+use super::xml_tree::{Element, XmlLimits, XmlTree};
 
 /// Limit of nodes and instances that are visited, each as often as it is instanced.
 const MAX_NODES: usize = 10_000;
 /// Limit of nodes within each other, through instances, too.
 const MAX_DEPTH: usize = 64;
+
+/// Limits of a document: a mesh of many parts has some thousands of elements.
+const XML_LIMITS: XmlLimits = XmlLimits { elements: 200_000, namespaces: 32 };
 
 /// Reads a COLLADA document.
 ///
@@ -21,7 +24,7 @@ const MAX_DEPTH: usize = 64;
 /// A sentence, whatever the bytes are.
 pub(super) fn collada(bytes: &[u8]) -> Result<Mesh, String> {
     let text = std::str::from_utf8(bytes).map_err(|_| "not a text in UTF-8, as a COLLADA must be".to_owned())?;
-    let tree = XmlTree::parse(text)?;
+    let tree = XmlTree::parse(text, XML_LIMITS)?;
     if tree.element(0).name != "COLLADA" {
         return Err(format!("its root element is `{}`, `COLLADA` expected", tree.element(0).name));
     }
@@ -362,7 +365,7 @@ mod tests {
     #[test]
     fn what_is_wrong_is_named() {
         let faults = [
-            ("<COLLADA", "<!DOCTYPE x><COLLADA"),
+            ("<COLLADA", "<!DOCTYPE x []><COLLADA"),
             ("url=\"#wedge\"", "url=\"other.dae#wedge\""),
             ("url=\"#wedge\"", "url=\"#none\""),
             ("meter=\"0.001\"", "meter=\"0\""),

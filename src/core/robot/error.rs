@@ -34,20 +34,28 @@ pub enum RobotError {
     Syntax { code: Code, file: PathBuf, message: String },
     #[error(transparent)]
     Value(#[from] FileIssue),
-    #[error("{}: links and joints form a loop at link `{link}`; an arm must be a tree", file.display())]
-    Loop { file: PathBuf, link: String },
-    #[error("{}: joint `{joint}` names the link `{link}`, which the file does not define", file.display())]
-    MissingLink { file: PathBuf, joint: String, link: String },
+    #[error(
+        "{}: {place}: joint `{joint}` closes a loop at link `{link}`; the arm's chain must be a tree. Delete one of \
+         the joints that hold the link",
+        file.display()
+    )]
+    Loop { file: PathBuf, place: String, link: String, joint: String },
+    #[error(
+        "{}: {place}: joint `{joint}` names the link `{link}`, which the file does not define. Correct the name, or \
+         add <link name=\"{link}\"/>",
+        file.display()
+    )]
+    MissingLink { file: PathBuf, place: String, joint: String, link: String },
     #[error("{}: link `{link}` has mass {mass_kg} kg; a simulated link needs a mass above 0", file.display())]
     ZeroMass { file: PathBuf, link: String, mass_kg: f64 },
     #[error("{}: no chain of joints leads from `{from}` to `{to}`", file.display())]
     NoChain { file: PathBuf, from: String, to: String },
     #[error(
-        "{}: joint `{joint}` between base_link and the tool or camera is {kind}; only revolute, continuous, \
+        "{}: {place}: joint `{joint}` between base_link and the tool or camera is {kind}; only revolute, continuous, \
          prismatic and fixed joints may be there: name a base_link beyond it, or a tool and camera before it",
         file.display()
     )]
-    JointKind { file: PathBuf, joint: String, kind: String },
+    JointKind { file: PathBuf, place: String, joint: String, kind: String },
 }
 
 impl FileIssue {

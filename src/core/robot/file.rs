@@ -16,13 +16,14 @@ use super::error::{FileIssue, RobotError, parse_toml, read_in};
 use super::geometry::GeometryPriors;
 use super::gripper::GripperFile;
 use super::gripper_tag::{GripperTag, GripperTagFile};
-use super::joint_sensor::{SensorFile, check_sensors, displacements};
+use super::joint_sensor::{JointSensorSpec, SensorFile, check_sensors, displacements};
 use super::nominal::{BASE_TAG, Robot, STOWED, TAG_LINK, ToolSpec, check_stowed, lens_issue};
 use super::self_collision::{self, Stored};
 use super::shape::{PlacedShape, Shape};
 use super::survey::{SurveyedTag, TagFile, check_tags};
 use super::urdf::{UrdfChain, UrdfModel};
 use super::urdf_mesh::{CollisionMeshes, MeshFolders};
+use super::urdf_notes;
 use crate::joints::JointAngles;
 use crate::kinematics::{ArmLoads, Attachment, JointKind};
 use crate::optics::TagFamily;
@@ -162,6 +163,7 @@ fn planning_issues(file: &Path, raw: &RobotFile, camera: &CameraSpec, arm: &Urdf
     if !camera.lens.is_known() {
         issues.push(lens_issue(file));
     }
+    issues.extend(urdf_notes::planning_issues(arm));
     if let Some(slide) = arm.chain.joints().iter().find(|joint| joint.kind.is_slide()) {
         let problem = "is prismatic, and an arm with slides is neither simulated nor planned for yet: `armcal \
                        calibrate` works on recordings of it; where it is a lift that stands still, name the link on \
@@ -202,9 +204,7 @@ fn robot_of(folder: &Path, raw: RobotFile, urdf: UrdfModel, meshes: Meshes) -> R
         displacement_l_per_rad: displacements_l_per_rad(&file, &raw.joint_sensor, &arm)?,
         motion: raw.motion.check(&file)?,
     };
-    let middle = || JointAngles::from_fn(chain.n_joints(), |joint| sensors[joint].center_rad);
-    let stowed = raw.stowed_rad.map(|angles_rad| check_stowed(&file, STOWED, &angles_rad, chain.n_joints()));
-    let stowed = stowed.transpose()?.unwrap_or_else(middle);
+    let stowed = stowed_or_middle(&file, raw.stowed_rad.as_deref(), &sensors)?;
     let mut tool = arm.attachment(&raw.tool.link)?;
     raw.tool.check(&file)?;
     let gripper = raw.gripper.map(|gripper| gripper.check(&file, &arm, &tool)).transpose()?;
@@ -220,6 +220,8 @@ fn robot_of(folder: &Path, raw: RobotFile, urdf: UrdfModel, meshes: Meshes) -> R
     let buoyancy_fraction = FileIssue::check_range(&file, "buoyancy_fraction", raw.buoyancy_fraction, 0.0..=0.95)?;
     Ok(Robot {
         failed: Vec::new(),
+        urdf_warnings: urdf_notes::warnings(&arm),
+        efforts_n_m: chain.joints().iter().map(|joint| urdf.effort_n_m(&joint.name)).collect(),
         name: raw.name,
         serial: raw.serial,
         folder: folder.to_owned(),
@@ -247,6 +249,16 @@ fn robot_of(folder: &Path, raw: RobotFile, urdf: UrdfModel, meshes: Meshes) -> R
         tag_family: family.or(gripper_tag.map(|tag| tag.family)).unwrap_or_default(),
         links,
     })
+}
+
+/// Returns the stowed angles of the file, or the middle of each joint's range.
+fn stowed_or_middle(
+    file: &Path,
+    stowed_rad: Option<&[f64]>,
+    sensors: &[JointSensorSpec],
+) -> Result<JointAngles, RobotError> {
+    let middle = || JointAngles::from_fn(sensors.len(), |joint| sensors[joint].center_rad);
+    stowed_rad.map_or_else(|| Ok(middle()), |angles_rad| check_stowed(file, STOWED, angles_rad, sensors.len()))
 }
 
 fn check_cameras(

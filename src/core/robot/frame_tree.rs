@@ -6,7 +6,7 @@ use nalgebra::Isometry3;
 
 use super::error::RobotError;
 use super::nominal::Robot;
-use super::urdf::{UrdfModel, isometry};
+use super::urdf::UrdfModel;
 use crate::kinematics::{Attachment, LinkPoses};
 
 /// Every link of an arm's URDF, once as a child; the root alone is none.
@@ -64,16 +64,16 @@ impl FrameTree {
         let (mut root, mut base_from_root) = (robot.base_link.as_str(), Isometry3::identity());
         while let Some(&joint) = urdf.joint_of_child.get(root) {
             let joint = &urdf.robot.joints[joint];
-            base_from_root *= isometry(&joint.origin).inverse();
-            root = &joint.parent.link;
+            base_from_root *= joint.origin.isometry().inverse();
+            root = &joint.parent;
         }
         let (mut fixed, mut moving) = (Vec::new(), Vec::new());
         for joint in &urdf.robot.joints {
-            let (parent, child) = (joint.parent.link.clone(), joint.child.link.clone());
+            let (parent, child) = (joint.parent.clone(), joint.child.clone());
             let body = robot.chain.joints().iter().position(|moved| moved.name == joint.name).map(|at| at + 1);
             match body.zip(robot.links.get(&parent)) {
                 Some((body, &parent_place)) => moving.push(MovingFrame { parent, child, parent_place, body }),
-                None => fixed.push(FixedFrame { parent, child, parent_from_child: isometry(&joint.origin) }),
+                None => fixed.push(FixedFrame { parent, child, parent_from_child: joint.origin.isometry() }),
             }
         }
         moving.sort_by_key(|frame| frame.body);

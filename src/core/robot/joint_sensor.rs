@@ -41,7 +41,7 @@ pub struct JointSensorSpec {
     pub wrap_counts: f64,
     /// The middle of the joint's range, about which gain errors are defined.
     pub center_rad: f64,
-    /// Half of the joint's range; pi for a joint without limits.
+    /// Half of the joint's range; pi for a joint without limits, 1 m for a slide without.
     pub half_range_rad: f64,
     /// One sigma of the relative gain error.
     pub gain_std: f64,
@@ -266,6 +266,14 @@ pub(super) fn check_sensors(
     raw.iter().zip(chain.joints()).map(|(s, joint)| check_sensor(file, s, joint)).collect()
 }
 
+/// Half of the range of a joint without limits: half a turn; of a slide 1 m, assumed, the order of an arm's reach.
+fn free_half_range(kind: JointKind) -> f64 {
+    match kind {
+        JointKind::Revolute => std::f64::consts::PI,
+        JointKind::Prismatic => 1.0,
+    }
+}
+
 fn check_sensor(file: &Path, s: &SensorFile, joint: &ChainJoint) -> Result<JointSensorSpec, RobotError> {
     let of_joint = OfJoint { file, table: s, kind: joint.kind };
     of_joint.check_units()?;
@@ -292,7 +300,7 @@ fn check_sensor(file: &Path, s: &SensorFile, joint: &ChainJoint) -> Result<Joint
         center_rad: joint.limits.map_or(0.0, |l| 0.5 * (l.lower_rad + l.upper_rad)),
         half_range_rad: joint
             .limits
-            .map_or(std::f64::consts::PI, |l| 0.5 * (l.upper_rad - l.lower_rad).max(f64::MIN_POSITIVE)),
+            .map_or(free_half_range(joint.kind), |l| 0.5 * (l.upper_rad - l.lower_rad).max(f64::MIN_POSITIVE)),
         gain_std: of_joint.check("gain_std", s.gain_std, 0.0..=10.0)?,
         offset_std_rad: of_joint.figure(&OFFSET_STD)?,
         gain_bound: of_joint.check("gain_bound", s.gain_bound, 0.0..=0.5)?,

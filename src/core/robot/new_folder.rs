@@ -52,15 +52,23 @@ pub struct NewFile {
     pub bytes: Vec<u8>,
 }
 
+/// The files of a new robot folder.
+#[derive(Clone, Debug)]
+pub struct DraftedRobot {
+    /// The URDF, its collision meshes and robot.toml, the last.
+    pub files: Vec<NewFile>,
+    /// Joints that were taken for those of a gripper, or of what carries the arm, and left out.
+    pub left_out: Vec<String>,
+}
+
 /// Folders above the URDF's in which packages are looked for.
 const MAX_ANCESTORS: usize = 8;
 
-/// The files of a robot folder: the URDF, those of its collision meshes that are found beside or above it, and
-/// robot.toml, the last.
+/// Returns the files of a robot folder. Collision meshes are looked for in the URDF's folder and in those above it.
 ///
 /// # Errors
 /// [`RobotError`] for a URDF that cannot be read, that has no arm, or several and no tip is named.
-pub fn draft_robot(wanted: &NewRobot<'_>, meshes: DraftedMeshes<'_>) -> Result<Vec<NewFile>, RobotError> {
+pub fn draft_robot(wanted: &NewRobot<'_>, meshes: DraftedMeshes<'_>) -> Result<DraftedRobot, RobotError> {
     let (urdf, arm) = read_arm(wanted)?;
     let camera = arm.camera.as_deref().unwrap_or(&arm.tip);
     let chain = urdf.chain(&arm.base, &[&arm.tip, camera])?;
@@ -71,18 +79,12 @@ pub fn draft_robot(wanted: &NewRobot<'_>, meshes: DraftedMeshes<'_>) -> Result<V
     let name = wanted.name.unwrap_or(&urdf.robot.name);
     let draft = Draft { wanted, urdf: &urdf, urdf_name: &urdf_name, name, arm: &arm, chain: &chain, meshes };
     files.push(NewFile { path: "robot.toml".into(), bytes: draft.text().into_bytes() });
-    Ok(files)
+    Ok(DraftedRobot { files, left_out: arm.left_out })
 }
 
 /// The URDF, and the arm in it.
 fn read_arm(wanted: &NewRobot<'_>) -> Result<(UrdfModel, FoundArm), RobotError> {
-    let text = read_text(wanted.urdf)?;
-    let has_xacro = text.contains("<xacro:");
-    let urdf = UrdfModel::parse(wanted.urdf, text)?;
-    if has_xacro && urdf.robot.joints.iter().all(|joint| joint.name.contains("${")) {
-        let message = "has elements of xacro: expand them first, `xacro ARM.urdf.xacro > ARM.urdf`".to_owned();
-        return Err(RobotError::Syntax { code: Code::FileSyntax, file: wanted.urdf.to_owned(), message });
-    }
+    let urdf = UrdfModel::parse(wanted.urdf, read_text(wanted.urdf)?)?;
     let arm = find_arm(&urdf, &Ends { base: wanted.base, tip: wanted.tip, camera: wanted.camera })?;
     Ok((urdf, arm))
 }
@@ -232,11 +234,18 @@ impl Draft<'_> {
              # Assumed: the tool point is that link's origin.\npoint_m = [0.0, 0.0, 0.0]\n",
             quoted(&self.arm.tip)
         );
+        if !self.arm.left_out.is_empty() {
+            let joints = on_line(&self.arm.left_out.join(", "));
+            let _ = writeln!(
+                out,
+                "# Assumed: not the arm's, but a gripper's or a carriage's: {joints}. Or name --base, --tip."
+            );
+        }
     }
 
     fn sensor(&self, out: &mut String, joint: &ChainJoint) {
-        let drawn = self.urdf.robot.joints.iter().find(|other| other.name == joint.name);
-        let velocity = drawn.map_or(0.0, |drawn| drawn.limit.velocity);
+        let drawn = self.urdf.joint(&joint.name);
+        let velocity = drawn.map_or(0.0, |drawn| drawn.velocity);
         let (rate_rad_s, whose) = match velocity {
             v if v.is_finite() && v > 0.0 => (v.clamp(1e-3, 20.0), "read"),
             _ => (0.5, "assumed"),
@@ -245,17 +254,13 @@ impl Draft<'_> {
             || "no limits".to_owned(),
             |limits| format!("{} .. {} {}", limits.lower_rad, limits.upper_rad, joint.kind.si()),
         );
-        let mimics = drawn.and_then(|drawn| drawn.mimic.as_ref()).map_or_else(String::new, |mimic| {
-            let name = on_line(&mimic.joint);
-            format!("# Read: it follows the joint {name}; give it a sensor of its own only if it has one.\n")
-        });
         let (rest, max_rate) = match joint.kind {
             JointKind::Revolute => (SENSOR, "max_rate_rad_s"),
             JointKind::Prismatic => (SLIDE_SENSOR, "max_rate_m_s"),
         };
         let _ = write!(
             out,
-            "\n[[joint_sensor]]\n# Read: {limits}.\n{mimics}joint = {}\n{rest}\
+            "\n[[joint_sensor]]\n# Read: {limits}.\njoint = {}\n{rest}\
              {max_rate} = {rate_rad_s:?}  # {whose}\n",
             quoted(&joint.name),
         );

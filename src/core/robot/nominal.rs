@@ -1,6 +1,6 @@
 //! The nominal arm.
 
-use crate::codes::Code;
+use crate::codes::{Code, Warning};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -36,6 +36,10 @@ pub struct Robot {
     pub urdf_name: String,
     /// The URDF as read.
     pub urdf_text: String,
+    /// Parts of the URDF that were skipped, by link or joint.
+    pub urdf_warnings: Vec<Warning>,
+    /// Largest torque of each joint by the URDF, N m (N of a slide), base first; 0 where it states none.
+    pub efforts_n_m: Vec<f64>,
     /// Link of the URDF whose frame is the base frame.
     pub base_link: String,
     /// Moving joints from the base link to tool and camera.

@@ -4,16 +4,15 @@ use crate::codes::Code;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use nalgebra::{Isometry3, Matrix3, Translation3, Unit, UnitQuaternion, Vector3};
-use urdf_rs::{Geometry, JointType};
+use nalgebra::{Isometry3, Translation3, Unit, Vector3};
 
 use super::body::LinkBody;
 use super::error::{FileIssue, RobotError};
 use super::shape::{PlacedShape, Shape};
+use super::urdf_file::{JointType, Range, ShapeElement, Skipped, UrdfFile, UrdfJoint, UrdfLink, UrdfShape};
 use super::urdf_mesh::{MeshFolders, NamedMesh};
-use super::urdf_text::plain_urdf;
 use crate::joints::MAX_JOINTS;
-use crate::kinematics::{Attachment, Chain, ChainJoint, JointKind, JointLimits};
+use crate::kinematics::{Attachment, Chain, ChainJoint, JointKind};
 
 /// Limit of an arm's collision shapes, so that planning places them without allocating.
 pub const MAX_COLLISION_SHAPES: usize = 64;
@@ -25,9 +24,13 @@ const UNPAINTED_RGB: [u8; 3] = [160; 3];
 pub(super) struct UrdfModel {
     pub file: PathBuf,
     pub text: String,
-    pub robot: urdf_rs::Robot,
-    /// Child link -> joint index.
+    pub robot: UrdfFile,
+    /// Child link -> joint index; the first joint that holds the link.
     pub joint_of_child: BTreeMap<String, usize>,
+    /// Child link -> the second joint that holds it: a closed chain.
+    closing: BTreeMap<String, usize>,
+    /// Names that several joints have.
+    repeated: BTreeSet<String>,
 }
 
 /// A URDF file and the chain of an arm in it.
@@ -38,122 +41,197 @@ pub(super) struct UrdfChain<'a> {
     pub chain: &'a Chain,
 }
 
-/// A shape of a link, at its place in the link's frame.
-struct Element<'a> {
-    origin: &'a urdf_rs::Pose,
-    shape: Shape,
-    color_rgb: [u8; 3],
-}
-
-/// The shape of a geometry that needs no file; `None` for a mesh.
-fn primitive(geometry: &Geometry) -> Option<Shape> {
-    match *geometry {
-        Geometry::Box { size } => Some(Shape::Box { size_m: size.0 }),
-        Geometry::Cylinder { radius, length } => Some(Shape::Cylinder { radius_m: radius, length_m: length }),
-        Geometry::Capsule { radius, length } => Some(Shape::Capsule { radius_m: radius, length_m: length }),
-        Geometry::Sphere { radius } => Some(Shape::Sphere { radius_m: radius }),
-        Geometry::Mesh { .. } => None,
+/// The shape of an element that needs no file; `None` for a mesh.
+fn primitive(element: &ShapeElement) -> Option<&Shape> {
+    match &element.shape {
+        UrdfShape::Primitive(shape) => Some(shape),
+        UrdfShape::Mesh { .. } => None,
     }
 }
 
-fn named_mesh<'a>(link: &'a urdf_rs::Link, geometry: &'a Geometry) -> Option<NamedMesh<'a>> {
-    let Geometry::Mesh { filename, scale } = geometry else { return None };
-    Some(NamedMesh { link: &link.name, name: filename, scale: scale.map_or([1.0; 3], |scale| scale.0) })
+fn named_mesh<'a>(link: &'a UrdfLink, element: &'a ShapeElement) -> Option<NamedMesh<'a>> {
+    let UrdfShape::Mesh { name, scale } = &element.shape else { return None };
+    Some(NamedMesh { link: &link.name, name, scale: *scale })
 }
 
-/// The pose that an `<origin>` gives.
-pub(super) fn isometry(origin: &urdf_rs::Pose) -> Isometry3<f64> {
-    let [roll, pitch, yaw] = origin.rpy.0;
-    Isometry3::from_parts(
-        Translation3::from(Vector3::from(origin.xyz.0)),
-        UnitQuaternion::from_euler_angles(roll, pitch, yaw),
-    )
+fn placed(element: &ShapeElement, shape: Shape, body_from_link: &Isometry3<f64>, color_rgb: [u8; 3]) -> PlacedShape {
+    PlacedShape { owner_from_shape: body_from_link * element.origin.isometry(), shape, color_rgb }
 }
 
 impl UrdfModel {
-    /// Largest torque of a joint, N m; 0 where the file gives none.
-    pub(super) fn effort_n_m(&self, joint: &str) -> f64 {
-        self.robot.joints.iter().find(|other| other.name == joint).map_or(0.0, |joint| joint.limit.effort)
+    /// The joint of that name; the first one where several have it.
+    pub(super) fn joint(&self, name: &str) -> Option<&UrdfJoint> {
+        self.robot.joints.iter().find(|joint| joint.name == name)
     }
 
-    /// Parses the text of `file` and checks that it is a tree of known links with finite numbers.
+    /// Largest torque of a joint, N m; 0 where the file gives none.
+    pub(super) fn effort_n_m(&self, joint: &str) -> f64 {
+        self.joint(joint).map_or(0.0, |joint| joint.effort)
+    }
+
+    /// Parses the text of `file` and checks that it is a tree of links.
     ///
     /// # Errors
     /// [`RobotError`] naming the file and the link or joint.
     pub fn parse(file: &Path, text: String) -> Result<Self, RobotError> {
-        let robot = plain_urdf(&text)
-            .and_then(|plain| urdf_rs::read_from_string(&plain).map_err(|error| error.to_string()))
-            .map_err(|message| RobotError::Syntax { code: Code::FileSyntax, file: file.to_owned(), message })?;
-        let links: BTreeSet<&str> = robot.links.iter().map(|l| l.name.as_str()).collect();
-        let mut joint_of_child = BTreeMap::new();
-        let mut joint_names = BTreeSet::new();
-        for (idx, joint) in robot.joints.iter().enumerate() {
-            if !joint_names.insert(joint.name.as_str()) {
-                return Err(FileIssue::new(
-                    Code::ValueDuplicate,
-                    file,
-                    format!("joint `{}`", joint.name),
-                    "is defined twice",
-                )
-                .into());
-            }
-            for link in [&joint.parent.link, &joint.child.link] {
-                if !links.contains(link.as_str()) {
-                    return Err(RobotError::MissingLink {
-                        file: file.to_owned(),
-                        joint: joint.name.clone(),
-                        link: link.clone(),
-                    });
-                }
-            }
-            if joint_of_child.insert(joint.child.link.clone(), idx).is_some() {
-                return Err(RobotError::Loop { file: file.to_owned(), link: joint.child.link.clone() });
-            }
-            check_numbers(file, joint)?;
-        }
-        let model = Self { file: file.to_owned(), text, robot, joint_of_child };
+        let robot = UrdfFile::parse(&text).map_err(|message| RobotError::Syntax {
+            code: Code::FileSyntax,
+            file: file.to_owned(),
+            message,
+        })?;
+        let mut model = Self {
+            file: file.to_owned(),
+            text,
+            robot,
+            joint_of_child: BTreeMap::new(),
+            closing: BTreeMap::new(),
+            repeated: BTreeSet::new(),
+        };
+        model.connect();
         model.check_acyclic()?;
+        model.add_implied_links()?;
+        model.note_loose_links();
         Ok(model)
     }
 
+    /// Fills the tables of joints. What is ambiguous matters on the chain only, and is skipped elsewhere.
+    fn connect(&mut self) {
+        let mut places = BTreeMap::new();
+        for (idx, joint) in self.robot.joints.iter().enumerate() {
+            let mut skip = |text: String| {
+                let owner = format!("joint `{}`", joint.name);
+                self.robot.skipped.push(Skipped { owner, place: joint.place, text });
+            };
+            if let Some(first) = places.insert(joint.name.clone(), joint.place) {
+                self.repeated.insert(joint.name.clone());
+                skip(format!("has the name of the joint at {first}; neither can be a joint of the arm"));
+            }
+            if self.joint_of_child.contains_key(&joint.child) {
+                skip(format!(
+                    "holds the link `{}`, which another joint holds: the chain that it closes is skipped",
+                    joint.child
+                ));
+                self.closing.entry(joint.child.clone()).or_insert(idx);
+            } else {
+                self.joint_of_child.insert(joint.child.clone(), idx);
+            }
+        }
+    }
+
     fn check_acyclic(&self) -> Result<(), RobotError> {
-        for link in &self.robot.links {
-            let mut at = link.name.as_str();
+        for joint in &self.robot.joints {
+            let mut at = joint.child.as_str();
             for _ in 0..=self.robot.joints.len() {
                 match self.joint_of_child.get(at) {
-                    Some(&joint) => at = &self.robot.joints[joint].parent.link,
+                    Some(&joint) => at = &self.robot.joints[joint].parent,
                     None => break,
                 }
             }
             if self.joint_of_child.contains_key(at) {
-                return Err(RobotError::Loop { file: self.file.clone(), link: link.name.clone() });
+                let (file, link) = (self.file.clone(), joint.child.clone());
+                return Err(RobotError::Loop { file, place: joint.place.to_string(), link, joint: joint.name.clone() });
             }
         }
         Ok(())
     }
 
+    /// Adds links that only joints name, where the joints leave no doubt about the link.
+    fn add_implied_links(&mut self) -> Result<(), RobotError> {
+        let defined: BTreeSet<String> = self.robot.links.iter().map(|link| link.name.clone()).collect();
+        let parents = self.robot.joints.iter().map(|joint| joint.parent.clone());
+        let links: BTreeSet<String> = defined.iter().cloned().chain(parents).collect();
+        let n_roots = links.iter().filter(|link| !self.joint_of_child.contains_key(*link)).count();
+        let mut added: BTreeMap<String, UrdfLink> = BTreeMap::new();
+        for joint in &self.robot.joints {
+            for link in [&joint.parent, &joint.child] {
+                if defined.contains(link) || added.contains_key(link) {
+                    continue;
+                }
+                // A wrong name tears the tree apart.
+                if n_roots > 1 {
+                    return Err(RobotError::MissingLink {
+                        file: self.file.clone(),
+                        place: joint.place.to_string(),
+                        joint: joint.name.clone(),
+                        link: link.clone(),
+                    });
+                }
+                let text = "no <link> of this name is defined; it is used without mass and shape".to_owned();
+                self.robot.skipped.push(Skipped { owner: format!("link `{link}`"), place: joint.place, text });
+                added.insert(link.clone(), UrdfLink::implied(link, joint.place));
+            }
+        }
+        self.robot.links.extend(added.into_values());
+        Ok(())
+    }
+
+    fn note_loose_links(&mut self) {
+        let held = |link: &UrdfLink| {
+            self.robot.joints.iter().any(|joint| joint.parent == link.name || joint.child == link.name)
+        };
+        let loose = self.robot.links.iter().filter(|link| !self.robot.joints.is_empty() && !held(link));
+        let note = |link: &UrdfLink| Skipped {
+            owner: format!("link `{}`", link.name),
+            place: link.place,
+            text: "no joint holds it: skipped".to_owned(),
+        };
+        let notes: Vec<Skipped> = loose.map(note).collect();
+        self.robot.skipped.extend(notes);
+    }
+
+    /// Links that no joint holds and from which joints lead on.
+    pub fn roots(&self) -> impl Iterator<Item = &str> {
+        let links = self.robot.links.iter().map(|link| link.name.as_str());
+        links.filter(|link| {
+            !self.joint_of_child.contains_key(*link) && self.robot.joints.iter().any(|joint| joint.parent == **link)
+        })
+    }
+
     /// Joint indices from `base` down to `tip`.
-    fn path(&self, base: &str, tip: &str) -> Result<Vec<usize>, RobotError> {
+    ///
+    /// # Errors
+    /// [`RobotError::NoChain`] where `base` is not above `tip`, [`RobotError::Loop`] in a closed chain.
+    pub fn path(&self, base: &str, tip: &str) -> Result<Vec<usize>, RobotError> {
         let no_chain = || RobotError::NoChain { file: self.file.clone(), from: base.to_owned(), to: tip.to_owned() };
         let mut path = Vec::new();
         let mut at = tip;
         while at != base {
             let &joint = self.joint_of_child.get(at).ok_or_else(no_chain)?;
             path.push(joint);
-            at = &self.robot.joints[joint].parent.link;
+            at = &self.robot.joints[joint].parent;
         }
         path.reverse();
+        self.check_open(&path)?;
         Ok(path)
+    }
+
+    /// Refuses a path through a link that two joints hold.
+    fn check_open(&self, path: &[usize]) -> Result<(), RobotError> {
+        for &joint in path {
+            let link = &self.robot.joints[joint].child;
+            if let Some(&closing) = self.closing.get(link) {
+                let closing = &self.robot.joints[closing];
+                return Err(RobotError::Loop {
+                    file: self.file.clone(),
+                    place: closing.place.to_string(),
+                    link: link.clone(),
+                    joint: closing.name.clone(),
+                });
+            }
+        }
+        Ok(())
     }
 
     /// The chain of moving joints from `base` that carries every link named in `tips`.
     ///
     /// # Errors
-    /// [`RobotError::NoChain`] when no single chain carries all tips, [`RobotError::JointKind`] for other joints.
+    /// [`RobotError::NoChain`] when no single chain carries all tips, [`RobotError::JointKind`] for other joints, and
+    /// for joints whose frame or axis is wrong.
     pub fn chain(&self, base: &str, tips: &[&str]) -> Result<Chain, RobotError> {
         let mut longest: Vec<usize> = Vec::new();
         for tip in tips {
             let path = self.path(base, tip)?;
+            path.iter().try_for_each(|&idx| self.check_usable(&self.robot.joints[idx]))?;
             if self.moving(&path).count() > self.moving(&longest).count() || longest.is_empty() {
                 longest = path;
             }
@@ -162,42 +240,65 @@ impl UrdfModel {
         let mut pending = Isometry3::identity();
         for &idx in &longest {
             let joint = &self.robot.joints[idx];
-            check_moving(&self.file, joint)?;
-            pending *= isometry(&joint.origin);
-            let limits = JointLimits { lower_rad: joint.limit.lower, upper_rad: joint.limit.upper };
-            let (kind, limits) = match joint.joint_type {
+            pending *= joint.origin.isometry();
+            let kind = match joint.joint_type {
                 JointType::Fixed => continue,
-                JointType::Continuous => (JointKind::Revolute, None),
-                JointType::Revolute => (JointKind::Revolute, Some(limits)),
-                JointType::Prismatic => (JointKind::Prismatic, Some(limits)),
-                ref other => {
-                    return Err(RobotError::JointKind {
-                        file: self.file.clone(),
-                        joint: joint.name.clone(),
-                        kind: format!("{other:?}").to_lowercase(),
-                    });
-                }
+                JointType::Prismatic => JointKind::Prismatic,
+                _ => JointKind::Revolute,
             };
             joints.push(ChainJoint {
                 name: joint.name.clone(),
-                child_link: joint.child.link.clone(),
+                child_link: joint.child.clone(),
                 kind,
                 parent_from_joint: pending,
-                axis: Unit::new_normalize(Vector3::from(joint.axis.xyz.0)),
-                limits,
+                axis: Unit::new_normalize(Vector3::from(joint.axis)),
+                limits: if let Range::Limits(limits) = joint.range { Some(limits) } else { None },
             });
             pending = Isometry3::identity();
         }
         if joints.is_empty() || joints.len() > MAX_JOINTS {
-            let problem =
-                format!("{} moving joints between `{base}` and {tips:?}, 1 .. {MAX_JOINTS} allowed", joints.len());
+            let problem = format!(
+                "{} moving joints between `{base}` and {tips:?}, 1 .. {MAX_JOINTS} allowed. Name other links as base, \
+                 tool or camera",
+                joints.len()
+            );
             return Err(FileIssue::new(Code::UrdfStructure, &self.file, "joint", problem).into());
         }
         Ok(Chain::new(joints))
     }
 
+    /// Refuses a joint of the chain that kinematics cannot use.
+    fn check_usable(&self, joint: &UrdfJoint) -> Result<(), RobotError> {
+        let (file, name) = (&self.file, &joint.name);
+        if let Some(defect) = joint.defects.first() {
+            let key = format!("{}: joint `{name}`: {}", defect.place, defect.key);
+            return Err(FileIssue::new(Code::ValueInvalid, file, key, defect.problem.clone()).into());
+        }
+        if joint.is_fixed() {
+            return Ok(());
+        }
+        let key = || format!("{}: joint `{name}`", joint.place);
+        if let JointType::Other(kind) = &joint.joint_type {
+            let (file, place) = (file.clone(), joint.place.to_string());
+            return Err(RobotError::JointKind { file, place, joint: name.clone(), kind: kind.clone() });
+        }
+        if self.repeated.contains(name) {
+            let problem = "is defined twice, so that its readings cannot be assigned. Rename one of the two";
+            return Err(FileIssue::new(Code::ValueDuplicate, file, key(), problem).into());
+        }
+        if let Some(leader) = &joint.mimic {
+            let problem = format!(
+                "follows the joint `{leader}` (mimic), and calibration needs a sensor on each joint of the chain. If \
+                 it has one, delete its <mimic>. Otherwise name a base behind it or a tool in front of it (--base, \
+                 --tip)"
+            );
+            return Err(FileIssue::new(Code::UrdfStructure, file, key(), problem).into());
+        }
+        Ok(())
+    }
+
     fn moving<'a>(&'a self, path: &'a [usize]) -> impl Iterator<Item = usize> + 'a {
-        path.iter().copied().filter(|&idx| self.robot.joints[idx].joint_type != JointType::Fixed)
+        path.iter().copied().filter(|&idx| !self.robot.joints[idx].is_fixed())
     }
 
     pub(super) fn has_link(&self, name: &str) -> bool {
@@ -208,87 +309,45 @@ impl UrdfModel {
     fn add_link(
         &self,
         body: &mut LinkBody,
-        link: &urdf_rs::Link,
+        link: &UrdfLink,
         body_from_link: &Isometry3<f64>,
         meshes: Option<&MeshFolders>,
     ) -> Result<(), RobotError> {
-        let inertial = &link.inertial;
-        let mass_key = format!("link `{}`: mass", link.name);
-        let mass_kg = FileIssue::check_range(&self.file, &mass_key, inertial.mass.value, 0.0..=1e6)?;
-        let i = &inertial.inertia;
-        let inertia = Matrix3::new(i.ixx, i.ixy, i.ixz, i.ixy, i.iyy, i.iyz, i.ixz, i.iyz, i.izz);
-        if !inertia.iter().all(|v| v.is_finite()) {
-            let key = format!("link `{}`: inertia", link.name);
-            return Err(FileIssue::new(Code::ValueInvalid, &self.file, key, "is not finite").into());
-        }
-        if mass_kg > 0.0 {
-            FileIssue::check_range(&self.file, &mass_key, mass_kg, 1e-6..=1e6)?;
-            if inertia.cholesky().is_none() {
+        if let Some(inertial) = &link.inertial {
+            if inertial.inertia_kg_m2.cholesky().is_none() {
                 body.bad_inertia.get_or_insert_with(|| link.name.clone());
             }
-            let body_from_com = body_from_link * isometry(&inertial.origin);
-            body.add_mass(mass_kg, &body_from_com, &inertia);
+            let body_from_com = body_from_link * inertial.origin.isometry();
+            body.add_mass(inertial.mass_kg, &body_from_com, &inertial.inertia_kg_m2);
         }
         // Drawn where a link has nothing else.
-        let color_rgb = link.visual.iter().find_map(|visual| self.color(visual)).unwrap_or(UNPAINTED_RGB);
+        let color_rgb = link.visual.iter().find_map(|visual| visual.color_rgb).unwrap_or(UNPAINTED_RGB);
         for collision in &link.collision {
-            let origin = &collision.origin;
-            let placed = match (named_mesh(link, &collision.geometry), meshes) {
+            let shape = match (named_mesh(link, collision), meshes) {
                 (None, _) => {
-                    let Some(shape) = primitive(&collision.geometry) else { continue };
-                    self.placed(&link.name, Element { origin, shape, color_rgb }, body_from_link)?
+                    let Some(shape) = primitive(collision) else { continue };
+                    placed(collision, shape.clone(), body_from_link, color_rgb)
                 }
                 (Some(mesh), Some(folders)) => {
                     let (shape, center_m) = folders.hull(&self.file, &mesh)?;
-                    let element = Element { origin, shape, color_rgb };
-                    let mut placed = self.placed(&link.name, element, body_from_link)?;
+                    let mut placed = placed(collision, shape, body_from_link, color_rgb);
                     placed.owner_from_shape *= Translation3::from(center_m);
                     placed
                 }
                 (Some(_), None) => continue,
             };
-            body.collisions.push(placed);
+            body.collisions.push(shape);
         }
         Ok(())
     }
 
-    fn add_visuals(
-        &self,
-        body: &mut LinkBody,
-        link: &urdf_rs::Link,
-        body_from_link: &Isometry3<f64>,
-    ) -> Result<(), RobotError> {
+    /// Adds the shapes to display; nothing is drawn of a mesh.
+    fn add_visuals(&self, body: &mut LinkBody, link: &UrdfLink, body_from_link: &Isometry3<f64>) {
         for visual in &link.visual {
-            // Nothing is drawn of a mesh.
-            let Some(shape) = primitive(&visual.geometry) else { continue };
-            let color_rgb = self.color(visual).unwrap_or(UNPAINTED_RGB);
-            let element = Element { origin: &visual.origin, shape, color_rgb };
-            body.visuals.push(self.placed(&link.name, element, body_from_link)?);
+            let Some(shape) = primitive(visual) else { continue };
+            let color_rgb = visual.color_rgb.unwrap_or(UNPAINTED_RGB);
+            body.visuals.push(placed(visual, shape.clone(), body_from_link, color_rgb));
         }
-        Ok(())
-    }
-
-    fn color(&self, visual: &urdf_rs::Visual) -> Option<[u8; 3]> {
-        let material = visual.material.as_ref()?;
-        let named = self.robot.materials.iter().find(|m| m.name == material.name);
-        let color = material.color.as_ref().or_else(|| named.and_then(|m| m.color.as_ref()))?;
-        Some([0, 1, 2].map(|k| (color.rgba.0[k].clamp(0.0, 1.0) * 255.0).round() as u8))
-    }
-
-    fn placed(
-        &self,
-        link: &str,
-        element: Element<'_>,
-        body_from_link: &Isometry3<f64>,
-    ) -> Result<PlacedShape, RobotError> {
-        let Element { origin, shape, color_rgb } = element;
-        for (name, length) in shape.lengths() {
-            FileIssue::check_range(&self.file, &format!("link `{link}`: {name}"), length, 1e-6..=1e4)?;
-        }
-        for value in origin.xyz.0.iter().chain(&origin.rpy.0) {
-            FileIssue::check_range(&self.file, &format!("link `{link}`: origin"), *value, -1e4..=1e4)?;
-        }
-        Ok(PlacedShape { owner_from_shape: body_from_link * isometry(origin), shape, color_rgb })
     }
 }
 
@@ -302,8 +361,9 @@ impl UrdfChain<'_> {
         let mut link_from_frame = Isometry3::identity();
         for idx in self.urdf.path(self.base_link, link)? {
             let joint = &self.urdf.robot.joints[idx];
-            if joint.joint_type == JointType::Fixed {
-                link_from_frame *= isometry(&joint.origin);
+            if joint.is_fixed() {
+                self.urdf.check_usable(joint)?;
+                link_from_frame *= joint.origin.isometry();
             } else if self.chain.joints().get(n_joints).is_some_and(|j| j.name == joint.name) {
                 n_joints += 1;
                 link_from_frame = Isometry3::identity();
@@ -329,13 +389,14 @@ impl UrdfChain<'_> {
         let attachment = self.attachment(name)?;
         let mut body = LinkBody::empty(name.to_owned());
         for link in self.urdf.robot.links.iter().filter(|link| link.name == name) {
-            self.urdf.add_visuals(&mut body, link, &attachment.link_from_frame)?;
+            self.urdf.add_visuals(&mut body, link, &attachment.link_from_frame);
         }
         Ok(body.visuals)
     }
 
     /// Bodies 0..=n: the base with everything fixed to it, then one per joint of the chain. The links in `apart` move
-    /// by themselves; their visual shapes are omitted. Collision meshes are left out where `meshes` is `None`.
+    /// by themselves; their visual shapes are omitted. Collision meshes are left out where `meshes` is `None`, and all
+    /// collision shapes where more of them than planning takes need no file.
     ///
     /// # Errors
     /// [`RobotError::Value`] for invalid numbers, shapes or meshes; all meshes without a file at once.
@@ -343,28 +404,40 @@ impl UrdfChain<'_> {
         let mut names = vec![self.base_link.to_owned()];
         names.extend(self.chain.joints().iter().map(|j| j.child_link.clone()));
         let mut bodies: Vec<LinkBody> = names.into_iter().map(LinkBody::empty).collect();
-        self.check_collisions(meshes)?;
+        if let Some(folders) = meshes {
+            self.check_collisions(folders)?;
+        }
+        let has_room = self.n_primitives() <= MAX_COLLISION_SHAPES;
         for link in &self.urdf.robot.links {
             let Ok(attachment) = self.attachment(&link.name) else { continue };
             let body = &mut bodies[attachment.n_joints];
             self.urdf.add_link(body, link, &attachment.link_from_frame, meshes)?;
             if !apart.contains(&link.name) {
-                self.urdf.add_visuals(body, link, &attachment.link_from_frame)?;
+                self.urdf.add_visuals(body, link, &attachment.link_from_frame);
             }
+        }
+        if !has_room {
+            bodies.iter_mut().for_each(|body| body.collisions.clear());
         }
         Ok(bodies)
     }
 
+    /// Shapes on the chain that need no file.
+    pub fn n_primitives(&self) -> usize {
+        self.links().flat_map(|link| &link.collision).filter(|element| primitive(element).is_some()).count()
+    }
+
     /// Before any mesh is read: the number of shapes, and whether the meshes are there.
-    fn check_collisions(&self, meshes: Option<&MeshFolders>) -> Result<(), RobotError> {
+    fn check_collisions(&self, folders: &MeshFolders) -> Result<(), RobotError> {
         let named = self.collision_meshes();
-        let primitives = self.links().flat_map(|link| &link.collision).filter(|c| primitive(&c.geometry).is_some());
-        let n_shapes = primitives.count() + meshes.map_or(0, |_| named.len());
+        let n_shapes = self.n_primitives() + named.len();
         if n_shapes > MAX_COLLISION_SHAPES {
-            let problem = format!("{n_shapes} shapes on the chain, 0 .. {MAX_COLLISION_SHAPES} allowed");
+            let problem = format!(
+                "{n_shapes} shapes on the chain, 0 .. {MAX_COLLISION_SHAPES} allowed. Or write collision_meshes = \
+                 \"ignore\" in robot.toml: then paths cannot be planned"
+            );
             return Err(FileIssue::new(Code::MeshUnusable, &self.urdf.file, "collision", problem).into());
         }
-        let Some(folders) = meshes else { return Ok(()) };
         let problems: Vec<String> = named
             .iter()
             .filter_map(|mesh| {
@@ -383,7 +456,7 @@ impl UrdfChain<'_> {
     }
 
     /// The links that the chain carries.
-    fn links(&self) -> impl Iterator<Item = &urdf_rs::Link> {
+    pub fn links(&self) -> impl Iterator<Item = &UrdfLink> {
         self.urdf.robot.links.iter().filter(|link| self.attachment(&link.name).is_ok())
     }
 
@@ -391,47 +464,8 @@ impl UrdfChain<'_> {
     pub fn collision_meshes(&self) -> Vec<NamedMesh<'_>> {
         let mut named = Vec::new();
         for link in self.links() {
-            named.extend(link.collision.iter().filter_map(|collision| named_mesh(link, &collision.geometry)));
+            named.extend(link.collision.iter().filter_map(|collision| named_mesh(link, collision)));
         }
         named
     }
-}
-
-/// Numbers that matter for joints of every kind, on the chain or beside it.
-fn check_numbers(file: &Path, joint: &urdf_rs::Joint) -> Result<(), RobotError> {
-    for value in joint.origin.xyz.0.iter().chain(&joint.origin.rpy.0).chain(&joint.axis.xyz.0) {
-        FileIssue::check_range(file, &format!("joint `{}`: origin or axis", joint.name), *value, -1e4..=1e4)?;
-    }
-    Ok(())
-}
-
-/// Axis, effort and limits of a joint of the chain.
-fn check_moving(file: &Path, joint: &urdf_rs::Joint) -> Result<(), RobotError> {
-    if joint.joint_type == JointType::Fixed {
-        return Ok(());
-    }
-    if Vector3::from(joint.axis.xyz.0).norm() < 1e-6 {
-        return Err(FileIssue::new(
-            Code::ValueInvalid,
-            file,
-            format!("joint `{}`: axis", joint.name),
-            "has no direction",
-        )
-        .into());
-    }
-    FileIssue::check_range(file, &format!("joint `{}`: effort", joint.name), joint.limit.effort, 0.0..=1e7)?;
-    let (lower, upper) = (joint.limit.lower, joint.limit.upper);
-    if matches!(joint.joint_type, JointType::Revolute | JointType::Prismatic)
-        && !(lower.is_finite() && upper.is_finite() && lower < upper)
-    {
-        let key = format!("joint `{}`: limit", joint.name);
-        return Err(FileIssue::new(
-            Code::ValueInvalid,
-            file,
-            key,
-            format!("lower {lower} must lie below upper {upper}"),
-        )
-        .into());
-    }
-    Ok(())
 }

@@ -1,26 +1,78 @@
-//! Elements of a bounded XML text, for documents whose parts refer to each other.
+//! Elements of a bounded XML text, each with its line and column.
 //!
-//! A pull parser reads the text within the limits below; nothing is read by recursion. Document types are refused.
+//! A pull parser reads the text within the given limits, which are checked before anything is stored; nothing is read
+//! by recursion. Document types that declare anything are refused, and so are entities other than XML's own. The text
+//! after the root element is not read.
 
 use quick_xml::Reader;
 use quick_xml::escape::unescape;
 use quick_xml::events::{BytesStart, Event};
 
-/// Limit of elements within each other.
+/// Limit of elements within each other: a URDF nests five deep, extensions for simulators about ten.
 const MAX_DEPTH: usize = 64;
-/// Limit of a file's elements: a mesh of many parts has some thousands.
-const MAX_ELEMENTS: usize = 200_000;
-/// Limit of an element's attributes.
+/// Limit of an element's attributes: those of URDF and COLLADA have 8 at most.
 const MAX_ATTRIBUTES: usize = 32;
+
+/// Limits of one format that depend on its content.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct XmlLimits {
+    /// Elements of a file.
+    pub elements: usize,
+    /// Namespace declarations of a file.
+    pub namespaces: usize,
+}
+
+/// Place of an element in its file, both counted from 1; the column in characters.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Place {
+    pub line: usize,
+    pub column: usize,
+}
+
+impl std::fmt::Display for Place {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "line {}, column {}", self.line, self.column)
+    }
+}
 
 /// An element. Names are without their prefixes.
 #[derive(Debug, Default)]
 pub(super) struct Element {
     pub name: String,
+    /// Prefix of a namespace; empty for the format's own elements.
+    pub prefix: String,
+    /// Start of the element's tag.
+    pub place: Place,
     attributes: Vec<(String, String)>,
     /// All of its own text; entities are left out.
     pub text: String,
     children: Vec<usize>,
+}
+
+/// Turns byte offsets that never fall into lines and columns; each byte is read once.
+#[derive(Debug, Default)]
+struct LineCounter {
+    at: usize,
+    n_lines: usize,
+    /// Characters between the start of the line and `at`.
+    n_characters: usize,
+}
+
+impl LineCounter {
+    fn place(&mut self, text: &str, offset: usize) -> Place {
+        let offset = offset.min(text.len());
+        for byte in text.as_bytes().get(self.at..offset).unwrap_or_default() {
+            if *byte == b'\n' {
+                self.n_lines += 1;
+                self.n_characters = 0;
+            } else if *byte & 0xC0 != 0x80 {
+                // Continuation bytes of UTF-8 begin no character.
+                self.n_characters += 1;
+            }
+        }
+        self.at = self.at.max(offset);
+        Place { line: 1 + self.n_lines, column: 1 + self.n_characters }
+    }
 }
 
 impl Element {
@@ -29,19 +81,44 @@ impl Element {
         self.attributes.iter().find(|(key, _)| key == name).map(|(_, value)| value.as_str())
     }
 
-    fn of(tag: &BytesStart<'_>) -> Result<Self, String> {
-        let mut element = Self { name: text_of(tag.local_name().as_ref())?.to_owned(), ..Self::default() };
+    /// Names and values of all attributes without a namespace prefix.
+    pub fn attributes(&self) -> impl Iterator<Item = (&str, &str)> {
+        self.attributes.iter().map(|(key, value)| (key.as_str(), value.as_str()))
+    }
+
+    fn of(tag: &BytesStart<'_>, n_namespaces: &mut usize, limits: XmlLimits) -> Result<Self, String> {
+        let name = checked_name(tag.local_name().as_ref())?.to_owned();
+        let prefix = tag.name().prefix().map(|prefix| checked_name(prefix.as_ref()).map(str::to_owned));
+        let mut element = Self { name, prefix: prefix.transpose()?.unwrap_or_default(), ..Self::default() };
         for (n, attribute) in tag.attributes().enumerate() {
             if n == MAX_ATTRIBUTES {
                 return Err(format!("an element has more than {MAX_ATTRIBUTES} attributes"));
             }
             let attribute = attribute.map_err(|error| error.to_string())?;
-            let name = text_of(attribute.key.local_name().as_ref())?.to_owned();
+            let name = checked_name(attribute.key.as_ref())?;
+            *n_namespaces += usize::from(attribute.key.as_namespace_binding().is_some());
+            if *n_namespaces > limits.namespaces {
+                return Err(format!("more than {} namespaces are declared", limits.namespaces));
+            }
             let value = unescape(text_of(&attribute.value)?).map_err(|error| format!("{name}: {error}"))?.into_owned();
-            element.attributes.push((name, value));
+            if attribute.key.prefix().is_none() && name != "xmlns" {
+                element.attributes.push((name.to_owned(), value));
+            }
         }
         Ok(element)
     }
+}
+
+/// Names that other parsers accept, too.
+fn checked_name(bytes: &[u8]) -> Result<&str, String> {
+    let name = text_of(bytes)?;
+    let is_name = name.starts_with(|first: char| first.is_alphabetic() || first == '_')
+        && name.chars().all(|c| c.is_alphanumeric() || "_-.:".contains(c));
+    if is_name { Ok(name) } else { Err(format!("`{name}` is not a name")) }
+}
+
+fn offset(position: u64) -> usize {
+    usize::try_from(position).unwrap_or(usize::MAX)
 }
 
 fn text_of(bytes: &[u8]) -> Result<&str, String> {
@@ -52,34 +129,41 @@ fn text_of(bytes: &[u8]) -> Result<&str, String> {
 #[derive(Debug)]
 pub(super) struct XmlTree {
     elements: Vec<Element>,
+    n_namespaces: usize,
+    limits: XmlLimits,
 }
 
 impl XmlTree {
     /// Reads a text up to the end of its root element.
     ///
     /// # Errors
-    /// A sentence with the line, where `text` is not well-formed or beyond a limit.
-    pub fn parse(text: &str) -> Result<Self, String> {
+    /// A sentence with line and column, where `text` is not well-formed or beyond a limit.
+    pub fn parse(text: &str, limits: XmlLimits) -> Result<Self, String> {
+        // The reader does not count a byte order mark.
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let mut reader = Reader::from_str(text);
-        let mut tree = Self { elements: Vec::new() };
-        let mut open = Vec::new();
+        let mut tree = Self { elements: Vec::new(), n_namespaces: 0, limits };
+        let (mut open, mut counter) = (Vec::new(), LineCounter::default());
         loop {
+            let start = offset(reader.buffer_position());
             let event = reader.read_event().map_err(|error| error.to_string());
-            let step = event.and_then(|event| tree.step(&event, &mut open));
-            let at = usize::try_from(reader.buffer_position().max(reader.error_position())).unwrap_or(usize::MAX);
-            let line = || 1 + text.bytes().take(at).filter(|byte| *byte == b'\n').count();
-            step.map_err(|problem| format!("line {}: {problem}", line()))?;
+            let place = counter.place(text, start);
+            let step = event.and_then(|event| tree.step(&event, &mut open, place));
+            if let Err(problem) = step {
+                let at = offset(reader.error_position()).max(start);
+                return Err(format!("{}: {problem}", counter.place(text, at)));
+            }
             if open.is_empty() && !tree.elements.is_empty() {
                 return Ok(tree);
             }
         }
     }
 
-    fn step(&mut self, event: &Event<'_>, open: &mut Vec<usize>) -> Result<(), String> {
+    fn step(&mut self, event: &Event<'_>, open: &mut Vec<usize>, place: Place) -> Result<(), String> {
         match event {
-            Event::Start(tag) => self.open(tag, open),
+            Event::Start(tag) => self.open(tag, open, place),
             Event::Empty(tag) => {
-                self.open(tag, open)?;
+                self.open(tag, open, place)?;
                 open.pop();
                 Ok(())
             }
@@ -89,25 +173,32 @@ impl XmlTree {
             }
             Event::Text(text) => self.add_text(text, open),
             Event::CData(text) => self.add_text(text, open),
-            Event::DocType(_) => Err("a document type is not supported".to_owned()),
+            Event::DocType(declared) if declared.contains(&b'[') => {
+                Err("a document type with declarations is not supported; delete the <!DOCTYPE ..>".to_owned())
+            }
+            Event::GeneralRef(entity) => {
+                let entity = format!("&{};", text_of(entity)?);
+                unescape(&entity).map(drop).map_err(|_| format!("the entity `{entity}` is not supported"))
+            }
             Event::Eof if self.elements.is_empty() => Err("the file has no element".to_owned()),
             Event::Eof => Err("the file ends within an element".to_owned()),
             _ => Ok(()),
         }
     }
 
-    fn open(&mut self, tag: &BytesStart<'_>, open: &mut Vec<usize>) -> Result<(), String> {
+    fn open(&mut self, tag: &BytesStart<'_>, open: &mut Vec<usize>, place: Place) -> Result<(), String> {
         if open.len() == MAX_DEPTH {
             return Err(format!("elements are nested more than {MAX_DEPTH} deep"));
         }
-        if self.elements.len() == MAX_ELEMENTS {
-            return Err(format!("more than {MAX_ELEMENTS} elements"));
+        if self.elements.len() == self.limits.elements {
+            return Err(format!("more than {} elements", self.limits.elements));
         }
         let number = self.elements.len();
         if let Some(&parent) = open.last() {
             self.elements[parent].children.push(number);
         }
-        self.elements.push(Element::of(tag)?);
+        let element = Element::of(tag, &mut self.n_namespaces, self.limits)?;
+        self.elements.push(Element { place, ..element });
         open.push(number);
         Ok(())
     }
@@ -142,5 +233,110 @@ impl XmlTree {
     /// All elements of this name.
     pub fn named<'a>(&'a self, name: &'a str) -> impl Iterator<Item = usize> + 'a {
         (0..self.elements.len()).filter(move |&at| self.elements[at].name == name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LIMITS: XmlLimits = XmlLimits { elements: 10_000, namespaces: 32 };
+
+    fn parse(text: &str) -> Result<XmlTree, String> {
+        XmlTree::parse(text, LIMITS)
+    }
+
+    /// Message about a refused text.
+    fn told(text: &str) -> String {
+        let problem = parse(text).expect_err("refused");
+        assert!(problem.len() < 200, "{problem}");
+        problem
+    }
+
+    fn nested(depth: usize) -> String {
+        format!("<robot name=\"a\">{}{}</robot>", "<a>".repeat(depth), "</a>".repeat(depth))
+    }
+
+    #[test]
+    fn elements_have_their_prefix_attributes_and_place() {
+        let text = "\u{feff}<?xml version=\"1.0\"?><!-- <a> -->\n<!-- é -->\
+            <robot name='a&lt;\"&#65;' xmlns:x=\"u\" x:y=\"z\">\n\
+            text &amp; more <![CDATA[<b>]]><x:sensor><link name=\"no\"/></x:sensor>\n  <link name=\"b\"/></robot><c>";
+        let tree = parse(text).expect("it reads");
+        let robot = tree.element(0);
+        assert_eq!(robot.attributes().collect::<Vec<_>>(), [("name", "a<\"A")]);
+        let children: Vec<&Element> = tree.children(0).map(|at| tree.element(at)).collect();
+        let [sensor, link] = children[..] else { panic!("{children:?}") };
+        assert_eq!((sensor.prefix.as_str(), sensor.name.as_str()), ("x", "sensor"));
+        assert_eq!((link.prefix.as_str(), link.attribute("name")), ("", Some("b")));
+        assert_eq!(robot.place, Place { line: 2, column: 11 });
+        assert_eq!(link.place, Place { line: 4, column: 3 });
+    }
+
+    #[test]
+    fn deep_elements_are_refused_before_they_are_parsed() {
+        assert!(parse(&nested(MAX_DEPTH - 1)).is_ok());
+        for deep in [nested(MAX_DEPTH), nested(15_000), "<a>".repeat(1_000_000)] {
+            insta::assert_snapshot!("deep", told(&deep));
+        }
+    }
+
+    #[test]
+    fn many_elements_are_refused() {
+        let of = |n: usize| format!("<robot name=\"a\">{}</robot>", "<link name=\"b\"/>".repeat(n));
+        assert!(parse(&of(LIMITS.elements - 1)).is_ok());
+        insta::assert_snapshot!("many_elements", told(&of(LIMITS.elements)));
+    }
+
+    /// RUSTSEC-2026-0194: distinct names in one start tag took quadratic time.
+    #[test]
+    fn many_attributes_are_refused_at_once() {
+        let of = |n: usize| format!("<robot {}/>", (0..n).map(|k| format!(" a{k}=\"\"")).collect::<String>());
+        assert!(parse(&of(MAX_ATTRIBUTES)).is_ok());
+        insta::assert_snapshot!("many_attributes", told(&of(MAX_ATTRIBUTES + 1)));
+        let started = std::time::Instant::now();
+        insta::assert_snapshot!("many_attributes", told(&of(400_000)));
+        assert!(started.elapsed().as_secs() < 5, "{:?}", started.elapsed());
+        insta::assert_snapshot!("an_attribute_twice", told("<robot name=\"a\" name=\"b\"/>"));
+    }
+
+    /// RUSTSEC-2026-0195: namespace declarations were kept without bound.
+    #[test]
+    fn many_namespaces_are_refused() {
+        let of = |n: usize| {
+            let links = (0..n).map(|k| format!("<link xmlns:n{k}=\"u{k}\"/>"));
+            format!("<robot>{}</robot>", links.collect::<String>())
+        };
+        assert!(parse(&of(LIMITS.namespaces)).is_ok());
+        insta::assert_snapshot!("many_namespaces", told(&of(LIMITS.namespaces + 1)));
+    }
+
+    fn told_of<const N: usize>(texts: [&str; N]) -> String {
+        texts.map(|text| format!("{text:?}\n  {}\n", told(text))).concat()
+    }
+
+    #[test]
+    fn document_types_and_entities_are_refused() {
+        let texts = [
+            "<!DOCTYPE robot [<!ENTITY a \"aaaa\">]><robot name=\"&a;\"/>",
+            "<robot name=\"&a;\"/>",
+            "<robot>\n&a;</robot>",
+        ];
+        insta::assert_snapshot!("entities", told_of(texts));
+    }
+
+    #[test]
+    fn what_is_not_well_formed_is_named_with_its_line() {
+        let texts = [
+            "",
+            "a mere text",
+            "<robot>\n<link>\n</robot>",
+            "<robot>\n<link/>",
+            "<robot>\n<link",
+            "</robot>",
+            "<robot na<me=\"a\"/>",
+            "<1/>",
+        ];
+        insta::assert_snapshot!("not_well_formed", told_of(texts));
     }
 }

@@ -17,13 +17,9 @@ pub(crate) struct ActuatorInput {
 /// Torque limits from the URDF's effort, rates from the sensors' table.
 pub(crate) fn actuator_inputs(robot: &Robot) -> Result<Vec<ActuatorInput>, SimError> {
     let file = robot.folder.join("robot.toml");
-    let urdf = urdf_rs::read_from_string(&robot.urdf_text).ok();
-    let effort =
-        |name: &str| urdf.iter().flat_map(|u| &u.joints).find(|j| j.name == name).map_or(0.0, |j| j.limit.effort);
-    let joints = robot.chain.joints().iter().zip(&robot.sensors);
+    let joints = robot.chain.joints().iter().zip(&robot.sensors).zip(&robot.efforts_n_m);
     joints
-        .map(|(joint, sensor)| {
-            let effort_n_m = effort(&joint.name);
+        .map(|((joint, sensor), &effort_n_m)| {
             if !(effort_n_m.is_finite() && effort_n_m > 0.0) {
                 return Err(SimError::NoEffort { file: file.clone(), joint: joint.name.clone(), effort_n_m });
             }

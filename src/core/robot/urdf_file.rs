@@ -1,0 +1,158 @@
+//! Links and joints of a URDF file, with what was skipped.
+//!
+//! Values that kinematics need and that are wrong become defects of their joint: they refuse the file where the joint
+//! is on the arm's chain. Everything else that is wrong is skipped, and the skip is noted by link or joint.
+
+use super::xml_tree::{Place, XmlLimits, XmlTree};
+
+pub(super) use self::joint::{JointType, Range, UrdfJoint};
+pub(super) use self::link::{ShapeElement, UrdfLink, UrdfShape};
+use self::scan::Scan;
+pub(super) use self::scan::Skipped;
+
+mod joint;
+mod link;
+mod scan;
+
+/// Limits of a URDF: a humanoid has about 3000 elements, one with every collision sphere 10,000.
+const XML_LIMITS: XmlLimits = XmlLimits { elements: 50_000, namespaces: 64 };
+/// Elements of other tools, which every reader of URDF skips.
+const OF_OTHER_TOOLS: [&str; 8] =
+    ["gazebo", "transmission", "ros2_control", "sensor", "plugin", "mujoco", "isaac_sim", "loop_joint"];
+
+/// Links and joints in the order of the file.
+#[derive(Clone, Debug)]
+pub(super) struct UrdfFile {
+    pub name: String,
+    pub links: Vec<UrdfLink>,
+    pub joints: Vec<UrdfJoint>,
+    pub skipped: Vec<Skipped>,
+}
+
+impl UrdfFile {
+    /// Reads the text of a URDF.
+    ///
+    /// # Errors
+    /// A sentence with line and column, where the text is no URDF or where a joint names no links.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let tree = XmlTree::parse(text, XML_LIMITS)?;
+        let root = tree.element(0);
+        if root.name != "robot" {
+            return Err(format!(
+                "{}: the root element is `{}`, and that of a URDF is `robot`. Convert the file to URDF first",
+                root.place, root.name
+            ));
+        }
+        refuse_xacro(&tree)?;
+        let mut scan = Scan::new(&tree);
+        let colors = link::named_colors(&mut scan);
+        let name = root.attribute("name").filter(|name| !name.is_empty()).unwrap_or("arm").to_owned();
+        let mut file = Self { name, links: Vec::new(), joints: Vec::new(), skipped: Vec::new() };
+        for at in tree.children(0) {
+            let element = tree.element(at);
+            if element.prefix == "xacro" && !["property", "arg", "macro"].contains(&element.name.as_str()) {
+                scan.skip("robot", at, format!("xacro left `xacro:{}` over: skipped", element.name));
+            }
+            if !element.prefix.is_empty() {
+                continue;
+            }
+            match element.name.as_str() {
+                "link" => file.add_link(&mut scan, at, &colors),
+                "joint" => file.joints.push(joint::read_joint(&mut scan, at)?),
+                "material" => {}
+                other if OF_OTHER_TOOLS.contains(&other) => {}
+                other => scan.skip("robot", at, format!("the element `{other}` is not part of URDF: skipped")),
+            }
+        }
+        file.skipped = scan.into_skipped();
+        Ok(file)
+    }
+
+    fn add_link(&mut self, scan: &mut Scan<'_>, at: usize, colors: &link::NamedColors) {
+        let Some(name) = scan.element(at).attribute("name").map(str::to_owned) else {
+            scan.skip("a link", at, "has no name, so that no joint can hold it: skipped".to_owned());
+            return;
+        };
+        if let Some(first) = self.links.iter().find(|link| link.name == name) {
+            let text = format!("is defined again; the definition at {} is used", first.place);
+            scan.skip(&format!("link `{name}`"), at, text);
+            return;
+        }
+        self.links.push(link::read_link(scan, at, name, colors));
+    }
+}
+
+/// Refuses a file that only xacro can expand. What an expanded file has left over, such as unused definitions and calls
+/// of macros that are defined nowhere, is skipped.
+fn refuse_xacro(tree: &XmlTree) -> Result<(), String> {
+    let advice = "Run xacro first: `xacro ARM.urdf.xacro > ARM.urdf`";
+    let has_joints = tree.children(0).any(|at| tree.element(at).prefix.is_empty() && tree.element(at).name == "joint");
+    let of_xacro = || tree.elements().iter().filter(|element| element.prefix == "xacro");
+    let macros = of_xacro().filter(|element| element.name == "macro");
+    let macros: Vec<&str> = macros.filter_map(|element| element.attribute("name")).collect();
+    for element in of_xacro() {
+        let (place, name) = (element.place, element.name.as_str());
+        let expands = ["include", "if", "unless", "insert_block", "call"].contains(&name) || macros.contains(&name);
+        if expands || !has_joints {
+            return Err(format!("{place}: `xacro:{name}` is xacro, not URDF. {advice}"));
+        }
+    }
+    let mut open: Vec<usize> = tree.children(0).filter(|&at| is_of_urdf(tree, at)).collect();
+    while let Some(at) = open.pop() {
+        let element = tree.element(at);
+        let computed = element.attributes().find(|(key, value)| *key != "filename" && value.contains("${"));
+        if let Some((key, value)) = computed {
+            return Err(format!("{}: {key} = `{value}` is xacro, not URDF. {advice}", element.place));
+        }
+        open.extend(tree.children(at));
+    }
+    Ok(())
+}
+
+fn is_of_urdf(tree: &XmlTree, at: usize) -> bool {
+    let element = tree.element(at);
+    element.prefix.is_empty() && ["link", "joint"].contains(&element.name.as_str())
+}
+
+impl UrdfLink {
+    /// A link that only a joint names.
+    pub fn implied(name: &str, place: Place) -> Self {
+        Self { name: name.to_owned(), place, inertial: None, visual: Vec::new(), collision: Vec::new(), lost: None }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn told(body: &str) -> Vec<String> {
+        let file = UrdfFile::parse(&format!("<robot name=\"a\">\n{body}\n</robot>")).expect("it reads");
+        file.skipped.iter().map(|skipped| format!("{}: {}", skipped.owner, skipped.text)).collect()
+    }
+
+    #[test]
+    fn what_other_tools_add_is_skipped_in_silence() {
+        let quiet = "<link name=\"l\"><x:y xmlns:x=\"z\"/></link><gazebo reference=\"l\"><link/></gazebo>\
+                     <transmission name=\"t\"><joint name=\"j\"/></transmission><material name=\"m\"/>";
+        assert_eq!(told(quiet), Vec::<String>::new());
+        assert_eq!(told("<wheel/>"), ["robot: the element `wheel` is not part of URDF: skipped"]);
+    }
+
+    #[test]
+    fn xacro_is_refused_with_its_place() {
+        for text in [
+            "<robot name=\"a\" xmlns:xacro=\"x\"><xacro:macro name=\"b\"/></robot>",
+            "<robot name=\"a\">\n<link name=\"${prefix}b\"/></robot>",
+            "<robot name=\"a\"><joint name=\"j\"/><xacro:include filename=\"b\"/></robot>",
+        ] {
+            let problem = UrdfFile::parse(text).expect_err("refused");
+            assert!(problem.contains("Run xacro first") && problem.starts_with("line "), "{problem}");
+        }
+    }
+
+    #[test]
+    fn another_format_is_named() {
+        let problem = UrdfFile::parse("<sdf version=\"1.6\"><model name=\"a\"/></sdf>").expect_err("refused");
+        assert!(problem.contains("`sdf`"), "{problem}");
+    }
+}
