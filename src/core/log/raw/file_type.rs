@@ -9,12 +9,18 @@ pub const START_BYTES: usize = 512;
 pub const SQLITE: &[u8] = b"SQLite format 3\0";
 
 const UNPACK: &str = "unpack it first";
-const CONVERT: &str = "convert it, for example with `mcap convert IN OUT.mcap`";
+/// Command that makes a readable recording of a ROS 1 bag; tests/oracle/make_ros1_golden.py runs it.
+pub const ROS1_ADVICE: &str = "rosbags 0.11.9 (`pip install rosbags==0.11.9`) converts it: \
+    `rosbags-convert --src IN.bag --dst OUT --dst-storage mcap` writes OUT/OUT.mcap";
 const NO_RECORDING: &str = "name the recording itself, an .mcap or .db3 file";
+const TABLE: &str = "name the recording itself, an .mcap or .db3 file; a table of poses needs an input map with \
+    [table], which `armcal inspect FILE --write-input MAP.toml` proposes";
+
+const CSV: &str = "a table as text (CSV)";
 
 /// First bytes, type and advice.
 const KINDS: [(&[u8], &str, &str); 20] = [
-    (b"#ROSBAG V", "a ROS 1 bag", CONVERT),
+    (b"#ROSBAG V", "a ROS 1 bag", ROS1_ADVICE),
     (SQLITE, "an SQLite database, as ROS 2 bags in .db3 files are", "only finished ones are read"),
     (b"RRF", "a file for the Rerun viewer (.rrd)", "name the recording that it was made from"),
     (b"RRIO", "a file for the Rerun viewer (.rrd)", "name the recording that it was made from"),
@@ -48,7 +54,7 @@ pub fn describe(start: &[u8]) -> String {
         return "it holds zeros: it was never written, or was copied in part".to_owned();
     }
     if let Some(what) = text_kind(start) {
-        return format!("it is {what}; {NO_RECORDING}");
+        return format!("it is {what}; {}", if what == CSV { TABLE } else { NO_RECORDING });
     }
     let hex = |bytes: &[u8]| bytes.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" ");
     format!("it begins with the bytes {}, not with {}", hex(&start[..start.len().min(MAGIC.len())]), hex(MAGIC))
@@ -74,7 +80,7 @@ fn text_kind(start: &[u8]) -> Option<&'static str> {
             "a JSON text"
         }
         Some('<') => "an XML or HTML text",
-        _ if first_line.matches([',', ';', '\t']).count() >= 2 => "a table as text (CSV)",
+        _ if first_line.matches([',', ';', '\t']).count() >= 2 => CSV,
         _ => "a text",
     })
 }
