@@ -54,8 +54,8 @@ pub enum InputError {
     NoPositions { file: String, topic: String, n: u64, reasons: String },
     #[error(
         "{file}: topic {topic}: {n} of {of} messages have joint `{joint}` twice with different positions: {first:.6} \
-         and {second:.6} in message {message}; record one source of `{joint}` only, or take the other's messages out of \
-         the recording"
+         and {second:.6} in message {message}; record one source of `{joint}` only, or remove the \
+         messages of the other"
     )]
     JointTwice { file: String, topic: String, joint: String, first: f64, second: f64, message: u64, n: u64, of: u64 },
     #[error("{file}: {place}: {field} of `{of}` is {value}, not a finite number")]

@@ -135,7 +135,7 @@ fn tags(table: &TableContents, roles: &Roles) -> String {
             _ => "",
         };
         text += &format!("rotation = [{}]\nrotation_form = \"{form}\"{or}\n", list(&columns.names));
-        if *form != "quaternion_xyzw" && largest(table, &columns.names) > MAX_TURN_RAD {
+        if !["quaternion_xyzw", "matrix"].contains(form) && largest(table, &columns.names) > MAX_TURN_RAD {
             text += "rotation_unit = \"deg\"\n";
         }
     }

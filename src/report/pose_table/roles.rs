@@ -151,7 +151,7 @@ fn triples(names: &[String]) -> Vec<Columns> {
     let mut found = Vec::new();
     for name in names {
         let lower = name.to_lowercase();
-        let Some(at) = lower.rfind('x').filter(|_| lower.len() == name.len()) else { continue };
+        let Some(at) = lower.rfind('x').filter(|_| name.is_ascii()) else { continue };
         // Within a word, x is a letter as any other.
         let is_end = at + 1 == name.len() || !name[at + 1..].starts_with(|c: char| c.is_ascii_alphanumeric());
         let upper = name[at..].starts_with('X');
@@ -198,6 +198,9 @@ fn rotation(names: &[String], found: Vec<Columns>, position_stem: &str) -> Optio
         let form = if columns.names.len() == 4 { "quaternion_xyzw" } else { "rotation_vector" };
         return Some((columns, form));
     }
+    if let Some(columns) = matrix(names) {
+        return Some((columns, "matrix"));
+    }
     let roll = names.iter().find(|name| last_part(name).ends_with("roll"))?;
     let lower = roll.to_lowercase();
     let at = lower.len() - "roll".len();
@@ -205,6 +208,17 @@ fn rotation(names: &[String], found: Vec<Columns>, position_stem: &str) -> Optio
         .map(|word| names.iter().find(|name| name.to_lowercase() == format!("{}{word}", &lower[..at])).cloned());
     let [Some(roll), Some(pitch), Some(yaw)] = all else { return None };
     Some((Columns { names: vec![roll, pitch, yaw], stem: lower[..at].to_owned() }, "fixed_xyz"))
+}
+
+/// Nine columns such as `r11` to `r33`, or `r00` to `r22`.
+fn matrix(names: &[String]) -> Option<Columns> {
+    names.iter().find_map(|name| {
+        let counted = [("11", 1), ("00", 0)].into_iter().find_map(|(end, from)| Some((name.strip_suffix(end)?, from)));
+        let (stem, from) = counted?;
+        let cells: Vec<String> = (0..9).map(|k| format!("{stem}{}{}", from + k / 3, from + k % 3)).collect();
+        let columns = Columns { names: cells, stem: stem.to_lowercase() };
+        columns.names.iter().all(|cell| names.contains(cell)).then_some(columns)
+    })
 }
 
 fn pixel(names: &[String]) -> Option<[String; 2]> {
