@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use armcal::log::{Completeness, for_each_raw};
+use armcal::log::{Completeness, decode, for_each_raw, ros};
 use armcal::robot::Robot;
 
 use crate::support::bag::{VERSIONS, write_bag};
@@ -124,4 +124,35 @@ fn bags_of_another_writer_hold_the_messages_of_its_mcap_files() {
     let last = &bag[36];
     assert_eq!((last.0.as_str(), last.1.as_str()), ("/image", "sensor_msgs/msg/Image"));
     assert!(last.3.len() > 6000 && last.3.ends_with(&[5998, 5999].map(|n: u32| (n % 251) as u8)));
+}
+
+/// A ROS 1 bag, and the file that the conversion in our message makes of it: tests/oracle/make_ros1_golden.py.
+#[test]
+fn the_conversion_that_ros_1_bags_are_refused_with_gives_their_messages() {
+    let golden = root().join("tests/golden/bag");
+    let command = read(&golden.join("ros1.txt"));
+    let inspect = |name: &str| answer(program().arg("inspect").arg(golden.join(name)));
+    inspect("ros1.bag").expect("ROS 1", 2, &[command.trim(), "rosbags==0.11.9", "recording_format"]);
+    inspect("ros1.mcap").expect("converted", 0, &["whole", "elbow", "tag36h11:7"]);
+    let converted = messages(&golden.join("ros1.mcap"));
+    assert_eq!(converted.len(), 24);
+    let joints: ros::JointState = decode(&converted[2].3).expect("joints");
+    assert_eq!((joints.name, joints.position), (vec!["shoulder".to_owned(), "elbow".to_owned()], vec![0.1, -0.05]));
+    let tags: ros::TfMessage = decode(&converted[3].3).expect("transforms");
+    assert_eq!(tags.transforms[0].transform.translation.y, 0.02);
+}
+
+/// Runs the conversion where rosbags is installed.
+#[test]
+#[ignore = "needs target/oracle: tests/oracle/README.md"]
+fn the_conversion_runs_where_rosbags_is_installed() {
+    let (folder, golden) = (temp(), root().join("tests/golden/bag"));
+    let command = read(&golden.join("ros1.txt"));
+    std::fs::copy(golden.join("ros1.bag"), folder.path().join("IN.bag")).expect("copied");
+    let mut words = command.split_whitespace();
+    let converter = root().join("target/oracle/bin").join(words.next().expect("a program"));
+    let status = std::process::Command::new(converter).args(words).current_dir(folder.path()).status();
+    assert!(status.expect("rosbags is installed").success());
+    let found = messages(&folder.path().join("OUT/OUT.mcap"));
+    assert!(found == messages(&golden.join("ros1.mcap")));
 }

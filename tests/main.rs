@@ -10,7 +10,8 @@
 //! arms against them; `determinism`, `closed_loop`, `script` and `cli` run the program, `kill` ends it badly; `sim`
 //! looks at the simulated world from outside; `uncalibrated` calibrates arms of which little is known; `real` reads
 //! recordings of real arms, `board_corners` those of a chessboard, `bags` the same as SQLite files, `recorded_inputs`
-//! their slow sensors and images, `streams` those that were recorded all the time, `cameras` those of arms with two
+//! their slow sensors and images, `messages` what
+//! calibration cannot use as it is, `streams` those that were recorded all the time, `cameras` those of arms with two
 //! cameras; `tagmap` maps tags in recordings that the test writes; `touch` feels surveyed plates with the tool;
 //! `any_arm` makes robot folders for drawings of all sorts, `urdf` for URDFs that are wrong in parts; `report` reads
 //! report.html; `work` works on a dive, `watch` follows recordings that grow; `repository` reads sources and pages.
@@ -39,11 +40,13 @@ mod golden;
 mod gripper_tag;
 mod kill;
 mod map;
+mod messages;
 mod methods;
 mod mutations;
 mod online;
 mod oracle;
 mod planning;
+mod pose_tables;
 mod property;
 mod real;
 mod recorded_inputs;

@@ -199,7 +199,7 @@ fn expect_tags_of_a_named_family_to_be_found(families: &[TagFamily]) {
         let with_family = image_map("/png").replace("[tags]", &format!("[tags]\nfamily = \"{family}\""));
         let read = |text: &str| {
             let map = parse_input_map(Path::new("map.toml"), text).expect("a map");
-            let lens = read_camera_info(&recording, "/info").expect("a lens");
+            let lens = read_camera_info(&recording, "/info").expect("a lens").lens;
             let family = map.tag_family.unwrap_or(robot.tag_family);
             read_external_images(&recording, &map, &robot, &mut RecordedImageDetector::new([&lens], family))
         };
@@ -233,7 +233,7 @@ fn tags_are_found_in_recorded_images_of_each_form() {
     let path = folder.path().join("arm.mcap");
     let (camera, robot) = (Camera::before_a_tag_of(TagFamily::Tag36h11), titan());
     camera.write(&path, &robot);
-    let lens = read_camera_info(&path, "/info").expect("a lens");
+    let lens = read_camera_info(&path, "/info").expect("a lens").lens;
     assert_eq!(lens, camera.lens);
     let expected = square_corners(SIZE_M)
         .map(|corner| camera.lens.project(&(camera.camera_from_tag * corner).coords).expect("in view"));

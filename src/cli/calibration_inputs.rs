@@ -21,7 +21,8 @@ use armcal_belief::tagmap::files::{LandmarkFile, NamedSurvey, read_landmarks};
 #[cfg(not(feature = "sim"))]
 use armcal_core::input::read_external;
 use armcal_core::input::{
-    ChildFrame, ExternalRecording, InputMap, Source, TagUse, read_camera_info, read_input_map, read_task,
+    CameraInfoLens, ChildFrame, ExternalRecording, InputMap, Source, TagUse, read_camera_info, read_input_map,
+    read_task,
 };
 #[cfg(feature = "sim")]
 use armcal_core::input::{ImageDetector, ImageProblem, RecordedImage, TagCorners, Topics, read_external_images};
@@ -289,7 +290,13 @@ impl CalibrationInputs<'_> {
             warn(Code::TaskMissing, "no task is named (--task), so that no tool error is predicted");
         }
         let context = ExternalContext { task, landmark_names: named.names, plain };
-        Ok((prepare_external(&recordings, &map, &robot, context)?, lost))
+        let prepared = prepare_external(&recordings, &map, &robot, context)?;
+        for recording in &recordings {
+            if let Some(doubt) = &recording.clock_doubt {
+                warn(Code::ClocksDiffer, format_args!("{}: {doubt}", recording.path.display()));
+            }
+        }
+        Ok((prepared, lost))
     }
 
     /// A robot without a lens takes that of the recordings, where the input map names it.
@@ -299,8 +306,17 @@ impl CalibrationInputs<'_> {
             _ => None,
         };
         let Some(topic) = topic else { return Ok(robot.require_lens()?) };
+        let images = match &map.source {
+            Source::Topics(topics) => Some(topics.tags.as_str()),
+            Source::Table(_) => None,
+        };
         for path in self.recordings {
-            let lens = read_camera_info(path, topic)?;
+            let found = read_camera_info(path, topic)?;
+            let rectified = images.and_then(|images| found.rectified_note(images, topic));
+            let CameraInfoLens { lens, notes, .. } = found;
+            for note in notes.iter().chain(&rectified) {
+                warn(Code::CameraInfoInvalid, format_args!("{}: {note}", path.display()));
+            }
             if robot.camera.lens.is_known() && robot.camera.lens != lens {
                 let problem = format!("{}: the lens on {topic} is not that of the others", path.display());
                 return Err(UsageError::new(Code::UsageInvalid, problem).into());

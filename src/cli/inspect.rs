@@ -13,14 +13,16 @@ use crate::cli::file_kind::expect_recording;
 use crate::cli::stdout::{note, say};
 use crate::output;
 use crate::report::inspection::{State, inspect as look, to_text};
+use crate::report::pose_table::{inspect_table, propose_table_map};
 use crate::report::proposed_map::propose_input_map;
+use armcal_core::input::{TableContents, read_table_contents};
 use armcal_core::log::{LogError, read_attachments};
 use armcal_core::robot::{self, Robot};
 
 /// Exits with 0 for a whole recording, 3 for one that is cut or damaged, 2 for what is no recording.
 #[derive(Debug, Args)]
 pub(super) struct InspectArgs {
-    /// Recording (.mcap) of armcal or of any other program
+    /// Recording (.mcap, .db3) of armcal or of any other program, or a table of poses (.csv, .yaml, .json)
     recording: PathBuf,
     /// Robot folder, to print which parameters the recording determines; default: the files attached to the recording
     #[arg(long, value_name = "DIR")]
@@ -34,9 +36,13 @@ pub(super) struct InspectArgs {
 }
 
 pub(super) fn inspect(args: &InspectArgs) -> Result<Exit> {
-    expect_recording(&args.recording)?;
+    let table = read_table_contents(&args.recording);
+    if table.is_none() {
+        expect_recording(&args.recording)?;
+    }
     let robot = match &args.robot {
         Some(folder) => Some(load_robot(folder, &[])?),
+        None if table.is_some() => None,
         None => attached_robot(&args.recording)?,
     };
     if let Some(file) = args.write_input.as_deref().filter(|file| file.symlink_metadata().is_ok()) {
@@ -45,6 +51,9 @@ pub(super) fn inspect(args: &InspectArgs) -> Result<Exit> {
             format!("{}: is there; name another --write-input", file.display()),
         )
         .into());
+    }
+    if let Some(table) = table {
+        return inspect_columns(args, &table?, robot.as_ref());
     }
     let inspection = look(&args.recording, robot.as_ref())?;
     if args.json {
@@ -61,6 +70,22 @@ pub(super) fn inspect(args: &InspectArgs) -> Result<Exit> {
         State::Whole => Exit::Ok,
         State::Cut | State::Damaged => Exit::DataLost,
     })
+}
+
+/// Looks at a table of poses.
+fn inspect_columns(args: &InspectArgs, table: &TableContents, robot: Option<&Robot>) -> Result<Exit> {
+    let inspection = inspect_table(&args.recording, table, robot);
+    if args.json {
+        say(&serde_json::to_string_pretty(&inspection).context("the inspection has no JSON form")?)?;
+    } else {
+        say_wrapped(&inspection.to_text())?;
+    }
+    if let Some(file) = &args.write_input {
+        let text = propose_table_map(&args.recording, table, robot)?;
+        output::write_together(&[(file.as_path(), text.as_bytes())])?;
+        note(format_args!("written: {}; look at what it says was chosen", file.display()));
+    }
+    Ok(Exit::Ok)
 }
 
 /// The robot as attached to the recording; `None` where that is missing or cannot be used, for it is a help, no more.

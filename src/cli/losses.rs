@@ -69,6 +69,12 @@ pub(super) fn warn_of_external(recording: &ExternalRecording, robot: &Robot) -> 
     for (what, n) in &recording.left_out {
         warn(Code::MessagesRejected, format_args!("{file}: {n} {what} left out"));
     }
+    for (what, n) in &recording.skipped {
+        warn(Code::MessagesRejected, format_args!("{file}: {n} {what} skipped"));
+    }
+    for note in &recording.notes {
+        warn(Code::StampsReplaced, format_args!("{file}: {note}"));
+    }
     if !recording.extra_joints.is_empty() {
         let names = recording.extra_joints.join(", ");
         warn(Code::JointsIgnored, format_args!("{file}: joints that the robot lacks are ignored: {names}"));

@@ -25,10 +25,25 @@ fn check_resolution(found: [u32; 2], wanted: [u32; 2]) -> Result<(), ImageProble
         return Ok(());
     }
     let ([width, height], [lens_width, lens_height]) = (found, wanted);
+    let todo = match factor(found, wanted) {
+        Some(factor) => format!(
+            "the images are {factor} times as large: in [camera] of robot.toml, set resolution_px = [{width}, \
+             {height}], multiply focal_px by {factor} and make each number c of center_px (c + 0.5) * {factor} - \
+             0.5; or name their own tags.camera_info"
+        ),
+        None => "state the lens of these images in robot.toml, or name their own tags.camera_info".to_owned(),
+    };
     Err(ImageProblem::Unusable(format!(
-        "the image has {width} x {height} pixels, the camera's lens {lens_width} x {lens_height}; give the lens of \
-         these images in robot.toml, or name tags.camera_info"
+        "the image has {width} x {height} pixels, the camera's lens {lens_width} x {lens_height}; {todo}"
     )))
+}
+
+/// The factor between two sizes of the same shape.
+fn factor(found: [u32; 2], wanted: [u32; 2]) -> Option<f64> {
+    let [a, b]: [f64; 2] = std::array::from_fn(|k| f64::from(found[k]) / f64::from(wanted[k].max(1)));
+    // Rounded sizes differ by a pixel.
+    let rounding = 1.0 / f64::from(wanted[0].min(wanted[1]).max(1));
+    ((a - b).abs() <= rounding).then(|| (1e4 * a).round() / 1e4)
 }
 
 fn raw(image: &Image, resolution_px: [u32; 2]) -> Result<Vec<u8>, ImageProblem> {

@@ -4,7 +4,7 @@
 use armcal_core::codes::{Code, Coded};
 use std::path::Path;
 
-use armcal_core::input::parse_input_map;
+use armcal_core::input::{ClockDoubt, ClockRemedy, DEFAULT_MAX_GAP_S, compare_clocks, parse_input_map};
 use armcal_core::log::{LogError, for_each_raw};
 use armcal_core::robot::{Robot, RobotError};
 use armcal_core::text::printable;
@@ -16,6 +16,10 @@ mod tags;
 use contents::{Contents, Kind};
 use joints::choose_joints;
 use tags::choose_tags;
+
+/// Topics that `[tags]` may name.
+const TAG_TYPES: &str = "tags (tf2_msgs/msg/TFMessage, AprilTagDetectionArray of apriltag_msgs or \
+    isaac_ros_apriltag_interfaces, sensor_msgs images)";
 
 /// Why no input map can be proposed.
 #[derive(Debug, thiserror::Error)]
@@ -40,26 +44,44 @@ pub fn propose_input_map(recording: &Path, robot: Option<&Robot>) -> Result<Stri
     for_each_raw(recording, |raw| contents.take(raw))?;
     let file = recording.display().to_string();
     let missing = |what| {
-        let topics = contents.topics.keys().cloned().collect();
+        let typed = |(name, topic): (&String, &contents::Topic)| format!("{name} ({})", topic.schema);
+        let topics = contents.topics.iter().map(typed).collect();
         ProposalError::Missing { file: file.clone(), what, topics }
     };
-    let joints = choose_joints(&contents, robot).map_err(|problem| match problem {
+    let (joint_topic, joints) = choose_joints(&contents, robot).map_err(|problem| match problem {
         None => missing("joint readings (sensor_msgs/msg/JointState)"),
         Some(problem) => ProposalError::Joints { file: file.clone(), problem },
     })?;
-    let tags = choose_tags(&contents)
-        .ok_or_else(|| missing("tags (transforms, apriltag_msgs/msg/AprilTagDetectionArray or sensor_msgs images)"))?;
+    let (tag_topic, tags) = choose_tags(&contents).ok_or_else(|| missing(TAG_TYPES))?;
     let mut text = format!(
         "# Proposed by `armcal inspect --write-input` for {}.\n# Look at each choice; docs/reference/real-arms.md says \
          what the keys mean.\nversion = 1\n",
         comment(&file)
     );
     text += "# max_gap_s = 0.5   # a tag message farther than this from any joint reading is left out\n";
+    let (above, in_tags) = clocks(&contents, &joint_topic, &tag_topic);
+    text += &above;
     text += &joints;
     text += &tags;
+    text += &in_tags;
     text += &conditions(&contents);
     parse_input_map(Path::new("proposed input map"), &text)?;
     Ok(text)
+}
+
+/// Lines about clocks that differ: above the tables, and in `[tags]`.
+fn clocks(contents: &Contents, joint_topic: &str, tag_topic: &str) -> (String, String) {
+    let times = |name: &str| contents.topics.get(name).map(|topic| topic.times(name));
+    let doubt = times(joint_topic)
+        .zip(times(tag_topic))
+        .and_then(|(joints, tags)| compare_clocks(DEFAULT_MAX_GAP_S, joints, tags));
+    let Some(ClockDoubt { text, remedy }) = doubt else { return Default::default() };
+    let why = comment(&format!("# {text}"));
+    match remedy {
+        ClockRemedy::LogTime => (format!("{why}\nstamps = \"log_time\"\n"), String::new()),
+        ClockRemedy::Offset(offset_s) => (String::new(), format!("{why}\nclock_offset_s = {offset_s:.3}\n")),
+        ClockRemedy::Unknown => (format!("{why}\n"), String::new()),
+    }
 }
 
 /// The slow sensors. A thermometer that is not called after oil may measure anything, so it is only named.
@@ -106,12 +128,12 @@ fn others<'a>(what: &str, names: impl Iterator<Item = &'a String>) -> String {
 }
 
 /// As TOML writes a text.
-fn quoted(text: &str) -> String {
+pub(in crate::report) fn quoted(text: &str) -> String {
     toml::Value::String(text.to_owned()).to_string()
 }
 
 /// One line without control characters.
-fn comment(text: &str) -> String {
+pub(in crate::report) fn comment(text: &str) -> String {
     printable(text).replace(['\n', '\r', '\t'], " ")
 }
 

@@ -3,6 +3,7 @@
 
 pub mod bag;
 pub mod external;
+pub mod scene;
 pub mod synthetic;
 pub mod texts;
 

@@ -58,6 +58,8 @@ pub enum CalibError {
     NotFinite { recording: String, what: String, n: u64, of: u64 },
     #[error("{recording}: no view is left: {reasons}")]
     AllRejected { recording: String, reasons: String },
+    #[error("{recording}: {problem}")]
+    Clocks { recording: String, problem: String },
     #[error("{recording}: topic {topic}: {disorder}")]
     Disorder { recording: String, topic: String, disorder: StampRegression },
 }
@@ -91,6 +93,7 @@ impl Coded for CalibError {
             Self::Surveys { .. } => Code::SurveysConflict,
             Self::PriorSag { .. } => Code::PriorUnusable,
             Self::NotFinite { .. } => Code::MessageInvalid,
+            Self::Clocks { .. } => Code::ClocksDiffer,
             Self::Disorder { .. } => Code::StampsDisordered,
         }
     }

@@ -33,8 +33,9 @@ pub enum ViewsError {
     #[error(transparent)]
     Log(#[from] LogError),
     #[error(
-        "{}: no topic with detections (apriltag_msgs/msg/AprilTagDetectionArray) of the cameras; \
-         wanted: {wanted:?}, in the recording: {found:?}; name one with --topic", path.display()
+        "{}: no topic with detections (AprilTagDetectionArray of apriltag_msgs or isaac_ros_apriltag_interfaces) \
+         of the cameras; wanted: {wanted:?}, in the recording: {found:?}; name one with --topic",
+        path.display()
     )]
     NoTopic { path: PathBuf, wanted: Vec<String>, found: Vec<String> },
 }
@@ -88,8 +89,8 @@ pub fn read_views(
 
 impl Contents {
     fn take(&mut self, message: &RawMessage<'_>) {
-        if message.schema_name().ends_with("/AprilTagDetectionArray") {
-            let array = decode(message.data).ok();
+        if let Some(array) = ros::decode_detections(message.schema_name(), message.data) {
+            let array = array.ok();
             self.arrays.entry(message.topic().to_owned()).or_default().push((message.log_time(), array));
         } else if message.topic() == topics::VEHICLE_IMU
             && let Ok(imu) = decode::<ros::Imu>(message.data)

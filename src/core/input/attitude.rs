@@ -4,7 +4,7 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use super::error::{BadPlace, InputError};
 use super::map::{InputMap, NotFinite, QUATERNION_LENGTH_TOLERANCE, Topics};
-use super::stamp::stamp_or_log_time;
+use super::stamp::TopicClock;
 use crate::log::ros::Imu;
 use crate::log::{RawMessage, decode};
 use crate::time::Stamp;
@@ -25,6 +25,7 @@ pub(super) struct AttitudeReader<'a> {
     file: &'a str,
     not_finite: NotFinite,
     base_from_sensor: UnitQuaternion<f64>,
+    clock: TopicClock,
     pub readings: Vec<AttitudeReading>,
     pub left_out: u64,
     messages: u64,
@@ -33,7 +34,8 @@ pub(super) struct AttitudeReader<'a> {
 impl<'a> AttitudeReader<'a> {
     pub fn new(file: &'a str, map: &InputMap, topics: &Topics) -> Self {
         let (not_finite, base_from_sensor) = (map.not_finite, topics.base_from_attitude);
-        Self { file, not_finite, base_from_sensor, readings: Vec::new(), left_out: 0, messages: 0 }
+        let clock = TopicClock::new(map.stamps);
+        Self { file, not_finite, base_from_sensor, clock, readings: Vec::new(), left_out: 0, messages: 0 }
     }
 
     pub fn take(&mut self, raw: &RawMessage<'_>, digest: [u8; 32]) -> Result<(), InputError> {
@@ -65,7 +67,7 @@ impl<'a> AttitudeReader<'a> {
         }
         let world_from_sensor = UnitQuaternion::from_quaternion(quaternion);
         let up = self.base_from_sensor * (world_from_sensor.inverse() * Vector3::z());
-        let stamp = stamp_or_log_time(message.header.stamp, raw.log_time());
+        let stamp = self.clock.read(message.header.stamp, raw.log_time());
         self.readings.push(AttitudeReading { stamp, up, digest });
         Ok(())
     }

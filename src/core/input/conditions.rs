@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::error::{BadPlace, InputError};
 use super::map::{ConditionKind, ConditionTopics, InputMap, NotFinite};
-use super::stamp::stamp_or_log_time;
+use super::stamp::TopicClock;
 use crate::log::ros::{FluidPressure, Temperature};
 use crate::log::{RawMessage, decode};
 use crate::time::Stamp;
@@ -27,6 +27,7 @@ pub(super) struct ConditionReader<'a> {
     file: &'a str,
     topics: &'a ConditionTopics,
     not_finite: NotFinite,
+    clock: TopicClock,
     pub readings: Vec<ConditionReading>,
     pub left_out: u64,
     messages: BTreeMap<ConditionKind, u64>,
@@ -34,8 +35,8 @@ pub(super) struct ConditionReader<'a> {
 
 impl<'a> ConditionReader<'a> {
     pub fn new(file: &'a str, map: &InputMap, topics: &'a ConditionTopics) -> Self {
-        let not_finite = map.not_finite;
-        Self { file, topics, not_finite, readings: Vec::new(), left_out: 0, messages: BTreeMap::new() }
+        let (not_finite, clock) = (map.not_finite, TopicClock::new(map.stamps));
+        Self { file, topics, not_finite, clock, readings: Vec::new(), left_out: 0, messages: BTreeMap::new() }
     }
 
     /// What `topic` holds by the input map.
@@ -65,7 +66,7 @@ impl<'a> ConditionReader<'a> {
             }
             return Err(InputError::NotFinite { file: file(), place, field, of: raw.topic().to_owned(), value });
         }
-        let stamp = stamp_or_log_time(stamp, raw.log_time());
+        let stamp = self.clock.read(stamp, raw.log_time());
         self.readings.push(ConditionReading { stamp, kind, value, digest });
         Ok(())
     }

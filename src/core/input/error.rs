@@ -35,14 +35,29 @@ pub enum InputError {
     Log(#[from] LogError),
     #[error("{file}: no message on topic {topic} of the input map; topics there: {found:?}")]
     NoTopic { file: String, topic: String, found: Vec<String> },
-    #[error("{file}: topic {topic} holds {found:?}, not {expected}")]
-    Type { file: String, topic: String, found: String, expected: &'static str },
-    #[error("{file}: topic {topic} is encoded as {found:?}, not \"cdr\"")]
+    #[error(
+        "{file}: topic {topic} holds {found:?}{}; name a topic with {expected}",
+        namesake.map_or_else(
+            || ", which armcal does not read".to_owned(),
+            |other| format!(", whose layout armcal does not know; {other} is another type")
+        )
+    )]
+    Type { file: String, topic: String, found: String, namesake: Option<&'static str>, expected: String },
+    #[error("{file}: topic {topic} is encoded as {found:?}, not \"cdr\"; {}", encoding_remedy(found))]
     Encoding { file: String, topic: String, found: String },
     #[error("{file}: {place}: cannot be decoded: {error}")]
     Undecodable { file: String, place: BadPlace, error: CdrError },
-    #[error("{file}: {place}: {names} names for {positions} positions")]
-    NameCount { file: String, place: BadPlace, names: usize, positions: usize },
+    #[error(
+        "{file}: topic {topic}: none of its {n} messages is a joint reading: {reasons}; name the topic of \
+         sensor_msgs/msg/JointState with name[] and position[]"
+    )]
+    NoPositions { file: String, topic: String, n: u64, reasons: String },
+    #[error(
+        "{file}: topic {topic}: {n} of {of} messages have joint `{joint}` twice with different positions: {first:.6} \
+         and {second:.6} in message {message}; record one source of `{joint}` only, or remove the \
+         messages of the other"
+    )]
+    JointTwice { file: String, topic: String, joint: String, first: f64, second: f64, message: u64, n: u64, of: u64 },
     #[error("{file}: {place}: {field} of `{of}` is {value}, not a finite number")]
     NotFinite { file: String, place: BadPlace, field: &'static str, of: String, value: f64 },
     #[error("{file}: topic {topic}: {disorder}")]
@@ -88,13 +103,22 @@ pub enum InputError {
     Use { file: String, topic: String, held: &'static str, allowed: &'static str },
 }
 
+/// The remedy for messages that are not CDR.
+fn encoding_remedy(found: &str) -> String {
+    match found {
+        "ros1" => format!("start from the ROS 1 bag (.bag) that it was made from: {}", crate::log::ROS1_ADVICE),
+        _ => "record the topic as ROS 2 messages".to_owned(),
+    }
+}
+
 impl Coded for InputError {
     fn code(&self) -> Code {
         match self {
             Self::Log(error) => error.code(),
             Self::NoTopic { .. } => Code::TopicMissing,
             Self::Type { .. } | Self::Encoding { .. } | Self::Use { .. } => Code::MessageType,
-            Self::Undecodable { .. } | Self::NameCount { .. } | Self::NotFinite { .. } => Code::MessageInvalid,
+            Self::Undecodable { .. } | Self::JointTwice { .. } | Self::NotFinite { .. } => Code::MessageInvalid,
+            Self::NoPositions { .. } => Code::ReadingsMissing,
             Self::Disorder { .. } => Code::StampsDisordered,
             Self::JointNames { .. } => Code::JointsMismatch,
             Self::Unit { .. } | Self::SlideUnit { .. } => Code::InputUnit,

@@ -4,16 +4,22 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use super::attitude::AttitudeReader;
+use super::clocks::{StreamTimes, compare_clocks};
 use super::conditions::ConditionReader;
 use super::error::InputError;
-use super::images::{IMAGE_TYPES, ImageDetector};
+use super::images::ImageDetector;
 use super::joint_unit::check_unit;
 use super::joints::{JointReader, n_needed};
-use super::map::{ConditionKind, FurtherTopic, InputMap, Source, TagUse, Topics};
+use super::map::{ConditionKind, FurtherTopic, InputMap, Source, StampSource, TagUse, Topics};
+use super::message_type::check_type;
 use super::recording::ExternalRecording;
 use super::table::read_table;
 use super::tags::TagReader;
-use crate::log::{RawMessage, for_each_raw};
+use crate::log::ros::{
+    AprilTagDetectionArray, CompressedImage, FluidPressure, Image, Imu, IsaacDetectionArray, JointState, Temperature,
+    TfMessage,
+};
+use crate::log::{RawMessage, RosMessage, RosSchema, for_each_raw};
 use crate::robot::Robot;
 
 /// Readings, and images with tags, of one recording: 22 hours at 100 Hz, 1 GB. Whether the arm rested between two
@@ -117,7 +123,7 @@ impl MessageReader<'_> {
             self.seen.insert(raw.topic().to_owned());
         }
         let n_kept = if raw.topic() == self.topics.joints {
-            check_type(self.file, raw, &["JointState"], "sensor_msgs/msg/JointState")?;
+            check_type(self.file, raw, &[JointState::SCHEMA])?;
             self.joints.take(raw, digest(raw))?;
             self.joints.readings.len()
         } else if self.cameras().any(|reader| reader.topic == raw.topic()) {
@@ -131,17 +137,13 @@ impl MessageReader<'_> {
             most
         } else if let Some(kind) = self.conditions.kind_of(raw.topic()) {
             match kind {
-                ConditionKind::OilTemperature => {
-                    check_type(self.file, raw, &["Temperature"], "sensor_msgs/msg/Temperature")?;
-                }
-                ConditionKind::Pressure => {
-                    check_type(self.file, raw, &["FluidPressure"], "sensor_msgs/msg/FluidPressure")?;
-                }
+                ConditionKind::OilTemperature => check_type(self.file, raw, &[Temperature::SCHEMA])?,
+                ConditionKind::Pressure => check_type(self.file, raw, &[FluidPressure::SCHEMA])?,
             }
             self.conditions.take(raw, kind, digest(raw))?;
             self.conditions.readings.len()
         } else if self.topics.conditions.attitude.as_deref() == Some(raw.topic()) {
-            check_type(self.file, raw, &["Imu"], "sensor_msgs/msg/Imu")?;
+            check_type(self.file, raw, &[Imu::SCHEMA])?;
             self.attitudes.take(raw, digest(raw))?;
             self.attitudes.readings.len()
         } else {
@@ -187,11 +189,34 @@ impl MessageReader<'_> {
         }
     }
 
+    /// Messages whose stamps were replaced, by topic.
+    fn notes(&self) -> Vec<String> {
+        let joints = self.joints.clock.note(&self.topics.joints);
+        joints.into_iter().chain(self.cameras().filter_map(|reader| reader.clock.note(reader.topic))).collect()
+    }
+
+    /// A sentence where clocks that differ keep most frames from a joint reading.
+    fn clock_doubt(&self) -> Option<String> {
+        if self.map.stamps == StampSource::LogTime {
+            return None;
+        }
+        let joints = StreamTimes {
+            topic: self.topics.joints.clone(),
+            stamps: self.joints.readings.iter().map(|reading| reading.stamp).collect(),
+            log_times: self.joints.log_times.clone(),
+        };
+        let (stamps, log_times) = self.cameras().flat_map(TagReader::times).unzip();
+        let tags = StreamTimes { topic: self.topics.tags.clone(), stamps, log_times };
+        compare_clocks(self.map.max_gap_s, joints, tags).map(|doubt| doubt.text)
+    }
+
     fn finish(self, robot: &Robot) -> ExternalRecording {
         let absent_joints =
             (n_needed(robot)..robot.n_joints()).filter(|joint| !self.joints.present.contains(joint)).collect();
         let extra_joints = self.joints.extra();
-        let (mut readings, mut left_out) = (self.joints.readings, self.joints.left_out);
+        let (notes, clock_doubt) = (self.notes(), self.clock_doubt());
+        let (skipped, left_out) = (self.joints.skipped(), self.joints.left_out());
+        let (mut readings, mut left_out) = (self.joints.readings, left_out);
         readings.sort_by_key(|reading| reading.stamp);
         let (frames, of_tags) = self.tags.finish();
         left_out.extend(of_tags);
@@ -218,7 +243,10 @@ impl MessageReader<'_> {
             attitudes,
             absent_joints,
             extra_joints,
+            skipped,
             left_out,
+            notes,
+            clock_doubt,
             ..ExternalRecording::default()
         }
     }
@@ -234,24 +262,15 @@ fn digest(raw: &RawMessage<'_>) -> [u8; 32] {
     *hasher.finalize().as_bytes()
 }
 
-/// ROS writes package/msg/Type; some converters leave out the middle.
-fn check_type(file: &str, raw: &RawMessage<'_>, types: &[&str], expected: &'static str) -> Result<(), InputError> {
-    let (file, topic) = (|| file.to_owned(), || raw.topic().to_owned());
-    if raw.channel.message_encoding != "cdr" {
-        let found = raw.channel.message_encoding.clone();
-        return Err(InputError::Encoding { file: file(), topic: topic(), found });
-    }
-    match raw.schema_name().rsplit('/').next() {
-        Some(name) if types.contains(&name) => Ok(()),
-        _ => Err(InputError::Type { file: file(), topic: topic(), found: raw.schema_name().to_owned(), expected }),
-    }
-}
-
 fn check_tags(file: &str, raw: &RawMessage<'_>, map: &InputMap) -> Result<(), InputError> {
-    const EXPECTED: &str = "tf2_msgs/msg/TFMessage, apriltag_msgs/msg/AprilTagDetectionArray, sensor_msgs/msg/Image \
-        or sensor_msgs/msg/CompressedImage";
-    let [image, compressed] = IMAGE_TYPES;
-    check_type(file, raw, &["TFMessage", "AprilTagDetectionArray", image, compressed], EXPECTED)?;
+    const TYPES: [RosSchema; 5] = [
+        TfMessage::SCHEMA,
+        AprilTagDetectionArray::SCHEMA,
+        IsaacDetectionArray::SCHEMA,
+        Image::SCHEMA,
+        CompressedImage::SCHEMA,
+    ];
+    check_type(file, raw, &TYPES)?;
     let is_transform = raw.schema_name().ends_with("/TFMessage");
     let is_image = raw.schema_name().ends_with("Image");
     let (held, allowed) = match map.tag_use {

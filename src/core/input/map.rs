@@ -5,6 +5,7 @@
 //! max_gap_s = 0.5                    # optional: a tag message farther from any reading is left out
 //! while_moving = "leave_out"         # optional: or "use": what the camera saw while the arm was on its way
 //! not_finite = "refuse"              # optional: or "leave_out": NaN and infinities
+//! stamps = "header"                  # optional: or "log_time": the recorder's times, where the senders' clocks differ
 //! [joint_sensors]
 //! topic = "/joint_states"            # sensor_msgs/msg/JointState, position[] = the raw sensor reading
 //! names = { elbow = "joint_3" }      # optional: the robot's joint = the recorded name, where they differ
@@ -13,6 +14,7 @@
 //! [tags]
 //! topic = "/tf"                      # tf2_msgs/msg/TFMessage, apriltag_msgs/msg/AprilTagDetectionArray, or
 //!                                    # sensor_msgs/msg/Image or CompressedImage (with use = "corners")
+//! clock_offset_s = 0.0               # optional: added to the stamps of this topic: joints' clock less the camera's
 //! camera_frame = "fisheye"
 //! child_frame = "tag36h11:{id}"      # or a plain name, for one landmark
 //! use = "position"                   # "position" | "pose" | "corners" | "board_corners"
@@ -106,6 +108,17 @@ pub enum NotFinite {
     LeaveOut,
 }
 
+/// Which time of a message counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StampSource {
+    /// The stamp in its header, by the sender's clock; the log time where that is zero.
+    #[default]
+    Header,
+    /// The log time, by the recorder's clock.
+    LogTime,
+}
+
 /// How the frames of tags are called.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ChildFrame {
@@ -187,6 +200,8 @@ pub struct Topics {
     pub camera_frame: Option<String>,
     /// The camera's lens, `sensor_msgs/msg/CameraInfo`, for a robot that has none.
     pub camera_info: Option<String>,
+    /// Seconds added to the header stamps of the tags, of further cameras too.
+    pub clock_offset_s: f64,
     /// Least time between two images that are looked at.
     pub image_period_s: f64,
     /// What further cameras saw.
@@ -257,6 +272,8 @@ pub struct InputMap {
     pub while_moving: WhileMoving,
     /// What becomes of NaN and infinities.
     pub not_finite: NotFinite,
+    /// Which time of a message counts.
+    pub stamps: StampSource,
 }
 
 impl InputMap {
@@ -301,6 +318,9 @@ impl InputMap {
     }
 }
 
+/// Offsets of clocks that fit ROS times, the years 1901 to 2038, s.
+const CLOCK_OFFSETS_S: std::ops::RangeInclusive<f64> = -4.3e9..=4.3e9;
+
 /// Old ROS names begin with a slash; both mean one frame.
 pub(super) fn without_slash(frame: &str) -> &str {
     frame.strip_prefix('/').unwrap_or(frame)
@@ -316,6 +336,8 @@ struct MapToml {
     while_moving: WhileMoving,
     #[serde(default)]
     not_finite: NotFinite,
+    #[serde(default)]
+    stamps: StampSource,
     #[serde(default)]
     table: Option<TableToml>,
     joint_sensors: JointsToml,
@@ -359,6 +381,8 @@ struct TagsToml {
     #[serde(default)]
     image_period_s: f64,
     camera_info: Option<String>,
+    #[serde(default)]
+    clock_offset_s: f64,
     position_std_m: Option<f64>,
     rotation_std_rad: Option<f64>,
 }
@@ -386,9 +410,11 @@ impl TagsToml {
     }
 }
 
-/// Assumed: half of what one pose a second leaves.
+/// Default of `max_gap_s`, s. Assumed: half of what one pose a second leaves.
+pub const DEFAULT_MAX_GAP_S: f64 = 0.5;
+
 fn usual_gap_s() -> f64 {
-    0.5
+    DEFAULT_MAX_GAP_S
 }
 
 /// Reads an input map.
@@ -443,6 +469,7 @@ pub fn parse_input_map(file: &Path, text: &str) -> Result<InputMap, RobotError> 
         max_gap_s: FileIssue::check_range(file, "max_gap_s", raw.max_gap_s, 1e-6..=60.0)?,
         while_moving: raw.while_moving,
         not_finite: raw.not_finite,
+        stamps: raw.stamps,
     })
 }
 
@@ -523,6 +550,7 @@ fn topics(file: &Path, joints: &JointsToml, tags: &TagsToml, conditions: Conditi
         tags: topic("tags.topic", &tags.topic)?,
         camera_frame,
         camera_info: tags.camera_info.clone(),
+        clock_offset_s: FileIssue::check_range(file, "tags.clock_offset_s", tags.clock_offset_s, CLOCK_OFFSETS_S)?,
         image_period_s: FileIssue::check_range(file, "tags.image_period_s", tags.image_period_s, 0.0..=3600.0)?,
         base_from_attitude: base_from_attitude(file, &conditions)?,
         further: Vec::new(),

@@ -6,6 +6,7 @@
 //! paired or averaged. `task` reads `--task` files, the targets that the arm is calibrated for.
 
 mod attitude;
+mod clocks;
 mod conditions;
 mod error;
 mod external;
@@ -13,6 +14,7 @@ mod images;
 mod joint_unit;
 mod joints;
 mod map;
+mod message_type;
 mod recording;
 mod stamp;
 mod table;
@@ -20,16 +22,20 @@ mod tags;
 mod task;
 
 pub use attitude::AttitudeReading;
+pub use clocks::{ClockDoubt, ClockRemedy, StreamTimes, compare_clocks, header_stamp};
 pub use conditions::ConditionReading;
 pub use error::{BadPlace, InputError};
 pub use external::{read_external, read_external_images};
-pub use images::{ImageDetector, ImageProblem, RecordedImage, TagCorners, read_camera_info};
+pub use images::{
+    CameraInfoLens, ImageDetector, ImageProblem, RecordedImage, TagCorners, lens_of_camera_info, read_camera_info,
+};
 pub use joints::Reading;
 pub use map::{
-    ChildFrame, ConditionKind, ConditionTopics, Direction, FurtherTopic, InputMap, JointUnit, NotFinite, PoseColumns,
-    RotationColumns, RotationForm, SeenColumns, SlideUnit, Source, TableFormat, TableLayout, TagNoise, TagUse,
-    TimeColumn, Topics, WhileMoving, parse_input_map, read_input_map,
+    ChildFrame, ConditionKind, ConditionTopics, DEFAULT_MAX_GAP_S, Direction, FurtherTopic, InputMap, JointUnit,
+    NotFinite, PoseColumns, RotationColumns, RotationForm, SeenColumns, SlideUnit, Source, StampSource, TableFormat,
+    TableLayout, TagNoise, TagUse, TimeColumn, Topics, WhileMoving, parse_input_map, read_input_map,
 };
 pub use recording::ExternalRecording;
+pub use table::{TableColumn, TableContents, read_table_contents};
 pub use tags::{ExternalDetection, RawMeasurement, TagFrame};
 pub use task::{TaskFile, parse_task, read_task};

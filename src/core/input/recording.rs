@@ -30,6 +30,12 @@ pub struct ExternalRecording {
     pub extra_joints: Vec<String>,
     /// What speaks for another unit of the joints' numbers than the input map says.
     pub unit_doubt: Option<String>,
+    /// A sentence where clocks that differ keep most frames from a joint reading.
+    pub clock_doubt: Option<String>,
+    /// Sentences on what was read in another way than the messages say.
+    pub notes: Vec<String>,
+    /// Number of messages that hold no data of use, by reason.
+    pub skipped: BTreeMap<String, u64>,
     /// Number of unused messages by reason.
     pub left_out: BTreeMap<String, u64>,
     /// Whether the file could be read to its end.

@@ -1,9 +1,51 @@
 //! Time stamps of external messages.
 
+use super::map::StampSource;
 use crate::log::ros::Time;
 use crate::time::Stamp;
 
-/// The header's stamp, or the log time where that is zero or invalid.
-pub(super) fn stamp_or_log_time(stamp: Time, log_time: Stamp) -> Stamp {
-    Stamp::try_from(stamp).ok().filter(|stamp| stamp.nanos != 0).unwrap_or(log_time)
+/// The stamps of one topic: which time of a message counts, and how many messages lacked a stamp.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct TopicClock {
+    source: StampSource,
+    /// Added to every header's stamp, s.
+    offset_s: f64,
+    /// Messages without a valid stamp, whose log time was used.
+    pub unstamped: u64,
+    pub stamped: u64,
+}
+
+impl TopicClock {
+    pub fn new(source: StampSource) -> Self {
+        Self { source, ..Self::default() }
+    }
+
+    /// Returns this clock with `offset_s` added to its header stamps.
+    pub fn with_offset(self, offset_s: f64) -> Self {
+        Self { offset_s, ..self }
+    }
+
+    /// The time that counts: the header's stamp, or the log time where that is zero or invalid, or is asked for.
+    pub fn read(&mut self, stamp: Time, log_time: Stamp) -> Stamp {
+        if self.source == StampSource::LogTime {
+            return log_time;
+        }
+        match Stamp::try_from(stamp).ok().filter(|stamp| stamp.nanos != 0) {
+            Some(stamp) => {
+                self.stamped += 1;
+                if self.offset_s == 0.0 { stamp } else { stamp.plus_s(self.offset_s) }
+            }
+            None => {
+                self.unstamped += 1;
+                log_time
+            }
+        }
+    }
+
+    /// A sentence about messages without a stamp on `topic`; `None` where all had one.
+    pub fn note(&self, topic: &str) -> Option<String> {
+        let (n, of) = (self.unstamped, self.unstamped + self.stamped);
+        (n > 0)
+            .then(|| format!("{n} of {of} stamps on {topic} are zero or invalid; the messages' log times replace them"))
+    }
 }

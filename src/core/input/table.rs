@@ -16,12 +16,14 @@ use crate::robot::Robot;
 use crate::time::Stamp;
 
 mod columns;
+mod contents;
 mod csv_text;
 mod pose;
 mod rows;
 mod yaml;
 
 use columns::Columns;
+pub use contents::{TableColumn, TableContents, read_table_contents};
 use csv_text::csv_rows;
 use pose::camera_from_tag;
 use rows::{Row, Rows};
@@ -72,9 +74,7 @@ fn read_rows(path: &Path, layout: &TableLayout, wanted: &[String]) -> Result<Row
                 .to_owned(),
         })?,
     };
-    // YAML takes many times its bytes in memory.
-    let kind = if format == TableFormat::Csv { FileKind::Table } else { FileKind::Text };
-    let text = read_text(path, kind).map_err(|source| InputError::Unreadable { file: file.clone(), source })?;
+    let text = read_table_text(path, format)?;
     let found = match format {
         TableFormat::Csv => csv_rows(&file, &text, wanted)?,
         TableFormat::Yaml => yaml_rows(&file, &text, layout, wanted)?,
@@ -83,6 +83,12 @@ fn read_rows(path: &Path, layout: &TableLayout, wanted: &[String]) -> Result<Row
         return Err(InputError::Table { file, problem: "it has no rows".to_owned() });
     }
     Ok(found)
+}
+
+fn read_table_text(path: &Path, format: TableFormat) -> Result<String, InputError> {
+    // YAML takes many times its bytes in memory.
+    let kind = if format == TableFormat::Csv { FileKind::Table } else { FileKind::Text };
+    read_text(path, kind).map_err(|source| InputError::Unreadable { file: path.display().to_string(), source })
 }
 
 fn format_by_name(path: &Path) -> Option<TableFormat> {

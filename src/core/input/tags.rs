@@ -1,5 +1,5 @@
-//! Detections from transforms (`tf2_msgs/msg/TFMessage`), corners (`apriltag_msgs/msg/AprilTagDetectionArray`) or
-//! images.
+//! Detections from transforms (`tf2_msgs/msg/TFMessage`), corners (`AprilTagDetectionArray` of `apriltag_msgs` or
+//! `isaac_ros_apriltag_interfaces`) or images.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,9 +8,9 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use super::error::{BadPlace, InputError};
 use super::images::{ImageDetector, ImageProblem, RecordedImage};
 use super::map::{FurtherTopic, InputMap, NotFinite, QUATERNION_LENGTH_TOLERANCE, TagUse, Topics, without_slash};
-use super::stamp::stamp_or_log_time;
-use crate::log::ros::{AprilTagDetectionArray, TfMessage, TransformStamped};
-use crate::log::{RawMessage, StampOrder, decode};
+use super::stamp::TopicClock;
+use crate::log::ros::{AprilTagDetectionArray, TfMessage, Time, TransformStamped, decode_detections};
+use crate::log::{CdrError, RawMessage, StampOrder, decode};
 use crate::optics::TagFamily;
 use crate::time::Stamp;
 
@@ -82,6 +82,9 @@ pub(super) struct TagReader<'a> {
     family: TagFamily,
     last_image: Option<Stamp>,
     frames: BTreeMap<Stamp, TagFrame>,
+    pub clock: TopicClock,
+    /// Log time of each frame's first message, by the frame's stamp.
+    log_times: BTreeMap<Stamp, Stamp>,
     pub order: StampOrder,
     pub left_out: BTreeMap<String, u64>,
     /// `parent -> child` of transforms, or frames of detections, that the map does not name.
@@ -102,6 +105,8 @@ impl<'a> TagReader<'a> {
             family: TagFamily::default(),
             last_image: None,
             frames: BTreeMap::new(),
+            clock: TopicClock::new(map.stamps).with_offset(topics.clock_offset_s),
+            log_times: BTreeMap::new(),
             order: StampOrder::default(),
             left_out: BTreeMap::new(),
             others: BTreeSet::new(),
@@ -132,7 +137,8 @@ impl<'a> TagReader<'a> {
             let image = RecordedImage::of(raw).map_err(undecodable)?;
             self.image(&image, raw.log_time(), (&place, digest), detector)?;
         } else {
-            let message: AprilTagDetectionArray = decode(raw.data).map_err(undecodable)?;
+            let message = decode_detections(raw.schema_name(), raw.data).unwrap_or(Err(CdrError::Type));
+            let message = message.map_err(undecodable)?;
             self.detections(&message, raw.log_time(), &place, digest)?;
         }
         Ok(())
@@ -156,7 +162,7 @@ impl<'a> TagReader<'a> {
                 return Ok(());
             }
         };
-        let stamp = stamp_or_log_time(transform.header.stamp, log_time);
+        let stamp = self.stamp(transform.header.stamp, log_time);
         self.order.add_of(self.messages, stamp);
         let position: [f64; 3] = transform.transform.translation.into();
         let [w, x, y, z] = transform.transform.rotation.wxyz();
@@ -201,7 +207,7 @@ impl<'a> TagReader<'a> {
             self.others.insert(frame.to_owned());
             return Ok(());
         }
-        let stamp = stamp_or_log_time(message.header.stamp, log_time);
+        let stamp = self.stamp(message.header.stamp, log_time);
         self.order.add_of(self.messages, stamp);
         for tag in &message.detections {
             let Ok(id) = u32::try_from(tag.id) else {
@@ -243,7 +249,7 @@ impl<'a> TagReader<'a> {
             self.others.insert(frame.to_owned());
             return Ok(());
         }
-        let stamp = stamp_or_log_time(header.stamp, log_time);
+        let stamp = self.stamp(header.stamp, log_time);
         self.order.add_of(self.messages, stamp);
         if self.last_image.is_some_and(|last| stamp.since_s(last).abs() < self.image_period_s) {
             return Ok(());
@@ -263,6 +269,17 @@ impl<'a> TagReader<'a> {
             Err(ImageProblem::Unusable(why)) => return problem(why),
         }
         Ok(())
+    }
+
+    fn stamp(&mut self, stamp: Time, log_time: Stamp) -> Stamp {
+        let stamp = self.clock.read(stamp, log_time);
+        self.log_times.entry(stamp).or_insert(log_time);
+        stamp
+    }
+
+    /// Stamps and log times of its frames.
+    pub fn times(&self) -> impl Iterator<Item = (Stamp, Stamp)> {
+        self.frames.keys().filter_map(|stamp| Some((*stamp, *self.log_times.get(stamp)?)))
     }
 
     fn not_finite(&mut self, place: &BadPlace, field: &'static str, of: &str, value: f64) -> Result<(), InputError> {

@@ -12,6 +12,14 @@ pub struct RosSchema {
     pub text: &'static str,
 }
 
+/// Returns true if `name` is the type `full` (`package/msg/Type`); some converters leave out the middle.
+#[must_use]
+pub fn is_type(name: &str, full: &str) -> bool {
+    let is_short =
+        || full.split_once("/msg/").is_some_and(|(package, last)| name.split_once('/') == Some((package, last)));
+    name == full || is_short()
+}
+
 /// A message whose bytes are CDR and whose definition is known.
 pub trait RosMessage: Serialize + DeserializeOwned {
     /// Name and definition of the ROS type.
@@ -72,14 +80,17 @@ macro_rules! message {
 #[cfg(test)]
 mod tests {
     use super::super::message_codec::Stream;
-    use super::super::messages::{CameraInfo, ImageAnnotations, PoseStamped, SceneUpdate, StringMessage, TfMessage};
+    use super::super::messages::{
+        CameraInfo, ImageAnnotations, IsaacDetectionArray, PoseStamped, SceneUpdate, StringMessage, TfMessage,
+    };
     use super::*;
 
     #[test]
     fn every_type_that_a_definition_names_is_defined_in_it() {
         let foxglove = [SceneUpdate::SCHEMA, ImageAnnotations::SCHEMA];
         let viewers = [StringMessage::SCHEMA, CameraInfo::SCHEMA, TfMessage::SCHEMA, PoseStamped::SCHEMA];
-        for schema in Stream::ALL.map(|stream| *stream.schema()).into_iter().chain(viewers).chain(foxglove) {
+        let others = [IsaacDetectionArray::SCHEMA].into_iter().chain(viewers).chain(foxglove);
+        for schema in Stream::ALL.map(|stream| *stream.schema()).into_iter().chain(others) {
             for line in schema.text.lines().filter(|line| !line.starts_with("MSG: ") && !line.starts_with('=')) {
                 let field_type = line.split_whitespace().next().unwrap().split('[').next().unwrap();
                 if field_type.contains('/') {
@@ -87,6 +98,15 @@ mod tests {
                     assert!(schema.text.contains(&definition), "{}: {field_type}", schema.name);
                 }
             }
+        }
+    }
+
+    #[test]
+    fn types_of_other_packages_are_others() {
+        let full = "apriltag_msgs/msg/AprilTagDetectionArray";
+        assert!(is_type(full, full) && is_type("apriltag_msgs/AprilTagDetectionArray", full));
+        for other in ["apriltag_ros/msg/AprilTagDetectionArray", "AprilTagDetectionArray", "apriltag_msgs/msg", ""] {
+            assert!(!is_type(other, full), "{other}");
         }
     }
 }

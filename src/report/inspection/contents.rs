@@ -9,7 +9,7 @@ use crate::report::inspection::arm::is_capture;
 use crate::report::inspection::observable_parameters::observable_parameters;
 use crate::report::inspection::{ArmContents, ObservableParameters, TopicContents, arm, topics};
 use armcal_core::log::topics as log_topics;
-use armcal_core::log::{Completeness, FileContents, LogError, RawSummary, TopicMap, scan_recording};
+use armcal_core::log::{Completeness, FileContents, LogError, ROS1_ADVICE, RawSummary, TopicMap, scan_recording};
 use armcal_core::robot::Robot;
 use armcal_core::streams::Message;
 
@@ -205,7 +205,9 @@ fn hints(inspection: &Inspection) -> Vec<String> {
         State::Damaged => hint("damaged: all commands use the readable chunks"),
     }
     if inspection.topics.iter().any(|topic| topic.encoding == "ros1") {
-        hint("armcal does not decode ROS 1 messages: convert the recording to ROS 2 (for example `rosbags-convert`)");
+        hint(&format!(
+            "armcal reads no ROS 1 messages; start from the ROS 1 bag (.bag) that it was made from: {ROS1_ADVICE}"
+        ));
     }
     if arm.joint_readings == 0 {
         hint("no joint readings on /joint_sensors, the topic of raw counts for `armcal calibrate`");

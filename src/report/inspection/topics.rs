@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 
-use armcal_core::log::ros::{AprilTagDetectionArray, JointState, TfMessage};
+use armcal_core::log::ros::{JointState, TfMessage, decode_detections};
 use armcal_core::log::{RawMessage, decode};
 use armcal_core::log::{Stream, topics};
 
@@ -35,6 +35,15 @@ pub struct TopicContents {
 const MAX_SAMPLES: u64 = 200;
 /// Names that are told of one topic.
 const MAX_NAMES: usize = 12;
+
+/// Types that an input map may name, in addition to those of detections.
+const READ: [&str; 5] = [
+    "sensor_msgs/JointState",
+    "tf2_msgs/TFMessage",
+    "sensor_msgs/CameraInfo",
+    "sensor_msgs/Image",
+    "sensor_msgs/CompressedImage",
+];
 
 #[derive(Default)]
 struct Seen {
@@ -110,11 +119,6 @@ impl Seen {
                     }
                 }
             }
-            "apriltag_msgs/AprilTagDetectionArray" => {
-                if let Ok(message) = decode::<AprilTagDetectionArray>(data) {
-                    self.names.extend(message.detections.iter().map(|tag| tag.id.to_string()));
-                }
-            }
             "tf2_msgs/TFMessage" => {
                 if let Ok(message) = decode::<TfMessage>(data) {
                     let name = |t: &armcal_core::log::ros::TransformStamped| {
@@ -123,7 +127,11 @@ impl Seen {
                     self.names.extend(message.transforms.iter().map(name));
                 }
             }
-            _ => {}
+            _ => {
+                if let Some(Ok(message)) = decode_detections(schema, data) {
+                    self.names.extend(message.detections.iter().map(|tag| tag.id.to_string()));
+                }
+            }
         }
     }
 
@@ -146,7 +154,7 @@ impl Seen {
     fn may_be(&self, schema: &str) -> Option<String> {
         // Foxglove's types have dots.
         let (_, name) = schema.rsplit_once(['/', '.']).unwrap_or(("", schema));
-        Some(match name {
+        let may_be = match name {
             "JointState" | "JointStates" => self.joint_sensors(),
             "DynamicJointState" => "joint sensors".to_owned(),
             "AprilTagDetectionArray" | "AprilTagDetections" | "ArucoMarkers" | "FiducialArray" => {
@@ -160,7 +168,9 @@ impl Seen {
                 "images; `calibrate --input` searches png, jpeg and 8-bit images for tags".to_owned()
             }
             _ => return None,
-        })
+        };
+        let is_read = READ.contains(&schema) || decode_detections(schema, &[]).is_some();
+        Some(if is_read { may_be } else { format!("{may_be}; armcal does not read the type {schema}") })
     }
 
     fn joint_sensors(&self) -> String {

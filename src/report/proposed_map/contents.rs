@@ -2,16 +2,23 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use armcal_core::log::ros::{AprilTagDetection, AprilTagDetectionArray, JointState, TfMessage};
-use armcal_core::log::{RawMessage, decode};
+use armcal_core::input::{StreamTimes, header_stamp, lens_of_camera_info};
+use armcal_core::log::ros::{
+    AprilTagDetection, CameraInfo, CompressedImage, FluidPressure, Image, Imu, JointState, Temperature, TfMessage,
+    decode_detections,
+};
+use armcal_core::log::{RawMessage, RosMessage, decode, is_type};
+use armcal_core::time::Stamp;
 
 /// Messages of a topic that are decoded.
 const MAX_SAMPLES: u64 = 1000;
+/// Times of one topic that are kept: 16 bytes each.
+const MAX_TIMES: usize = 2_000_000;
 /// Topics, and names or frames of one topic, that are kept.
 const MAX_NAMES: usize = 2000;
 
 /// What a topic may be for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Kind {
     Joints,
     Transforms,
@@ -21,29 +28,36 @@ pub(super) enum Kind {
     Temperature,
     Pressure,
     Attitude,
+    #[default]
     Other,
 }
 
 impl Kind {
     fn of(schema: &str) -> Self {
-        match schema.rsplit('/').next().unwrap_or_default() {
-            "JointState" => Self::Joints,
-            "TFMessage" => Self::Transforms,
-            "AprilTagDetectionArray" => Self::Detections,
-            "Image" | "CompressedImage" => Self::Images,
-            "CameraInfo" => Self::CameraInfo,
-            "Temperature" => Self::Temperature,
-            "FluidPressure" => Self::Pressure,
-            "Imu" => Self::Attitude,
-            _ => Self::Other,
+        let kinds = [
+            (JointState::SCHEMA, Self::Joints),
+            (TfMessage::SCHEMA, Self::Transforms),
+            (Image::SCHEMA, Self::Images),
+            (CompressedImage::SCHEMA, Self::Images),
+            (CameraInfo::SCHEMA, Self::CameraInfo),
+            (Temperature::SCHEMA, Self::Temperature),
+            (FluidPressure::SCHEMA, Self::Pressure),
+            (Imu::SCHEMA, Self::Attitude),
+        ];
+        match kinds.into_iter().find(|(known, _)| is_type(schema, known.name)) {
+            Some((_, kind)) => kind,
+            None if decode_detections(schema, &[]).is_some() => Self::Detections,
+            None => Self::Other,
         }
     }
 }
 
 /// One topic.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Topic {
     pub kind: Kind,
+    /// Name of the messages' type.
+    pub schema: String,
     pub messages: u64,
     /// Names of joints.
     pub joints: BTreeSet<String>,
@@ -55,6 +69,14 @@ pub(super) struct Topic {
     pub ids: BTreeSet<i32>,
     /// Detections that have an outline, as tags do.
     pub outlines: u64,
+    /// Frame of the first message with one.
+    pub frame: String,
+    /// Image size of the first usable lens, px; else why the first lens is of no use.
+    pub lens: Option<Result<[u32; 2], String>>,
+    /// The highest column and row of a corner, px.
+    pub extent_px: [f64; 2],
+    stamps: Vec<Stamp>,
+    log_times: Vec<Stamp>,
 }
 
 /// The topics of a recording, by name.
@@ -71,12 +93,12 @@ impl Contents {
             }
             let is_cdr = raw.channel.message_encoding == "cdr";
             let kind = if is_cdr { Kind::of(raw.schema_name()) } else { Kind::Other };
-            let (joints, frames, ids) = Default::default();
-            let topic = Topic { kind, messages: 0, joints, largest: 0.0, frames, ids, outlines: 0 };
+            let topic = Topic { kind, schema: raw.schema_name().to_owned(), ..Topic::default() };
             self.topics.insert(raw.topic().to_owned(), topic);
         }
         let Some(topic) = self.topics.get_mut(raw.topic()) else { return };
         topic.messages += 1;
+        topic.note_time(raw);
         if topic.messages <= MAX_SAMPLES {
             topic.look_into(raw.data);
         }
@@ -98,10 +120,39 @@ impl Topic {
         !self.ids.is_empty() && self.outlines == 0
     }
 
+    /// Times of all messages so far, to compare clocks.
+    pub fn times(&self, name: &str) -> StreamTimes {
+        StreamTimes { topic: name.to_owned(), stamps: self.stamps.clone(), log_times: self.log_times.clone() }
+    }
+
+    fn note_time(&mut self, raw: &RawMessage<'_>) {
+        // A message of transforms begins with their number.
+        let skip = match self.kind {
+            Kind::Joints | Kind::Detections | Kind::Images => 0,
+            Kind::Transforms => 4,
+            _ => return,
+        };
+        if self.stamps.len() < MAX_TIMES
+            && let Some(time) = header_stamp(raw.data, skip)
+        {
+            let stamp = Stamp::try_from(time).ok().filter(|stamp| stamp.nanos != 0);
+            self.stamps.push(stamp.unwrap_or(raw.log_time()));
+            self.log_times.push(raw.log_time());
+        }
+    }
+
+    fn note_frame(&mut self, frame: String) {
+        if self.frame.is_empty() {
+            self.frame = frame;
+        }
+    }
+
     fn look_into(&mut self, data: &[u8]) {
         match self.kind {
             Kind::Joints => {
-                if let Ok(message) = decode::<JointState>(data) {
+                if let Ok(message) = decode::<JointState>(data)
+                    && message.position.len() == message.name.len()
+                {
                     let room = MAX_NAMES.saturating_sub(self.joints.len());
                     self.joints.extend(message.name.into_iter().take(room));
                     let finite = message.position.into_iter().filter(|value| value.is_finite());
@@ -116,14 +167,39 @@ impl Topic {
                     self.frames.extend(pairs.map(|t| (plain(&t.header.frame_id), plain(&t.child_frame_id))));
                 }
             }
-            Kind::Detections => {
-                if let Ok(message) = decode::<AprilTagDetectionArray>(data) {
-                    let room = MAX_NAMES.saturating_sub(self.ids.len());
-                    self.ids.extend(message.detections.iter().take(room).map(|tag| tag.id));
-                    self.outlines += message.detections.iter().filter(|tag| has_outline(tag)).count() as u64;
+            Kind::Detections => self.look_into_detections(data),
+            Kind::Images => {
+                let frame = |data: &[u8]| match is_type(&self.schema, Image::SCHEMA.name) {
+                    true => decode::<Image>(data).map(|image| image.header.frame_id),
+                    false => decode::<CompressedImage>(data).map(|image| image.header.frame_id),
+                };
+                if self.frame.is_empty()
+                    && let Ok(frame) = frame(data)
+                {
+                    self.note_frame(frame);
+                }
+            }
+            Kind::CameraInfo => {
+                if let Ok(info) = decode::<CameraInfo>(data) {
+                    let lens = lens_of_camera_info(&info).map(|lens| lens.resolution_px());
+                    if !matches!(self.lens, Some(Ok(_))) && (lens.is_ok() || self.lens.is_none()) {
+                        self.lens = Some(lens);
+                    }
+                    self.note_frame(info.header.frame_id);
                 }
             }
             _ => {}
         }
+    }
+
+    fn look_into_detections(&mut self, data: &[u8]) {
+        let Some(Ok(message)) = decode_detections(&self.schema, data) else { return };
+        let room = MAX_NAMES.saturating_sub(self.ids.len());
+        self.ids.extend(message.detections.iter().take(room).map(|tag| tag.id));
+        self.outlines += message.detections.iter().filter(|tag| has_outline(tag)).count() as u64;
+        for corner in message.detections.iter().flat_map(|tag| &tag.corners) {
+            self.extent_px = [self.extent_px[0].max(corner.x), self.extent_px[1].max(corner.y)];
+        }
+        self.note_frame(message.header.frame_id);
     }
 }

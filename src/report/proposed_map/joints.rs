@@ -13,8 +13,9 @@ const MAX_RAD: f64 = 4.0 * std::f64::consts::PI;
 /// A robot folder whose readings are radians has one count per radian.
 const RADIANS_WITHIN: f64 = 1e-6;
 
-/// `[joint_sensors]`; the error is that there is no topic (`None`), or what is wrong with them all.
-pub(super) fn choose_joints(contents: &Contents, robot: Option<&Robot>) -> Result<String, Option<String>> {
+/// The topic and the text of `[joint_sensors]`; the error is that there is no topic (`None`), or what is wrong with
+/// them all.
+pub(super) fn choose_joints(contents: &Contents, robot: Option<&Robot>) -> Result<(String, String), Option<String>> {
     let wanted = robot.map(Robot::joint_names).unwrap_or_default();
     let n_needed = robot.map_or(0, |robot| robot.camera.mount.n_joints);
     let n_matched = |topic: &Topic| wanted.iter().filter(|joint| likely_name(joint, &topic.joints).is_some()).count();
@@ -45,7 +46,7 @@ pub(super) fn choose_joints(contents: &Contents, robot: Option<&Robot>) -> Resul
     text += &unit(topic, robot);
     text +=
         &others("other joint readings", contents.of_kind(Kind::Joints).map(|(other, _)| other).filter(|o| *o != name));
-    Ok(text)
+    Ok((name.clone(), text))
 }
 
 fn unit(topic: &Topic, robot: Option<&Robot>) -> String {

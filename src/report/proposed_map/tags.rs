@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::contents::{Contents, Kind};
-use super::{comment, line, others, quoted};
+use super::contents::{Contents, Kind, Topic};
+use super::{comment, others, quoted};
 
 /// Words in the names of cameras' frames, and of tags' and boards'.
 const CAMERA_WORDS: [&str; 3] = ["cam", "optical", "fisheye"];
@@ -18,36 +18,61 @@ struct Candidate {
     child: String,
 }
 
-/// `[tags]`; `None` where the recording has none.
-pub(super) fn choose_tags(contents: &Contents) -> Option<String> {
+/// The topic and the text of `[tags]`; `None` where the recording has none.
+pub(super) fn choose_tags(contents: &Contents) -> Option<(String, String)> {
     let chosen = of_detections(contents).or_else(|| of_transforms(contents)).or_else(|| of_images(contents));
-    let mut text = format!("\n[tags]\n{}", chosen?);
+    let (topic, chosen) = chosen?;
+    let mut text = format!("\n[tags]\n{chosen}");
     let topics = |kind| contents.of_kind(kind).map(|(topic, _)| topic);
     text += &others("all topics with detections", topics(Kind::Detections));
     text += &others("all topics with transforms", topics(Kind::Transforms));
     text += &others("all topics with images (use = \"corners\")", topics(Kind::Images));
-    Some(text)
+    Some((topic, text))
 }
 
-fn of_detections(contents: &Contents) -> Option<String> {
+fn of_detections(contents: &Contents) -> Option<(String, String)> {
     let (name, topic) = contents.of_kind(Kind::Detections).max_by_key(|(_, topic)| topic.messages)?;
     let ids: Vec<String> = topic.ids.iter().map(i32::to_string).collect();
-    if topic.has_board_corners() {
-        return Some(format!(
+    let lens = camera_info(contents, (name, topic));
+    let text = if topic.has_board_corners() {
+        format!(
             "topic = {}   # {} messages; detections without an outline: the corners of a board\nuse = \
              \"board_corners\"\nchild_frame = \"board\"   # as the tag map calls it, with its squares and \
-             square_m\n{}",
+             square_m\n{lens}{}",
             quoted(name),
             topic.messages,
             others("numbers of the corners there", ids.iter())
-        ));
-    }
-    let ids = others("ids of the tags there", ids.iter());
-    Some(format!("topic = {}   # {} messages with corners\nuse = \"corners\"\n{ids}", quoted(name), topic.messages))
+        )
+    } else {
+        let ids = others("ids of the tags there", ids.iter());
+        format!("topic = {}   # {} messages with corners\nuse = \"corners\"\n{lens}{ids}", quoted(name), topic.messages)
+    };
+    Some((name.clone(), text))
+}
+
+/// The line with the lens of a camera whose detections or images are on that topic: of the camera_info with the same
+/// frame, with all corners in its image and with the most similar name. A comment where none is usable.
+fn camera_info(contents: &Contents, (name, topic): (&str, &Topic)) -> String {
+    let shared = |other: &str| other.chars().zip(name.chars()).take_while(|(a, b)| a == b).count();
+    let rank = |(of, info): &(&String, &Topic)| {
+        let size = info.lens.as_ref().and_then(|lens| lens.as_ref().ok());
+        let holds_all = size.is_some_and(|size| (0..2).all(|k| topic.extent_px[k] <= f64::from(size[k])));
+        (size.is_some(), !topic.frame.is_empty() && info.frame == topic.frame, holds_all, shared(of))
+    };
+    let Some((chosen, info)) = contents.of_kind(Kind::CameraInfo).max_by_key(rank) else { return String::new() };
+    let rest = contents.of_kind(Kind::CameraInfo).map(|(of, _)| of).filter(|of| *of != chosen);
+    let line = match &info.lens {
+        Some(Ok([width, height])) => {
+            format!("camera_info = {}   # {width} x {height} px; used where robot.toml has no lens\n", quoted(chosen))
+        }
+        Some(Err(problem)) => comment(&format!("# camera_info: the lens on {chosen} {problem}")) + "\n",
+        None => comment(&format!("# camera_info: the messages on {chosen} cannot be decoded")) + "\n",
+    };
+    line + &others("other lenses", rest)
 }
 
 /// The best of all pairs of frames by their names; all of them are named beside it.
-fn of_transforms(contents: &Contents) -> Option<String> {
+fn of_transforms(contents: &Contents) -> Option<(String, String)> {
     let mut found: BTreeMap<Candidate, u32> = BTreeMap::new();
     for (name, topic) in contents.of_kind(Kind::Transforms) {
         for (parent, child) in &topic.frames {
@@ -71,7 +96,7 @@ fn of_transforms(contents: &Contents) -> Option<String> {
         .map(|other| format!("`{}` in `{}` on {}", other.child, other.camera, other.topic))
         .collect();
     let Candidate { topic, camera, child } = best;
-    Some(format!(
+    let text = format!(
         "topic = {}\ncamera_frame = {}\nchild_frame = {}\n\
          use = \"pose\"   # or \"position\", where rotations are poor\n\
          # position_std_m = 0.003       # noise of a tag's position, one sigma per axis, as you know it\n\
@@ -80,21 +105,21 @@ fn of_transforms(contents: &Contents) -> Option<String> {
         quoted(camera),
         quoted(child),
         others("other pairs of frames", pairs.iter())
-    ))
+    );
+    Some((topic.clone(), text))
 }
 
-fn of_images(contents: &Contents) -> Option<String> {
+fn of_images(contents: &Contents) -> Option<(String, String)> {
     let (name, topic) = contents.of_kind(Kind::Images).max_by_key(|(_, topic)| topic.messages)?;
-    let shared = |other: &str| other.chars().zip(name.chars()).take_while(|(a, b)| a == b).count();
-    let info = contents.of_kind(Kind::CameraInfo).map(|(topic, _)| topic).max_by_key(|topic| shared(topic));
-    Some(format!(
+    let text = format!(
         "topic = {}   # {} images; armcal looks for tags in them\nuse = \"corners\"\n\
          # family = \"36h11\"   # or \"25h9\", \"Standard41h12\" .., where robot.toml has no [[tag]]s\n\
          # image_period_s = 0.2   # looks at one image in so many seconds\n{}",
         quoted(name),
         topic.messages,
-        line("camera_info", info, "the lens, where robot.toml has none")
-    ))
+        camera_info(contents, (name, topic))
+    );
+    Some((name.clone(), text))
 }
 
 fn has_word(frame: &str, words: &[&str]) -> bool {

@@ -95,8 +95,11 @@ fn detections_come_before_images_and_images_bring_their_lens() {
     let mut given = Given::new();
     given.joints("/words", &["a".to_owned()], 30_000.0);
     given.add("/left/image", &CompressedImage::default());
-    given.add("/right/camera_info", &CameraInfo::default());
-    given.add("/left/camera_info", &CameraInfo::default());
+    let k = [400.0, 0.0, 320.0, 0.0, 400.0, 240.0, 0.0, 0.0, 1.0];
+    let info =
+        CameraInfo { width: 640, height: 480, k, distortion_model: "plumb_bob".to_owned(), ..Default::default() };
+    given.add("/right/camera_info", &info);
+    given.add("/left/camera_info", &info);
     let (folder, text) = given.proposed(None);
     let text = text.expect("a map");
     let (map, of_images) = topics(&text);

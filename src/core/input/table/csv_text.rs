@@ -1,18 +1,31 @@
 //! Rows from CSV.
 
-use super::rows::{Row, Rows, check_count, number};
+use super::rows::{Cells, Row, Rows, check_count, number};
 use crate::input::error::InputError;
 
-/// Reads the columns `wanted`; the first line that is no comment names them all.
-pub(super) fn csv_rows(file: &str, text: &str, wanted: &[String]) -> Result<Rows, InputError> {
+fn csv_reader(text: &str) -> csv::Reader<&[u8]> {
     let text = text.trim_start_matches('\u{feff}');
     let header = text.lines().find(|line| !line.is_empty() && !line.starts_with('#')).unwrap_or_default();
     let delimiter = [b'\t', b';'].into_iter().find(|mark| header.as_bytes().contains(mark)).unwrap_or(b',');
-    let mut reader = csv::ReaderBuilder::new()
-        .delimiter(delimiter)
-        .comment(Some(b'#'))
-        .trim(csv::Trim::All)
-        .from_reader(text.as_bytes());
+    csv::ReaderBuilder::new().delimiter(delimiter).comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes())
+}
+
+/// Reads all cells.
+pub(super) fn csv_cells(file: &str, text: &str) -> Result<Cells, InputError> {
+    let mut reader = csv_reader(text);
+    let bad = |error: csv::Error| InputError::Table { file: file.to_owned(), problem: format!("is no CSV: {error}") };
+    let names = reader.headers().map_err(bad)?.iter().map(str::to_owned).collect();
+    let mut cells = Cells { names, ..Cells::default() };
+    for record in reader.records() {
+        cells.rows.push(record.map_err(bad)?.iter().map(str::to_owned).collect());
+        check_count(file, cells.rows.len())?;
+    }
+    Ok(cells)
+}
+
+/// Reads the columns `wanted`; the first line that is no comment names them all.
+pub(super) fn csv_rows(file: &str, text: &str, wanted: &[String]) -> Result<Rows, InputError> {
+    let mut reader = csv_reader(text);
     let bad = |error: csv::Error| InputError::Table { file: file.to_owned(), problem: format!("is no CSV: {error}") };
     let header = reader.headers().map_err(bad)?.clone();
     let mut at = Vec::new();

@@ -1,11 +1,11 @@
 //! Rows from YAML, of which JSON is a part: a list or a map with one entry per row.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
 
-use super::rows::{Row, Rows, check_count, number};
+use super::rows::{Cells, Row, Rows, check_count, number};
 use crate::input::error::InputError;
 use crate::input::map::TableLayout;
 
@@ -36,6 +36,19 @@ impl Node {
 
     fn at<'a>(&self, path: impl IntoIterator<Item = &'a str>) -> Option<&Self> {
         path.into_iter().try_fold(self, |node, key| node.get(key))
+    }
+
+    /// The paths of all scalars, in the order of the file.
+    fn leaves(&self) -> Vec<String> {
+        let join = |key: &str, below: String| if below.is_empty() { key.to_owned() } else { format!("{key}.{below}") };
+        let of = |key: String, node: &Self| {
+            node.leaves().into_iter().map(move |below| join(&key, below)).collect::<Vec<_>>()
+        };
+        match self {
+            Self::Scalar(_) => vec![String::new()],
+            Self::List(list) => list.iter().enumerate().flat_map(|(k, node)| of(k.to_string(), node)).collect(),
+            Self::Map(map) => map.iter().flat_map(|(key, node)| of(key.clone(), node)).collect(),
+        }
     }
 
     /// The paths of all scalars.
@@ -115,12 +128,85 @@ impl<'de> Visitor<'de> for NodeVisitor {
     }
 }
 
+fn parse(file: &str, text: &str) -> Result<Node, InputError> {
+    let options = serde_saphyr::options! { budget: serde_saphyr::budget! { max_depth: MAX_DEPTH } };
+    serde_saphyr::from_str_with_options(text, options).map_err(|error| {
+        let problem = format!("is no YAML of this kind: {error}");
+        InputError::Table { file: file.to_owned(), problem }
+    })
+}
+
+/// The entries of a list or a map that are lists or maps themselves; none where one is a scalar.
+fn entries(node: &Node) -> Vec<&Node> {
+    let all: Vec<&Node> = match node {
+        Node::List(list) => list.iter().collect(),
+        Node::Map(map) => map.iter().map(|(_, node)| node).collect(),
+        Node::Scalar(_) => Vec::new(),
+    };
+    if all.iter().any(|entry| matches!(entry, Node::Scalar(_))) { Vec::new() } else { all }
+}
+
+/// Reads all cells: of the list or map with the most entries that are lists or maps, at the top or below one key.
+pub(super) fn yaml_cells(file: &str, text: &str) -> Result<Cells, InputError> {
+    let all = parse(file, text)?;
+    let below: Vec<(Vec<String>, &Node)> = match &all {
+        Node::Map(map) => map.iter().map(|(key, node)| (vec![key.clone()], node)).collect(),
+        Node::List(_) | Node::Scalar(_) => Vec::new(),
+    };
+    let candidates = std::iter::once((Vec::new(), &all)).chain(below);
+    let found = candidates.map(|(path, node)| (path, entries(node))).max_by_key(|(path, rows)| {
+        let is_uniform = rows.windows(2).all(|two| two[0].leaves() == two[1].leaves());
+        // The whole file before its parts; a map of one list is that list.
+        (is_uniform, rows.len() > 1, rows.len(), path.is_empty())
+    });
+    let Some((rows_at, rows)) = found.filter(|(_, rows)| !rows.is_empty()) else {
+        let keys: Vec<String> = match &all {
+            Node::Map(map) => map.iter().take(12).map(|(key, _)| key.clone()).collect(),
+            Node::List(_) | Node::Scalar(_) => Vec::new(),
+        };
+        let problem = format!(
+            "it is a YAML or JSON text without a list of rows (keys {keys:?}); armcal reads tables (CSV, YAML, JSON) \
+             with one row or entry per pose, and recordings (.mcap, .db3)"
+        );
+        return Err(InputError::Table { file: file.to_owned(), problem });
+    };
+    check_count(file, rows.len())?;
+    let mut names = Vec::new();
+    let first = rows.first().map(|row| row.leaves()).unwrap_or_default();
+    names.extend(first.into_iter().take(MAX_COLUMNS));
+    let cell = |row: &Node, name: &String| match row.at(name.split('.')) {
+        Some(Node::Scalar(cell)) => cell.clone(),
+        _ => String::new(),
+    };
+    let cells = rows.iter().map(|row| names.iter().map(|name| cell(row, name)).collect()).collect();
+    let other_names = names_beside(&all, &names);
+    Ok(Cells { rows_at, rows: cells, other_names, names })
+}
+
+/// A list of as many texts as there are numbered columns names these.
+fn names_beside(all: &Node, columns: &[String]) -> BTreeMap<String, String> {
+    let Node::Map(map) = all else { return BTreeMap::new() };
+    let is_numbered = columns.iter().enumerate().all(|(k, column)| *column == k.to_string());
+    let texts = |node: &Node| match node {
+        Node::List(list) if is_numbered && list.len() == columns.len() => list.iter().map(text_of).collect(),
+        _ => None,
+    };
+    let names: Option<Vec<String>> = map.iter().find_map(|(_, node)| texts(node));
+    names.unwrap_or_default().into_iter().zip(columns.iter().cloned()).collect()
+}
+
+/// A scalar that is no number.
+fn text_of(node: &Node) -> Option<String> {
+    match node {
+        Node::Scalar(text) if !text.is_empty() && text.parse::<f64>().is_err() => Some(text.clone()),
+        _ => None,
+    }
+}
+
 /// Reads the paths `wanted` of each entry.
 pub(super) fn yaml_rows(file: &str, text: &str, layout: &TableLayout, wanted: &[String]) -> Result<Rows, InputError> {
     let bad = |problem: String| InputError::Table { file: file.to_owned(), problem };
-    let options = serde_saphyr::options! { budget: serde_saphyr::budget! { max_depth: MAX_DEPTH } };
-    let all: Node = serde_saphyr::from_str_with_options(text, options)
-        .map_err(|error| bad(format!("is no YAML of this kind: {error}")))?;
+    let all = parse(file, text)?;
     let path = layout.rows.join(".");
     let entries: Vec<&Node> = match all.at(layout.rows.iter().map(String::as_str)) {
         Some(Node::List(list)) => list.iter().collect(),

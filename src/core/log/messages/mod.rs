@@ -9,6 +9,7 @@ mod checks;
 pub(super) mod detections;
 mod foxglove;
 pub(super) mod images;
+mod isaac;
 pub(super) mod joints;
 pub(super) mod log_line;
 pub(super) mod marks;
@@ -28,6 +29,7 @@ pub use foxglove::{
     TextPrimitive, TriangleListPrimitive,
 };
 pub use images::{CompressedImage, Image};
+pub use isaac::{IsaacDetection, IsaacDetectionArray, PoseWithCovarianceStamped, decode_detections};
 pub use joints::JointState;
 pub use log_line::Log;
 pub use marks::Mark;

@@ -25,7 +25,8 @@ pub struct ExternalContext {
 /// Makes views of recordings of one arm; `robot` has the landmarks that were around it.
 ///
 /// # Errors
-/// [`CalibError::Twice`] for a recording that is given twice, [`CalibError::NoTags`] without any view.
+/// [`CalibError::Twice`] for a recording that is given twice; without any view [`CalibError::Clocks`] where it is the
+/// clocks, else [`CalibError::NoTags`] or [`CalibError::AllRejected`].
 pub fn prepare_external(
     recordings: &[ExternalRecording],
     map: &InputMap,
@@ -69,7 +70,11 @@ pub fn prepare_external(
     data.ids_seen.sort_unstable();
     data.ids_seen.dedup();
     if data.fit.is_empty() {
-        return Err(no_views(name, robot, &data));
+        let of_clocks = recordings.iter().find_map(|recording| {
+            let problem = recording.clock_doubt.clone()?;
+            Some(CalibError::Clocks { recording: recording.path.display().to_string(), problem })
+        });
+        return Err(of_clocks.unwrap_or_else(|| no_views(name, robot, &data)));
     }
     let messages_hash = hash(&mut digests);
     Ok(CalibrationData {

@@ -1,0 +1,165 @@
+//! The contents of any table: columns, ranges and gaps, before an input map says what they are.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use super::csv_text::csv_cells;
+use super::rows::Cells;
+use super::{format_by_name, read_table_text};
+use crate::input::error::InputError;
+use crate::input::map::TableFormat;
+
+/// One column.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TableColumn {
+    /// As the input map names it.
+    pub name: String,
+    /// Cells with a finite number.
+    pub n_numbers: usize,
+    /// Cells that are empty.
+    pub n_empty: usize,
+    /// Cells with something else; the first of them.
+    pub n_others: usize,
+    /// The first cell that is no finite number.
+    pub first_other: Option<String>,
+    /// Lowest and highest number; `None` without one.
+    pub range: Option<[f64; 2]>,
+    /// All numbers are whole.
+    pub is_whole: bool,
+    /// No number is smaller than the one before.
+    pub is_rising: bool,
+}
+
+/// Columns and rows of a table.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TableContents {
+    /// CSV, or YAML with JSON.
+    pub format: TableFormat,
+    /// Keys that lead to the rows in YAML.
+    pub rows_at: Vec<String>,
+    /// Number of rows.
+    pub n_rows: usize,
+    /// In the order of the file.
+    pub columns: Vec<TableColumn>,
+    /// Names that another list of the file gives to numbered columns.
+    pub other_names: BTreeMap<String, String>,
+}
+
+/// Looks at a table, whose format is that of its name's ending; `None` where the ending is not a table's.
+///
+/// # Errors
+/// [`InputError`] where it is no table: without rows, columns or numbers.
+pub fn read_table_contents(path: &Path) -> Option<Result<TableContents, InputError>> {
+    let format = format_by_name(path)?;
+    Some(contents(path, format))
+}
+
+fn contents(path: &Path, format: TableFormat) -> Result<TableContents, InputError> {
+    let file = path.display().to_string();
+    let text = read_table_text(path, format)?;
+    let cells = match format {
+        TableFormat::Csv => csv_cells(&file, &text)?,
+        TableFormat::Yaml => super::yaml::yaml_cells(&file, &text)?,
+    };
+    let Cells { rows_at, names, rows, other_names } = cells;
+    let column = |(k, name): (usize, &String)| {
+        let cells = rows.iter().map(|row| row.get(k).map_or("", |cell| cell.trim()));
+        column(name.clone(), cells)
+    };
+    let columns: Vec<TableColumn> = names.iter().enumerate().map(column).collect();
+    if rows.is_empty() || columns.iter().all(|column| column.n_numbers == 0) {
+        let problem = format!(
+            "it is no table of poses: {} rows, none with a number in its columns {:?}; armcal reads tables (CSV, YAML, \
+             JSON) with one row or entry per pose, and recordings (.mcap, .db3)",
+            rows.len(),
+            names.iter().take(12).collect::<Vec<_>>()
+        );
+        return Err(InputError::Table { file, problem });
+    }
+    Ok(TableContents { format, rows_at, n_rows: rows.len(), columns, other_names })
+}
+
+fn column<'a>(name: String, cells: impl Iterator<Item = &'a str>) -> TableColumn {
+    let mut found = TableColumn {
+        name,
+        n_numbers: 0,
+        n_empty: 0,
+        n_others: 0,
+        first_other: None,
+        range: None,
+        is_whole: true,
+        is_rising: true,
+    };
+    let mut last = f64::NEG_INFINITY;
+    for cell in cells {
+        match cell.parse::<f64>() {
+            Ok(value) if value.is_finite() => {
+                found.n_numbers += 1;
+                let [low, high] = found.range.unwrap_or([value; 2]);
+                found.range = Some([low.min(value), high.max(value)]);
+                found.is_whole &= value.fract() == 0.0;
+                found.is_rising &= value >= last;
+                last = value;
+            }
+            _ if cell.is_empty() => found.n_empty += 1,
+            _ => {
+                found.n_others += 1;
+                found.first_other.get_or_insert_with(|| cell.chars().take(40).collect());
+            }
+        }
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(name: &str, text: &str) -> Result<TableContents, String> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        let found = read_table_contents(&path).expect("a table's ending");
+        found.map_err(|error| error.to_string().replace(&folder.path().display().to_string(), "FOLDER"))
+    }
+
+    #[test]
+    fn columns_are_counted_with_their_ranges_and_gaps() {
+        let found = read("a.csv", "# bench\nt;q1;note\n0;1.5;a\n1;-2;\n2;;b\n3;nan;\n").unwrap();
+        assert_eq!((found.n_rows, found.columns.len()), (4, 3));
+        let q1 = &found.columns[1];
+        assert_eq!((q1.n_numbers, q1.n_empty, q1.n_others, q1.range), (2, 1, 1, Some([-2.0, 1.5])));
+        assert!(found.columns[0].is_rising && found.columns[0].is_whole && !q1.is_rising);
+        assert_eq!(found.columns[2].first_other.as_deref(), Some("a"));
+    }
+
+    #[test]
+    fn rows_of_yaml_and_json_are_found_by_themselves() {
+        let nested =
+            "rate: 2\nsamples:\n- robot: {x: 1.0, y: 2}\n  hand: [1, 2]\n- robot: {x: 3, y: 1}\n  hand: [4, 5]\n";
+        let found = read("a.yaml", nested).unwrap();
+        assert_eq!((found.rows_at, found.n_rows), (vec!["samples".to_owned()], 2));
+        let names: Vec<&str> = found.columns.iter().map(|column| column.name.as_str()).collect();
+        assert_eq!(names, ["robot.x", "robot.y", "hand.0", "hand.1"]);
+        let named = read("b.yml", "joint_names: [a, b]\njoint_values:\n  - [1, 2]\n  - [3, 4]\n  - [5, 6]\n").unwrap();
+        assert_eq!((named.rows_at, named.n_rows), (vec!["joint_values".to_owned()], 3));
+        assert_eq!(named.other_names["a"], "0");
+        let list = read("c.json", "[{\"j1\": 0.5}, {\"j1\": 0.25}]").unwrap();
+        assert_eq!((list.rows_at.len(), list.n_rows, list.columns[0].range), (0, 2, Some([0.25, 0.5])));
+        let by_name = read("d.yaml", "poses:\n  first: {j1: 1}\n  second: {j1: 2}\n").unwrap();
+        assert_eq!((by_name.rows_at, by_name.n_rows), (vec!["poses".to_owned()], 2));
+    }
+
+    #[test]
+    fn what_is_no_table_is_refused_with_what_is_read() {
+        let cases = [
+            ("a.yaml", "image_width: 640\ncamera_name: wrist\n"),
+            ("b.csv", "just a text\nwithout numbers\n"),
+            ("c.yaml", "a: [\n"),
+            ("d.csv", "a,b\n1\n2,3,4\n"),
+            ("e.txt", ""),
+        ];
+        let told: Vec<String> = cases.map(|(name, text)| read(name, text).expect_err("refused")).to_vec();
+        insta::assert_snapshot!("no_tables", told.join("\n"));
+    }
+}

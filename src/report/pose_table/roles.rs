@@ -1,0 +1,227 @@
+//! Likely roles of a table's columns, from their names.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use armcal_core::input::{TableColumn, TableContents};
+use armcal_core::robot::{Robot, likely_name};
+
+/// Three columns of one place, or three or four of one rotation.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Columns {
+    pub names: Vec<String>,
+    /// The part of the names that they share.
+    stem: String,
+}
+
+/// The rotation's columns and the form that the input map names.
+pub(super) type Rotation = (Columns, &'static str);
+
+/// Roles that the columns may have.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Roles {
+    /// The robot's joint, or without a robot the column itself, to the column.
+    pub joints: Vec<(String, String)>,
+    /// Joints of the robot without a column.
+    pub missing_joints: Vec<String>,
+    pub time: Option<String>,
+    pub position: Option<Columns>,
+    pub other_positions: Vec<Columns>,
+    pub rotation: Option<Rotation>,
+    pub pixel: Option<[String; 2]>,
+    pub id: Option<String>,
+}
+
+/// Names of a column of times, of ids, and words for what the camera sees and for the arm itself.
+const TIMES: [&str; 8] = ["t", "time", "stamp", "timestamp", "secs", "seconds", "nanos", "time_s"];
+const IDS: [&str; 8] = ["id", "tag", "tag_id", "marker", "marker_id", "corner", "corner_id", "landmark"];
+const SEEN_WORDS: [&str; 10] =
+    ["tag", "board", "marker", "target", "track", "cam", "object", "pattern", "aruco", "landmark"];
+const ARM_WORDS: [&str; 6] = ["robot", "tool", "base", "flange", "tcp", "ee"];
+const ROTATION_STEMS: [&str; 6] = ["r", "rot", "rvec", "rotation", "euler", "rotvec"];
+
+impl Roles {
+    pub fn of(table: &TableContents, robot: Option<&Robot>) -> Self {
+        let numbers: Vec<&TableColumn> = table.columns.iter().filter(|column| column.n_numbers > 0).collect();
+        let names: Vec<String> = numbers.iter().map(|column| column.name.clone()).collect();
+        let mut roles = Self::default();
+        let is_time = |name: &&String| {
+            let name = name.to_lowercase();
+            TIMES.contains(&name.as_str()) || name.starts_with("time") || name.starts_with("stamp")
+        };
+        roles.time = names.iter().find(is_time).cloned();
+        roles.id = names.iter().find(|name| IDS.contains(&last_part(name).as_str())).cloned();
+        let mut places = triples(&names);
+        let rotations: Vec<Columns> = extracted(&mut places, |columns| is_rotation(columns));
+        places.sort_by_key(|columns| seen_rank(&columns.stem));
+        let mut places = places.into_iter();
+        (roles.position, roles.other_positions) = (places.next(), places.collect());
+        let stem = roles.position.as_ref().map_or("", |columns| &columns.stem);
+        roles.rotation = rotation(&names, rotations, stem);
+        roles.pixel = pixel(&names);
+        roles.match_joints(&names, &table.other_names, robot);
+        roles
+    }
+
+    fn used(&self) -> BTreeSet<&String> {
+        let places = self.position.iter().chain(&self.other_positions).flat_map(|columns| &columns.names);
+        let rotation = self.rotation.iter().flat_map(|(columns, _)| &columns.names);
+        places.chain(rotation).chain(&self.time).chain(&self.id).chain(self.pixel.iter().flatten()).collect()
+    }
+
+    fn match_joints(&mut self, names: &[String], other_names: &BTreeMap<String, String>, robot: Option<&Robot>) {
+        let Some(robot) = robot else {
+            let used = self.used();
+            let free = names.iter().filter(|name| !used.contains(name) && is_joint_name(name));
+            let found: Vec<(String, String)> = match other_names.is_empty() {
+                true => free.map(|name| (name.clone(), name.clone())).collect(),
+                false => other_names.clone().into_iter().collect(),
+            };
+            self.joints = found;
+            return;
+        };
+        let all: BTreeSet<String> = names.iter().chain(other_names.keys()).cloned().collect();
+        let n_needed = robot.camera.mount.n_joints;
+        for (k, joint) in robot.joint_names().into_iter().enumerate() {
+            match likely_name(&joint, &all) {
+                Some(column) => {
+                    let column = other_names.get(column).unwrap_or(column).clone();
+                    self.joints.push((joint, column));
+                }
+                None if k < n_needed => self.missing_joints.push(joint),
+                None => {}
+            }
+        }
+        if self.joints.is_empty() {
+            self.number_joints(names, robot);
+        }
+    }
+
+    /// Columns called `q1`, `q2` .. are the joints in the robot's order, where there are as many.
+    fn number_joints(&mut self, names: &[String], robot: &Robot) {
+        let used = self.used();
+        let free: Vec<&String> = names.iter().filter(|name| !used.contains(name) && is_joint_name(name)).collect();
+        let joints = robot.joint_names();
+        if free.len() == joints.len() || free.len() == robot.camera.mount.n_joints {
+            self.joints = joints.into_iter().zip(free.into_iter().cloned()).collect();
+            self.missing_joints.clear();
+        }
+    }
+
+    /// The role of one column, in words.
+    pub fn of_column(&self, name: &String) -> &'static str {
+        let is_of = |columns: &Columns| columns.names.contains(name);
+        if self.joints.iter().any(|(_, column)| column == name) {
+            "joint"
+        } else if self.time.as_ref() == Some(name) {
+            "time"
+        } else if self.id.as_ref() == Some(name) {
+            "number of a tag or corner"
+        } else if self.position.as_ref().is_some_and(is_of) {
+            "position"
+        } else if self.other_positions.iter().any(is_of) {
+            "another position"
+        } else if self.rotation.as_ref().is_some_and(|(columns, _)| is_of(columns)) {
+            "rotation"
+        } else if self.pixel.iter().flatten().any(|column| column == name) {
+            "pixel"
+        } else {
+            ""
+        }
+    }
+}
+
+fn last_part(name: &str) -> String {
+    name.rsplit('.').next().unwrap_or(name).to_lowercase()
+}
+
+/// `q1`, `j_2`, `joint3.position`, or a number alone.
+fn is_joint_name(name: &str) -> bool {
+    let name = name.to_lowercase();
+    let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
+    let stem = stem.trim_end_matches(['_', '.', '-', '[']);
+    let is_numbered = stem.len() < name.len();
+    name.contains("joint")
+        || (is_numbered && ["q", "j", "a", "axis", "theta", "angle", ""].contains(&stem))
+        || (is_numbered && (stem.ends_with(".q") || stem.ends_with("joints")))
+}
+
+/// All sets of columns whose names differ in x, y, z alone, with w where it is there.
+fn triples(names: &[String]) -> Vec<Columns> {
+    let has = |name: &String| names.contains(name);
+    let mut found = Vec::new();
+    for name in names {
+        let lower = name.to_lowercase();
+        let Some(at) = lower.rfind('x').filter(|_| name.is_ascii()) else { continue };
+        // Within a word, x is a letter as any other.
+        let is_end = at + 1 == name.len() || !name[at + 1..].starts_with(|c: char| c.is_ascii_alphanumeric());
+        let upper = name[at..].starts_with('X');
+        let with = |letter: char| {
+            let letter = if upper { letter.to_ascii_uppercase() } else { letter };
+            format!("{}{letter}{}", &name[..at], &name[at + 1..])
+        };
+        let all = ['x', 'y', 'z'].map(with);
+        if is_end && all.iter().all(has) {
+            let mut columns: Vec<String> = all.to_vec();
+            columns.extend(Some(with('w')).filter(has));
+            found.push(Columns { names: columns, stem: lower[..at].to_owned() });
+        }
+    }
+    found
+}
+
+fn is_rotation(columns: &Columns) -> bool {
+    let stem = columns.stem.trim_end_matches(['_', '.', '-']);
+    let last = stem.rsplit(['_', '.', '-']).next().unwrap_or(stem);
+    columns.names.len() == 4 || ROTATION_STEMS.contains(&last)
+}
+
+fn extracted(all: &mut Vec<Columns>, is: impl Fn(&Columns) -> bool) -> Vec<Columns> {
+    let (found, rest) = std::mem::take(all).into_iter().partition(|columns| is(columns));
+    *all = rest;
+    found
+}
+
+/// Lower for names of what a camera sees than for those of the arm.
+fn seen_rank(stem: &str) -> u32 {
+    let has = |words: &[&str]| words.iter().any(|word| stem.contains(word));
+    match (has(&SEEN_WORDS), has(&ARM_WORDS)) {
+        (true, _) => 0,
+        (false, false) => 1,
+        (false, true) => 2,
+    }
+}
+
+/// The rotation whose names share most with the position's.
+fn rotation(names: &[String], found: Vec<Columns>, position_stem: &str) -> Option<Rotation> {
+    let shared = |stem: &str| stem.chars().zip(position_stem.chars()).take_while(|(a, b)| a == b).count();
+    if let Some(columns) = found.into_iter().max_by_key(|columns| (shared(&columns.stem), columns.names.len())) {
+        let form = if columns.names.len() == 4 { "quaternion_xyzw" } else { "rotation_vector" };
+        return Some((columns, form));
+    }
+    if let Some(columns) = matrix(names) {
+        return Some((columns, "matrix"));
+    }
+    let roll = names.iter().find(|name| last_part(name).ends_with("roll"))?;
+    let lower = roll.to_lowercase();
+    let at = lower.len() - "roll".len();
+    let all = ["roll", "pitch", "yaw"]
+        .map(|word| names.iter().find(|name| name.to_lowercase() == format!("{}{word}", &lower[..at])).cloned());
+    let [Some(roll), Some(pitch), Some(yaw)] = all else { return None };
+    Some((Columns { names: vec![roll, pitch, yaw], stem: lower[..at].to_owned() }, "fixed_xyz"))
+}
+
+/// Nine columns such as `r11` to `r33`, or `r00` to `r22`.
+fn matrix(names: &[String]) -> Option<Columns> {
+    names.iter().find_map(|name| {
+        let counted = [("11", 1), ("00", 0)].into_iter().find_map(|(end, from)| Some((name.strip_suffix(end)?, from)));
+        let (stem, from) = counted?;
+        let cells: Vec<String> = (0..9).map(|k| format!("{stem}{}{}", from + k / 3, from + k % 3)).collect();
+        let columns = Columns { names: cells, stem: stem.to_lowercase() };
+        columns.names.iter().all(|cell| names.contains(cell)).then_some(columns)
+    })
+}
+
+fn pixel(names: &[String]) -> Option<[String; 2]> {
+    let find = |words: [&str; 3]| names.iter().find(|name| words.contains(&last_part(name).as_str())).cloned();
+    Some([find(["u", "px", "u_px"])?, find(["v", "py", "v_px"])?])
+}

@@ -1,0 +1,150 @@
+//! A table in plain lines, and as data.
+
+use std::path::Path;
+
+use comfy_table::presets::NOTHING;
+use comfy_table::{CellAlignment, Table};
+use serde::Serialize;
+
+use super::roles::Roles;
+use armcal_core::input::{TableContents, TableFormat};
+use armcal_core::robot::Robot;
+use armcal_core::text::printable;
+
+/// One column as `inspect --json` has it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ColumnInspection {
+    name: String,
+    numbers: usize,
+    empty: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    range: Option<[f64; 2]>,
+    #[serde(skip_serializing_if = "str::is_empty")]
+    may_be: &'static str,
+    /// The first cell that is no number.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    other: Option<String>,
+}
+
+/// Columns of a table, and the data that an input map would still need.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TableInspection {
+    version: u32,
+    table: String,
+    format: &'static str,
+    rows_at: String,
+    rows: usize,
+    columns: Vec<ColumnInspection>,
+    joints: Vec<String>,
+    missing: Vec<String>,
+}
+
+/// Columns that are printed.
+const MOST_COLUMNS: usize = 60;
+
+/// Looks at a table.
+#[must_use]
+pub fn inspect_table(path: &Path, table: &TableContents, robot: Option<&Robot>) -> TableInspection {
+    let roles = Roles::of(table, robot);
+    let column = |column: &armcal_core::input::TableColumn| ColumnInspection {
+        name: column.name.clone(),
+        numbers: column.n_numbers,
+        empty: column.n_empty,
+        range: column.range,
+        may_be: roles.of_column(&column.name),
+        other: column.first_other.clone(),
+    };
+    TableInspection {
+        version: 1,
+        table: path.display().to_string(),
+        format: if table.format == TableFormat::Csv { "CSV" } else { "YAML or JSON" },
+        rows_at: table.rows_at.join("."),
+        rows: table.n_rows,
+        columns: table.columns.iter().map(column).collect(),
+        joints: roles.joints.iter().map(|(joint, _)| joint.clone()).collect(),
+        missing: missing(table, &roles),
+    }
+}
+
+/// Reasons for which `calibrate` cannot read the table.
+pub(super) fn missing(table: &TableContents, roles: &Roles) -> Vec<String> {
+    let mut missing = Vec::new();
+    if !roles.missing_joints.is_empty() {
+        missing.push(format!("columns of the robot's joints {:?}", roles.missing_joints));
+    } else if roles.joints.is_empty() {
+        missing.push("columns of joint readings (--robot DIR matches their names)".to_owned());
+    }
+    match (&roles.position, &roles.pixel) {
+        (None, None) => {
+            missing.push(
+                "columns of what the camera saw: x, y, z of a tag or board, or a corner's id and u, v".to_owned(),
+            );
+        }
+        (None, Some(_)) if roles.id.is_none() => missing.push("a column of the corner's number".to_owned()),
+        _ => {}
+    }
+    for column in table.columns.iter().filter(|column| !roles.of_column(&column.name).is_empty()) {
+        let n = column.n_empty + column.n_others;
+        if n > 0 {
+            let other = column.first_other.as_ref().map_or(String::new(), |other| format!("; the first is {other:?}"));
+            missing.push(format!("numbers in {n} of {} rows of the column `{}`{other}", table.n_rows, column.name));
+        }
+    }
+    missing
+}
+
+impl TableInspection {
+    /// Plain lines for a terminal.
+    #[must_use]
+    pub fn to_text(&self) -> String {
+        let at = if self.rows_at.is_empty() { String::new() } else { format!(", rows at `{}`", self.rows_at) };
+        let mut lines = vec![
+            format!("table        {}", self.table),
+            format!("format       {}{at}: {} rows, {} columns", self.format, self.rows, self.columns.len()),
+            String::new(),
+        ];
+        lines.extend(self.column_table());
+        lines.push(String::new());
+        let joints = if self.joints.is_empty() { "none".to_owned() } else { self.joints.join(", ") };
+        lines.push(format!("joints       {joints}"));
+        lines.extend(self.times());
+        lines.extend(self.missing.iter().map(|what| format!("missing      {what}")));
+        if self.missing.is_empty() {
+            lines.push("note         --write-input MAP.toml proposes an input map for it".to_owned());
+        }
+        lines.iter().map(|line| printable(line)).collect::<Vec<_>>().join("\n")
+    }
+
+    fn times(&self) -> Option<String> {
+        let Some(column) = self.columns.iter().find(|column| column.may_be == "time") else {
+            return Some("time         no column; rows count as 1 s apart".to_owned());
+        };
+        let [first, last] = column.range?;
+        Some(format!("time         column `{}`: {first} to {last}", column.name))
+    }
+
+    fn column_table(&self) -> Vec<String> {
+        let mut table = Table::new();
+        table.load_preset(NOTHING);
+        table.set_header(["column", "numbers", "missing", "smallest", "largest", "may be"]);
+        let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:.6}"));
+        for column in self.columns.iter().take(MOST_COLUMNS) {
+            table.add_row([
+                column.name.clone(),
+                column.numbers.to_string(),
+                (self.rows - column.numbers.min(self.rows)).to_string(),
+                number(column.range.map(|range| range[0])),
+                number(column.range.map(|range| range[1])),
+                column.may_be.to_owned(),
+            ]);
+        }
+        for column in table.column_iter_mut().skip(1).take(4) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+        let mut lines: Vec<String> = table.to_string().lines().map(|line| line.trim_end().to_owned()).collect();
+        if self.columns.len() > MOST_COLUMNS {
+            lines.push(format!("             {} further columns: --json has them", self.columns.len() - MOST_COLUMNS));
+        }
+        lines
+    }
+}

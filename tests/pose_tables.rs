@@ -1,0 +1,172 @@
+//! `inspect` on tables of poses: what it says of their columns, and the input map that it proposes.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use armcal::input::{Source, parse_input_map, read_external};
+use armcal::robot::{Robot, load};
+use armcal::stats::stream_rng;
+use armcal::streams::JointAngles;
+use armcal::tagmap::files::read_landmarks;
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+
+use crate::support::synthetic::TrueArm;
+use crate::support::texts::Texts;
+use crate::support::{Answer, answer, program, read, root, temp, write};
+
+/// A board before an arm.
+const BOARD: &str = "version = 1\nframe = \"base_link\"\n[[tag]]\nname = \"board\"\nposition_m = [1.0, 0.2, -0.1]\n\
+    quaternion_wxyz = [1.0, 0.0, 0.0, 0.0]\nposition_std_m = [0.002, 0.002, 0.002]\n\
+    rotation_std_rad = [0.01, 0.01, 0.01]\n";
+
+/// Joint angles and the board in the camera's frame at random poses.
+fn poses(robot: &Robot, n: usize, seed: u64) -> Vec<(JointAngles, Isometry3<f64>)> {
+    let mut rng = stream_rng(seed, "tables");
+    let arm = TrueArm::with_sensor_errors(robot, &mut rng);
+    let base_from_board = Isometry3::from_parts(Translation3::new(1.0, 0.2, -0.1), UnitQuaternion::identity());
+    let mut pose = || {
+        let angles = arm.random_angles(&mut rng);
+        (angles, robot.chain.link_poses(&angles).frame(&arm.camera).inverse() * base_from_board)
+    };
+    (0..n).map(|_| pose()).collect()
+}
+
+fn inspect(table: &Path, robot: Option<&Path>, map: Option<&Path>) -> Answer {
+    let mut command = program();
+    command.arg("inspect").arg(table);
+    if let Some(folder) = robot {
+        command.arg("--robot").arg(folder);
+    }
+    if let Some(file) = map {
+        command.arg("--write-input").arg(file);
+    }
+    answer(&mut command)
+}
+
+/// The proposed map, and that the table reads by it as `poses` has it.
+#[track_caller]
+fn expect_proposal(table: &Path, robot: (&Robot, &Path), poses: &[(JointAngles, Isometry3<f64>)]) -> String {
+    let map = table.with_extension("map.toml");
+    inspect(table, Some(robot.1), Some(&map)).expect("a table", 0, &["joints", "position", "written"]);
+    let text = read(&map);
+    let parsed = parse_input_map(&map, &text).expect("it reads");
+    let Source::Table(_) = &parsed.source else { panic!("{text}") };
+    let tags = table.with_extension("tags.toml");
+    write(&tags, BOARD);
+    let named = read_landmarks(&tags).expect("it reads").survey(&tags, robot.0, parsed.tag_use).expect("a survey");
+    let with_board = robot.0.clone().with_survey(named.survey);
+    let recording = read_external(table, &parsed, &with_board).expect("it reads");
+    assert_eq!(recording.readings.len(), poses.len(), "{text}");
+    for (reading, (angles, _)) in recording.readings.iter().zip(poses) {
+        for (joint, spec) in robot.0.sensors.iter().enumerate() {
+            let found = (reading.counts[joint] - spec.offset_counts) / spec.counts_per_rad;
+            assert!((found - angles[joint]).abs() < 1e-5, "{joint}: {found} against {}\n{text}", angles[joint]);
+        }
+    }
+    for (frame, (_, board)) in recording.frames.iter().zip(poses) {
+        let armcal::input::RawMeasurement::Pose(seen) = frame.tags[0].seen else { panic!("{text}") };
+        let off_m = (seen.translation.vector - board.translation.vector).norm();
+        assert!(off_m < 1e-5 && seen.rotation.angle_to(&board.rotation) < 1e-5, "{off_m} m off\n{text}");
+    }
+    text
+}
+
+fn place(folder: &Path, name: &str) -> PathBuf {
+    folder.join(name)
+}
+
+#[test]
+fn tables_are_described_and_a_map_is_proposed() {
+    let _texts = Texts::of("tables_are_described_and_a_map_is_proposed");
+    let folder = temp();
+    // Joints by their names in radians, a quaternion, times in s.
+    let titan_folder = root().join("robots/titan4");
+    let titan = load(&titan_folder).expect("it reads");
+    let of_titan = poses(&titan, 12, 1);
+    let mut text = format!("time,{},tag_x,tag_y,tag_z,tag_qx,tag_qy,tag_qz,tag_qw\n", titan.joint_names().join(","));
+    for (k, (angles, board)) in of_titan.iter().enumerate() {
+        let [x, y, z]: [f64; 3] = board.translation.vector.into();
+        let q = board.rotation;
+        let joints: Vec<String> = angles.iter().map(f64::to_string).collect();
+        writeln!(text, "{},{},{x},{y},{z},{},{},{},{}", 2 * k, joints.join(","), q.i, q.j, q.k, q.w).expect("text");
+    }
+    let table = place(folder.path(), "titan.csv");
+    write(&table, &text);
+    let map = expect_proposal(&table, (&titan, &titan_folder), &of_titan);
+    assert!(map.contains("unit = \"rad\"") && map.contains("unit = \"s\""), "{map}");
+    // Degrees, millimetres, rotation vectors, columns that are only numbered.
+    let bench_folder = root().join("tests/golden/bench");
+    let bench = load(&bench_folder).expect("it reads");
+    let of_bench = poses(&bench, 15, 2);
+    let mut text = "q1;q2;q3;q4;q5;q6;x;y;z;rx;ry;rz\n".to_owned();
+    for (angles, board) in &of_bench {
+        let joints: Vec<String> = angles.iter().map(|angle| angle.to_degrees().to_string()).collect();
+        let mm: Vector3<f64> = 1e3 * board.translation.vector;
+        let turn = board.rotation.scaled_axis();
+        writeln!(text, "{};{};{};{};{};{};{}", joints.join(";"), mm.x, mm.y, mm.z, turn.x, turn.y, turn.z)
+            .expect("text");
+    }
+    let table = place(folder.path(), "bench.csv");
+    write(&table, &text);
+    let map = expect_proposal(&table, (&bench, &bench_folder), &of_bench);
+    assert!(map.contains("unit = \"deg\"") && map.contains("position_unit = \"mm\""), "{map}");
+    // YAML with nested maps; the robot's own pose is not the board's.
+    let kraft_folder = root().join("robots/kraft-predator");
+    let kraft = load(&kraft_folder).expect("it reads");
+    let of_kraft = poses(&kraft, 9, 3);
+    let mut text = "date: 2026-03-01\nsamples:\n".to_owned();
+    for (angles, board) in &of_kraft {
+        let [x, y, z]: [f64; 3] = board.translation.vector.into();
+        let q = board.rotation;
+        let joints = kraft.joint_names().into_iter().zip(angles.iter()).map(|(name, angle)| format!("{name}: {angle}"));
+        let joints: Vec<String> = joints.collect();
+        writeln!(
+            text,
+            "- robot: {{translation: {{x: 1.0, y: 2.0, z: 3.0}}}}\n  joints: {{{}}}\n  tracking: {{translation: \
+             {{x: {x}, y: {y}, z: {z}}}, rotation: {{x: {}, y: {}, z: {}, w: {}}}}}",
+            joints.join(", "),
+            q.i,
+            q.j,
+            q.k,
+            q.w
+        )
+        .expect("text");
+    }
+    let table = place(folder.path(), "kraft.yaml");
+    write(&table, &text);
+    let map = expect_proposal(&table, (&kraft, &kraft_folder), &of_kraft);
+    assert!(map.contains("rows = \"samples\"") && map.contains("tracking.translation.x"), "{map}");
+}
+
+#[test]
+fn what_a_table_lacks_is_named() {
+    let _texts = Texts::of("what_a_table_lacks_is_named");
+    let folder = temp();
+    let given = |name: &str, text: &str| {
+        let table = place(folder.path(), name);
+        write(&table, text);
+        (inspect(&table, None, None), inspect(&table, None, Some(&table.with_extension("map.toml"))))
+    };
+    let names = "joint_names: [j1, j2]\njoint_values:\n  - [0.1, -0.5]\n  - [0.2, -0.4]\n  - [0.3, 0.4]\n";
+    let (said, proposed) = given("joints.yaml", names);
+    said.expect("joints alone", 0, &["YAML", "3 rows", "j1, j2", "missing "]);
+    proposed.expect("joints alone", 2, &["joints_mismatch"]);
+    let samples = "samples:\n- tracking: {translation: {x: 0.1, y: 0.2, z: 0.5}, rotation: {x: 0, y: 0, z: 0, w: 1}}\n\
+                   - tracking: {translation: {x: 0.2, y: 0.1, z: 0.6}, rotation: {x: 0, y: 1, z: 0, w: 0}}\n";
+    let (said, proposed) = given("samples.yaml", samples);
+    said.expect("poses alone", 0, &["`samples`", "2 rows", "position", "missing "]);
+    proposed.expect("poses alone", 2, &["joints_mismatch"]);
+    let (said, _) =
+        given("gaps.csv", "t,q1,q2,x,y,z\n1,0.1,0.2,0.5,0.1,1.0\n3,,0.3,0.5,0.1,1.1\n4,0.2,bad,0.4,0.1,1.2\n");
+    said.expect("gaps", 0, &["1 of 3", "`q1`", "`q2`", "\"bad\"", "`t`: 1 to 4"]);
+    let (said, _) = given("corners.csv", "joint_1,joint_2,corner,u,v\n0.1,0.2,0,100,200\n0.1,0.2,1,120,200\n");
+    said.expect("corners", 0, &["pixel", "corner"]);
+    let (said, _) = given("lens.yaml", "image_width: 640\nimage_height: 480\ncamera_name: wrist\n");
+    said.expect("no table", 2, &["YAML", "image_width", "table_invalid"]);
+    let (said, _) = given("notes.txt", "measured on Monday\nwithout numbers\n");
+    said.expect("no table", 2, &["table_invalid"]);
+    let json =
+        program().arg("inspect").arg(place(folder.path(), "joints.yaml")).arg("--json").output().expect("it runs");
+    let json: serde_json::Value = serde_json::from_slice(&json.stdout).expect("JSON");
+    assert_eq!((&json["rows"], &json["joints"][1]), (&3.into(), &"j2".into()));
+}
