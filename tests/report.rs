@@ -91,6 +91,6 @@ fn a_refusal_says_why_and_what_to_do_before_anything_else() {
     let refusal = calibration.refusals.first().expect("a reason");
     let in_html = |text: &str| text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
     let tail = |text: &str| in_html(&text.chars().skip(1).collect::<String>());
-    assert!(verdict.contains(&tail(&refusal.cause())) && verdict.contains(&tail(refusal.remedy())), "{verdict}");
+    assert!(verdict.contains(&tail(&refusal.cause())) && verdict.contains(&tail(&refusal.remedy())), "{verdict}");
     assert!(!rest.contains("ACCEPTED"));
 }

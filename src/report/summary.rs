@@ -91,6 +91,8 @@ pub struct VerdictSummary {
 /// Stated sigma that the result depends on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Condition {
+    /// Kind of the element, or `not_included`.
+    pub code: Code,
     pub what: String,
     /// One stated sigma, in `unit`.
     pub std: f64,

@@ -87,6 +87,7 @@ impl RunSummary {
         let (grade, codes) = (found.grade.name().to_owned(), found.codes);
         let calibration = &self.calibration;
         let condition = |reservation: &Reservation| Condition {
+            code: reservation.code(),
             what: reservation.what.clone(),
             std: reservation.prior_std,
             unit: reservation.unit,

@@ -87,7 +87,9 @@ impl fmt::Display for ReadingError {
             }
             Self::Zeros { joints } => {
                 let one = |zero: &JointZero| {
-                    format!("{} reads {} too little", zero.joint, zero.moves.unit().shown(zero.off_rad, 1))
+                    let less = if zero.off_rad > 0.0 { "less" } else { "more" };
+                    let size = zero.moves.unit().shown(zero.off_rad.abs(), 1);
+                    format!("{} reads {size} {less} than its angle", zero.joint)
                 };
                 let all: Vec<String> = joints.iter().map(one).collect();
                 write!(f, "joint zeros differ: {}", all.join(", "))
@@ -103,7 +105,7 @@ impl fmt::Display for MisreadReadings {
             let [as_read, corrected] = [self.tag_error_m, corrected_m].map(|m| 1e3 * m);
             write!(f, ": corrected, the tags fit within {corrected:.1} mm rms instead of {as_read:.1} mm")?;
         }
-        self.alternatives.iter().try_for_each(|other| write!(f, "; or {other}"))
+        self.alternatives.iter().try_for_each(|other| write!(f, " (nearly as likely: {other})"))
     }
 }
 

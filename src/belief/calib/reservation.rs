@@ -5,6 +5,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use crate::calib::finding::FindingUnit;
+use armcal_core::codes::Code;
 
 /// One element that the data do not tell, so that the answer holds only as far as its prior does.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -31,6 +32,19 @@ fn is_included() -> bool {
 }
 
 impl Reservation {
+    /// Code of the element, or that of what U95 leaves out.
+    #[must_use]
+    pub fn code(&self) -> Code {
+        let elements = [
+            ("camera mount", Code::CameraMount),
+            ("camera lens", Code::Lens),
+            ("tag survey", Code::Base),
+            ("tool", Code::Tool),
+        ];
+        let element = elements.into_iter().find(|(name, _)| self.what.starts_with(name));
+        if self.included { element.map_or(Code::Link, |(_, code)| code) } else { Code::NotIncluded }
+    }
+
     /// Tool error by one `unit` of the element, m per m or m per rad.
     #[must_use]
     pub fn tool_error_per_unit(&self) -> f64 {

@@ -257,7 +257,11 @@ impl Refusal {
             ),
             Self::SensorLine { joint, slope } => {
                 let what = if *slope < 0.0 { "is reversed" } else { "has another scale than its datasheet" };
-                write!(f, "the sensor of {joint} {what}: the camera's angles follow it with a slope of {slope:.2}")
+                let digits = if slope.abs() < 0.1 { 4 } else { 2 };
+                write!(
+                    f,
+                    "the sensor of {joint} {what}: the camera's angles follow it with a slope of {slope:.digits$}"
+                )
             }
             Self::TooFewViewsSinceSlip { joint, evidence, views } => {
                 write!(f, "{joint}: {evidence}; {views} views since then cannot calibrate it")

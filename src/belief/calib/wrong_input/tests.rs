@@ -56,6 +56,21 @@ fn quaternions_of_the_map_in_the_other_order_are_told() {
     insta::assert_snapshot!("map_quaternions", format!("{wrong}; {}", wrong.remedy()));
 }
 
+/// The conventions of other programs: z into the tag, another first corner, x out of the tag.
+#[test]
+fn tags_that_are_all_turned_alike_are_told_with_the_turn() {
+    let (data, robot) = sample();
+    let turns = [(Vector3::x(), 2.0), (Vector3::z(), 1.0), (Vector3::z(), 2.0), (Vector3::y(), -1.0)];
+    for (axis, quarters) in turns {
+        let turn = UnitQuaternion::from_scaled_axis(axis * (quarters * FRAC_PI_2));
+        let turned = with_tags(&robot, |_, pose| pose * turn);
+        let wrong = wrong_input(&data, &turned.tags, &turned).expect("a wrong input");
+        let WrongInputKind::TagFrames([w, x, y, z]) = wrong.input else { panic!("{wrong}") };
+        let back = turn * UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
+        assert!(back.angle() < 1e-6, "{wrong}");
+    }
+}
+
 #[test]
 fn a_map_of_other_tags_is_told() {
     let (data, robot) = sample();

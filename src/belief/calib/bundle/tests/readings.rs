@@ -87,6 +87,27 @@ fn readings_of_0_to_360_deg_are_named() {
     }
 }
 
+/// A lens measured in air and used in water, one used in air that was measured in water, and another lens.
+#[test]
+fn a_lens_of_another_focal_length_is_named_and_judges_the_held_out_views() {
+    for (seed, ratio) in [(20, 1.333), (21, 0.75), (22, 1.1)] {
+        let mut case = case(seed, None);
+        let [fx, fy, rest @ ..] = case.robot.camera.lens.intrinsics();
+        let [cx, cy, k1, k2, k3, k4] = rest;
+        let stated = [fx / ratio, fy / ratio, cx, cy, k1, k2, k3, k4];
+        case.robot.camera.lens = case.robot.camera.lens.with_intrinsics(stated);
+        let calibration = case.calibrated();
+        match calibration.refusals.first() {
+            Some(Refusal::Lens { ratio: found, .. }) => {
+                assert!((found / ratio - 1.0).abs() < 0.01, "seed {seed}: {found}")
+            }
+            other => panic!("seed {seed}: {other:?}"),
+        }
+        let held_out_m = calibration.held_out.rms_m.expect("held-out views");
+        assert!(held_out_m < 0.01, "seed {seed}: {held_out_m}");
+    }
+}
+
 /// Arms that are read as they should be, with faults that have other names.
 #[test]
 fn other_faults_are_not_called_misread() {
