@@ -135,6 +135,20 @@ fn a_lens_of_air_in_water_is_named_with_the_focal_length() {
     assert!(held_out_m < 0.003, "{held_out_m}");
 }
 
+/// The map of a grid whose camera file has another lens model says so; with the right one it says nothing.
+#[test]
+fn a_tag_map_by_the_wrong_lens_model_is_warned_of() {
+    let case = Case::new("tagmap_wrong_lens_model");
+    for (lens, is_warned) in [("cam-pinhole-equi.yaml", true), ("cam-pinhole-radtan.yaml", false)] {
+        let mut command = program();
+        command.arg("tagmap").arg(case.file("grid.mcap")).arg("--camera").arg(case.file(lens));
+        command.arg("--tags").arg(case.file("grid.yaml")).args(["--topic", "/cam0/detections", "--mode", "unknown"]);
+        let said = answer(command.arg("--out").arg(case.file(&format!("{lens}.toml"))));
+        said.expect(lens, 0, &[]);
+        assert_eq!(said.stderr.contains("[corners_noisy]"), is_warned, "{lens}: {}", said.stderr);
+    }
+}
+
 #[test]
 fn targets_out_of_reach_refuse_by_their_numbers() {
     let case = Case::new("targets_out_of_reach");

@@ -82,6 +82,8 @@ const MANY_DETECTIONS: usize = 1000;
 
 /// Share of the detections that may be rejected before the map counts as made of bad data. Assumed.
 const MAX_REJECTED_SHARE: f64 = 0.2;
+/// Corner noise over the stated one from which a lens or size is doubtful: as `calibrate` warns.
+const NOISY: f64 = 2.0;
 
 pub(super) fn tagmap(args: &TagmapArgs) -> Result<Exit> {
     expect_recording(&args.recording)?;
@@ -254,6 +256,14 @@ fn warnings(file: &str, map: &TagMap, read: &RecordedViews, tags: &TagFile) -> (
     found.extend(ignored.map(|text| Warning::new(Code::KeyIgnored, text)));
     found.extend(map.scale_warnings.iter().map(|warning| Warning::new(Code::MapTagSize, warning.to_string())));
     found.extend(map.warnings.iter().cloned());
+    if map.noise_scale > NOISY {
+        let text = format!(
+            "corner residuals are {:.1} times the stated corner noise ({:.2} px rms): check model and distortion of the \
+             lens, and the tag sizes",
+            map.noise_scale, map.rms_px
+        );
+        found.push(Warning::new(Code::CornersNoisy, text));
+    }
     if !map.has_converged {
         found.push(Warning::new(Code::MapNotConverged, "the fit did not come to rest"));
     }

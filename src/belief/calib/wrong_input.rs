@@ -62,6 +62,8 @@ pub enum WrongInputKind {
     LensModel,
     /// All tags are of so many times their stated size.
     TagSize(f64),
+    /// The map's positions are in this unit, and not in metres.
+    MapUnit(String),
     /// All tags of the map are turned alike: the rotation, w, x, y, z, that follows each `quaternion_wxyz`.
     TagFrames([f64; 4]),
     /// These tags hang in one another's places.
@@ -85,6 +87,8 @@ const IMAGE_SCALES: [f64; 4] = [0.5, 2.0, 0.25, 4.0];
 const BEYOND_IMAGE: f64 = 1.03;
 /// A size within this of the stated one is not called wrong.
 const SIZE_TOLERANCE: f64 = 0.03;
+/// Units that a survey may be in, and how many make a metre.
+const UNITS: [(&str, f64); 4] = [("mm", 1e3), ("cm", 1e2), ("inches", 1.0 / 0.0254), ("feet", 1.0 / 0.3048)];
 /// Rotations of one landmark: spread that says nothing, and that of good ones, rad.
 const SPREAD_RAD: f64 = 0.5;
 const GOOD_SPREAD_RAD: f64 = 0.25;
@@ -171,6 +175,11 @@ fn by_pairs(views: &[&View], tags: &[SurveyedTag], robot: &Robot, as_written: &P
     }
     if as_written.mismatch > BAD {
         return Some(wrong((WrongInputKind::OtherMap, None)));
+    }
+    if let Some((name, _)) = UNITS.iter().find(|(_, per_m)| (as_written.ratio / per_m - 1.0).abs() < SIZE_TOLERANCE)
+        && as_written.mismatch < GOOD
+    {
+        return Some(wrong((WrongInputKind::MapUnit((*name).to_owned()), None)));
     }
     let is_of_size = (as_written.ratio - 1.0).abs() > SIZE_TOLERANCE && as_written.mismatch < GOOD;
     is_of_size.then(|| WrongInput {
@@ -405,6 +414,7 @@ impl Coded for WrongInput {
             WrongInputKind::LensModel => Code::InputLensModel,
             WrongInputKind::TagSize(_) => Code::InputTagSize,
             WrongInputKind::ExchangedIds(_) => Code::InputTagIds,
+            WrongInputKind::MapUnit(_) => Code::InputMapUnit,
             WrongInputKind::TagFrames(_) => Code::InputTagFrames,
             WrongInputKind::OtherMap => Code::InputTagMap,
         }
@@ -423,6 +433,7 @@ impl WrongInput {
     fn usual_remedy(&self) -> &'static str {
         match &self.input {
             WrongInputKind::TagFrames(_) => "",
+            WrongInputKind::MapUnit(_) => "write position_m and position_std_m of the tag map in metres",
             WrongInputKind::MapQuaternions => "write quaternion_wxyz of the tag map in the order w, x, y, z",
             WrongInputKind::RecordedQuaternions => {
                 "set the other one of quaternion_wxyz and quaternion_xyzw as \
@@ -494,6 +505,12 @@ impl fmt::Display for WrongInput {
             WrongInputKind::TagSize(ratio) => {
                 write!(f, "the size of all tags differs by {:+.1} % from the stated size", 100.0 * (ratio - 1.0))?;
                 self.size_hint.as_ref().map_or(Ok(()), |hint| write!(f, ", {hint}"))
+            }
+            WrongInputKind::MapUnit(unit) => {
+                write!(
+                    f,
+                    "the positions of the tag map are in {unit}, not in metres: so many of them are seen as one metre"
+                )
             }
             WrongInputKind::TagFrames(turn) => {
                 write!(f, "the frames of all tags are turned alike against the tag map, by {}: ", turn_in_words(turn))?;

@@ -141,6 +141,7 @@ codes! {
     JointZeros = "joint_zeros",
     JointTurns = "joint_turns",
     InputTagFrames = "input_tag_frames",
+    InputMapUnit = "input_map_unit",
     RepairTooLarge = "repair_too_large",
     LensContradicted = "lens_contradicted",
     GeometryContradicted = "geometry_contradicted",

@@ -72,6 +72,17 @@ fn tags_that_are_all_turned_alike_are_told_with_the_turn() {
 }
 
 #[test]
+fn a_survey_in_another_unit_is_told() {
+    let (data, robot) = sample();
+    for (unit, per_m) in UNITS {
+        let scaled = |_: usize, pose: &Isometry3<f64>| {
+            Isometry3::from_parts((pose.translation.vector * per_m).into(), pose.rotation)
+        };
+        assert_eq!(found(&data, &with_tags(&robot, scaled)), Some(WrongInputKind::MapUnit(unit.to_owned())));
+    }
+}
+
+#[test]
 fn a_map_of_other_tags_is_told() {
     let (data, robot) = sample();
     let n = robot.tags.len();
