@@ -20,7 +20,7 @@ pub enum Payload {
     Joints(ros::JointState),
     Tags(ros::AprilTagDetectionArray),
     Isaac(ros::IsaacDetectionArray),
-    Info(ros::CameraInfo),
+    Info(Box<ros::CameraInfo>),
     /// Written as if it were of this type.
     Named(&'static str, ros::AprilTagDetectionArray),
 }
@@ -54,7 +54,7 @@ impl Scene {
             let payload = match raw.topic() {
                 "/joint_states" => Payload::Joints(decode(raw.data).expect("joints")),
                 "/detections" => Payload::Tags(decode(raw.data).expect("tags")),
-                _ => Payload::Info(decode(raw.data).expect("a lens")),
+                _ => Payload::Info(Box::new(decode(raw.data).expect("a lens"))),
             };
             messages.push(Recorded { topic: raw.topic().to_owned(), log: raw.log_time(), payload });
         })
@@ -85,7 +85,7 @@ impl Scene {
             let detections = shot.tags.iter().map(|(id, corners_px)| detection(*id, corners_px)).collect();
             let tags = ros::AprilTagDetectionArray { header: header(log, LENS_FRAME), detections };
             let info = camera_info(&robot.camera.lens, LENS_FRAME);
-            let payloads = [Payload::Joints(joints), Payload::Tags(tags), Payload::Info(info)];
+            let payloads = [Payload::Joints(joints), Payload::Tags(tags), Payload::Info(Box::new(info))];
             for (topic, payload) in topics.iter().zip(payloads) {
                 messages.push(Recorded { topic: (*topic).to_owned(), log, payload });
             }
@@ -127,7 +127,7 @@ impl Scene {
 
     pub fn infos(&mut self) -> impl Iterator<Item = &mut ros::CameraInfo> {
         self.messages.iter_mut().filter_map(|message| match &mut message.payload {
-            Payload::Info(info) => Some(info),
+            Payload::Info(info) => Some(info.as_mut()),
             _ => None,
         })
     }
@@ -164,7 +164,7 @@ impl Scene {
                 Payload::Joints(joints) => writer.write_ros(topic, &ros::JointState::SCHEMA, *log, joints),
                 Payload::Tags(tags) => writer.write_ros(topic, &ros::AprilTagDetectionArray::SCHEMA, *log, tags),
                 Payload::Isaac(tags) => writer.write_ros(topic, &ros::IsaacDetectionArray::SCHEMA, *log, tags),
-                Payload::Info(info) => writer.write_ros(topic, &ros::CameraInfo::SCHEMA, *log, info),
+                Payload::Info(info) => writer.write_ros(topic, &ros::CameraInfo::SCHEMA, *log, info.as_ref()),
                 Payload::Named(name, tags) => {
                     let schema = RosSchema { name, text: ros::AprilTagDetectionArray::SCHEMA.text };
                     writer.write_ros(topic, &schema, *log, tags)

@@ -51,7 +51,7 @@ impl Roles {
         roles.time = names.iter().find(is_time).cloned();
         roles.id = names.iter().find(|name| IDS.contains(&last_part(name).as_str())).cloned();
         let mut places = triples(&names);
-        let rotations: Vec<Columns> = extracted(&mut places, |columns| is_rotation(columns));
+        let rotations: Vec<Columns> = extracted(&mut places, is_rotation);
         places.sort_by_key(|columns| seen_rank(&columns.stem));
         let mut places = places.into_iter();
         (roles.position, roles.other_positions) = (places.next(), places.collect());
