@@ -100,7 +100,8 @@ impl TaskFile {
                 JointKind::Prismatic => (joint, angle),
             });
             let in_degrees: Vec<(&ChainJoint, f64)> = in_degrees.collect();
-            if in_degrees.iter().all(|(joint, angle)| is_within(joint, *angle)) {
+            let has_turned = pose.iter().any(|angle| angle.abs() > std::f64::consts::TAU);
+            if has_turned && in_degrees.iter().all(|(joint, angle)| is_within(joint, *angle)) {
                 let angles: Vec<String> = in_degrees.iter().map(|(_, angle)| format!("{angle:.4}")).collect();
                 problem += &format!(". The pose looks like degrees; write it in rad: [{}]", angles.join(", "));
             } else {

@@ -21,9 +21,9 @@ use super::nominal::{BASE_TAG, Robot, STOWED, TAG_LINK, ToolSpec, check_stowed, 
 use super::self_collision::{self, Stored};
 use super::shape::{PlacedShape, Shape};
 use super::survey::{SurveyedTag, TagFile, check_tags};
-use super::urdf::{UrdfChain, UrdfModel};
+use super::urdf::{UrdfChain, UrdfModel, notes as urdf_notes};
 use super::urdf_mesh::{CollisionMeshes, MeshFolders};
-use super::urdf_notes;
+
 use crate::joints::JointAngles;
 use crate::kinematics::{ArmLoads, Attachment, JointKind};
 use crate::optics::TagFamily;

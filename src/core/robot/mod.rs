@@ -35,7 +35,6 @@ mod triangles;
 mod urdf;
 mod urdf_file;
 mod urdf_mesh;
-mod urdf_notes;
 mod vehicle;
 mod xml_tree;
 

@@ -14,6 +14,8 @@ use super::urdf_mesh::{MeshFolders, NamedMesh};
 use crate::joints::MAX_JOINTS;
 use crate::kinematics::{Attachment, Chain, ChainJoint, JointKind};
 
+pub(super) mod notes;
+
 /// Limit of an arm's collision shapes, so that planning places them without allocating.
 pub const MAX_COLLISION_SHAPES: usize = 64;
 /// Grey, for shapes without a material.

@@ -1,9 +1,9 @@
 //! Warnings about a URDF, and what planning lacks in it.
 
-use super::error::FileIssue;
-use super::urdf::{MAX_COLLISION_SHAPES, UrdfChain};
-use super::urdf_file::{Range, Skipped, UrdfJoint};
+use super::{MAX_COLLISION_SHAPES, UrdfChain};
 use crate::codes::{Code, Warning};
+use crate::robot::error::FileIssue;
+use crate::robot::urdf_file::{Range, Skipped, UrdfJoint};
 
 /// Links or joints that one warning names.
 const MAX_NAMED: usize = 8;
@@ -11,7 +11,7 @@ const MAX_NAMED: usize = 8;
 const MAX_WARNINGS: usize = 40;
 
 /// Returns one warning per problem, each with the links or joints that have it.
-pub(super) fn warnings(arm: &UrdfChain<'_>) -> Vec<Warning> {
+pub fn warnings(arm: &UrdfChain<'_>) -> Vec<Warning> {
     let mut groups: Vec<(&str, Vec<&Skipped>)> = Vec::new();
     let off_chain = defects_off_chain(arm);
     for skipped in arm.urdf.robot.skipped.iter().chain(&off_chain) {
@@ -50,7 +50,7 @@ fn defects_off_chain(arm: &UrdfChain<'_>) -> Vec<Skipped> {
 }
 
 /// Returns what planning needs of the URDF and cannot use.
-pub(super) fn planning_issues(arm: &UrdfChain<'_>) -> Vec<FileIssue> {
+pub fn planning_issues(arm: &UrdfChain<'_>) -> Vec<FileIssue> {
     let file = &arm.urdf.file;
     let mut issues = Vec::new();
     for joint in arm.chain.joints() {
