@@ -40,7 +40,7 @@ impl Case {
     /// The first code of a refusal, and the figures behind it.
     fn refused(&self, task: &str) -> Value {
         self.calibrate("run.mcap", task).expect("refused", 4, &[]);
-        self.summary()["calibration"]["refusals"][0].clone()
+        self.summary()["refusals"][0].clone()
     }
 
     fn accepted(&self) {
@@ -78,7 +78,7 @@ fn zeros_of_another_convention_are_named_with_both_explanations() {
     let zeros = refused["found"]["joints"].as_array().expect("joints");
     let names: Vec<&str> = zeros.iter().filter_map(|zero| zero["joint"].as_str()).collect();
     assert_eq!(names, ["lift", "elbow"]);
-    let codes: Vec<Value> = case.summary()["calibration"]["refusals"].as_array().expect("all").clone();
+    let codes: Vec<Value> = case.summary()["refusals"].as_array().expect("all").clone();
     assert!(codes.iter().any(|refusal| refusal["code"] == "repair_too_large"), "the links are the other explanation");
 }
 

@@ -258,8 +258,8 @@ fn warnings(file: &str, map: &TagMap, read: &RecordedViews, tags: &TagFile) -> (
     found.extend(map.warnings.iter().cloned());
     if map.noise_scale > NOISY {
         let text = format!(
-            "corner residuals are {:.1} times the stated corner noise ({:.2} px rms): check model and distortion of the \
-             lens, and the tag sizes",
+            "corner residuals are {:.1} times the stated corner noise ({:.2} px rms): check model and distortion of \
+             the lens, and the tag sizes",
             map.noise_scale, map.rms_px
         );
         found.push(Warning::new(Code::CornersNoisy, text));

@@ -389,13 +389,14 @@ impl Refusal {
             Self::MisreadReadings(misread) => misread.remedy().into(),
             Self::WrongInput(wrong) => wrong.remedy(),
             Self::SensorLine { joint, slope } if *slope > 0.0 => format!(
-                "correct the scale of {joint}: scale_counts_per_deg in robot.toml times {:.4}, or the unit of its readings",
+                "correct the scale of {joint}: multiply scale_counts_per_deg in robot.toml by {:.4}, or correct the \
+                 unit of its readings",
                 1.0 / slope
             )
             .into(),
             Self::Lens { focal_px: [x, y], .. } => format!(
-                "measure the intrinsics in the water or air that the arm works in; these views show focal_px = [{x:.1}, \
-                 {y:.1}] for [camera] of robot.toml"
+                "measure the intrinsics in the water or air that the arm works in; these views show focal_px = \
+                 [{x:.1}, {y:.1}] for [camera] of robot.toml"
             )
             .into(),
             _ => self.usual_remedy().into(),

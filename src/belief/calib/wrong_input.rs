@@ -459,6 +459,40 @@ impl WrongInput {
     }
 }
 
+impl WrongInput {
+    /// Causes in the tag map.
+    fn fmt_of_map(&self, f: &mut fmt::Formatter<'_>, of_pairs: &str) -> fmt::Result {
+        match &self.input {
+            WrongInputKind::TagSize(ratio) => {
+                write!(f, "the size of all tags differs by {:+.1} % from the stated size", 100.0 * (ratio - 1.0))?;
+                self.size_hint.as_ref().map_or(Ok(()), |hint| write!(f, ", {hint}"))
+            }
+            WrongInputKind::MapUnit(unit) => {
+                write!(
+                    f,
+                    "the positions of the tag map are in {unit}, not in metres: so many of them are seen as one metre"
+                )
+            }
+            WrongInputKind::TagFrames(turn) => {
+                write!(f, "the frames of all tags are turned alike against the tag map, by {}: ", turn_in_words(turn))?;
+                write!(f, "turned so, the tags of a view fit each other within {of_pairs}")
+            }
+            WrongInputKind::ExchangedIds(ids) => {
+                let ids: Vec<String> = ids.iter().map(ToString::to_string).collect();
+                write!(f, "the tag map has the ids {} exchanged: corrected, ", ids.join(", "))?;
+                write!(f, "the tags of a view fit each other within {of_pairs}")
+            }
+            WrongInputKind::OtherMap => write!(
+                f,
+                "the tags are not placed as the tag map says: within one view they differ by {} of their distances, \
+                 regardless of the arm",
+                format_args!("{:.0} %", 100.0 * self.mismatch)
+            ),
+            _ => Ok(()),
+        }
+    }
+}
+
 /// The cause and its evidence.
 impl fmt::Display for WrongInput {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -502,31 +536,7 @@ impl fmt::Display for WrongInput {
                 )?;
                 write!(f, "the tags of a view fit each other within {of_pairs}")
             }
-            WrongInputKind::TagSize(ratio) => {
-                write!(f, "the size of all tags differs by {:+.1} % from the stated size", 100.0 * (ratio - 1.0))?;
-                self.size_hint.as_ref().map_or(Ok(()), |hint| write!(f, ", {hint}"))
-            }
-            WrongInputKind::MapUnit(unit) => {
-                write!(
-                    f,
-                    "the positions of the tag map are in {unit}, not in metres: so many of them are seen as one metre"
-                )
-            }
-            WrongInputKind::TagFrames(turn) => {
-                write!(f, "the frames of all tags are turned alike against the tag map, by {}: ", turn_in_words(turn))?;
-                write!(f, "turned so, the tags of a view fit each other within {of_pairs}")
-            }
-            WrongInputKind::ExchangedIds(ids) => {
-                let ids: Vec<String> = ids.iter().map(ToString::to_string).collect();
-                write!(f, "the tag map has the ids {} exchanged: corrected, ", ids.join(", "))?;
-                write!(f, "the tags of a view fit each other within {of_pairs}")
-            }
-            WrongInputKind::OtherMap => write!(
-                f,
-                "the tags are not placed as the tag map says: within one view they differ by {} of their distances, \
-                 regardless of the arm",
-                percent(self.mismatch)
-            ),
+            _ => self.fmt_of_map(f, &of_pairs),
         }
     }
 }

@@ -200,14 +200,14 @@ impl ReadingSearch<'_> {
             return None;
         }
         let mut axis: Vector3<f64> = joints[a].axis.into_inner();
-        for k in a + 1..=b {
-            axis = joints[k].parent_from_joint.rotation.inverse() * axis;
-            let cosine = axis.dot(&joints[k].axis);
+        for joint in &joints[a + 1..=b] {
+            axis = joint.parent_from_joint.rotation.inverse() * axis;
+            let cosine = axis.dot(&joint.axis);
             let is_parallel = cosine.abs().min(1.0).acos() < PARALLEL_RAD;
             if !is_parallel {
                 return None;
             }
-            axis = joints[k].axis.into_inner() * cosine.signum();
+            axis = joint.axis.into_inner() * cosine.signum();
         }
         Some(axis.dot(&joints[b].axis).signum())
     }

@@ -109,7 +109,7 @@ fn measured() -> Vec<Refusal> {
         misread(ReadingError::Exchanged { joints: ["shoulder".to_owned(), joint()] }),
         misread(ReadingError::Reversed { joints: vec!["shoulder".to_owned(), joint()] }),
         misread(ReadingError::Coupled { joint: joint(), with: "shoulder".to_owned(), sign: -1.0 }),
-        misread(ReadingError::OtherTurns { joints: vec![joint()], wrap_counts: 6.283_185 }),
+        misread(ReadingError::OtherTurns { joints: vec![joint()], wrap_counts: 16_560.0 }),
         misread(ReadingError::Zeros {
             joints: vec![JointZero { joint: joint(), off_rad: 1.57, moves: JointKind::Revolute, offset_counts: -1.57 }],
         }),

@@ -29,14 +29,12 @@ impl Refusal {
     /// Cause and evidence.
     pub(super) fn fmt_cause(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::Lens { .. } | Self::RepairTooLarge { .. } | Self::BeyondDatasheet { .. } => self.fmt_of_size(f),
             Self::WrongInput(_)
             | Self::MisreadReadings(_)
-            | Self::Lens { .. }
             | Self::Geometry(_)
-            | Self::RepairTooLarge { .. }
             | Self::SensorUnit { .. }
             | Self::SensorError { .. }
-            | Self::BeyondDatasheet { .. }
             | Self::Nonlinearity { .. }
             | Self::SensorLine { .. }
             | Self::TooFewViewsSinceSlip { .. }
@@ -196,12 +194,9 @@ impl Refusal {
         }
     }
 
-    /// Causes in the arm or in its files.
-    fn fmt_of_arm(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    /// Estimates that differ from their stated sizes by more than is repaired.
+    fn fmt_of_size(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::WrongInput(wrong) => write!(f, "{wrong}"),
-            Self::MisreadReadings(misread) => write!(f, "{misread}"),
-            Self::Geometry(geometry) => write!(f, "{geometry}"),
             Self::Lens { ratio, std, stated_std, most_sigmas, .. } => {
                 let [std, stated] = [std, stated_std].map(|share| 100.0 * share);
                 write!(
@@ -219,11 +214,6 @@ impl Refusal {
                     _ => Ok(()),
                 }
             }
-            Self::SensorUnit { joint, gain, moves } => {
-                let [small, large] = if moves.is_slide() { ["mm", "m"] } else { ["deg", "rad"] };
-                let [found, stated] = if *gain < 1.0 { [small, large] } else { [large, small] };
-                write!(f, "the readings of {joint} are in {found}, not in {stated}: {:.4} times its motion", 1.0 / gain)
-            }
             Self::RepairTooLarge { element, size, unit, stated_std, most_sigmas, length_m } => {
                 let sigmas = size / stated_std;
                 let [size, std] = [size, stated_std].map(|value| unit.in_words(*value));
@@ -233,13 +223,6 @@ impl Refusal {
                     None => write!(f, ", at most {most_sigmas:.0} are repaired"),
                 }
             }
-            Self::SensorError { joint, std_rad, datasheet_std_rad, moves } => write!(
-                f,
-                "{joint} varies by {} between views; its datasheet linearity is {}: a slipping sensor or wrong link \
-                 geometry",
-                moves.unit().shown(*std_rad, 2),
-                moves.unit().shown(*datasheet_std_rad, 2)
-            ),
             Self::BeyondDatasheet { parameter, sigmas, off, unit } => {
                 let [off, std] = [*off, off.abs() / sigmas].map(|value| unit.in_words(value));
                 write!(
@@ -248,6 +231,28 @@ impl Refusal {
                      another sensor is installed"
                 )
             }
+            _ => Ok(()),
+        }
+    }
+
+    /// Causes in the arm or in its files.
+    fn fmt_of_arm(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::WrongInput(wrong) => write!(f, "{wrong}"),
+            Self::MisreadReadings(misread) => write!(f, "{misread}"),
+            Self::Geometry(geometry) => write!(f, "{geometry}"),
+            Self::SensorUnit { joint, gain, moves } => {
+                let [small, large] = if moves.is_slide() { ["mm", "m"] } else { ["deg", "rad"] };
+                let [found, stated] = if *gain < 1.0 { [small, large] } else { [large, small] };
+                write!(f, "the readings of {joint} are in {found}, not in {stated}: {:.4} times its motion", 1.0 / gain)
+            }
+            Self::SensorError { joint, std_rad, datasheet_std_rad, moves } => write!(
+                f,
+                "{joint} varies by {} between views; its datasheet linearity is {}: a slipping sensor or wrong link \
+                 geometry",
+                moves.unit().shown(*std_rad, 2),
+                moves.unit().shown(*datasheet_std_rad, 2)
+            ),
             Self::Nonlinearity { joint, std_rad, datasheet_std_rad, moves } => write!(
                 f,
                 "the nonlinearity of {joint} is {}, {:.1} times the {} of its datasheet",

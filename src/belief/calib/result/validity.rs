@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use crate::calib::result::calibration::{Calibration, JointResult};
 use crate::calib::result::valid_range::{ordered, past};
-use armcal_core::robot::Robot;
+use armcal_core::robot::{FailedKind, Robot};
 use armcal_core::sensor::Conditions;
 use armcal_core::streams::JointAngles;
 
@@ -42,9 +42,9 @@ impl Calibration {
     }
 }
 
-/// Excess over the captured range, in widths of that range, from which a target is not judged: a sensor's curve is
-/// known only where it was seen. Assumed.
-const MAX_EXTRAPOLATION: f64 = 0.5;
+/// Excess over the captured range, in widths of that range, from which a target is not judged: U95 includes the stated
+/// linearity of a sensor beyond the views, and in good arms up to 0.96 widths occur. Assumed.
+const MAX_EXTRAPOLATION: f64 = 1.0;
 /// A joint that moves the tool by less than this matters to no target, m/rad; slides always do. Assumed.
 const MIN_LEVER_M: f64 = 0.01;
 
@@ -81,10 +81,18 @@ impl<'a> Extrapolation<'a> {
         self.calibration.joint.iter().enumerate().filter(|(_, j)| j.gain_estimated || j.offset_estimated)
     }
 
-    /// Numbers, from 1, of the targets that are too far beyond the range of a joint to be judged.
+    /// Numbers, from 1, of the targets that are too far beyond the range of a joint to be judged. An earlier
+    /// calibration knows more of the range than these views, and a joint that is held needs none.
     pub(crate) fn not_judged(&self) -> Vec<usize> {
         let mut numbers = BTreeSet::new();
-        for (joint, result) in self.joints() {
+        if self.calibration.prior.is_some() {
+            return Vec::new();
+        }
+        let is_held = |name: &str| {
+            let mut failed = self.calibration.failed_joint.iter();
+            failed.any(|failed| failed.joint == name && failed.kind != FailedKind::NotMoved)
+        };
+        for (joint, result) in self.joints().filter(|(_, result)| !is_held(&result.name)) {
             let [low, high] = ordered(result.covered_rad);
             let far = self.beyond(joint).into_iter().filter(|(_, by)| *by > MAX_EXTRAPOLATION * (high - low));
             numbers.extend(far.map(|(index, _)| index as usize + 1));
