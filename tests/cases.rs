@@ -161,3 +161,9 @@ fn targets_out_of_reach_refuse_by_their_numbers() {
         );
     }
 }
+
+#[test]
+fn poses_of_a_task_in_degrees_are_named_before_anything_is_calibrated() {
+    let case = Case::new("targets_out_of_reach");
+    case.calibrate("run.mcap", "poses-in-degrees.toml").expect("refused", 2, &["poses_rad[0]", "[joint_limit]"]);
+}

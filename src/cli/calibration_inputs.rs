@@ -155,7 +155,12 @@ impl CalibrationInputs<'_> {
     }
 
     fn task(&self) -> Result<Option<ReachTask>> {
-        self.task.map(|file| Ok(read_task(file)?.for_robot(file, self.robot)?)).transpose()
+        let read = |file: &Path| {
+            let task = read_task(file)?;
+            task.check_poses(file, self.robot)?;
+            Ok(task.for_robot(file, self.robot)?)
+        };
+        self.task.map(read).transpose()
     }
 
     /// Feeds the recordings to a belief, message by message; `hear` is told after each of them. Returns whether a
