@@ -58,6 +58,8 @@ pub enum WrongInputKind {
     },
     /// The lens is that of an image of so many times the recorded one's size.
     ImageScale(f64),
+    /// The lens has so many times its stated focal length.
+    FocalLength(f64),
     /// The lens is of the other model: a fisheye called a pinhole, or the other way round.
     LensModel,
     /// All tags are of so many times their stated size.
@@ -89,6 +91,9 @@ const BEYOND_IMAGE: f64 = 1.03;
 const SIZE_TOLERANCE: f64 = 0.03;
 /// Units that a survey may be in, and how many make a metre.
 const UNITS: [(&str, f64); 4] = [("mm", 1e3), ("cm", 1e2), ("inches", 1.0 / 0.0254), ("feet", 1.0 / 0.3048)];
+/// Focal lengths that are tried, over robot.toml's: so many steps of a logarithm up and down, to 0.5 and 2.
+const FOCAL_STEP: f64 = 0.02;
+const FOCAL_STEPS: i32 = 35;
 /// Rotations of one landmark: spread that says nothing, and that of good ones, rad.
 const SPREAD_RAD: f64 = 0.5;
 const GOOD_SPREAD_RAD: f64 = 0.25;
@@ -155,6 +160,10 @@ fn by_pairs(views: &[&View], tags: &[SurveyedTag], robot: &Robot, as_written: &P
         consider(WrongInputKind::ImageScale(scale), mismatch(views, tags, &scaled(lens, 1.0 / scale)));
     }
     consider(WrongInputKind::LensModel, mismatch(views, tags, &of_other_model(lens)));
+    let steps = (-FOCAL_STEPS..=FOCAL_STEPS).map(|k| (f64::from(k) * FOCAL_STEP).exp());
+    for ratio in steps.filter(|ratio| (ratio - 1.0).abs() > SIZE_TOLERANCE) {
+        consider(WrongInputKind::FocalLength(ratio), mismatch(views, tags, &of_focal_length(lens, ratio)));
+    }
     for turn in quarter_turns() {
         let turned: Vec<SurveyedTag> = tags.iter().map(|tag| turned_by(tag, &turn)).collect();
         let [x, y, z] = [turn.i, turn.j, turn.k];
@@ -193,6 +202,25 @@ fn scaled(lens: &CameraModel, scale: f64) -> CameraModel {
     let [fx, fy, cx, cy, k @ ..] = lens.intrinsics();
     let [a, b, c, d] = k;
     lens.with_intrinsics([fx * scale, fy * scale, cx * scale, cy * scale, a, b, c, d])
+}
+
+/// The lens with `ratio` times its focal length.
+fn of_focal_length(lens: &CameraModel, ratio: f64) -> CameraModel {
+    let [fx, fy, rest @ ..] = lens.intrinsics();
+    let [cx, cy, a, b, c, d] = rest;
+    lens.with_intrinsics([fx * ratio, fy * ratio, cx, cy, a, b, c, d])
+}
+
+/// In what medium a lens shows a focal length of `ratio` times the stated one: sea water has the refractive index 1.34,
+/// by which a flat window in front of the lens multiplies the focal length (Treibitz et al. 2012).
+pub(crate) fn medium_of_lens(ratio: f64) -> &'static str {
+    const WATER: f64 = 1.34;
+    const NEAR: f64 = 0.04;
+    match ratio {
+        r if (r / WATER - 1.0).abs() < NEAR => ". A lens of air shows this factor in water",
+        r if (r * WATER - 1.0).abs() < NEAR => ". A lens of water shows this factor in air",
+        _ => "",
+    }
 }
 
 /// A lens of the same focal length and centre, without distortion: a fisheye for a pinhole, and the other way round.
@@ -412,6 +440,7 @@ impl Coded for WrongInput {
             WrongInputKind::RecordedDirection => Code::InputDirection,
             WrongInputKind::ImageSize { .. } | WrongInputKind::ImageScale(_) => Code::InputImageSize,
             WrongInputKind::LensModel => Code::InputLensModel,
+            WrongInputKind::FocalLength(_) => Code::LensContradicted,
             WrongInputKind::TagSize(_) => Code::InputTagSize,
             WrongInputKind::ExchangedIds(_) => Code::InputTagIds,
             WrongInputKind::MapUnit(_) => Code::InputMapUnit,
@@ -445,6 +474,9 @@ impl WrongInput {
             WrongInputKind::ImageSize { .. } | WrongInputKind::ImageScale(_) => {
                 "state the lens of the recorded image size in [camera] of robot.toml, or record images of the size \
                  that it was measured for"
+            }
+            WrongInputKind::FocalLength(_) => {
+                "measure the intrinsics in the water or air that the arm works in, and state them in [camera] of robot.toml"
             }
             WrongInputKind::LensModel => "state the model and the distortion of that lens in [camera] of robot.toml",
             WrongInputKind::TagSize(_) => {
@@ -528,6 +560,10 @@ impl fmt::Display for WrongInput {
             WrongInputKind::ImageScale(scale) => {
                 write!(f, "the lens of robot.toml belongs to an image {scale} times the size of the recorded image: ")?;
                 write!(f, "scaled, the tags of a view fit each other within {of_pairs}")
+            }
+            WrongInputKind::FocalLength(ratio) => {
+                write!(f, "the lens is not that of robot.toml: with {ratio:.2} times its focal length ")?;
+                write!(f, "the tags of a view fit each other within {of_pairs}{}", medium_of_lens(*ratio))
             }
             WrongInputKind::LensModel => {
                 write!(

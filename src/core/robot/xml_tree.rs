@@ -276,9 +276,10 @@ mod tests {
     #[test]
     fn deep_elements_are_refused_before_they_are_parsed() {
         assert!(parse(&nested(MAX_DEPTH - 1)).is_ok());
-        for deep in [nested(MAX_DEPTH), nested(15_000), "<a>".repeat(1_000_000)] {
+        for deep in [nested(MAX_DEPTH), nested(15_000)] {
             insta::assert_snapshot!("deep", told(&deep));
         }
+        insta::assert_snapshot!("deep_without_end", told(&"<a>".repeat(1_000_000)));
     }
 
     #[test]

@@ -4,11 +4,7 @@ use std::fmt;
 
 use crate::calib::baseline_comparison::SIGNIFICANCE;
 use crate::calib::refusal::{HeldOutLimitSource, MIN_USED_SHARE, Refusal};
-
-/// Refractive index of sea water, by which a flat window in front of the lens multiplies the focal length (Treibitz et
-/// al. 2012), and how near to it a ratio is taken for it.
-const WATER: f64 = 1.34;
-const NEAR_WATER: f64 = 0.04;
+use crate::calib::wrong_input::medium_of_lens;
 
 /// A refusal without its remedy.
 struct Cause<'a>(&'a Refusal);
@@ -204,15 +200,7 @@ impl Refusal {
                     "the lens is not that of robot.toml: its focal length is {ratio:.3} times the stated one (sigma "
                 )?;
                 write!(f, "{std:.2} %; stated sigma {stated:.1} %, at most {most_sigmas:.0} of these are repaired)")?;
-                match ratio {
-                    r if (r / WATER - 1.0).abs() < NEAR_WATER => {
-                        write!(f, ". A lens of air shows this factor in water")
-                    }
-                    r if (r * WATER - 1.0).abs() < NEAR_WATER => {
-                        write!(f, ". A lens of water shows this factor in air")
-                    }
-                    _ => Ok(()),
-                }
+                f.write_str(medium_of_lens(*ratio))
             }
             Self::RepairTooLarge { element, size, unit, stated_std, most_sigmas, length_m } => {
                 let sigmas = size / stated_std;
