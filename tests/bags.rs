@@ -141,18 +141,3 @@ fn the_conversion_that_ros_1_bags_are_refused_with_gives_their_messages() {
     let tags: ros::TfMessage = decode(&converted[3].3).expect("transforms");
     assert_eq!(tags.transforms[0].transform.translation.y, 0.02);
 }
-
-/// Runs the conversion where rosbags is installed.
-#[test]
-#[ignore = "needs target/oracle: tests/oracle/README.md"]
-fn the_conversion_runs_where_rosbags_is_installed() {
-    let (folder, golden) = (temp(), root().join("tests/golden/bag"));
-    let command = read(&golden.join("ros1.txt"));
-    std::fs::copy(golden.join("ros1.bag"), folder.path().join("IN.bag")).expect("copied");
-    let mut words = command.split_whitespace();
-    let converter = root().join("target/oracle/bin").join(words.next().expect("a program"));
-    let status = std::process::Command::new(converter).args(words).current_dir(folder.path()).status();
-    assert!(status.expect("rosbags is installed").success());
-    let found = messages(&folder.path().join("OUT/OUT.mcap"));
-    assert!(found == messages(&golden.join("ros1.mcap")));
-}
