@@ -476,7 +476,8 @@ impl WrongInput {
                  that it was measured for"
             }
             WrongInputKind::FocalLength(_) => {
-                "measure the intrinsics in the water or air that the arm works in, and state them in [camera] of robot.toml"
+                "measure the intrinsics in the water or air that the arm works in, and state them in [camera] of \
+                 robot.toml"
             }
             WrongInputKind::LensModel => "state the model and the distortion of that lens in [camera] of robot.toml",
             WrongInputKind::TagSize(_) => {
