@@ -85,7 +85,7 @@ fn a_joint_twice_with_two_positions_is_refused_or_left_out() {
     arm.joints().skip(3).step_by(10).for_each(|(_, joints)| again(joints, 0, 90.0));
     let words = ["ACCEPTED", ": 4 joint", TITAN[0], "`shoulder_yaw`", "message 4"];
     arm.calibrate().expect("four of them", 3, &words);
-    // The same number twice is one number, and joints that nobody needs may have any.
+    // Equal values are no contradiction; joints outside the arm are not checked.
     let mut arm = kraft(49);
     arm.joints().for_each(|(_, joints)| again(joints, 1, 0.0));
     arm.joints().for_each(|(_, joints)| joints.name.extend(["lamp", "lamp"].map(str::to_owned)));

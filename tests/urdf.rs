@@ -14,7 +14,7 @@ use crate::support::{Answer, answer, program, temp, write};
 struct Parts {
     base: String,
     tool: String,
-    /// Of the second joint.
+    /// Readings of the second joint.
     kind: String,
     origin: String,
     axis: String,
@@ -247,7 +247,7 @@ fn limits_beyond_any_joint_mean_none() {
         assert!(robot.chain.joints()[1].limits.is_none());
         assert!(robot.planning_issues.iter().all(|issue| !issue.key.contains("j2")), "it may turn on");
     }
-    // Of several turns.
+    // Limits of several turns.
     for limits in ["-6.2831853,6.2831853", "-12.566,12.566", "-18.85,18.85", "0,25.1"] {
         let mut parts = Parts::default();
         edit(&mut parts, limits);

@@ -56,8 +56,9 @@ def positions(data):
     return names, at, struct.unpack_from(f"<{n}d", data, at)
 
 
-def rewrite(source, target, change):
-    with open(source, "rb") as old, open(target, "wb") as new:
+def rewrite(target, topic, change):
+    """The case's recording with the bytes of each message on `topic` changed."""
+    with open(CASE / "run.mcap", "rb") as old, open(target, "wb") as new:
         writer, schemas, channels = Writer(new), {}, {}
         writer.start(profile="ros2")
         for schema, channel, message in make_reader(old).iter_messages():
@@ -65,13 +66,22 @@ def rewrite(source, target, change):
                 schemas[schema.id] = writer.register_schema(schema.name, schema.encoding, schema.data)
             if channel.id not in channels:
                 channels[channel.id] = writer.register_channel(channel.topic, channel.message_encoding, schemas[schema.id], channel.metadata)
-            data = message.data
-            if channel.topic == "/joint_states":
-                names, at, read = positions(data)
-                changed = change(dict(zip(names, read)))
-                data = data[:at] + struct.pack(f"<{len(read)}d", *[changed[name] for name in names]) + data[at + 8 * len(read):]
+            data = change(message.data) if channel.topic == topic else message.data
             writer.add_message(channels[channel.id], message.log_time, data, message.publish_time)
         writer.finish()
+
+
+def with_readings(data, change):
+    names, at, read = positions(data)
+    changed = change(dict(zip(names, read)))
+    return data[:at] + struct.pack(f"<{len(read)}d", *[changed[name] for name in names]) + data[at + 8 * len(read):]
+
+
+def with_focal_length(data, k):
+    """A camera_info with `k` times its focal length: the largest number that K and P repeat."""
+    numbers = [struct.unpack_from("<d", data, at)[0] for at in range(4, len(data) - 7)]
+    focal = max(value for value in numbers if 300 < value < 3000 and numbers.count(value) >= 2)
+    return data.replace(struct.pack("<d", focal), struct.pack("<d", k * focal))
 
 
 def turn(axis, angle):
@@ -102,7 +112,7 @@ def calibrate(armcal, folder, change=None, task=None):
     poses = [[0.3, 0.4, 0.4, 0.2, 0.5, 0.1], [-0.3, 0.6, 0.3, -0.4, 0.4, -0.5]]
     (folder / "task.toml").write_text(task or f"version = 1\ntolerance_m = {TOLERANCE_M}\nposes_rad = {poses}\n")
     if callable(change):
-        rewrite(CASE / "run.mcap", folder / "run.mcap", change)
+        rewrite(folder / "run.mcap", "/joint_states", lambda data: with_readings(data, change))
     words = [armcal, "calibrate", "run.mcap", "--robot", "robot", "--input", "input.toml", "--tag-map", "tags.toml", "--task", "task.toml",
              "--out", "out"]
     return lambda: subprocess.run(words, cwd=folder, capture_output=True, text=True)
@@ -130,26 +140,6 @@ def cases():
     for joint in JOINTS:
         yield f"{joint} of other sign", lambda q, j=joint: {**q, j: -q[j]}, {"sensor_line"}
     yield "0 to 360 deg", lambda q: {name: value % (2 * math.pi) for name, value in q.items()}, {"joint_turns"}
-
-
-def scale_focal(source, target, k):
-    """The recording with its camera_info's focal lengths times `k`."""
-    with open(source, "rb") as old, open(target, "wb") as new:
-        writer, schemas, channels = Writer(new), {}, {}
-        writer.start(profile="ros2")
-        for schema, channel, message in make_reader(old).iter_messages():
-            if schema.id not in schemas:
-                schemas[schema.id] = writer.register_schema(schema.name, schema.encoding, schema.data)
-            if channel.id not in channels:
-                channels[channel.id] = writer.register_channel(channel.topic, channel.message_encoding, schemas[schema.id], channel.metadata)
-            data = message.data
-            if channel.topic == "/camera_info":
-                # Each focal length of K and P is the largest repeated number of the message.
-                numbers = [struct.unpack_from("<d", data, at)[0] for at in range(4, len(data) - 7)]
-                focal = max(value for value in numbers if 300 < value < 3000 and numbers.count(value) >= 2)
-                data = data.replace(struct.pack("<d", focal), struct.pack("<d", k * focal))
-            writer.add_message(channels[channel.id], message.log_time, data, message.publish_time)
-        writer.finish()
 
 
 def judge(folder, done, plain, change):
@@ -191,7 +181,7 @@ def main(armcal, out=None):
         for k in FOCAL:
             kind = f"focal length times {k:.4g}"
             run = calibrate(armcal, folder)
-            scale_focal(CASE / "run.mcap", folder / "run.mcap", k)
+            rewrite(folder / "run.mcap", "/camera_info", lambda data, k=k: with_focal_length(data, k))
             row(kind, run(), None, {"lens_contradicted", "input_image_size", "lens"})
         for kind, xyz, names in [("a target 5 m away", [5.0, 0.0, 0.5], {"targets_not_judged"}), ("a target in reach", [0.7, 0.1, 0.8], set())]:
             row(kind, calibrate(armcal, folder, task=f"version = 1\ntolerance_m = {TOLERANCE_M}\ntargets_m = [{xyz}]\n")(), None, names)

@@ -246,7 +246,7 @@ fn a_wrong_urdf_is_refused_with_file_and_joint_or_link() {
     }
 }
 
-/// What calibration does not use refuses a run and not the robot folder.
+/// Values that only a run uses refuse the run, not the robot folder.
 const URDF_OF_A_RUN: &[Spoilt] = &[
     ("lower=\"-3.6296\"", "lower=\"3.6296\"", &["titan4.urdf", "shoulder_yaw", "limit"]),
     ("mass value=\"18.709626\"", "mass value=\"nan\"", &["titan4.urdf", "forearm_link", "mass"]),

@@ -38,7 +38,7 @@ pub struct Scene {
     pub robot: PathBuf,
     tag_map: Option<PathBuf>,
     pub messages: Vec<Recorded>,
-    /// Of joints, tags and lens.
+    /// Topics of joints, tags and lens.
     pub topics: [String; 3],
 }
 
@@ -93,7 +93,7 @@ impl Scene {
         Self { folder: temp(), robot: folder, tag_map: None, messages, topics: topics.map(str::to_owned) }
     }
 
-    /// The same with a copy of the robot that lacks its lens.
+    /// Calibrates with a copy of the robot that lacks its lens.
     pub fn without_lens(mut self) -> Self {
         let copy = self.folder.path().join("robot");
         std::fs::create_dir(&copy).expect("a folder");
@@ -233,7 +233,7 @@ pub fn camera_info(lens: &CameraModel, frame: &str) -> ros::CameraInfo {
     }
 }
 
-/// The same tags in the type of NVIDIA's package.
+/// Detections in the type of NVIDIA's package.
 pub fn isaac(tags: ros::AprilTagDetectionArray) -> Payload {
     let point = |pixel: ros::PixelPoint| ros::Point { x: pixel.x, y: pixel.y, z: 0.0 };
     let detection = |tag: ros::AprilTagDetection| ros::IsaacDetection {

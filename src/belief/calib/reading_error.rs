@@ -68,7 +68,7 @@ pub struct MisreadReadings {
     pub alternatives: Vec<ReadingError>,
     /// Root mean square distance between predicted and surveyed tags, by the datasheet and the readings as they are, m.
     pub tag_error_m: f64,
-    /// The same with the readings corrected and calibrated, m; absent where the readings themselves show the error.
+    /// That distance with the readings corrected and calibrated, m; absent where no tag was predicted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub corrected_m: Option<f64>,
 }

@@ -103,7 +103,7 @@ pub enum Refusal {
     TargetsNotCovered {
         /// Their numbers, from 1.
         targets: Vec<usize>,
-        /// How far beyond which joint's range, in words.
+        /// Each joint concerned, its captured range and the excess, in words.
         ranges: Vec<String>,
     },
     /// Held-out positions or poses are off by more than their stated noise explains, or than may be without one.

@@ -220,7 +220,7 @@ impl<'a> BundleCalibration<'a> {
             EstimatePurpose::Interim => &[],
         };
         let estimated = estimated.with_touches(touches, &self.data.robot);
-        self.as_read.clone_from(&views);
+        self.as_read = views;
         self.finish(estimated)
     }
 

@@ -73,9 +73,9 @@ pub(crate) struct ReadingSearch<'a> {
     pub robot: &'a Robot,
     /// As they were read.
     pub views: &'a [View],
-    /// What was found to have failed, against which reading errors have to hold.
+    /// Failed sensors as detected: the alternative that a reading error must beat.
     pub failures: &'a [Failure],
-    /// Repaired geometry, against which they have to hold, too.
+    /// Repaired geometry, another alternative.
     pub drawing: &'a Drawing,
 }
 

@@ -52,7 +52,7 @@ const MIN_LEVER_M: f64 = 0.01;
 pub(crate) struct Extrapolation<'a> {
     calibration: &'a Calibration,
     postures: &'a [(u32, JointAngles)],
-    /// Of each posture, whether each joint moves the tool.
+    /// True for each joint that moves the tool at that posture.
     matters: Vec<Vec<bool>>,
 }
 

@@ -19,14 +19,14 @@ const KNOWN: [&str; 10] =
 /// Largest effort, N m or N.
 const MAX_EFFORT: f64 = 1e7;
 
-/// What a joint lets move.
+/// Kind of motion that a joint allows.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum JointType {
     Fixed,
     Revolute,
     Continuous,
     Prismatic,
-    /// Of more than one degree of freedom, or a word that URDF does not have.
+    /// More than one degree of freedom, or an unknown type.
     Other(String),
 }
 
@@ -44,7 +44,7 @@ pub struct Defect {
 #[derive(Clone, Debug)]
 pub enum Range {
     Limits(JointLimits),
-    /// By the joint's type.
+    /// Motion by the joint's type.
     Endless,
     /// Limits that are farther apart than those of any joint: lower and upper.
     Unlimited([f64; 2]),

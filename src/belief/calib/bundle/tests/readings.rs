@@ -20,7 +20,7 @@ fn changed(case: &mut Case, change: impl Fn(&Robot, &JointAngles, &mut JointAngl
     }
 }
 
-/// What joint `a` reads of an angle of joint `b` in counts of its own.
+/// Angle that joint `a` reads where its input gets the counts of joint `b`.
 fn counts_as(robot: &Robot, a: usize, b: usize, angle_rad: f64) -> f64 {
     let (own, other) = (&robot.sensors[a], &robot.sensors[b]);
     (other.offset_counts + other.counts_per_rad * angle_rad - own.offset_counts) / own.counts_per_rad
