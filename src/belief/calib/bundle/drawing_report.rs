@@ -1,8 +1,9 @@
 //! What an estimate found of the drawing: links, base, camera mount and lens that are not as drawn.
 //!
-//! An element counts whose estimate z is many sigmas of the drawing's prior from it, and which its own covariance C
-//! does not explain: `z^T C^-1 z` is large. Were the drawing kept, the sensors' parameters x would follow the
-//! posterior's covariance, `dx = C_xz C_zz^-1 z`, and the tool would be off by what both move it together.
+//! An element counts whose estimate z neither its stated size S nor its own covariance C explains: where it is as
+//! large as stated, z has the covariance S + C, and `z^T (S + C)^-1 z` is that of three axes. Were the drawing kept, the
+//! sensors' parameters x would follow the posterior's covariance, `dx = C_xz C_zz^-1 z`, and the tool would be off by
+//! what both move it together.
 
 use nalgebra::{DVector, Matrix3, Vector3};
 
@@ -20,8 +21,8 @@ use armcal_core::joints::JointAngles;
 use armcal_core::robot::Robot;
 use armcal_core::spatial::log;
 
-/// Sigmas, of the stated size and of the estimate alike, from which an element is named: three axes together exceed
-/// four as seldom (0.1 %) as one axis 3.3.
+/// Sigmas, of stated size and estimate together, from which an element is named: three axes together exceed four as
+/// seldom (0.1 %) as one axis 3.3.
 const NAMED_SIGMAS: f64 = 4.0;
 /// A repair may be this many stated sigmas and no longer than the link itself: beyond, something else is wrong.
 const MAX_REPAIR_SIGMAS: f64 = 10.0;
@@ -44,9 +45,9 @@ struct Departure {
     size: Vector3<f64>,
     /// Along the size, by the posterior.
     std: f64,
-    /// Over the posterior's covariance.
-    sure_sigmas: f64,
-    /// Over the drawing's prior.
+    /// Over stated size and posterior's covariance together.
+    weight: f64,
+    /// Over the stated size.
     sigmas: f64,
     tool_m: Option<f64>,
     /// Length of the link, m.
@@ -60,8 +61,8 @@ impl Estimate<'_> {
     pub(crate) fn report_drawing(&self, drawing: &Drawing, task: &[JointAngles], calibration: &mut Calibration) {
         let all = self.link_departures(task).chain(self.mount_departures()).chain(self.further_mount_departures());
         let mut found: Vec<Departure> = all.collect();
-        found.sort_by(|a, b| b.weight().total_cmp(&a.weight()));
-        let n = found.iter().filter(|departure| departure.weight() > NAMED_SIGMAS).count();
+        found.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+        let n = found.iter().filter(|departure| departure.weight > NAMED_SIGMAS).count();
         // Several links may share what one of them has: the likeliest is named.
         let is_beyond = drawing.links.as_ref().is_some_and(LinkStart::is_beyond_stated);
         found.truncate(n.max(usize::from(is_beyond)));
@@ -105,7 +106,7 @@ impl Estimate<'_> {
                 unit: [FindingUnit::Metre, FindingUnit::Radian][kind],
                 sigmas: size.norm() / priors[kind].max(1e-9),
                 std: std_along(&covariance, &size),
-                sure_sigmas: sigmas(&covariance, &size),
+                weight: sigmas(&covariance, priors[kind], &size),
                 tool_m: Some(self.tool_moved_m(&tool, first, &size)),
                 length_m: (joint > 0).then(|| self.link_length_m(joint)),
                 most_sigmas: if is_stated[kind] { MAX_REPAIR_SIGMAS } else { MAX_UNSTATED_REPAIR_SIGMAS },
@@ -149,7 +150,7 @@ impl Estimate<'_> {
                 unit: [FindingUnit::Metre, FindingUnit::Radian][kind],
                 sigmas: size.norm() / priors[kind].max(1e-9),
                 std: std_along(&covariance, &size),
-                sure_sigmas: sigmas(&covariance, &size),
+                weight: sigmas(&covariance, priors[kind], &size),
                 size,
                 tool_m: None,
                 length_m: None,
@@ -250,22 +251,17 @@ fn std_along(covariance: &Matrix3<f64>, size: &Vector3<f64>) -> f64 {
     (covariance * along).dot(&along).max(0.0).sqrt()
 }
 
-fn sigmas(covariance: &Matrix3<f64>, size: &Vector3<f64>) -> f64 {
-    covariance.try_inverse().map_or(0.0, |inverse| size.dot(&(inverse * size)).max(0.0).sqrt())
+/// Length of `size` in sigmas, where each axis is stated to be off by `stated_std` and known to `covariance`.
+fn sigmas(covariance: &Matrix3<f64>, stated_std: f64, size: &Vector3<f64>) -> f64 {
+    let whole = covariance + Matrix3::identity() * stated_std.powi(2);
+    whole.try_inverse().map_or(0.0, |inverse| size.dot(&(inverse * size)).max(0.0).sqrt())
 }
 
 impl Departure {
-    /// Sigmas of the drawing's prior or of the estimate, whichever are fewer.
-    fn weight(&self) -> f64 {
-        self.sigmas.min(self.sure_sigmas)
-    }
-
     /// A base that is not as drawn and tags that hang elsewhere all together look the same, and differ at the tool.
     fn is_undecided(&self) -> bool {
         let size_m = self.size.norm() * if self.unit == FindingUnit::Radian { REACH_M } else { 1.0 };
-        self.kind == FindingKind::Base
-            && self.weight() > NAMED_SIGMAS
-            && size_m.max(self.tool_m.unwrap_or(0.0)) > WORTH_M
+        self.kind == FindingKind::Base && self.weight > NAMED_SIGMAS && size_m.max(self.tool_m.unwrap_or(0.0)) > WORTH_M
     }
 
     /// The refusal of a departure that is too large for a repair.
@@ -288,7 +284,7 @@ impl Departure {
             joint: Some(robot.chain.joints()[0].name.clone()),
             error: if self.unit == FindingUnit::Radian { ErrorKind::Turn } else { ErrorKind::Shift },
             size: self.size.into(),
-            chi2: self.sure_sigmas.powi(2),
+            chi2: self.weight.powi(2),
             limit: NAMED_SIGMAS.powi(2),
             tool_error_m: self.tool_m.unwrap_or(0.0),
         }
