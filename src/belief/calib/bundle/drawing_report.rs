@@ -1,9 +1,9 @@
 //! What an estimate found of the drawing: links, base, camera mount and lens that are not as drawn.
 //!
 //! An element counts whose estimate z neither its stated size S nor its own covariance C explains: where it is as
-//! large as stated, z has the covariance S + C, and `z^T (S + C)^-1 z` is that of three axes. Were the drawing kept, the
-//! sensors' parameters x would follow the posterior's covariance, `dx = C_xz C_zz^-1 z`, and the tool would be off by
-//! what both move it together.
+//! large as stated, z has the covariance S + C, and `z^T (S + C)^-1 z` is that of three axes. Were the drawing kept,
+//! the sensors' parameters x would follow the posterior's covariance, `dx = C_xz C_zz^-1 z`, and the tool would be off
+//! by what both move it together.
 
 use nalgebra::{DVector, Matrix3, Vector3};
 

@@ -42,6 +42,8 @@ pub struct Walk {
     /// Probability of each joint's errors in time where its offset does not walk (`permutation_test`); one where no
     /// view constrains the joint.
     pub p_value: [f64; MAX_JOINTS],
+    /// Log evidence of all joints' walks over none.
+    pub gain_nats: f64,
 }
 
 /// Standard deviations that the data themselves may tell.

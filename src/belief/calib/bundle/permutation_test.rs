@@ -7,7 +7,9 @@
 //! squares. Where nothing depends on time, the p-value is uniform.
 
 use crate::calib::bundle::estimate::Estimate;
+use crate::calib::bundle::model::Hyperparameters;
 use crate::calib::bundle::step_test::JointError;
+use crate::calib::bundle::walk::WARMTH_WORTH_A_FIT;
 use crate::calib::parameters::ParameterKind;
 use armcal_core::joints::JointAngles;
 use armcal_core::stats::stream_rng;
@@ -36,9 +38,10 @@ pub(crate) struct TimeOrder {
 }
 
 impl TimeOrder {
-    /// `errors`: in the order of time, each with the arm's angles; the joint's own come first among the functions.
-    pub(crate) fn new(errors: &[f64], angles: &[JointAngles], joint: usize) -> Self {
-        let by_configuration = smooth_functions(angles, joint);
+    /// `errors`: in the order of time, each with the arm's angles. The errors are regressed on `stated`, effects that
+    /// the model has at their stated size, then on functions of the angles, the joint's own first.
+    pub(crate) fn new(errors: &[f64], angles: &[JointAngles], joint: usize, stated: Vec<DVector<f64>>) -> Self {
+        let by_configuration = smooth_functions(angles, joint, stated);
         let residual = without(&by_configuration, &DVector::from_column_slice(errors));
         Self { by_configuration, residual }
     }
@@ -100,7 +103,8 @@ impl TimeOrder {
 }
 
 impl Estimate<'_> {
-    /// The errors of a joint as a test of their order takes them, with what the model has as smooth in time given back.
+    /// The errors of a joint as a test of their order takes them. What the model has as smooth in time is given back,
+    /// and regressed on where it is no larger than stated: warmth is no walk, but takes up one.
     pub(crate) fn time_order(&self, joint: usize, errors: &[JointError]) -> TimeOrder {
         let is_of_time = |kind: ParameterKind| {
             matches!(kind, ParameterKind::OffsetPerK | ParameterKind::OffsetPerMpa | ParameterKind::DriftPerH)
@@ -108,14 +112,20 @@ impl Estimate<'_> {
         let parameters = self.joint_parameters().iter().enumerate();
         let of_time: Vec<usize> =
             parameters.filter(|(_, p)| p.joint == joint && is_of_time(p.kind)).map(|(column, _)| column).collect();
-        let error = |error: &JointError| {
-            let basis = &self.problem.views[error.view_idx].basis;
-            let given_back: f64 = of_time.iter().map(|&column| basis[column] * self.solved.state.joint[column]).sum();
-            (error.error_rad + given_back) * (error.weight / error.told).sqrt()
+        let whitening = |error: &JointError| (error.weight / error.told).sqrt();
+        let by = |column: usize, error: &JointError| self.problem.views[error.view_idx].basis[column];
+        let whitened = |error: &JointError| {
+            let given_back = of_time.iter().map(|&column| by(column, error) * self.solved.state.joint[column]);
+            (error.error_rad + given_back.sum::<f64>()) * whitening(error)
         };
+        let stated = Hyperparameters::datasheet(self.problem.robot).offset_std_rad_per_k;
+        let is_as_stated = self.scales().offset_std_rad_per_k <= WARMTH_WORTH_A_FIT * stated;
+        let effect =
+            |&column: &usize| DVector::from_iterator(errors.len(), errors.iter().map(|e| by(column, e) * whitening(e)));
+        let effects = of_time.iter().filter(|_| is_as_stated).map(effect).collect();
         let all = self.view_angles();
         let angles: Vec<JointAngles> = errors.iter().map(|error| all[error.view_idx]).collect();
-        TimeOrder::new(&errors.iter().map(error).collect::<Vec<_>>(), &angles, joint)
+        TimeOrder::new(&errors.iter().map(whitened).collect::<Vec<_>>(), &angles, joint, effects)
     }
 }
 
@@ -123,13 +133,14 @@ fn without(columns: &DMatrix<f64>, y: &DVector<f64>) -> DVector<f64> {
     y - columns * columns.tr_mul(y)
 }
 
-/// Orthonormal columns: a constant, sines and cosines of each joint's angle and of twice it, then their products, as
-/// many as the views allow.
-fn smooth_functions(angles: &[JointAngles], joint: usize) -> DMatrix<f64> {
+/// Orthonormal columns: a constant, `stated`, sines and cosines of each joint's angle and of twice it, then their
+/// products, as many as the views allow.
+fn smooth_functions(angles: &[JointAngles], joint: usize, stated: Vec<DVector<f64>>) -> DMatrix<f64> {
     let n_joints = angles.first().map_or(0, |at| at.len());
     let order = || std::iter::once(joint).chain((0..n_joints).filter(move |&other| other != joint));
     let values = |f: &dyn Fn(&JointAngles) -> f64| DVector::from_iterator(angles.len(), angles.iter().map(f));
     let mut functions = vec![values(&|_| 1.0)];
+    functions.extend(stated);
     for multiple in [1.0, 2.0] {
         for of in order() {
             functions.push(values(&|at| (multiple * at[of]).sin()));
@@ -188,7 +199,7 @@ mod tests {
 
     fn p_values(seed: u64, walk: f64) -> [f64; 2] {
         let (errors, angles) = series(seed, walk);
-        let order = TimeOrder::new(&errors, &angles, 0);
+        let order = TimeOrder::new(&errors, &angles, 0, Vec::new());
         let pattern =
             |row: usize, k: usize| ((k as f64 + 0.5) * std::f64::consts::PI * row as f64 / N_VIEWS as f64).sin();
         let patterns = DMatrix::from_fn(N_VIEWS, 4, pattern);

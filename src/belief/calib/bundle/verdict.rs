@@ -5,7 +5,7 @@ use crate::calib::baseline_comparison::SIGNIFICANCE;
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::innovations::{Innovations, JointInnovation};
 use crate::calib::bundle::input::BundleInput;
-use crate::calib::bundle::model::Hyperparameters;
+use crate::calib::bundle::model::{Hyperparameters, Walk};
 use crate::calib::bundle::observability::{Observability, observability};
 use crate::calib::bundle::score_test::{GeometryElement, ScoreTestResult};
 use crate::calib::covariance::numbered_task_angles;
@@ -62,6 +62,8 @@ const FAR_BEYOND: f64 = 4.0;
 const UNSEEN_LINKS: &str = "links distal to the camera: errors are unobservable without a gripper tag";
 /// An offset that walks by more than so many times a sensor's usual error from view to view is named.
 const WALKED: f64 = 1.0;
+/// Evidence of the walks from which they are named: less widens U95, and is no finding.
+const NAMED_WALK_NATS: f64 = 3.0;
 /// Probability of a joint's errors in a random order of the views below which its walk is named.
 const WALK_SIGNIFICANCE: f64 = 0.01;
 /// Standard deviation over the prior's above which the prior holds a parameter.
@@ -124,7 +126,8 @@ impl VerdictInput<'_> {
 
     /// Returns true where the views in a random order would not show this joint's walk.
     fn walks_surely(&self, joint: usize) -> bool {
-        self.found.model.walk.is_some_and(|walk| walk.p_value[joint] < WALK_SIGNIFICANCE)
+        let is_sure = |walk: Walk| walk.gain_nats > NAMED_WALK_NATS && walk.p_value[joint] < WALK_SIGNIFICANCE;
+        self.found.model.walk.is_some_and(is_sure)
     }
 
     /// Whether other links would explain the data better.

@@ -30,7 +30,7 @@ const MIN_VIEWS: usize = 8;
 const FEW_VIEWS: usize = 20;
 /// Columns are tried where offsets change with temperature by more than so many times what is stated: no good arm of
 /// 60.
-const WARMTH_WORTH_A_FIT: f64 = 1.6;
+pub(crate) const WARMTH_WORTH_A_FIT: f64 = 1.6;
 /// Or where the score test's statistic lies so many of its standard deviations above its mean: one good arm of 60.
 const SCORE_WORTH_A_FIT: f64 = 3.0;
 /// A walk that is missed is an error beyond its bound, one too many a bound that is too wide. Good arms lose two nats
@@ -69,18 +69,21 @@ impl<'a> Estimate<'a> {
             wider.scales.camera_error_std = self.scales().camera_error_std;
         }
         let p_value = self.walk_p_values(input.views, span);
-        wider.model.walk = Some(Walk { span, p_value });
+        wider.model.walk = Some(Walk { span, p_value, gain_nats: 0.0 });
         wider.scales.walk_std_rad = self.first_walk_std_rad(input.views);
         for (joint, kinds) in wider.model.joints.iter_mut().enumerate() {
             if !kinds.is_empty() && has_sensor(joint) {
                 kinds.extend((0..N_WALK_MODES as u8).map(ParameterKind::WalkMode));
             }
         }
-        let Some(found) = estimate(&wider) else { return (self, None) };
+        let Some(mut found) = estimate(&wider) else { return (self, None) };
         let gain_nats = evidence_gain_nats(&found, &self);
         // One that rejects more explains less.
         let least_p = p_value.iter().copied().fold(1.0, f64::min) * self.problem.n_seen_joints as f64;
         let is_in = gain_nats > MIN_WALK_NATS && found.outliers.len() <= self.outliers.len() && least_p < MAX_WALK_P;
+        if let Some(walk) = &mut found.model.walk {
+            walk.gain_nats = gain_nats;
+        }
         let selection = Selection { term: OptionalTerm::Walk, is_in, gain_nats };
         (if is_in { found } else { self }, Some(selection))
     }
