@@ -8,7 +8,7 @@ use crate::score::{MarginSummary, Score};
 use armcal_belief::calib::online::OnlineEvent;
 use armcal_belief::calib::{
     BaselineComparison, Calibration, CameraMount, FailedJointTable, Finding, FindingUnit, FurtherCamera, JointResult,
-    MapResult, ObservabilityTable, PriorTable, Refusal, Reservation, Status, VerdictTable,
+    MapResult, ObservabilityTable, PriorTable, Refusal, Reservation, Status, VerdictTable, ViewContainment,
 };
 use armcal_belief::judge::{TargetU95, U95Table};
 use armcal_belief::session::{AskedPoses, OnlineOutcome, SkippedTarget, StillReachable};
@@ -303,6 +303,9 @@ pub struct HeldOutSummary {
     /// The same by mount and map alone, and whether the calibration beats that.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub baseline: Option<BaselineComparison>,
+    /// Views within the 95 % regions of what they measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub within_95: Option<ViewContainment>,
 }
 
 /// One limit of an `assert` step.
@@ -397,6 +400,7 @@ impl RunSummary {
                 camera_mean_m: calibration.held_out.camera_mean_m,
                 nominal_rms_m: calibration.held_out.nominal_rms_m,
                 baseline: calibration.held_out.baseline,
+                within_95: calibration.held_out.within_95,
             },
             score: None,
             asserts: Vec::new(),

@@ -154,6 +154,7 @@ impl FoldSums {
             rms_px: mean(self.sum_px2, self.n_corners).map(f64::sqrt),
             nominal_rms_m: mean(self.nominal_m2, self.n).map(f64::sqrt),
             baseline: best_comparison(&self.baselines),
+            within_95: None,
         }
     }
 }

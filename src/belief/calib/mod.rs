@@ -53,7 +53,8 @@ pub use result::{
     CompactJoint, CornerResidual, CovarianceTable, FailedJointTable, FitDetails, FitMetrics, FurtherCamera,
     HeldOutMetrics, JointCompliance, JointResult, LinkResult, LookupTable, MAX_COMPACT_BYTES, MapResult, MapTag,
     ModelTable, ObservabilityTable, ObservedTag, PredictedToolError, PriorTable, ReferenceTable, SagTable, Status,
-    SurveyCoverage, TargetPrediction, TermsTable, ValidRange, VerdictTable, ViewResidual, covariance_file, metric,
+    SurveyCoverage, TargetPrediction, TermsTable, ValidRange, VerdictTable, ViewContainment, ViewResidual,
+    covariance_file, metric,
 };
 pub(crate) use views::dropouts::replace_dropouts;
 pub use views::{

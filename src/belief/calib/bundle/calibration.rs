@@ -31,7 +31,7 @@ use crate::calib::refusal::Refusal;
 use crate::calib::result::assemble::{Evidence, Fit, Provenance, assemble, is_near, noise_dof, refusal_by_priors};
 use crate::calib::result::calibration::{Calibration, Status};
 use crate::calib::result::map_table::MapResult;
-use crate::calib::result::metrics::HeldOutMetrics;
+use crate::calib::result::metrics::{HeldOutMetrics, ViewContainment};
 use crate::calib::tag_mapping::map_unknown_tags;
 use crate::calib::views::calibration_data::CalibrationData;
 use crate::calib::views::view::{ObservationRejection, Touch, View};
@@ -636,5 +636,11 @@ fn cross_validated(
             baselines: &baseline.as_ref().map(|baseline| baseline.fit(datasheet, &fitted)).unwrap_or_default(),
         });
     }
-    (sums.metrics(), innovations)
+    let mut within = ViewContainment::default();
+    for fold in &innovations {
+        within.views += fold.within_95.views;
+        within.within += fold.within_95.within;
+    }
+    let within_95 = (within.views > 0).then_some(within);
+    (HeldOutMetrics { within_95, ..sums.metrics() }, innovations)
 }

@@ -14,10 +14,12 @@ use crate::calib::bundle::input::BundleInput;
 use crate::calib::bundle::linearize::NormalEquations;
 use crate::calib::bundle::observation_term::unseen_chi2;
 use crate::calib::bundle::outliers::Outlier;
-use crate::calib::bundle::problem::{BundleProblem, State, WeightedMeasurement};
+use crate::calib::bundle::problem::{BundleProblem, ObservationTerm, State, WeightedMeasurement};
+use crate::calib::result::metrics::ViewContainment;
 use crate::calib::views::view::View;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::numeric::Loss;
+use armcal_core::stats::chi_square_quantile;
 
 /// Innovations of one fold's left-out views.
 #[derive(Clone, Debug)]
@@ -30,6 +32,8 @@ pub struct Innovations {
     pub camera_chi2: f64,
     /// Six per view that shows enough, less one for each joint whose sensor says nothing.
     pub camera_dof: usize,
+    /// Each view on its own.
+    pub within_95: ViewContainment,
     /// Those that the views tell enough of.
     pub joints: Vec<JointInnovation>,
 }
@@ -103,9 +107,34 @@ impl Estimate<'_> {
         };
         let dof = numbers(&told);
         let camera_dof = numbers(&|view_idx| camera_numbers(&problem, view_idx));
+        let mut within_95 = ViewContainment::default();
+        for view_idx in 0..views.len() {
+            let dof = told(view_idx).saturating_sub(taken(view_idx));
+            if dof > 0 {
+                within_95.views += 1;
+                let chi2 = self.chi2_of_view(
+                    input,
+                    &views[view_idx..=view_idx],
+                    &problem.observations[problem.views[view_idx].observations.clone()],
+                )?;
+                within_95.within += usize::from(chi2 <= chi_square_quantile(0.95, dof));
+            }
+        }
         problem.scales.camera_error_std = Some([FREE_CAMERA; 2]);
         let (_, free_chi2) = self.with_data(&problem, &state)?;
-        Some(Innovations { chi2, dof, camera_chi2: (chi2 - free_chi2).max(0.0), camera_dof, joints })
+        Some(Innovations { chi2, dof, camera_chi2: (chi2 - free_chi2).max(0.0), camera_dof, within_95, joints })
+    }
+
+    /// Chi-square of one view's innovations, with its observations as they are used.
+    fn chi2_of_view(&self, input: &BundleInput<'_>, view: &[View], observations: &[ObservationTerm]) -> Option<f64> {
+        let mut problem = self.data_only(input, view);
+        problem.observations.clone_from_slice(observations);
+        let state = State {
+            joint_error: vec![[0.0; MAX_JOINTS]],
+            camera_error: vec![Isometry3::identity()],
+            ..self.solved.state.clone()
+        };
+        self.with_data(&problem, &state).map(|(_, chi2)| chi2)
     }
 
     /// `views` in this estimate's columns, without any prior but the views' own.

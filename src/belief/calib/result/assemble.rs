@@ -248,6 +248,7 @@ pub(crate) fn held_out_metrics(problem: &PositionProblem<'_>, at: &JointParamete
         rms_px: problem.reprojection_rms_px(at),
         nominal_rms_m: problem.rms_m(&JointParameters::default()),
         baseline: None,
+        within_95: None,
     }
 }
 

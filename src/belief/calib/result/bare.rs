@@ -33,6 +33,7 @@ pub(in crate::calib) fn bare(robot: &str, method: Method) -> Calibration {
             rms_px: None,
             nominal_rms_m: None,
             baseline: None,
+            within_95: None,
         },
         predicted_tool_error_m: None,
         predicted_tool_error_with_priors_m: None,

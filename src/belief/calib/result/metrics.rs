@@ -44,6 +44,16 @@ fn as_the_datasheet_says() -> f64 {
     1.0
 }
 
+/// Cross-validated views by the 95 % regions of what they measured, noise included: 95 % should lie within.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ViewContainment {
+    /// Number of views that have a region.
+    pub views: usize,
+    /// Those of them that lie within.
+    pub within: usize,
+}
+
 /// How views fit that the fit did not use.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -71,4 +81,7 @@ pub struct HeldOutMetrics {
     /// The same views by mount and map alone, fitted to the same views as the calibration.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub baseline: Option<BaselineComparison>,
+    /// Views within their 95 % regions; absent without cross-validation and with the paper's methods.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub within_95: Option<ViewContainment>,
 }

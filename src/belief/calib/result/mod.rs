@@ -38,7 +38,7 @@ pub use file_error::CalibrationFileError;
 pub use link_table::LinkResult;
 pub use lookup::LookupTable;
 pub use map_table::{MapResult, MapTag, SurveyCoverage};
-pub use metrics::{FitMetrics, HeldOutMetrics};
+pub use metrics::{FitMetrics, HeldOutMetrics, ViewContainment};
 pub use model_table::ModelTable;
 pub use sag_table::{JointCompliance, SagTable};
 pub use slide_keys::metric;

@@ -154,6 +154,7 @@ fn views_that_were_left_out_are_as_far_off_as_foretold() {
     const SEEDS: u64 = 20;
     let (mut camera, mut coordinates) = ((0.0, 0), (0.0, 0));
     let (mut squares, mut n_joints, mut beyond) = (0.0, 0, 0);
+    let mut within = [0, 0];
     for seed in 0..SEEDS {
         let Arm { case, found: all } = arm(Built::AsDrawn, seed);
         for fold in 0..FOLDS {
@@ -167,6 +168,7 @@ fn views_that_were_left_out_are_as_far_off_as_foretold() {
             let places: Vec<(usize, View)> =
                 left_out.into_iter().enumerate().map(|(n, view)| (n * FOLDS + fold, view)).collect();
             let off = found.innovations(&part, &places, &all.outliers).expect("a factor");
+            within = [within[0] + off.within_95.within, within[1] + off.within_95.views];
             beyond += usize::from(off.camera_chi2 > chi_square_quantile(0.99, off.camera_dof));
             camera = (camera.0 + off.camera_chi2, camera.1 + off.camera_dof);
             coordinates = (coordinates.0 + off.chi2, coordinates.1 + off.dof);
@@ -184,6 +186,9 @@ fn views_that_were_left_out_are_as_far_off_as_foretold() {
         ratio(coordinates),
         coordinates.1
     );
+    let share = within[0] as f64 / within[1] as f64;
+    println!("{share:.3} of {} views within their 95 % regions", within[1]);
+    assert!((0.92..0.98).contains(&share), "{share:.3}");
     assert!((0.85..1.15).contains(&ratio(camera)), "{}", ratio(camera));
     assert!((0.97..1.03).contains(&ratio(coordinates)), "{}", ratio(coordinates));
     assert!((0.8..1.2).contains(&joints), "{joints}");

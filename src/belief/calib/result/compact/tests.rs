@@ -74,6 +74,7 @@ fn calibration(robot: &str, joints: &[Joint], refusal: Option<Refusal>) -> Calib
             rms_px: Some(2.6),
             nominal_rms_m: Some(0.2),
             baseline: None,
+            within_95: None,
         },
         predicted_tool_error_m: Some(Summary { n: 4, median: 0.005_879_45, p95: 0.006_070_3, max: 0.006_085 }),
         valid: ValidRange { time_nanos: 1_767_225_749_230_000_000, oil_c: None, water_c: None, pressure_pa: None },
