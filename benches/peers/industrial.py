@@ -27,6 +27,9 @@ import numpy as np
 import yaml
 from scipy.spatial.transform import Rotation
 
+sys.path.insert(0, str(Path(__file__).parent))
+from real_arms import positioner  # noqa: E402
+
 N_FOLDS = 5
 GUESS_STD_M, GUESS_STD_RAD = 0.1, 0.1
 JOINTS = [("x", "prismatic", "1 0 0"), ("y", "prismatic", "0 1 0"), ("z", "prismatic", "0 0 1"), ("rz", "revolute", "0 0 1"),
@@ -45,39 +48,6 @@ offset_bound_{unit} = 1e-5
 noise_std_counts = 1e-7
 linearity_std_{unit} = 0.0
 max_rate_{unit}_s = 0.5
-"""
-# Axes and target as the example has them, in a base frame turned so that the first axis is z.
-POSITIONER = """<robot name="positioner"><link name="base_link"/><link name="l1"/><link name="l2"/><link name="target"/>
-<joint name="j1" type="revolute"><parent link="base_link"/><child link="l1"/><axis xyz="0 0 1"/>
-<limit lower="-3.14159" upper="3.14159" effort="100" velocity="1"/></joint>
-<joint name="j2" type="revolute"><parent link="l1"/><child link="l2"/><axis xyz="0 0 1"/>
-<origin xyz="0 -0.475 0" rpy="-1.5707963267948966 -1.5707963267948966 0"/>
-<limit lower="-6.28" upper="6.28" effort="100" velocity="1"/></joint>
-<joint name="t" type="fixed"><parent link="l2"/><child link="target"/>
-<origin xyz="0.17 -0.65 0.5" rpy="1.5707963267948966 -0.20000119387833815 -1.5707963267948966"/></joint></robot>"""
-POSITIONER_MAP = """version = 1
-[table]
-format = "yaml"
-[joint_sensors]
-names = { j1 = "target_joints.0", j2 = "target_joints.1" }
-unit = "rad"
-[tags]
-child_frame = "target"
-use = "pose"
-[tags.columns]
-direction = "camera_from_tag"
-position = ["pose.x", "pose.y", "pose.z"]
-rotation = ["pose.qw", "pose.qx", "pose.qy", "pose.qz"]
-rotation_form = "quaternion_wxyz"
-"""
-TARGET = """version = 1
-frame = "target"
-[[tag]]
-name = "target"
-position_m = [0.0, 0.0, 0.0]
-quaternion_wxyz = [1.0, 0.0, 0.0, 0.0]
-position_std_m = [0.1, 0.1, 0.1]
-rotation_std_rad = [0.1, 0.1, 0.1]
 """
 
 
@@ -249,33 +219,13 @@ def hand_eye(armcal, examples, program):
           flush=True)
 
 
-def armcal_positioner(armcal, examples):
-    """Held-out distance of the target, mean, mm; camera and target as known as the example's guesses: 0.1 m and 0.1 rad."""
-    with tempfile.TemporaryDirectory() as folder:
-        folder = Path(folder)
-        run = lambda *words: subprocess.run([armcal, *map(str, words)], check=True, capture_output=True)
-        (folder / "arm.urdf").write_text(POSITIONER)
-        run("new-robot", folder / "arm.urdf", "--camera-link", "base_link", "--out", folder / "robot")
-        file = folder / "robot/robot.toml"
-        head, camera = file.read_text().split("[camera]\n")
-        camera = camera.replace("position_m = [0.0, 0.0, 0.0]", "position_m = [0.0, -0.525, -0.7]", 1)
-        camera = camera.replace("quaternion_wxyz = [1.0, 0.0, 0.0, 0.0]", "quaternion_wxyz = [0.7071067811865476, -0.7071067811865476, 0.0, 0.0]", 1)
-        assert "mount_std_m = 0.1\n" in camera and "mount_std_rad = 0.1\n" in camera
-        file.write_text(f"{head}[camera]\n{camera}")
-        (folder / "map.toml").write_text(POSITIONER_MAP)
-        (folder / "target.toml").write_text(TARGET)
-        run("calibrate", examples / "data/kinematic_calibration/measurements.yaml", "--robot", folder / "robot", "--input", folder / "map.toml",
-            "--tag-map", folder / "target.toml", "--out", folder / "out")
-        summary = json.loads((folder / "out/summary.json").read_text())
-    return 1e3 * summary["held_out"]["mean_m"], summary["status"]
-
-
 def kinematic(armcal, examples, program):
     said = subprocess.run([program], capture_output=True, text=True, check=True).stdout
     mm = [1e3 * float(v) for v in re.findall(r"Position Difference Mean: (\S+)", said)]
     print(f"| positioner, 205 poses | industrial_calibration, joints and links | {mm[0]:.3f} mm mean | |")
     print(f"| | industrial_calibration, camera and target alone | {mm[1]:.3f} mm mean | |", flush=True)
-    held, status = armcal_positioner(armcal, examples)
+    summary = positioner(armcal, examples / "data/kinematic_calibration/measurements.yaml")
+    held, status = 1e3 * summary["held_out"]["mean_m"], summary["status"]
     print(f"| | armcal, {status} | | {held:.3f} mm mean |", flush=True)
 
 
