@@ -33,6 +33,11 @@ impl Case {
         answer(command.arg("--out").arg(self.file("out")))
     }
 
+    fn new_robot(&self, urdf: &str, options: &[&str]) -> Answer {
+        let mut command = program();
+        answer(command.arg("new-robot").arg(self.file(urdf)).args(options).arg("--out").arg(self.file("made")))
+    }
+
     fn summary(&self) -> Value {
         serde_json::from_str(&read(&self.file("out/summary.json"))).expect("summary.json reads")
     }
@@ -166,4 +171,85 @@ fn targets_out_of_reach_refuse_by_their_numbers() {
 fn poses_of_a_task_in_degrees_are_named_before_anything_is_calibrated() {
     let case = Case::new("targets_out_of_reach");
     case.calibrate("run.mcap", "poses-in-degrees.toml").expect("refused", 2, &["poses_rad[0]", "[joint_limit]"]);
+}
+
+/// What calibration does not need is left out, and named with its link or joint.
+#[test]
+fn urdfs_of_makers_become_robot_folders() {
+    for (case, urdf, named) in [
+        ("tiny_mass", "tinymass", "link `tool`"),
+        ("urdf_strictness", "zerobox", "link `base_link`"),
+        ("urdf_strictness", "twomat", "link `base_link`"),
+        ("urdf_strictness", "novel", "joint `j2`"),
+        ("urdf_strictness", "biglimit", ""),
+        ("urdf_strictness", "noaxisxyz", ""),
+    ] {
+        let case = Case::new(case);
+        let said = case.new_robot(&format!("{urdf}.urdf"), &[]);
+        said.expect(urdf, 0, &[]);
+        assert!(said.stdout.contains("6 joints from `base_link`: j1, j2, j3, j4, j5, j6"), "{urdf}: {}", said.stdout);
+        assert!(said.stderr.contains(named), "{urdf}: {}", said.stderr);
+    }
+}
+
+#[test]
+fn a_mimic_in_the_chain_is_refused_by_name_with_and_without_options() {
+    let case = Case::new("mimic_in_chain");
+    for options in [vec![], vec!["--base", "base_link", "--tip", "tool"]] {
+        case.new_robot("mimic.urdf", &options).expect("refused", 2, &["joint `j5b`", "`j5` (mimic)"]);
+    }
+}
+
+#[test]
+fn two_clocks_are_named_with_their_difference_and_the_advice_works() {
+    let case = Case::new("camera_boot_clock");
+    case.calibrate("run.mcap", "task.toml").expect(
+        "refused",
+        2,
+        &["/detections", "/joint_states", "differ by 1699995000.000 s", "stamps = \"log_time\"", "[clocks_differ]"],
+    );
+    let map = case.file("input.toml");
+    std::fs::write(&map, format!("stamps = \"log_time\"\n{}", read(&map))).expect("written");
+    case.accepted();
+}
+
+#[test]
+fn messages_without_positions_are_skipped_counted_and_said() {
+    let case = Case::new("velocity_only_messages");
+    let said = case.calibrate("run.mcap", "task.toml");
+    said.expect("accepted", 0, &[]);
+    assert!(said.stderr.contains("40 joint messages without positions"), "{}", said.stderr);
+}
+
+#[test]
+fn a_proposed_map_has_the_camera_info_that_the_recording_has() {
+    let case = Case::new("proposal_without_lens");
+    let mut command = program();
+    command.arg("inspect").arg(case.file("run.mcap")).arg("--robot").arg(case.file("robot"));
+    answer(command.arg("--write-input").arg(case.file("input.toml"))).expect("proposed", 0, &[]);
+    assert!(read(&case.file("input.toml")).contains("camera_info"));
+    case.accepted();
+}
+
+#[test]
+fn detections_of_another_package_are_read_by_their_whole_type_name() {
+    Case::new("isaac_detections").accepted();
+}
+
+#[test]
+fn a_ros_1_bag_is_refused_with_its_conversion_and_tables_are_named() {
+    let case = Case::new("ros1_and_tables");
+    let inspect = |name: &str| answer(program().arg("inspect").arg(case.file(name)));
+    inspect("run.bag").expect("refused", 2, &["ROS 1 bag", "rosbags-convert --src", "[recording_format]"]);
+    for (name, found) in [("ros1.mcap", "ROS 1"), ("joints.yaml", "`joint_values`"), ("samples.yaml", "`samples`")] {
+        let said = inspect(name);
+        said.expect(name, 0, &[]);
+        assert!(said.stdout.contains(found), "{name}: {}", said.stdout);
+    }
+}
+
+#[test]
+fn a_joint_twice_in_a_message_is_refused_with_both_values() {
+    let case = Case::new("duplicate_joint_name");
+    case.calibrate("run.mcap", "task.toml").expect("refused", 2, &["`j3` twice", "1.294821 and 0.000000"]);
 }
