@@ -56,6 +56,13 @@ pub enum ReadingError {
         /// The joints concerned; two of a parallel pair.
         joints: Vec<JointZero>,
     },
+    /// One joint's readings are in another unit or scale.
+    Scaled {
+        /// Name of the joint in the URDF.
+        joint: String,
+        /// Angle over reading.
+        factor: f64,
+    },
 }
 
 /// The reading error that explains the views, with those that explain them nearly as well.
@@ -93,6 +100,12 @@ impl fmt::Display for ReadingError {
                 };
                 let all: Vec<String> = joints.iter().map(one).collect();
                 write!(f, "joint zeros differ: {}", all.join(", "))
+            }
+            Self::Scaled { joint, factor } => {
+                write!(
+                    f,
+                    "the sensor of {joint} has another scale than its datasheet: {joint} moves {factor:.4} times as far as it says"
+                )
             }
         }
     }
@@ -135,6 +148,13 @@ impl MisreadReadings {
                 let lines: Vec<String> = joints.iter().map(one).collect();
                 format!("set the zeros in [[joint_sensor]] of robot.toml, if the URDF is right: {}", lines.join("; "))
             }
+            ReadingError::Scaled { joint, factor } => {
+                format!(
+                    "correct the unit of {joint} in the input map, or its scale: multiply scale_counts_per_deg in \
+                     robot.toml by {:.4}",
+                    1.0 / factor
+                )
+            }
         }
     }
 }
@@ -146,6 +166,7 @@ impl Coded for MisreadReadings {
             ReadingError::Coupled { .. } => Code::JointsCoupled,
             ReadingError::OtherTurns { .. } => Code::JointTurns,
             ReadingError::Zeros { .. } => Code::JointZeros,
+            ReadingError::Scaled { .. } => Code::SensorLine,
         }
     }
 }

@@ -278,9 +278,10 @@ impl<'a> BundleCalibration<'a> {
             calibration.refuse_first_for([Refusal::WrongInput(wrong)]);
             return;
         }
-        // A scale or unit has been named.
+        // A scale or unit has been named, and explains all.
         let is_of_line = |refusal: &Refusal| matches!(refusal, Refusal::SensorLine { .. } | Refusal::SensorUnit { .. });
-        if calibration.refusals.iter().any(is_of_line) {
+        let is_of_scale = |refusal: &Refusal| is_of_line(refusal) || matches!(refusal, Refusal::BeyondDatasheet { .. });
+        if calibration.refusals.iter().any(is_of_line) && calibration.refusals.iter().all(is_of_scale) {
             return;
         }
         // A repair beyond its bound explains nothing.

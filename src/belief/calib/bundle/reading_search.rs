@@ -22,7 +22,7 @@ use armcal_core::joints::JointAngles;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::wrap_symmetric;
 
-/// Evidence that a reading error needs, twice the logarithm of the odds: e^30, as about 150 are tried.
+/// Evidence that a reading error needs, twice the logarithm of the odds: e^30, as about 300 are tried.
 const MARGIN: f64 = 60.0;
 /// Hypotheses within this of the best one are printed with it, in the same unit: odds of e^5.
 const ALTERNATIVE: f64 = 10.0;
@@ -38,6 +38,12 @@ const NEXT_TURN_RAD: f64 = 0.1;
 /// Zeros are tried at these steps; one sigma of what is left, rad.
 const ZERO_STEP_RAD: f64 = FRAC_PI_6;
 const ZERO_STD_RAD: f64 = 0.2;
+/// Scales are tried at these steps, up to about a thousandth and a thousand; one sigma of what is left.
+const SCALE_STEP: f64 = 1.6;
+const SCALE_STEPS: i32 = 15;
+const SCALE_STD: f64 = 0.2;
+/// A scale that is off by fewer steps shows in the sensor's line.
+const LEAST_SCALE_STEPS: i32 = 4;
 /// Axes within this angle are parallel, rad.
 const PARALLEL_RAD: f64 = 0.02;
 /// A zero error in stated sigmas below which a sensor is as stated.
@@ -57,6 +63,11 @@ enum Hypothesis {
     OtherTurns(Vec<usize>),
     /// Added to the angles.
     Zeros(Vec<(usize, f64)>),
+    /// The angle over the reading.
+    Scaled {
+        joint: usize,
+        factor: f64,
+    },
 }
 
 /// A hypothesis and what it explains.
@@ -64,7 +75,7 @@ struct Tried {
     hypothesis: Hypothesis,
     score: f64,
     fits: bool,
-    offset_rad: JointParameters,
+    sensors: JointParameters,
     tag_error_m: Option<f64>,
 }
 
@@ -190,7 +201,10 @@ impl ReadingSearch<'_> {
         let opposite = parallel.flat_map(|([a, b], sign)| {
             steps.iter().map(move |off| Hypothesis::Zeros(vec![(a, *off), (b, -sign * off)]))
         });
-        exchanged.chain([reversed]).chain(coupled).chain(single).chain(opposite).collect()
+        let steps = (-SCALE_STEPS..=SCALE_STEPS).filter(|step| step.abs() >= LEAST_SCALE_STEPS);
+        let scaled =
+            steps.flat_map(|step| (0..n).map(move |joint| Hypothesis::Scaled { joint, factor: SCALE_STEP.powi(step) }));
+        exchanged.chain([reversed]).chain(coupled).chain(single).chain(opposite).chain(scaled).collect()
     }
 
     /// 1 or -1 where both joints turn about parallel axes however the joints between them stand.
@@ -214,10 +228,14 @@ impl ReadingSearch<'_> {
 
     fn attempt(&self, hypothesis: Hypothesis, views: &[View]) -> Option<Tried> {
         let mut robot = self.robot.clone();
-        if let Hypothesis::Zeros(zeros) = &hypothesis {
-            for (joint, _) in zeros {
-                robot.sensors[*joint].offset_std_rad = robot.sensors[*joint].offset_std_rad.max(ZERO_STD_RAD);
+        match &hypothesis {
+            Hypothesis::Zeros(zeros) => {
+                for (joint, _) in zeros {
+                    robot.sensors[*joint].offset_std_rad = robot.sensors[*joint].offset_std_rad.max(ZERO_STD_RAD);
+                }
             }
+            Hypothesis::Scaled { joint, .. } => robot.sensors[*joint].gain_std = SCALE_STD,
+            _ => {}
         }
         let views: Vec<View> = views.iter().map(|view| hypothesis.applied(self.robot, view)).collect();
         let adjusted = FailureAdjusted::new(&robot, &views, &[], &JointParameters::default());
@@ -226,7 +244,7 @@ impl ReadingSearch<'_> {
             hypothesis,
             score: score(&found),
             fits: !is_suspicious(&found),
-            offset_rad: found.parameters(),
+            sensors: found.parameters(),
             tag_error_m: tag_error_m(&found, &views),
         })
     }
@@ -235,7 +253,7 @@ impl ReadingSearch<'_> {
     fn is_large(&self, tried: &Tried) -> bool {
         let Hypothesis::Zeros(zeros) = &tried.hypothesis else { return true };
         zeros.iter().all(|(joint, off_rad)| {
-            let off_rad = wrap_symmetric(off_rad + tried.offset_rad.offset_rad[*joint], TAU);
+            let off_rad = wrap_symmetric(off_rad + tried.sensors.offset_rad[*joint], TAU);
             off_rad.abs() > MIN_SIGMAS * self.robot.sensors[*joint].offset_std_rad
         })
     }
@@ -261,11 +279,14 @@ impl ReadingSearch<'_> {
             Hypothesis::Zeros(zeros) => {
                 let zero = |(joint, off_rad): &(usize, f64)| {
                     let spec = &self.robot.sensors[*joint];
-                    let off_rad = wrap_symmetric(off_rad + tried.offset_rad.offset_rad[*joint], TAU);
+                    let off_rad = wrap_symmetric(off_rad + tried.sensors.offset_rad[*joint], TAU);
                     let offset_counts = spec.offset_counts - spec.counts_per_rad * off_rad;
                     JointZero { joint: name(*joint), off_rad, moves: spec.moves, offset_counts }
                 };
                 ReadingError::Zeros { joints: zeros.iter().map(zero).collect() }
+            }
+            Hypothesis::Scaled { joint, factor } => {
+                ReadingError::Scaled { joint: name(*joint), factor: factor * tried.sensors.gain[*joint] }
             }
         }
     }
@@ -302,6 +323,12 @@ impl Hypothesis {
                     changed.travel_rad[*joint] = wrapped(robot, *joint, view.travel_rad[*joint] + off_rad);
                 }
             }
+            Self::Scaled { joint, factor } => {
+                let center_rad = robot.sensors[*joint].center_rad;
+                let angle_rad = factor * (center_rad + view.travel_rad[*joint]);
+                changed.travel_rad[*joint] = wrapped(robot, *joint, angle_rad - center_rad);
+                changed.rate_rad_s[*joint] *= factor;
+            }
         }
         changed
     }
@@ -329,6 +356,7 @@ fn concerns_same(a: &ReadingError, b: &ReadingError) -> bool {
         ReadingError::Reversed { joints } | ReadingError::OtherTurns { joints, .. } => joints.clone(),
         ReadingError::Coupled { joint, with, .. } => vec![joint.clone(), with.clone()],
         ReadingError::Zeros { joints } => joints.iter().map(|zero| zero.joint.clone()).collect(),
+        ReadingError::Scaled { joint, .. } => vec![joint.clone()],
     };
     std::mem::discriminant(a) == std::mem::discriminant(b) && joints(a) == joints(b)
 }

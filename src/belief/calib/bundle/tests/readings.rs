@@ -76,6 +76,27 @@ fn zeros_by_another_convention_are_named_with_their_size() {
     }
 }
 
+/// So far off that nothing fits, and the sensor's line is not found.
+#[test]
+fn a_scale_that_is_far_off_is_named_with_its_size() {
+    for (seed, joint, scale) in [(23, 1, 0.01), (24, 3, 0.004), (25, 2, 0.02), (26, 0, 70.0)] {
+        let mut case = case(seed, None);
+        changed(&mut case, |_, angles, read| read[joint] = scale * angles[joint]);
+        let name = case.robot.sensors[joint].joint.clone();
+        let calibration = case.calibrated();
+        let (of, factor) = match calibration.refusals.first() {
+            Some(Refusal::MisreadReadings(misread)) => match &misread.found {
+                ReadingError::Scaled { joint, factor } => (joint.clone(), *factor),
+                other => panic!("seed {seed}: {other:?}"),
+            },
+            Some(Refusal::SensorLine { joint, slope }) => (joint.clone(), *slope),
+            Some(Refusal::SensorUnit { joint, gain, .. }) => (joint.clone(), *gain),
+            other => panic!("seed {seed}: {other:?}"),
+        };
+        assert!(of == name && (factor * scale - 1.0).abs() < 0.2, "seed {seed}: {of} {factor}");
+    }
+}
+
 #[test]
 fn readings_of_0_to_360_deg_are_named() {
     for (seed, joint) in [(18, 0), (19, 3)] {
