@@ -104,7 +104,8 @@ impl fmt::Display for ReadingError {
             Self::Scaled { joint, factor } => {
                 write!(
                     f,
-                    "the sensor of {joint} has another scale than its datasheet: {joint} moves {factor:.4} times as far as it says"
+                    "the sensor of {joint} has another scale than its datasheet: {joint} moves {factor:.4} times as \
+                     far as it says"
                 )
             }
         }
