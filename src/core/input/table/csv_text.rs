@@ -1,6 +1,6 @@
 //! Rows from CSV.
 
-use super::contents::ColumnsSeen;
+use super::columns_seen::ColumnsSeen;
 use super::rows::{MAX_COLUMNS, Row, Rows, check_count, number};
 use crate::input::error::InputError;
 

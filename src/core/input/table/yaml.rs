@@ -5,7 +5,7 @@ use std::fmt;
 
 use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
 
-use super::contents::ColumnsSeen;
+use super::columns_seen::ColumnsSeen;
 use super::rows::{MAX_COLUMNS, Row, Rows, check_count, number};
 use crate::input::error::InputError;
 use crate::input::map::TableLayout;
