@@ -338,7 +338,7 @@ struct Soup {
     max: usize,
 }
 
-/// A corner of a primitive, or why there is none.
+/// A corner of a primitive, or why it cannot be read.
 type Corner = Result<[f64; 3], String>;
 
 impl Soup {

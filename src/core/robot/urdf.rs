@@ -150,7 +150,7 @@ impl UrdfModel {
         Ok(())
     }
 
-    /// Goes from a link to the root of its tree; the link after `n` joints where that is none.
+    /// Goes from a link to the root of its tree; an error is the link after `n` joints, with more above it.
     fn go_up<'a>(&'a self, link: &'a str, n: usize) -> Result<(), &'a str> {
         let mut at = link;
         for _ in 0..=n {
