@@ -12,8 +12,8 @@ use image::{ImageFormat, ImageReader, Limits};
 const ENCODINGS: &str = "mono8, 8UC1, rgb8, bgr8, rgba8, bgra8 and bayer_*8";
 /// Bytes that decoding one picture may take: the largest that a lens has, in 16 bits of four channels.
 const MAX_DECODED_BYTES: u64 = 1 << 30;
-/// Pixels that every compressed image may have, and pixels of each byte beyond that. JPEGs of dark water have 30 a byte;
-/// the search for tags takes 13 bytes of memory for each pixel.
+/// Pixels that every compressed image may have, and pixels of each byte beyond that. JPEGs of dark water have 30 a
+/// byte; the search for tags takes 13 bytes of memory for each pixel.
 const ALWAYS_ALLOWED_PIXELS: u64 = 3_000_000;
 const MAX_PIXELS_PER_BYTE: u64 = 32;
 /// First bytes of a PNG; bytes of a chunk next to its data: length, name and checksum.
