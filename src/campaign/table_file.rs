@@ -12,6 +12,9 @@ use armcal_core::units::Unit;
 /// In front of the figures.
 const FIXED: [&str; 8] = ["setting", "settings", "seed", "status", "exit_code", "stage", "failure", "command"];
 
+/// Bytes of a line: the reader of CSV keeps the places of all its cells.
+const MAX_LINE_BYTES: usize = 1 << 16;
+
 /// Rows with the names of their figures.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
@@ -79,6 +82,9 @@ pub fn read_table(path: &Path) -> Result<Table, CampaignError> {
 
 /// `bytes`: header and rows; lines that begin with # are left out.
 pub(crate) fn parse_table(bytes: &[u8]) -> Result<Table, String> {
+    if let Some(at) = bytes.split(|byte| *byte == b'\n').position(|line| line.len() > MAX_LINE_BYTES) {
+        return Err(format!("line {} is longer than {MAX_LINE_BYTES} bytes", at + 1));
+    }
     let mut reader = csv::ReaderBuilder::new().has_headers(true).comment(Some(b'#')).from_reader(bytes);
     let header = reader.headers().map_err(|error| format!("is no CSV: {error}"))?.clone();
     if header.len() < FIXED.len() || header.iter().zip(FIXED).any(|(found, expected)| found != expected) {
@@ -169,6 +175,7 @@ pub(super) mod tests {
             problem(&good.replace("0.5,3", "0.5,x")),
             problem(&format!("{good}{}", row_line(&row(0, 1), &names()))),
             problem(&format!("{good}1,2\n")),
+            problem(&format!("{good}{}\n", ",".repeat(70_000))),
         ];
         insta::assert_snapshot!("tables", told.map(|problem| format!("{problem}\n")).concat());
     }

@@ -2,8 +2,9 @@
 
 use std::borrow::Cow;
 
-/// `text` with control characters escaped, as `\u{1b}`, so that a name in a file cannot steer the terminal; so are
-/// those that change the direction of writing. Ends of lines and tabs stay.
+/// `text` with control characters escaped, as `\u001b`, so that a name in a file cannot steer the terminal; so are
+/// those that change the direction of writing. Ends of lines and tabs stay. The escape is that of strings in JSON, TOML
+/// and YAML, so that a file of these keeps its names.
 #[must_use]
 pub fn printable(text: &str) -> Cow<'_, str> {
     if !text.contains(steers) {
@@ -11,7 +12,7 @@ pub fn printable(text: &str) -> Cow<'_, str> {
     }
     let mut shown = String::with_capacity(text.len() + 16);
     for c in text.chars() {
-        if steers(c) { shown.extend(c.escape_unicode()) } else { shown.push(c) }
+        if steers(c) { shown += &format!("\\u{:04x}", u32::from(c)) } else { shown.push(c) }
     }
     Cow::Owned(shown)
 }
@@ -98,6 +99,9 @@ mod tests {
         let plain = "error: Größe \u{1f980}\n  |\t^^^";
         assert!(matches!(printable(plain), Cow::Borrowed(text) if text == plain));
         let steering = "a\u{1b}[2J\u{7}\r\u{7f}\u{9b}31m\u{202e}b\0";
-        assert_eq!(printable(steering), "a\\u{1b}[2J\\u{7}\\u{d}\\u{7f}\\u{9b}31m\\u{202e}b\\u{0}");
+        for c in ['\u{61c}', '\u{200e}', '\u{200f}', '\u{202a}', '\u{2066}', '\u{2069}'] {
+            assert!(printable(&format!("a{c}b")).is_ascii());
+        }
+        assert_eq!(printable(steering), "a\\u001b[2J\\u0007\\u000d\\u007f\\u009b31m\\u202eb\\u0000");
     }
 }

@@ -9,7 +9,7 @@ use std::path::Path;
 use tempfile::{Builder, NamedTempFile};
 
 use crate::output::lock::is_at;
-use crate::output::{OutputError, check_replaceable, make_folder, parent};
+use crate::output::{OutputError, as_written, check_replaceable, make_folder, parent};
 
 const SUFFIX: &str = ".partial";
 
@@ -55,7 +55,7 @@ impl<'a> Beside<'a> {
     /// Writes all of it, to disk.
     pub fn write(mut self, bytes: &[u8]) -> Result<Self, OutputError> {
         use std::io::Write;
-        self.file.write_all(bytes).map_err(OutputError::of(self.path, "cannot be written"))?;
+        self.file.write_all(&as_written(self.path, bytes)).map_err(OutputError::of(self.path, "cannot be written"))?;
         self.synced()
     }
 

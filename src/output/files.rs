@@ -1,8 +1,13 @@
 //! Files put in place when they are whole.
 
 use armcal_core::codes::{Code, Coded};
+use armcal_core::text::printable;
+use std::borrow::Cow;
 use std::io::Error;
 use std::path::{Path, PathBuf};
+
+/// Endings of the files that people and their terminals read. Others, a URDF among them, keep their bytes.
+const TEXTS: [&str; 10] = ["csv", "html", "json", "jsonl", "md", "toml", "txt", "xml", "yaml", "yml"];
 
 /// Why a file or folder could not be written; the source, if there is one, says what the system thinks of it.
 #[derive(Debug, thiserror::Error)]
@@ -21,6 +26,18 @@ impl OutputError {
 
     pub(crate) fn new(path: &Path, problem: impl Into<String>) -> Self {
         Self { path: path.to_owned(), problem: problem.into(), source: None }
+    }
+}
+
+/// The bytes of a file as it is written: names in a text, which others may have chosen, steer no terminal.
+pub(crate) fn as_written<'a>(path: &Path, bytes: &'a [u8]) -> Cow<'a, [u8]> {
+    let ending = path.extension().and_then(|ending| ending.to_str());
+    match std::str::from_utf8(bytes) {
+        Ok(text) if ending.is_some_and(|ending| TEXTS.contains(&ending)) => match printable(text) {
+            Cow::Borrowed(text) => Cow::Borrowed(text.as_bytes()),
+            Cow::Owned(text) => Cow::Owned(text.into_bytes()),
+        },
+        _ => Cow::Borrowed(bytes),
     }
 }
 
@@ -87,5 +104,27 @@ pub(crate) fn make_folder(folder: &Path) -> Result<(), OutputError> {
 impl Coded for OutputError {
     fn code(&self) -> Code {
         Code::FileUnwritable
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_in_texts_are_escaped_and_other_files_keep_their_bytes() {
+        let name = "a = \"tip\u{202e}\u{9b}31m\"\n";
+        for ending in TEXTS {
+            let written = as_written(Path::new(&format!("b.{ending}")), name.as_bytes()).into_owned();
+            assert_eq!(written, b"a = \"tip\\u202e\\u009b31m\"\n", "{ending}");
+        }
+        let json = serde_json::Value::from("tip\u{2066}").to_string();
+        let written = as_written(Path::new("b.json"), json.as_bytes()).into_owned();
+        assert!(written.is_ascii());
+        assert_eq!(serde_json::from_slice::<String>(&written).expect("JSON"), "tip\u{2066}");
+        for path in ["b.urdf", "b.stl", "b.mcap", "b"] {
+            assert_eq!(*as_written(Path::new(path), name.as_bytes()), *name.as_bytes(), "{path}");
+        }
+        assert_eq!(*as_written(Path::new("b.toml"), b"\xff\x1b"), *b"\xff\x1b");
     }
 }

@@ -7,7 +7,7 @@
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
-use crate::output::{FolderLock, OutputError, check_replaceable, complete, make_folder, partial, remove};
+use crate::output::{FolderLock, OutputError, as_written, check_replaceable, complete, make_folder, partial, remove};
 use armcal_core::log::{LogError, for_each_raw, topics};
 
 /// What a run leaves, in the order in which it is put in place.
@@ -60,6 +60,7 @@ impl OutputFolder {
     /// When it cannot be written.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), OutputError> {
         let path = self.partial(name);
+        let bytes = as_written(&self.folder.join(name), bytes);
         fs::write(&path, bytes).map_err(OutputError::of(&path, "cannot be written"))
     }
 

@@ -18,7 +18,7 @@ pub(crate) use beside::{check_takes_files, check_writable, write_together};
 pub use files::OutputError;
 #[cfg(any(feature = "sim", feature = "viewer"))]
 pub(crate) use files::remove;
-pub(crate) use files::{check_replaceable, make_folder, parent, refuse_link};
+pub(crate) use files::{as_written, check_replaceable, make_folder, parent, refuse_link};
 #[cfg(feature = "sim")]
 pub(crate) use files::{complete, partial, with_suffix};
 #[cfg(feature = "sim")]

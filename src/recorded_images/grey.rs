@@ -1,5 +1,6 @@
 //! Grey pictures of recorded images.
 
+use std::borrow::Cow;
 use std::io::Cursor;
 
 use armcal_core::input::{ImageProblem, RecordedImage};
@@ -9,8 +10,17 @@ use image::{ImageFormat, ImageReader, Limits};
 
 /// Encodings of `sensor_msgs/msg/Image` that are read.
 const ENCODINGS: &str = "mono8, 8UC1, rgb8, bgr8, rgba8, bgra8 and bayer_*8";
-/// Bytes that decoding one picture may take.
+/// Bytes that decoding one picture may take: the largest that a lens has, in 16 bits of four channels.
 const MAX_DECODED_BYTES: u64 = 1 << 30;
+/// Pixels that every compressed image may have, and pixels of each byte beyond that. JPEGs of dark water have 30 a
+/// byte; the search for tags takes 13 bytes of memory for each pixel.
+const ALWAYS_ALLOWED_PIXELS: u64 = 3_000_000;
+const MAX_PIXELS_PER_BYTE: u64 = 32;
+/// First bytes of a PNG; bytes of a chunk next to its data: length, name and checksum.
+const PNG_MAGIC_BYTES: usize = 8;
+const PNG_CHUNK_BYTES: usize = 12;
+/// Chunks that pixels come from. Texts and profiles may unpack to any size.
+const PNG_CHUNKS: [&[u8]; 5] = [b"IHDR", b"PLTE", b"tRNS", b"IDAT", b"IEND"];
 
 /// Grey values row by row, as many as the camera's resolution has pixels.
 pub(super) fn grey(image: &RecordedImage, resolution_px: [u32; 2]) -> Result<Vec<u8>, ImageProblem> {
@@ -110,20 +120,51 @@ fn compressed(image: &CompressedImage, resolution_px: [u32; 2]) -> Result<Vec<u8
             return Err(ImageProblem::Unusable(problem));
         }
     };
-    let reader = || ImageReader::with_format(Cursor::new(&image.data), format);
+    let bytes =
+        if format == ImageFormat::Png { Cow::Owned(png_pixels(&image.data)) } else { Cow::Borrowed(&image.data[..]) };
+    let reader = || ImageReader::with_format(Cursor::new(&bytes), format);
     let (width, height) = reader().into_dimensions().map_err(|_| ImageProblem::Damaged)?;
     check_resolution([width, height], resolution_px)?;
+    check_compression([width, height], bytes.len())?;
     // As the simulator's camera has it; else (RGB, CMYK) by its colours.
     if format == ImageFormat::Jpeg
-        && let Ok(picture) = grey_of_jpeg(&image.data)
+        && let Ok(picture) = grey_of_jpeg(&bytes, resolution_px)
     {
         return Ok(picture.data);
     }
     let mut reader = reader();
     let mut limits = Limits::default();
+    (limits.max_image_width, limits.max_image_height) = (Some(width), Some(height));
     limits.max_alloc = Some(MAX_DECODED_BYTES);
     reader.limits(limits);
     Ok(reader.decode().map_err(|_| ImageProblem::Damaged)?.into_luma8().into_raw())
+}
+
+fn check_compression([width, height]: [u32; 2], bytes: usize) -> Result<(), ImageProblem> {
+    let allowed = (bytes as u64).saturating_mul(MAX_PIXELS_PER_BYTE).saturating_add(ALWAYS_ALLOWED_PIXELS);
+    if u64::from(width) * u64::from(height) <= allowed {
+        return Ok(());
+    }
+    Err(ImageProblem::Unusable(format!(
+        "the image claims {width} x {height} pixels in {bytes} bytes; armcal decodes {MAX_PIXELS_PER_BYTE} pixels a \
+         byte beyond {} megapixels: record with less compression",
+        ALWAYS_ALLOWED_PIXELS / 1_000_000
+    )))
+}
+
+/// The PNG without chunks that its pixels do not need.
+fn png_pixels(data: &[u8]) -> Vec<u8> {
+    let (magic, mut rest) = data.split_at(PNG_MAGIC_BYTES.min(data.len()));
+    let mut kept = magic.to_vec();
+    while let Some((length, _)) = rest.split_first_chunk::<4>() {
+        let length = PNG_CHUNK_BYTES.saturating_add(u32::from_be_bytes(*length) as usize);
+        let (chunk, after) = rest.split_at(length.min(rest.len()));
+        if chunk.get(4..8).is_some_and(|name| PNG_CHUNKS.contains(&name)) {
+            kept.extend_from_slice(chunk);
+        }
+        rest = after;
+    }
+    kept
 }
 
 #[cfg(test)]
@@ -199,5 +240,33 @@ mod tests {
         let RecordedImage::Raw(mut short) = image("mono8", 1, |_, _| vec![0]) else { panic!("raw") };
         short.data.pop();
         assert_eq!(grey(&RecordedImage::Raw(short), SIZE), Err(ImageProblem::Damaged));
+    }
+
+    fn flat_png(side: u32) -> Vec<u8> {
+        let mut png = Vec::new();
+        let picture = image::GrayImage::from_pixel(side, side, image::Luma([90]));
+        picture.write_to(&mut Cursor::new(&mut png), ImageFormat::Png).expect("written");
+        png
+    }
+
+    #[test]
+    fn an_image_of_more_pixels_than_its_bytes_hold_is_refused_before_it_is_decoded() {
+        let mut image = CompressedImage { data: flat_png(2000), ..CompressedImage::default() };
+        // Decoded it would be damaged.
+        image.data.truncate(200);
+        let Err(ImageProblem::Unusable(why)) = compressed(&image, [2000; 2]) else { panic!("refused") };
+        insta::assert_snapshot!("claimed_pixels", why);
+    }
+
+    #[test]
+    fn chunks_without_pixels_are_not_read() {
+        let whole = flat_png(6);
+        let head = PNG_MAGIC_BYTES + PNG_CHUNK_BYTES + 13;
+        // Neither the checksum nor the data of these would pass.
+        let chunks = [b"iCCP", b"zTXt", b"iTXt", b"eXIf"].map(|name| [&[0, 0, 0, 3], &name[..], &[9; 7]].concat());
+        let data = [&whole[..head], &chunks.concat(), &whole[head..]].concat();
+        assert_eq!(png_pixels(&data), whole);
+        let image = CompressedImage { data, ..CompressedImage::default() };
+        assert_eq!(compressed(&image, [6; 2]).expect("a picture"), [90; 36]);
     }
 }

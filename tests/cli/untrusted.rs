@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use armcal::calib::Calibration;
 use armcal::log::{RecordingHeader, RecordingWriter};
 
 use crate::support::texts::Texts;
@@ -148,23 +149,40 @@ fn long_files_and_many_entries_are_refused() {
     check(&file).expect("200,000 tags", 2, &["map.toml"]);
 }
 
+/// Nor do marks that turn the direction of writing; read again, the files have the name as it was.
+#[test]
+fn names_steer_no_reader_of_the_files() {
+    let folder = temp();
+    let robot = robot_copy(folder.path());
+    edit(&robot.join("robot.toml"), "name = \"titan4\"", "name = \"titan\\u202e\\u009b4\"");
+    let out = folder.path().join("out");
+    let done = calibrate(&root().join("recordings/sample/run.mcap"), &robot, &out);
+    assert_eq!(done.code, 0, "{done:#?}");
+    for name in ["calibration.toml", "summary.json", "report.html"] {
+        let text = std::fs::read_to_string(out.join(name)).expect(name);
+        assert!(text.contains("titan\\u202e\\u009b4") && !text.contains(['\u{202e}', '\u{9b}']), "{name}");
+    }
+    let file = out.join("calibration.toml");
+    assert_eq!(Calibration::read(&file).expect("it reads").robot, "titan\u{202e}\u{9b}4");
+}
+
 #[test]
 fn control_characters_never_reach_the_terminal() {
     let folder = temp();
     let robot = robot_copy(folder.path());
     edit(&robot.join("robot.toml"), "name = \"titan4\"", "name = \"titan\\u001b[2J\\u009b4\"");
     let good = check(&robot);
-    good.expect("a robot's name", 0, &["titan\\u{1b}[2J\\u{9b}4"]);
+    good.expect("a robot's name", 0, &["titan\\u001b[2J\\u009b4"]);
     let broken = folder.path().join("broken.toml");
     write(&broken, "version = 1\nname = \u{1b}]0;owned\u{7}\n");
     let spoilt = check(&broken);
-    spoilt.expect("broken TOML", 2, &["\\u{1b}]0;owned\\u{7}"]);
+    spoilt.expect("broken TOML", 2, &["\\u001b]0;owned\\u0007"]);
     let failed = run(&broken, &folder.path().join("out"));
-    failed.expect("broken TOML", 2, &["\\u{1b}]0;owned\\u{7}"]);
+    failed.expect("broken TOML", 2, &["\\u001b]0;owned\\u0007"]);
     let map = folder.path().join("map.toml");
     write(&map, "version = 1\nframe = \"a\\u001b[31m\"\n[[tag]]\nid = 1\nsize_m = 0.1\nposition_m = [0.0, 0.0, 1.0]\n");
     let frame = check(&map);
-    frame.expect("a frame", 0, &["a\\u{1b}[31m"]);
+    frame.expect("a frame", 0, &["a\\u001b[31m"]);
     for told in [good, spoilt, failed, frame] {
         let steers = |c: char| c.is_control() && c != '\n' && c != '\t';
         assert!(!told.stdout.contains(steers) && !told.stderr.contains(steers), "{told:#?}");

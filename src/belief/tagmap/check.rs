@@ -2,6 +2,8 @@
 
 use std::collections::BTreeSet;
 
+use armcal_core::robot::MAX_TAGS;
+
 use crate::tagmap::types::{MapInput, MapSettings, TagMapError};
 
 /// Sizes of tags, m.
@@ -54,6 +56,9 @@ fn anchor(input: &MapInput<'_>, settings: &MapSettings) -> Result<(), TagMapErro
     let seen: BTreeSet<u32> = input.views.iter().flat_map(|view| view.tags.iter().map(|tag| tag.id)).collect();
     if seen.is_empty() {
         return Err(TagMapError::NoDetections);
+    }
+    if seen.len() > MAX_TAGS {
+        return Err(TagMapError::ManyTags { n: seen.len() });
     }
     let all = || seen.iter().copied().collect::<Vec<_>>();
     if let Some(base_tag) = settings.base_tag

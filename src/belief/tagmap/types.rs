@@ -4,6 +4,7 @@ use armcal_core::codes::{Code, Coded};
 use nalgebra::{Isometry3, Matrix2, UnitQuaternion};
 
 use armcal_core::optics::CameraModel;
+use armcal_core::robot::MAX_TAGS;
 use armcal_core::time::Stamp;
 
 /// One tag in one image.
@@ -191,6 +192,8 @@ pub enum TagMapError {
     NoBaseTag { base_tag: u32, seen: Vec<u32> },
     #[error("none of the tags whose places are known ({known:?}) was seen in any view; tags seen: {seen:?}")]
     NoKnownTag { known: Vec<u32>, seen: Vec<u32> },
+    #[error("the views show {n} different tags, 0 .. {MAX_TAGS} are allowed; choose another topic")]
+    ManyTags { n: usize },
     #[error("tag {id}: size_m {size_m} is outside 0.001 .. 10")]
     TagSize { id: u32, size_m: f64 },
     #[error("tag {id}: stands twice among the known tags")]
@@ -209,7 +212,7 @@ impl Coded for TagMapError {
     fn code(&self) -> Code {
         match self {
             Self::NoDetections | Self::NoBaseTag { .. } | Self::NoKnownTag { .. } => Code::TagsNotSeen,
-            Self::TagSize { .. } | Self::Setting { .. } => Code::ValueOutOfRange,
+            Self::ManyTags { .. } | Self::TagSize { .. } | Self::Setting { .. } => Code::ValueOutOfRange,
             Self::TagTwice { .. } => Code::ValueDuplicate,
             Self::NoSuchBody { .. } | Self::NoSuchCamera { .. } => Code::NameUnknown,
             Self::NothingLeft { .. } => Code::MapFailed,

@@ -6,7 +6,7 @@ use super::error::InputError;
 use super::message_type::check_type;
 use crate::log::ros::{CameraInfo, CompressedImage, Image};
 use crate::log::{CdrError, RawMessage, RosMessage, decode, for_each_raw};
-use crate::optics::{CameraModel, Fisheye, Radtan, TagFamily};
+use crate::optics::{CameraModel, Fisheye, Radtan, TagFamily, check_image_size};
 
 /// One image as recorded.
 #[derive(Clone, Debug, PartialEq)]
@@ -175,12 +175,8 @@ pub fn lens_of_camera_info(info: &CameraInfo) -> Result<CameraModel, String> {
                     the lens as [camera] of robot.toml"
             .to_owned());
     }
-    if !resolution_px.iter().all(|n| (16..=65536).contains(n)) {
-        return Err(format!(
-            "is for {} x {} pixels; 16 .. 65536 are allowed: state the lens as [camera] of robot.toml",
-            info.width, info.height
-        ));
-    }
+    check_image_size(resolution_px)
+        .map_err(|problem| format!("is for {problem}: state the lens as [camera] of robot.toml"))?;
     if !focal_px.iter().all(|f| (1.0..=1e6).contains(f)) || !center_px.iter().all(|c| c.abs() <= 1e6) {
         return Err(format!(
             "is no calibration: focal lengths {focal_px:?} px, centre {center_px:?} px; state the lens as [camera] of \
@@ -283,6 +279,8 @@ mod tests {
             info("plumb_bob", &[0.0; 3]),
             info("equidistant", &[f64::NAN; 4]),
             CameraInfo { width: 0, ..info("plumb_bob", &[]) },
+            CameraInfo { width: 20_000, height: 20_000, ..info("plumb_bob", &[]) },
+            CameraInfo { width: 50_000, ..info("plumb_bob", &[]) },
             uncalibrated,
             binned,
             part,

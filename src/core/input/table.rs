@@ -16,6 +16,7 @@ use crate::robot::Robot;
 use crate::time::Stamp;
 
 mod columns;
+mod columns_seen;
 mod contents;
 mod csv_text;
 mod pose;
@@ -23,7 +24,8 @@ mod rows;
 mod yaml;
 
 use columns::Columns;
-pub use contents::{TableColumn, TableContents, read_table_contents};
+pub use columns_seen::TableColumn;
+pub use contents::{TableContents, read_table_contents};
 use csv_text::csv_rows;
 use pose::camera_from_tag;
 use rows::{Row, Rows};

@@ -312,18 +312,17 @@ impl<'a> TagReader<'a> {
     pub fn finish(mut self) -> (Vec<TagFrame>, BTreeMap<String, u64>) {
         let mut frames: Vec<TagFrame> = std::mem::take(&mut self.frames).into_values().collect();
         for frame in &mut frames {
-            let mut once: Vec<ExternalDetection> = Vec::new();
+            let mut once: BTreeMap<_, ExternalDetection> = BTreeMap::new();
             let mut twice = BTreeSet::new();
             for observation in std::mem::take(&mut frame.tags) {
-                match once.iter().find(|other| other.key() == observation.key()) {
+                match once.get(&observation.key()) {
                     Some(other) if other.seen == observation.seen => {}
                     Some(_) => drop(twice.insert(observation.key())),
-                    None => once.push(observation),
+                    None => drop(once.insert(observation.key(), observation)),
                 }
             }
-            once.retain(|observation| !twice.contains(&observation.key()));
-            once.sort_by_key(ExternalDetection::key);
-            frame.tags = once;
+            once.retain(|key, _| !twice.contains(key));
+            frame.tags = once.into_values().collect();
             for _ in &twice {
                 self.count("tags seen at two places at one time");
             }

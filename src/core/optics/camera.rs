@@ -49,6 +49,27 @@ pub enum LensModel {
     Unknown(UnknownLens),
 }
 
+/// Pixels of the largest image: the library that looks for tags takes 13 bytes for each.
+const MAX_PIXELS: u64 = 100_000_000;
+/// Columns or rows of an image: that library counts them in 16 bits with a sign.
+const SIDE_PX: std::ops::RangeInclusive<u32> = 16..=32767;
+
+/// Checks the size of a camera's images before anything is made of that size.
+///
+/// # Errors
+/// The end of a sentence about the images: their size and what is allowed.
+pub fn check_image_size(resolution_px: [u32; 2]) -> Result<(), String> {
+    let [width, height] = resolution_px;
+    let is_side = resolution_px.iter().all(|n| SIDE_PX.contains(n));
+    if is_side && u64::from(width) * u64::from(height) <= MAX_PIXELS {
+        return Ok(());
+    }
+    let (least, most, megapixels) = (SIDE_PX.start(), SIDE_PX.end(), MAX_PIXELS / 1_000_000);
+    Err(format!(
+        "{width} x {height} pixels; each side may have {least} .. {most}, and an image up to {megapixels} megapixels"
+    ))
+}
+
 /// A lens of which nothing is known: nothing is seen through it, and all its numbers are NaN.
 #[derive(Clone, Copy, Debug)]
 pub struct UnknownLens {

@@ -17,7 +17,7 @@ mod tag_family;
 mod twist;
 
 pub use board::{BoardPose, Chessboard, solve_board};
-pub use camera::{CameraModel, Lens, LensModel, UnknownLens};
+pub use camera::{CameraModel, Lens, LensModel, UnknownLens, check_image_size};
 pub use corner_noise::{CornerNoise, DetectionChance};
 pub use fisheye::Fisheye;
 pub use flat_port::FlatPort;

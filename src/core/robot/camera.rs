@@ -9,7 +9,7 @@ use serde::Deserialize;
 use super::error::FileIssue;
 use super::part::check_place;
 use crate::kinematics::Attachment;
-use crate::optics::{CameraModel, Fisheye, FlatPort, Radtan};
+use crate::optics::{CameraModel, Fisheye, FlatPort, Radtan, check_image_size};
 use crate::spatial::{Camera, Link, Pose};
 
 mod further;
@@ -222,8 +222,9 @@ pub(super) fn check_camera(
     let lens = match raw.lens(table)? {
         None => CameraModel::unknown(),
         Some(given) => {
+            check_image_size(given.resolution_px)
+                .map_err(|problem| table.issue("resolution_px", format!("is {problem}")))?;
             for k in 0..2 {
-                check("resolution_px", f64::from(given.resolution_px[k]), 16.0..=65536.0)?;
                 check("focal_px", given.focal_px[k], 1.0..=1e6)?;
                 check("center_px", given.center_px[k], -1e6..=1e6)?;
             }

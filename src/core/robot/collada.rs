@@ -4,16 +4,22 @@
 //! that is what drawings are checked with. Materials, normals, lights and animations are not looked at.
 
 use std::collections::BTreeMap;
+use std::rc::Rc;
 
 use nalgebra::{Matrix4, Point3, Rotation3, Translation3, Unit, Vector3, Vector4};
 
-use super::triangles::{MAX_VERTICES, Mesh, MeshBuilder};
+use super::triangles::{MAX_VERTICES, Mesh, MeshBuilder, max_triangles, too_many_triangles};
 use super::xml_tree::{Element, XmlLimits, XmlTree};
 
 /// Limit of nodes and instances that are visited, each as often as it is instanced.
 const MAX_NODES: usize = 10_000;
 /// Limit of nodes within each other, through instances, too.
 const MAX_DEPTH: usize = 64;
+
+/// Limit of the visited nodes' elements, each as often as its node is visited.
+const MAX_VISITED_ELEMENTS: usize = 1_000_000;
+/// Limit of numbers in the lists of positions, each as often as it is named.
+const MAX_NUMBERS: usize = 3 * MAX_VERTICES;
 
 /// Limits of a document: a mesh of many parts has some thousands of elements.
 const XML_LIMITS: XmlLimits = XmlLimits { elements: 200_000, namespaces: 32 };
@@ -28,8 +34,16 @@ pub(super) fn collada(bytes: &[u8]) -> Result<Mesh, String> {
     if tree.element(0).name != "COLLADA" {
         return Err(format!("its root element is `{}`, `COLLADA` expected", tree.element(0).name));
     }
-    let mut document =
-        Document { tree: &tree, ids: BTreeMap::new(), soups: BTreeMap::new(), mesh: MeshBuilder::default() };
+    let mut document = Document {
+        tree: &tree,
+        ids: BTreeMap::new(),
+        soups: BTreeMap::new(),
+        positions: BTreeMap::new(),
+        n_numbers: 0,
+        max_triangles: max_triangles(bytes.len()),
+        n_triangles: 0,
+        mesh: MeshBuilder::of_file(bytes.len()),
+    };
     for (at, element) in tree.elements().iter().enumerate() {
         if let Some(id) = element.attribute("id") {
             document.ids.entry(id).or_insert(at);
@@ -45,6 +59,13 @@ struct Document<'a> {
     ids: BTreeMap<&'a str, usize>,
     /// Triangles of each geometry that was used, in its own coordinates.
     soups: BTreeMap<usize, Vec<Triangle>>,
+    /// Positions of each `vertices` that was used.
+    positions: BTreeMap<usize, Rc<Vec<[f64; 3]>>>,
+    /// Numbers that they were read from.
+    n_numbers: usize,
+    max_triangles: usize,
+    /// In all of `soups`.
+    n_triangles: usize,
     mesh: MeshBuilder,
 }
 
@@ -68,12 +89,16 @@ impl<'a> Document<'a> {
             return Ok(self.mesh.finish());
         };
         let mut visits: Vec<Visit> = Vec::new();
-        let mut n_visited = 0;
+        let (mut n_visited, mut n_elements) = (0, 0);
         self.push_children(&mut visits, Visit { element: scene, scene_from_parent: unit, depth: 0 });
         while let Some(visit) = visits.pop() {
             n_visited += 1;
             if n_visited > MAX_NODES || visit.depth > MAX_DEPTH {
                 return Err(format!("more than {MAX_NODES} nodes, or more than {MAX_DEPTH} within each other"));
+            }
+            n_elements += self.tree.children(visit.element).count();
+            if n_elements > MAX_VISITED_ELEMENTS {
+                return Err(format!("its nodes have more than {MAX_VISITED_ELEMENTS} elements"));
             }
             self.visit(visit, &mut visits)?;
         }
@@ -176,12 +201,14 @@ impl<'a> Document<'a> {
         Ok(())
     }
 
-    fn soup(&self, geometry: usize) -> Result<Vec<Triangle>, String> {
-        let mut soup = Vec::new();
+    fn soup(&mut self, geometry: usize) -> Result<Vec<Triangle>, String> {
+        let tree = self.tree;
+        let max = self.max_triangles;
+        let mut soup = Soup { triangles: Vec::new(), room: max - self.n_triangles, max };
         // A geometry without a mesh is a spline or a solid: nothing to read.
-        let Some(mesh) = self.tree.child(geometry, "mesh") else { return Ok(soup) };
-        for primitive in self.tree.children(mesh) {
-            let kind = match self.tree.element(primitive).name.as_str() {
+        let Some(mesh) = tree.child(geometry, "mesh") else { return Ok(soup.triangles) };
+        for primitive in tree.children(mesh) {
+            let kind = match tree.element(primitive).name.as_str() {
                 "triangles" => Kind::Triangles,
                 "polylist" => Kind::Polylist,
                 "polygons" | "trifans" => Kind::Fans,
@@ -190,10 +217,11 @@ impl<'a> Document<'a> {
             };
             self.add_primitive(primitive, kind, &mut soup)?;
         }
-        Ok(soup)
+        self.n_triangles += soup.triangles.len();
+        Ok(soup.triangles)
     }
 
-    fn add_primitive(&self, primitive: usize, kind: Kind, soup: &mut Vec<Triangle>) -> Result<(), String> {
+    fn add_primitive(&mut self, primitive: usize, kind: Kind, soup: &mut Soup) -> Result<(), String> {
         let mut stride = 1;
         let mut vertices = None;
         for input in self.tree.children(primitive).filter(|&child| self.tree.element(child).name == "input") {
@@ -213,19 +241,21 @@ impl<'a> Document<'a> {
         }
         let (vertices, offset) = vertices.ok_or("a primitive has no vertices")?;
         let positions = self.positions(vertices)?;
-        let counts = match (kind, self.tree.child(primitive, "vcount")) {
-            (Kind::Polylist, Some(counts)) => indices(self.tree.element(counts))?,
-            _ => Vec::new(),
-        };
+        let counts = self.tree.child(primitive, "vcount").filter(|_| kind == Kind::Polylist);
+        let counts = counts.map_or("", |counts| &self.tree.element(counts).text);
         for list in self.index_lists(primitive) {
-            let all = indices(self.tree.element(list))?;
-            let corners = all.chunks_exact(stride).map(|corner| {
-                positions
-                    .get(corner[offset])
-                    .copied()
-                    .ok_or_else(|| format!("corner {} is none of {} vertices", corner[offset], positions.len()))
+            let mut corner = 0;
+            let corners = indices(&self.tree.element(list).text, "p").enumerate().filter_map(|(n, index)| {
+                match index {
+                    Ok(index) if n % stride == offset => corner = index,
+                    Ok(_) => {}
+                    Err(problem) => return Some(Err(problem)),
+                }
+                let position = || positions.get(corner).copied();
+                let none = || format!("corner {corner} is none of {} vertices", positions.len());
+                (n % stride == stride - 1).then(|| position().ok_or_else(none))
             });
-            kind.add(&corners.collect::<Result<Vec<_>, String>>()?, &counts, soup)?;
+            kind.add(corners, indices(counts, "vcount"), soup)?;
         }
         Ok(())
     }
@@ -242,8 +272,17 @@ impl<'a> Document<'a> {
             .collect()
     }
 
-    /// Positions that a `vertices` element names.
-    fn positions(&self, vertices: usize) -> Result<Vec<[f64; 3]>, String> {
+    /// Positions that a `vertices` element names; read once, however many primitives name it.
+    fn positions(&mut self, vertices: usize) -> Result<Rc<Vec<[f64; 3]>>, String> {
+        if let Some(known) = self.positions.get(&vertices) {
+            return Ok(Rc::clone(known));
+        }
+        let positions = Rc::new(self.read_positions(vertices)?);
+        self.positions.insert(vertices, Rc::clone(&positions));
+        Ok(positions)
+    }
+
+    fn read_positions(&mut self, vertices: usize) -> Result<Vec<[f64; 3]>, String> {
         let is_position = |&child: &usize| self.tree.element(child).attribute("semantic") == Some("POSITION");
         let input = self.tree.children(vertices).find(is_position).ok_or("vertices have no positions")?;
         let source = self.target(input, "source")?;
@@ -263,15 +302,16 @@ impl<'a> Document<'a> {
         if stride < 3 {
             return Err(format!("positions of {stride} numbers, 3 expected"));
         }
-        let words = self.tree.element(array).text.split_ascii_whitespace().skip(offset);
         let (mut positions, mut position) = (Vec::new(), [0.0; 3]);
-        for (n, word) in words.enumerate() {
+        for (at, word) in self.tree.element(array).text.split_ascii_whitespace().enumerate() {
+            self.n_numbers += 1;
+            if self.n_numbers > MAX_NUMBERS {
+                return Err(format!("more than {MAX_NUMBERS} numbers in its lists of positions; use a coarser mesh"));
+            }
+            let Some(n) = at.checked_sub(offset) else { continue };
             let Some(place) = position.get_mut(n % stride) else { continue };
             *place = word.parse().map_err(|_| format!("`{word}` is no number"))?;
             if n % stride == 2 {
-                if positions.len() == MAX_VERTICES {
-                    return Err(format!("more than {MAX_VERTICES} vertices"));
-                }
                 positions.push(position);
             }
         }
@@ -290,29 +330,69 @@ enum Kind {
     Strips,
 }
 
-impl Kind {
-    fn add(self, corners: &[[f64; 3]], counts: &[usize], soup: &mut Vec<Triangle>) -> Result<(), String> {
-        match self {
-            Self::Triangles => soup.extend(corners.as_chunks::<3>().0),
-            Self::Fans => add_fan(corners, soup),
-            Self::Strips => soup.extend(corners.windows(3).map(|three| [three[0], three[1], three[2]])),
-            Self::Polylist => {
-                let mut rest = corners;
-                for &count in counts {
-                    let polygon;
-                    (polygon, rest) = rest.split_at_checked(count).ok_or("its polygons have too few corners")?;
-                    add_fan(polygon, soup);
-                }
-            }
+/// Triangles of a geometry, within what its file may still have.
+struct Soup {
+    triangles: Vec<Triangle>,
+    room: usize,
+    /// Of all geometries of the file.
+    max: usize,
+}
+
+/// A corner of a primitive, or why it cannot be read.
+type Corner = Result<[f64; 3], String>;
+
+impl Soup {
+    fn add(&mut self, triangle: Triangle) -> Result<(), String> {
+        self.room = self.room.checked_sub(1).ok_or_else(|| too_many_triangles(self.max))?;
+        self.triangles.push(triangle);
+        Ok(())
+    }
+
+    /// Adds a polygon as a fan about its first corner; nothing of fewer than three corners.
+    fn add_fan(&mut self, mut corners: impl Iterator<Item = Corner>) -> Result<(), String> {
+        let Some(first) = corners.next().transpose()? else { return Ok(()) };
+        let Some(mut last) = corners.next().transpose()? else { return Ok(()) };
+        for corner in corners {
+            let corner = corner?;
+            self.add([first, last, corner])?;
+            last = corner;
         }
         Ok(())
     }
 }
 
-/// A polygon as a fan about its first corner; nothing of fewer than three corners.
-fn add_fan(corners: &[[f64; 3]], soup: &mut Vec<Triangle>) {
-    if let Some((first, rest)) = corners.split_first() {
-        soup.extend(rest.windows(2).map(|pair| [*first, pair[0], pair[1]]));
+impl Kind {
+    /// Adds a list of corners, which are read as they are used.
+    fn add(
+        self,
+        mut corners: impl Iterator<Item = Corner>,
+        counts: impl Iterator<Item = Result<usize, String>>,
+        soup: &mut Soup,
+    ) -> Result<(), String> {
+        match self {
+            Self::Fans => soup.add_fan(corners),
+            Self::Triangles | Self::Strips => {
+                let mut three = Vec::with_capacity(3);
+                for corner in corners {
+                    three.push(corner?);
+                    if let Ok(triangle) = Triangle::try_from(&three[..]) {
+                        soup.add(triangle)?;
+                        three.drain(..if self == Self::Strips { 1 } else { 3 });
+                    }
+                }
+                Ok(())
+            }
+            Self::Polylist => {
+                for count in counts {
+                    let (count, mut n) = (count?, 0);
+                    soup.add_fan(corners.by_ref().take(count).inspect(|_| n += 1))?;
+                    if n < count {
+                        return Err("its polygons have too few corners".to_owned());
+                    }
+                }
+                Ok(())
+            }
+        }
     }
 }
 
@@ -325,9 +405,10 @@ fn numbers<const N: usize>(element: &Element) -> Result<[f64; N], String> {
         .ok_or_else(|| format!("a `{}` needs {N} finite numbers", element.name))
 }
 
-fn indices(element: &Element) -> Result<Vec<usize>, String> {
-    let words = element.text.split_ascii_whitespace();
-    words.map(|word| word.parse().map_err(|_| format!("`{word}` in a `{}` is no index", element.name))).collect()
+/// The numbers in the text of an element of this name.
+fn indices<'a>(text: &'a str, name: &'a str) -> impl Iterator<Item = Result<usize, String>> + 'a {
+    let words = text.split_ascii_whitespace();
+    words.map(move |word| word.parse().map_err(|_| format!("`{word}` in a `{name}` is no index")))
 }
 
 #[cfg(test)]
@@ -389,6 +470,34 @@ mod tests {
         let whole = ["<a/>", "", "<COLLADA><a>", &"<COLLADA>".repeat(65), &multiplied()];
         let whole = whole.map(|text| format!("{}\n", read(text).expect_err("refused")));
         insta::assert_snapshot!("collada", replaced.concat() + &whole.concat());
+    }
+
+    fn of_primitives(primitives: &str) -> String {
+        format!(
+            "<COLLADA><library_geometries><geometry><mesh><source id=\"p\"><float_array>0 0 0 1 0 0 0 1 0</float_array>\
+             </source><vertices id=\"v\"><input semantic=\"POSITION\" source=\"#p\"/></vertices>{primitives}</mesh>\
+             </geometry></library_geometries></COLLADA>"
+        )
+    }
+
+    #[test]
+    fn long_lists_and_many_uses_are_refused_by_count() {
+        const INPUT: &str = "<input semantic=\"VERTEX\" source=\"#v\"/>";
+        let list = |kind: &str, p: &str| of_primitives(&format!("<{kind}>{INPUT}<p>{p}</p></{kind}>"));
+        let long = "0 1 2 ".repeat(600_000);
+        let kinds = ["triangles", "trifans", "tristrips"];
+        let mut told = kinds.map(|kind| read(&list(kind, &long)).expect_err("refused")).to_vec();
+        // 60,000 numbers, read once for all primitives.
+        let many = of_primitives(&format!("<triangles>{INPUT}</triangles>").repeat(2_000));
+        let positions = "0 0 0 ".repeat(20_000);
+        assert!(read(&many.replace("0 0 0 ", &positions)).is_ok_and(|mesh| mesh.triangles.is_empty()));
+        // Read for each of the vertices that names them.
+        let vertices =
+            |k: usize| format!("<vertices id=\"v{k}\"><input semantic=\"POSITION\" source=\"#p\"/></vertices>");
+        let of = |k: usize| format!("{}<triangles>{}</triangles>", vertices(k), INPUT.replace("#v", &format!("#v{k}")));
+        let many = of_primitives(&(0..200).map(of).collect::<String>());
+        told.push(read(&many.replace("0 0 0 ", &positions)).expect_err("refused"));
+        insta::assert_snapshot!("collada_counts", told.join("\n"));
     }
 
     /// Each node instances the next one ten times.

@@ -70,7 +70,7 @@ fn stl(bytes: &[u8]) -> Result<Mesh, String> {
 }
 
 fn stl_binary(triangles: &[u8]) -> Result<Mesh, String> {
-    let mut builder = MeshBuilder::default();
+    let mut builder = MeshBuilder::of_file(triangles.len());
     for record in triangles.chunks_exact(STL_TRIANGLE) {
         // The normal comes first; the order of the corners implies it.
         let number = |k: usize| {
@@ -83,7 +83,7 @@ fn stl_binary(triangles: &[u8]) -> Result<Mesh, String> {
 }
 
 fn stl_ascii(text: &str) -> Result<Mesh, String> {
-    let mut builder = MeshBuilder::default();
+    let mut builder = MeshBuilder::of_file(text.len());
     let mut corners = Vec::with_capacity(3);
     for (n, line) in text.lines().enumerate() {
         let mut words = line.split_whitespace();
@@ -109,7 +109,7 @@ fn numbers<'a>(words: impl Iterator<Item = &'a str>, line: usize) -> Result<[f64
 fn obj(bytes: &[u8]) -> Result<Mesh, String> {
     let text = std::str::from_utf8(bytes).map_err(|_| "not a text, as an OBJ must be".to_owned())?;
     let mut vertices: Vec<[f64; 3]> = Vec::new();
-    let mut builder = MeshBuilder::default();
+    let mut builder = MeshBuilder::of_file(bytes.len());
     for (n, line) in text.lines().enumerate() {
         let mut words = line.split_whitespace();
         match words.next() {

@@ -23,8 +23,8 @@ pub(super) fn check_entries(text: &str) -> Result<(), String> {
                 n_dots = 0;
                 in_header |= at_line_start;
             }
-            // `[a.b]` has a key for each dot, `[1.0, 2.0]` has none.
-            b']' if in_header => n_keys += std::mem::take(&mut n_dots),
+            // `[a.b]` has two keys, `[1.0, 2.0]` has none.
+            b']' if std::mem::take(&mut in_header) => n_keys += 1 + std::mem::take(&mut n_dots),
             b',' => {
                 n_values += 1;
                 (n_dots, in_header) = (0, false);
@@ -55,7 +55,9 @@ mod tests {
 
     #[test]
     fn every_way_to_write_a_key_counts() {
-        for (unit, n) in [("a = 1\n", 1), ("a.b.c=1\n", 3), ("[a.b.c]\n", 2), ("[[a.b.c]]\n", 2), ("{a.b=1},", 2)] {
+        for (unit, n) in
+            [("a = 1\n", 1), ("a.b.c=1\n", 3), ("[a.b.c]\n", 3), ("[[a.b.c]]\n", 3), ("[a]\n", 1), ("{a.b=1},", 2)]
+        {
             assert_eq!(check_entries(&unit.repeat(MAX_KEYS / n)), Ok(()), "{unit}");
             insta::assert_snapshot!("many_keys", check_entries(&unit.repeat(MAX_KEYS / n + 1)).expect_err(unit));
         }

@@ -9,31 +9,53 @@ pub(super) struct Mesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// Limit of a mesh's triangles.
+/// Limit of a mesh's triangles, degenerate ones among them.
 const MAX_TRIANGLES: usize = 1_000_000;
 /// Limit of its vertices: as many as triangles of their own have.
 pub(super) const MAX_VERTICES: usize = 3 * MAX_TRIANGLES;
+/// Triangles that every file may have, and bytes of each triangle beyond that: a file may show one part many times. A
+/// triangle takes up to 250 bytes of memory; in a file it has 12 at least.
+const ALWAYS_ALLOWED_TRIANGLES: usize = 200_000;
+const MIN_BYTES_PER_TRIANGLE: usize = 10;
+
+/// Triangles that a file of `bytes` may have.
+pub(super) fn max_triangles(bytes: usize) -> usize {
+    MAX_TRIANGLES.min(ALWAYS_ALLOWED_TRIANGLES + bytes / MIN_BYTES_PER_TRIANGLE)
+}
+
+/// The error for a file of more than [`max_triangles`].
+pub(super) fn too_many_triangles(max: usize) -> String {
+    format!("more than {max} triangles; use a coarser mesh")
+}
 
 /// Mesh in the making; equal corners share one vertex.
-#[derive(Default)]
 pub(super) struct MeshBuilder {
     mesh: Mesh,
     number: BTreeMap<[u64; 3], u32>,
+    n_added: usize,
+    max_triangles: usize,
 }
 
 impl MeshBuilder {
+    /// An empty mesh of a file of so many bytes.
+    pub fn of_file(bytes: usize) -> Self {
+        let max_triangles = max_triangles(bytes);
+        Self { mesh: Mesh::default(), number: BTreeMap::new(), n_added: 0, max_triangles }
+    }
+
     /// Adds a triangle.
     ///
     /// # Errors
     /// A sentence, where there are too many or one has no place.
     pub fn add(&mut self, corners: [[f64; 3]; 3]) -> Result<(), String> {
-        if self.mesh.triangles.len() == MAX_TRIANGLES {
-            return Err(format!("more than {MAX_TRIANGLES} triangles"));
+        if self.n_added == self.max_triangles {
+            return Err(too_many_triangles(self.max_triangles));
         }
+        self.n_added += 1;
         if !corners.as_flattened().iter().all(|v| v.is_finite()) {
             return Err(format!("triangle {} has a coordinate that is not finite", self.mesh.triangles.len()));
         }
-        let Self { mesh, number } = self;
+        let Self { mesh, number, .. } = self;
         let triangle = corners.map(|corner| {
             // Adding zero turns -0 into 0.
             *number.entry(corner.map(|v| (v + 0.0).to_bits())).or_insert_with(|| {

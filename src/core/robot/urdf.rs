@@ -18,6 +18,10 @@ pub(super) mod notes;
 
 /// Limit of an arm's collision shapes, so that planning places them without allocating.
 pub const MAX_COLLISION_SHAPES: usize = 64;
+/// Joints between a link and the root of its tree; those of a humanoid have some thirty.
+const MAX_JOINTS_UP: usize = 200;
+/// Joints of a URDF; a humanoid with its hands has about 100. The search for an arm compares each with the others.
+const MAX_URDF_JOINTS: usize = 1000;
 /// Grey, for shapes without a material.
 const UNPAINTED_RGB: [u8; 3] = [160; 3];
 
@@ -81,6 +85,11 @@ impl UrdfModel {
             file: file.to_owned(),
             message,
         })?;
+        if robot.joints.len() > MAX_URDF_JOINTS {
+            let message =
+                format!("{} joints, 0 .. {MAX_URDF_JOINTS} allowed; give the arm's part alone", robot.joints.len());
+            return Err(RobotError::Syntax { code: Code::ValueInvalid, file: file.to_owned(), message });
+        }
         let mut model = Self {
             file: file.to_owned(),
             text,
@@ -122,19 +131,33 @@ impl UrdfModel {
 
     fn check_acyclic(&self) -> Result<(), RobotError> {
         for joint in &self.robot.joints {
-            let mut at = joint.child.as_str();
-            for _ in 0..=self.robot.joints.len() {
-                match self.joint_of_child.get(at) {
-                    Some(&joint) => at = &self.robot.joints[joint].parent,
-                    None => break,
+            let Err(at) = self.go_up(&joint.child, MAX_JOINTS_UP) else { continue };
+            let file = self.file.clone();
+            return Err(match self.go_up(at, self.robot.joints.len()) {
+                Ok(()) => {
+                    let message = format!(
+                        "{}: link `{}` is below more than {MAX_JOINTS_UP} joints; give the arm's part alone",
+                        joint.place, joint.child
+                    );
+                    RobotError::Syntax { code: Code::ValueInvalid, file, message }
                 }
-            }
-            if self.joint_of_child.contains_key(at) {
-                let (file, link) = (self.file.clone(), joint.child.clone());
-                return Err(RobotError::Loop { file, place: joint.place.to_string(), link, joint: joint.name.clone() });
-            }
+                Err(_) => {
+                    let (place, link) = (joint.place.to_string(), joint.child.clone());
+                    RobotError::Loop { file, place, link, joint: joint.name.clone() }
+                }
+            });
         }
         Ok(())
+    }
+
+    /// Goes from a link to the root of its tree; an error is the link after `n` joints, with more above it.
+    fn go_up<'a>(&'a self, link: &'a str, n: usize) -> Result<(), &'a str> {
+        let mut at = link;
+        for _ in 0..=n {
+            let Some(&joint) = self.joint_of_child.get(at) else { return Ok(()) };
+            at = &self.robot.joints[joint].parent;
+        }
+        Err(at)
     }
 
     /// Adds links that only joints name, where the joints leave no doubt about the link.
@@ -168,10 +191,9 @@ impl UrdfModel {
     }
 
     fn note_loose_links(&mut self) {
-        let held = |link: &UrdfLink| {
-            self.robot.joints.iter().any(|joint| joint.parent == link.name || joint.child == link.name)
-        };
-        let loose = self.robot.links.iter().filter(|link| !self.robot.joints.is_empty() && !held(link));
+        let held: BTreeSet<&String> =
+            self.robot.joints.iter().flat_map(|joint| [&joint.parent, &joint.child]).collect();
+        let loose = self.robot.links.iter().filter(|link| !held.is_empty() && !held.contains(&link.name));
         let note = |link: &UrdfLink| Skipped {
             owner: format!("link `{}`", link.name),
             place: link.place,
@@ -183,10 +205,9 @@ impl UrdfModel {
 
     /// Links that no joint holds and from which joints lead on.
     pub fn roots(&self) -> impl Iterator<Item = &str> {
+        let parents: BTreeSet<&str> = self.robot.joints.iter().map(|joint| joint.parent.as_str()).collect();
         let links = self.robot.links.iter().map(|link| link.name.as_str());
-        links.filter(|link| {
-            !self.joint_of_child.contains_key(*link) && self.robot.joints.iter().any(|joint| joint.parent == **link)
-        })
+        links.filter(move |link| !self.joint_of_child.contains_key(*link) && parents.contains(link))
     }
 
     /// Joint indices from `base` down to `tip`.
@@ -469,5 +490,35 @@ impl UrdfChain<'_> {
             named.extend(link.collision.iter().filter_map(|collision| named_mesh(link, collision)));
         }
         named
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Links one below the other, or all below the first.
+    fn parsed(n: usize, parent: impl Fn(usize) -> usize) -> Result<UrdfModel, RobotError> {
+        let link = |k: usize| format!("<link name=\"l{k}\"/>");
+        let joint = |k: usize| {
+            let parent = parent(k);
+            format!("<joint name=\"j{k}\" type=\"fixed\"><parent link=\"l{parent}\"/><child link=\"l{k}\"/></joint>")
+        };
+        let joints: String = (1..=n).map(joint).collect();
+        let text = format!("<robot name=\"a\">{}{joints}</robot>", (0..=n).map(link).collect::<String>());
+        UrdfModel::parse(Path::new("a.urdf"), text)
+    }
+
+    #[test]
+    fn many_joints_and_long_chains_are_refused_before_they_are_compared() {
+        assert!(parsed(MAX_JOINTS_UP, |k| k - 1).is_ok());
+        assert!(parsed(MAX_URDF_JOINTS, |_| 0).is_ok());
+        let told = [
+            parsed(MAX_JOINTS_UP + 1, |k| k - 1),
+            parsed(MAX_URDF_JOINTS + 1, |_| 0),
+            parsed(MAX_URDF_JOINTS, |k| 1 + k % MAX_URDF_JOINTS),
+        ];
+        let told = told.map(|found| found.expect_err("refused").to_string());
+        insta::assert_snapshot!("many_joints", told.join("\n"));
     }
 }

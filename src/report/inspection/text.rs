@@ -29,12 +29,7 @@ pub fn to_text(inspection: &Inspection, width: Option<usize>) -> String {
         lines.push(String::new());
         lines.extend(inspection.hints.iter().map(|hint| format!("note         {hint}")));
     }
-    lines.iter().map(|line| printable(line)).collect::<Vec<_>>().join("\n")
-}
-
-/// Names in a file are the file's; they must not steer the terminal.
-fn printable(line: &str) -> String {
-    line.chars().map(|c| if c.is_control() && c != '\n' { '\u{fffd}' } else { c }).collect()
+    lines.join("\n")
 }
 
 /// What the reader of bags in SQLite files says for their writer.

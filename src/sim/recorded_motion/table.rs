@@ -24,6 +24,8 @@ pub(super) struct Header {
 const BY_ANGLES: [&str; 7] = ["time_s", "x_m", "y_m", "z_m", "roll_rad", "pitch_rad", "yaw_rad"];
 const BY_QUATERNION: [&str; 8] = ["time_s", "x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"];
 const N_POSITION_COLUMNS: usize = 4;
+/// Bytes of a line: the reader of CSV keeps the places of all its cells.
+const MAX_LINE_BYTES: usize = 4096;
 /// A cubic through fewer says nothing about accelerations.
 const MIN_ROWS: usize = 4;
 
@@ -70,6 +72,10 @@ impl Header {
 /// Columns and samples of `text`.
 pub(super) fn parse(file: &Path, text: &str) -> Result<(Header, Vec<Sample>), FileIssue> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    if let Some(at) = text.lines().position(|line| line.len() > MAX_LINE_BYTES) {
+        let problem = format!("is longer than {MAX_LINE_BYTES} bytes; a line has a time and a pose alone");
+        return Err(FileIssue::new(Code::TableInvalid, file, format!("line {}", at + 1), problem));
+    }
     let mut reader =
         csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).flexible(true).from_reader(text.as_bytes());
     let unreadable =

@@ -198,6 +198,7 @@ fn bad_files_are_refused_with_line_column_and_range() {
         with_line(5, "1.5,40,0,0,0,0,0"),
         with_line(5, "1.5,0,0,0,0,0,3.0"),
         with_line(1, "t,x,y,z,roll,pitch,yaw"),
+        with_line(5, &",".repeat(5000)),
         HEADER.to_owned() + "0,0,0,0,0,0,0\n0.1,0,0,0,0,0,0\n",
         String::new(),
         "time_s,x_m,y_m,z_m,qw,qx,qy,qz\n0,0,0,0,0.5,0,0,0.5\n".to_owned(),

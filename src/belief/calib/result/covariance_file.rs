@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::calib::result::file_error::CalibrationFileError;
 use armcal_core::robot::{FileIssue, RobotError, parse_toml, read_text};
+use armcal_core::text::printable;
 
 /// Above so many rows, a covariance is written with seven significant digits.
 const FULL_DIGITS_ROWS: usize = 24;
@@ -117,6 +118,8 @@ pub fn covariance_file(calibration: &Path) -> PathBuf {
 /// Hash (blake3) of a file's lines, whatever comments, indents and empty lines it got, less the key of its counterpart.
 fn content_hash(text: &str) -> String {
     let mut hasher = blake3::Hasher::new();
+    // As the file is written.
+    let text = printable(text);
     let lines = text.lines().map(str::trim);
     for line in lines.filter(|l| !l.is_empty() && !l.starts_with('#') && !l.starts_with(CALIBRATION_HASH)) {
         hasher.update(line.as_bytes());

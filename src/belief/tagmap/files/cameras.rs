@@ -8,7 +8,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use crate::tagmap::files::yaml;
-use armcal_core::optics::{CameraModel, Fisheye, LensModel, Radtan};
+use armcal_core::optics::{CameraModel, Fisheye, LensModel, Radtan, check_image_size};
 use armcal_core::robot::{FileIssue, RobotError, read_text};
 
 /// A camera as files name it.
@@ -84,9 +84,7 @@ fn camera(file: &Path, name: &str, raw: &CameraYaml) -> Result<NamedCamera, Robo
     for c in [cx, cy] {
         check("intrinsics", c, -1e6..=1e6)?;
     }
-    for n in [width, height] {
-        check("resolution", f64::from(n), 16.0..=65536.0)?;
-    }
+    check_image_size([width, height]).map_err(|problem| issue("resolution", format!("is {problem}")))?;
     for k in &raw.distortion_coeffs {
         check("distortion_coeffs", *k, -100.0..=100.0)?;
     }

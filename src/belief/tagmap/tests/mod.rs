@@ -10,7 +10,7 @@ mod statistics;
 use fixture::{fisheye, pinhole, settings, wall};
 use nalgebra::Vector3;
 
-use crate::tagmap::{MapInput, TagMap, TagMapError, solve};
+use crate::tagmap::{MapDetection, MapInput, TagMap, TagMapError, solve};
 use fixture::Scene;
 
 fn position_errors(scene: &Scene, map: &TagMap) -> Vec<(u32, Vector3<f64>)> {
@@ -73,6 +73,11 @@ fn input_that_cannot_be_meant_is_refused() {
     assert_eq!(with(&|s| s.priors[2].body = 1), TagMapError::NoSuchBody { id: 2, body: 1, n_bodies: 1 });
     assert_eq!(with(&|s| s.views[3].camera = 2), TagMapError::NoSuchCamera { view: 3, camera: 2, n_cameras: 1 });
     assert_eq!(with(&|s| s.views.clear()), TagMapError::NoDetections);
+    let many = |s: &mut Scene| {
+        let tag = s.views[0].tags[0].clone();
+        s.views[0].tags = (0..5001).map(|id| MapDetection { id, ..tag.clone() }).collect();
+    };
+    assert_eq!(with(&many), TagMapError::ManyTags { n: 5001 });
     let nothing = MapInput { tags: &[], ..scene.input() };
     let error = solve(&nothing, &crate::tagmap::MapSettings { base_tag: None, ..settings() }).unwrap_err();
     let n = scene.views.iter().map(|view| view.tags.len()).sum();

@@ -3,32 +3,12 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::csv_text::csv_cells;
-use super::rows::Cells;
+use super::columns_seen::{ColumnsSeen, TableColumn};
+use super::csv_text::csv_columns;
+use super::yaml::{YamlColumns, yaml_columns};
 use super::{format_by_name, read_table_text};
 use crate::input::error::InputError;
 use crate::input::map::TableFormat;
-
-/// One column.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TableColumn {
-    /// As the input map names it.
-    pub name: String,
-    /// Cells with a finite number.
-    pub n_numbers: usize,
-    /// Cells that are empty.
-    pub n_empty: usize,
-    /// Cells with something else; the first of them.
-    pub n_others: usize,
-    /// The first cell that is no finite number.
-    pub first_other: Option<String>,
-    /// Lowest and highest number; `None` without one.
-    pub range: Option<[f64; 2]>,
-    /// All numbers are whole.
-    pub is_whole: bool,
-    /// No number is smaller than the one before.
-    pub is_rising: bool,
-}
 
 /// Columns and rows of a table.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,58 +37,24 @@ pub fn read_table_contents(path: &Path) -> Option<Result<TableContents, InputErr
 fn contents(path: &Path, format: TableFormat) -> Result<TableContents, InputError> {
     let file = path.display().to_string();
     let text = read_table_text(path, format)?;
-    let cells = match format {
-        TableFormat::Csv => csv_cells(&file, &text)?,
-        TableFormat::Yaml => super::yaml::yaml_cells(&file, &text)?,
+    let (seen, rows_at, other_names) = match format {
+        TableFormat::Csv => (csv_columns(&file, &text)?, Vec::new(), BTreeMap::new()),
+        TableFormat::Yaml => {
+            let YamlColumns { seen, rows_at, other_names } = yaml_columns(&file, &text)?;
+            (seen, rows_at, other_names)
+        }
     };
-    let Cells { rows_at, names, rows, other_names } = cells;
-    let column = |(k, name): (usize, &String)| {
-        let cells = rows.iter().map(|row| row.get(k).map_or("", |cell| cell.trim()));
-        column(name.clone(), cells)
-    };
-    let columns: Vec<TableColumn> = names.iter().enumerate().map(column).collect();
-    if rows.is_empty() || columns.iter().all(|column| column.n_numbers == 0) {
+    let ColumnsSeen { columns, n_rows, .. } = seen;
+    if n_rows == 0 || columns.iter().all(|column| column.n_numbers == 0) {
         let problem = format!(
             "it is no table of poses: {} rows, none with a number in its columns {:?}; armcal reads tables (CSV, YAML, \
              JSON) with one row or entry per pose, and recordings (.mcap, .db3)",
-            rows.len(),
-            names.iter().take(12).collect::<Vec<_>>()
+            n_rows,
+            columns.iter().take(12).map(|column| &column.name).collect::<Vec<_>>()
         );
         return Err(InputError::Table { file, problem });
     }
-    Ok(TableContents { format, rows_at, n_rows: rows.len(), columns, other_names })
-}
-
-fn column<'a>(name: String, cells: impl Iterator<Item = &'a str>) -> TableColumn {
-    let mut found = TableColumn {
-        name,
-        n_numbers: 0,
-        n_empty: 0,
-        n_others: 0,
-        first_other: None,
-        range: None,
-        is_whole: true,
-        is_rising: true,
-    };
-    let mut last = f64::NEG_INFINITY;
-    for cell in cells {
-        match cell.parse::<f64>() {
-            Ok(value) if value.is_finite() => {
-                found.n_numbers += 1;
-                let [low, high] = found.range.unwrap_or([value; 2]);
-                found.range = Some([low.min(value), high.max(value)]);
-                found.is_whole &= value.fract() == 0.0;
-                found.is_rising &= value >= last;
-                last = value;
-            }
-            _ if cell.is_empty() => found.n_empty += 1,
-            _ => {
-                found.n_others += 1;
-                found.first_other.get_or_insert_with(|| cell.chars().take(40).collect());
-            }
-        }
-    }
-    found
+    Ok(TableContents { format, rows_at, n_rows, columns, other_names })
 }
 
 #[cfg(test)]
@@ -158,6 +104,8 @@ mod tests {
             ("c.yaml", "a: [\n"),
             ("d.csv", "a,b\n1\n2,3,4\n"),
             ("e.txt", ""),
+            ("f.csv", &format!("a,b\n1,2\n{}\n", ",".repeat(1000))),
+            ("g.csv", &format!("\"a\n\"{}", ",".repeat(1000))),
         ];
         let told: Vec<String> = cases.map(|(name, text)| read(name, text).expect_err("refused")).to_vec();
         insta::assert_snapshot!("no_tables", told.join("\n"));

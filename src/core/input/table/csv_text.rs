@@ -1,31 +1,39 @@
 //! Rows from CSV.
 
-use super::rows::{Cells, Row, Rows, check_count, number};
+use super::columns_seen::ColumnsSeen;
+use super::rows::{MAX_COLUMNS, Row, Rows, check_count, number};
 use crate::input::error::InputError;
 
-fn csv_reader(text: &str) -> csv::Reader<&[u8]> {
+/// A reader of a text whose lines have few columns: it keeps the places of all cells of a row.
+fn csv_reader<'a>(file: &str, text: &'a str) -> Result<csv::Reader<&'a [u8]>, InputError> {
     let text = text.trim_start_matches('\u{feff}');
     let header = text.lines().find(|line| !line.is_empty() && !line.starts_with('#')).unwrap_or_default();
     let delimiter = [b'\t', b';'].into_iter().find(|mark| header.as_bytes().contains(mark)).unwrap_or(b',');
-    csv::ReaderBuilder::new().delimiter(delimiter).comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes())
+    let has_many = |line: &[u8]| line.iter().filter(|byte| **byte == delimiter).count() >= MAX_COLUMNS;
+    if let Some(at) = text.as_bytes().split(|byte| matches!(byte, b'\n' | b'\r')).position(has_many) {
+        let problem = format!("line {} has more than {MAX_COLUMNS} columns; leave out those that no map names", at + 1);
+        return Err(InputError::Table { file: file.to_owned(), problem });
+    }
+    let mut builder = csv::ReaderBuilder::new();
+    Ok(builder.delimiter(delimiter).comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes()))
 }
 
-/// Reads all cells.
-pub(super) fn csv_cells(file: &str, text: &str) -> Result<Cells, InputError> {
-    let mut reader = csv_reader(text);
+/// Looks at all cells, row by row.
+pub(super) fn csv_columns(file: &str, text: &str) -> Result<ColumnsSeen, InputError> {
+    let mut reader = csv_reader(file, text)?;
     let bad = |error: csv::Error| InputError::Table { file: file.to_owned(), problem: format!("is no CSV: {error}") };
-    let names = reader.headers().map_err(bad)?.iter().map(str::to_owned).collect();
-    let mut cells = Cells { names, ..Cells::default() };
-    for record in reader.records() {
-        cells.rows.push(record.map_err(bad)?.iter().map(str::to_owned).collect());
-        check_count(file, cells.rows.len())?;
+    let mut seen = ColumnsSeen::of_names(reader.headers().map_err(bad)?);
+    let mut record = csv::StringRecord::new();
+    while reader.read_record(&mut record).map_err(bad)? {
+        seen.add_row(record.iter());
+        check_count(file, seen.n_rows)?;
     }
-    Ok(cells)
+    Ok(seen)
 }
 
 /// Reads the columns `wanted`; the first line that is no comment names them all.
 pub(super) fn csv_rows(file: &str, text: &str, wanted: &[String]) -> Result<Rows, InputError> {
-    let mut reader = csv_reader(text);
+    let mut reader = csv_reader(file, text)?;
     let bad = |error: csv::Error| InputError::Table { file: file.to_owned(), problem: format!("is no CSV: {error}") };
     let header = reader.headers().map_err(bad)?.clone();
     let mut at = Vec::new();

@@ -1,11 +1,13 @@
 //! Rows of numbers, as CSV and YAML files have them.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use crate::input::error::{BadPlace, InputError};
 
 /// Poses at rest: eleven days of one every ten seconds.
 pub(super) const MAX_ROWS: usize = 100_000;
+/// Columns of a table; those of poses and joints are some tens.
+pub(super) const MAX_COLUMNS: usize = 1000;
 
 /// The wanted values of one row.
 pub(super) struct Row {
@@ -20,19 +22,6 @@ pub(super) struct Rows {
     pub rows: Vec<Row>,
     /// Names of the columns.
     pub columns: BTreeSet<String>,
-}
-
-/// All cells of a table, as texts.
-#[derive(Default)]
-pub(super) struct Cells {
-    /// Keys that lead to the rows in YAML.
-    pub rows_at: Vec<String>,
-    /// Names of the columns.
-    pub names: Vec<String>,
-    /// In the order of the columns; a row may be shorter.
-    pub rows: Vec<Vec<String>>,
-    /// Names that another list gives to numbered columns, to the column.
-    pub other_names: BTreeMap<String, String>,
 }
 
 /// The error for a table of more than [`MAX_ROWS`].

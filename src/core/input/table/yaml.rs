@@ -5,14 +5,13 @@ use std::fmt;
 
 use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
 
-use super::rows::{Cells, Row, Rows, check_count, number};
+use super::columns_seen::ColumnsSeen;
+use super::rows::{MAX_COLUMNS, Row, Rows, check_count, number};
 use crate::input::error::InputError;
 use crate::input::map::TableLayout;
 
 /// Maps and lists within each other.
 const MAX_DEPTH: usize = 32;
-/// Columns that are listed of one row.
-const MAX_COLUMNS: usize = 1000;
 
 /// A part of the file.
 #[derive(Debug)]
@@ -36,6 +35,14 @@ impl Node {
 
     fn at<'a>(&self, path: impl IntoIterator<Item = &'a str>) -> Option<&Self> {
         path.into_iter().try_fold(self, |node, key| node.get(key))
+    }
+
+    /// The scalar at the path of a column; empty without one.
+    fn cell(&self, column: &str) -> &str {
+        match self.at(column.split('.')) {
+            Some(Self::Scalar(cell)) => cell,
+            _ => "",
+        }
     }
 
     /// The paths of all scalars, in the order of the file.
@@ -146,8 +153,17 @@ fn entries(node: &Node) -> Vec<&Node> {
     if all.iter().any(|entry| matches!(entry, Node::Scalar(_))) { Vec::new() } else { all }
 }
 
-/// Reads all cells: of the list or map with the most entries that are lists or maps, at the top or below one key.
-pub(super) fn yaml_cells(file: &str, text: &str) -> Result<Cells, InputError> {
+/// Columns of the rows that a file holds.
+pub(super) struct YamlColumns {
+    pub seen: ColumnsSeen,
+    /// Keys that lead to the rows.
+    pub rows_at: Vec<String>,
+    /// Names that another list gives to numbered columns, to the column.
+    pub other_names: BTreeMap<String, String>,
+}
+
+/// Looks at all cells: of the list or map with the most entries that are lists or maps, at the top or below one key.
+pub(super) fn yaml_columns(file: &str, text: &str) -> Result<YamlColumns, InputError> {
     let all = parse(file, text)?;
     let below: Vec<(Vec<String>, &Node)> = match &all {
         Node::Map(map) => map.iter().map(|(key, node)| (vec![key.clone()], node)).collect(),
@@ -174,13 +190,9 @@ pub(super) fn yaml_cells(file: &str, text: &str) -> Result<Cells, InputError> {
     let mut names = Vec::new();
     let first = rows.first().map(|row| row.leaves()).unwrap_or_default();
     names.extend(first.into_iter().take(MAX_COLUMNS));
-    let cell = |row: &Node, name: &String| match row.at(name.split('.')) {
-        Some(Node::Scalar(cell)) => cell.clone(),
-        _ => String::new(),
-    };
-    let cells = rows.iter().map(|row| names.iter().map(|name| cell(row, name)).collect()).collect();
-    let other_names = names_beside(&all, &names);
-    Ok(Cells { rows_at, rows: cells, other_names, names })
+    let mut seen = ColumnsSeen::of_names(names.iter().map(String::as_str));
+    rows.iter().for_each(|row| seen.add_row(names.iter().map(|name| row.cell(name))));
+    Ok(YamlColumns { seen, rows_at, other_names: names_beside(&all, &names) })
 }
 
 /// A list of as many texts as there are numbered columns names these.

@@ -12,7 +12,7 @@ pub const MAX_HEAD_BYTES: u64 = 1 << 20;
 /// Bytes of such records that are kept in all.
 const MAX_KEPT_BYTES: usize = 16 << 20;
 /// What one of them costs beside its texts.
-const ENTRY_BYTES: usize = 128;
+const ENTRY_BYTES: usize = 1024;
 
 /// Number and bytes of the chunks of one compression.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -84,7 +84,8 @@ impl Searcher {
         // The camera hands out JPEG. The detector sees what the recording will hold, whether or not this one goes in.
         let jpeg = jpeg_bytes(frame, self.jpeg_quality)?;
         let unusable = |error: DetectError| SimError::Detector(error.to_string());
-        let seen = grey_of_jpeg(&jpeg).map_err(unusable)?;
+        let size_px = [frame.width, frame.height].map(|n| n as u32);
+        let seen = grey_of_jpeg(&jpeg, size_px).map_err(unusable)?;
         let image = GreyImage { width: seen.width, height: seen.height, data: &seen.data };
         let found = self.detector.detect(image).map_err(unusable)?;
         let tags = found.tags.into_iter().map(|tag| tag.detection).collect();

@@ -24,6 +24,8 @@ use crate::log::raw::scan::ScanError;
 
 /// The table of all tables is on the first page.
 const TABLES_ROOT: u32 = 1;
+/// The tables that are read, of any number that a file may declare.
+const TABLES: [&str; 4] = ["topics", "messages", "schema", "message_definitions"];
 /// What a topic or type costs beside its texts.
 const DECLARATION_BYTES: usize = 1024;
 
@@ -193,9 +195,9 @@ fn tables<R: Read + Seek>(pages: &mut Pages<R>, losses: &mut Losses) -> io::Resu
     let mut small = Small { pages, losses, left_bytes: MAX_DECLARED_BYTES };
     small.each(&list, ["type", "name", "rootpage", "sql"], |_, [kind, name, root, sql]| {
         let root = root.integer().and_then(|root| u32::try_from(root).ok()).filter(|root| *root > 0);
-        let columns = sql.text().and_then(column_names);
-        if let (Some("table"), Some(name), Some(root), Some(columns)) = (kind.text(), name.text(), root, columns) {
-            found.insert(name.to_owned(), Table { root, columns });
+        let name = name.text().filter(|name| TABLES.contains(name));
+        if let (Some("table"), Some(name), Some(root)) = (kind.text(), name, root) {
+            found.extend(sql.text().and_then(column_names).map(|columns| (name.to_owned(), Table { root, columns })));
         }
     })?;
     Ok(found)

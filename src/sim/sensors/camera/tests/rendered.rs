@@ -116,7 +116,7 @@ fn the_detector_sees_what_the_recording_holds() {
     let (lens, all) = images_kept_every(0.0);
     let mut detector = TagDetector::new(&lens, DetectorSettings::default()).expect("a detector");
     for image in &all {
-        let seen = grey_of_jpeg(image.jpeg.as_ref().expect("kept")).expect("a picture");
+        let seen = grey_of_jpeg(image.jpeg.as_ref().expect("kept"), lens.resolution_px()).expect("a picture");
         let seen = GreyImage { width: seen.width, height: seen.height, data: &seen.data };
         let found = detector.detect(seen).expect("searched").tags;
         let tags: Vec<_> = found.into_iter().map(|tag| tag.detection).collect();

@@ -1,0 +1,75 @@
+//! What the cells of each column are, added row by row: a table's cells are never kept.
+
+/// One column.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TableColumn {
+    /// As the input map names it.
+    pub name: String,
+    /// Cells with a finite number.
+    pub n_numbers: usize,
+    /// Cells that are empty.
+    pub n_empty: usize,
+    /// Cells with something else; the first of them.
+    pub n_others: usize,
+    /// The first cell that is no finite number.
+    pub first_other: Option<String>,
+    /// Lowest and highest number; `None` without one.
+    pub range: Option<[f64; 2]>,
+    /// All numbers are whole.
+    pub is_whole: bool,
+    /// No number is smaller than the one before.
+    pub is_rising: bool,
+}
+
+/// Columns as far as their rows were looked at.
+pub(super) struct ColumnsSeen {
+    pub columns: Vec<TableColumn>,
+    /// The last number of each.
+    last: Vec<f64>,
+    pub n_rows: usize,
+}
+
+impl ColumnsSeen {
+    pub fn of_names<'a>(names: impl IntoIterator<Item = &'a str>) -> Self {
+        let empty = |name: &str| TableColumn {
+            name: name.to_owned(),
+            n_numbers: 0,
+            n_empty: 0,
+            n_others: 0,
+            first_other: None,
+            range: None,
+            is_whole: true,
+            is_rising: true,
+        };
+        let columns: Vec<TableColumn> = names.into_iter().map(empty).collect();
+        Self { last: vec![f64::NEG_INFINITY; columns.len()], columns, n_rows: 0 }
+    }
+
+    /// Adds the cells of a row, in the order of the columns.
+    pub fn add_row<'a>(&mut self, cells: impl IntoIterator<Item = &'a str>) {
+        self.n_rows += 1;
+        for ((column, last), cell) in self.columns.iter_mut().zip(&mut self.last).zip(cells) {
+            column.add(cell.trim(), last);
+        }
+    }
+}
+
+impl TableColumn {
+    fn add(&mut self, cell: &str, last: &mut f64) {
+        match cell.parse::<f64>() {
+            Ok(value) if value.is_finite() => {
+                self.n_numbers += 1;
+                let [low, high] = self.range.unwrap_or([value; 2]);
+                self.range = Some([low.min(value), high.max(value)]);
+                self.is_whole &= value.fract() == 0.0;
+                self.is_rising &= value >= *last;
+                *last = value;
+            }
+            _ if cell.is_empty() => self.n_empty += 1,
+            _ => {
+                self.n_others += 1;
+                self.first_other.get_or_insert_with(|| cell.chars().take(40).collect());
+            }
+        }
+    }
+}
