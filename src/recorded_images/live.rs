@@ -34,6 +34,7 @@ impl TagFinder for LiveTagFinder {
         let resolution_px = self.lens.resolution_px();
         let data = grey(&image, resolution_px).map_err(|problem| match problem {
             ImageProblem::Damaged => "it is damaged".to_owned(),
+            ImageProblem::TooFewBytes => "it has too few bytes for its pixels".to_owned(),
             ImageProblem::Unusable(why) => why,
         })?;
         let [width, height] = resolution_px.map(|n| n as usize);

@@ -25,6 +25,8 @@ pub type TagCorners = (u32, [[f64; 2]; 4]);
 pub enum ImageProblem {
     /// It is damaged; others may not be.
     Damaged,
+    /// It claims more pixels than its bytes can hold a picture of, and is not decoded; others may not.
+    TooFewBytes,
     /// None of its kind can be used; the end of a sentence about the image.
     Unusable(String),
 }

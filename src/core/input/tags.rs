@@ -266,6 +266,7 @@ impl<'a> TagReader<'a> {
                 .into_iter()
                 .for_each(|(id, corners)| self.add(stamp, digest, Some(id), RawMeasurement::Corners(corners))),
             Err(ImageProblem::Damaged) => self.count("images that cannot be decoded"),
+            Err(ImageProblem::TooFewBytes) => self.count("images of too few bytes for their pixels"),
             Err(ImageProblem::Unusable(why)) => return problem(why),
         }
         Ok(())
