@@ -99,8 +99,8 @@ impl Estimate<'_> {
         // A joint without a sensor takes up one number of its view, whatever it is.
         let taken = |view_idx: usize| problem.views[view_idx].is_free.iter().filter(|is_free| **is_free).count();
         let told = |view_idx: usize| {
-            let used = &problem.observations[problem.views[view_idx].observations.clone()];
-            used.iter().filter(|s| s.is_used).map(|s| s.data.n_coordinates()).sum::<usize>()
+            let used = observations_of(&problem, view_idx).filter(|s| s.is_used);
+            used.map(|s| s.data.n_coordinates()).sum::<usize>()
         };
         let numbers = |of: &dyn Fn(usize) -> usize| -> usize {
             (0..views.len()).map(|view_idx| of(view_idx).saturating_sub(taken(view_idx))).sum()
@@ -112,11 +112,8 @@ impl Estimate<'_> {
             let dof = told(view_idx).saturating_sub(taken(view_idx));
             if dof > 0 {
                 within_95.views += 1;
-                let chi2 = self.chi2_of_view(
-                    input,
-                    &views[view_idx..=view_idx],
-                    &problem.observations[problem.views[view_idx].observations.clone()],
-                )?;
+                let observations = observations_of(&problem, view_idx).cloned().collect();
+                let chi2 = self.chi2_of_view(input, &views[view_idx..=view_idx], observations)?;
                 within_95.within += usize::from(chi2 <= chi_square_quantile(0.95, dof));
             }
         }
@@ -125,10 +122,10 @@ impl Estimate<'_> {
         Some(Innovations { chi2, dof, camera_chi2: (chi2 - free_chi2).max(0.0), camera_dof, within_95, joints })
     }
 
-    /// Chi-square of one view's innovations, with its observations as they are used.
-    fn chi2_of_view(&self, input: &BundleInput<'_>, view: &[View], observations: &[ObservationTerm]) -> Option<f64> {
+    /// Chi-square of one view's innovations, with its observations as they are used, the gripper's tag last.
+    fn chi2_of_view(&self, input: &BundleInput<'_>, view: &[View], observations: Vec<ObservationTerm>) -> Option<f64> {
         let mut problem = self.data_only(input, view);
-        problem.observations.clone_from_slice(observations);
+        problem.observations = observations;
         let state = State {
             joint_error: vec![[0.0; MAX_JOINTS]],
             camera_error: vec![Isometry3::identity()],
@@ -198,6 +195,12 @@ impl Joined {
         }
         out
     }
+}
+
+/// A view's observations, that of the gripper's tag last.
+fn observations_of<'p>(problem: &'p BundleProblem<'_>, view_idx: usize) -> impl Iterator<Item = &'p ObservationTerm> {
+    let view = &problem.views[view_idx];
+    problem.observations[view.observations.clone()].iter().chain(view.gripper.map(|at| &problem.observations[at]))
 }
 
 /// How many numbers of the camera's pose a view tells.
