@@ -42,7 +42,8 @@ use nalgebra::{Quaternion, UnitQuaternion};
 use serde::Deserialize;
 
 pub use self::table::{
-    Direction, PoseColumns, RotationColumns, RotationForm, SeenColumns, TableFormat, TableLayout, TimeColumn,
+    CornerOrder, Direction, PoseColumns, RotationColumns, RotationForm, SeenColumns, TableFormat, TableLayout,
+    TimeColumn,
 };
 use self::table::{TableToml, TagColumnsToml};
 pub use self::units::{JointUnit, SlideUnit};

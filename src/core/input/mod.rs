@@ -31,9 +31,9 @@ pub use images::{
 };
 pub use joints::Reading;
 pub use map::{
-    ChildFrame, ConditionKind, ConditionTopics, DEFAULT_MAX_GAP_S, Direction, FurtherTopic, InputMap, JointUnit,
-    NotFinite, PoseColumns, RotationColumns, RotationForm, SeenColumns, SlideUnit, Source, StampSource, TableFormat,
-    TableLayout, TagNoise, TagUse, TimeColumn, Topics, WhileMoving, parse_input_map, read_input_map,
+    ChildFrame, ConditionKind, ConditionTopics, CornerOrder, DEFAULT_MAX_GAP_S, Direction, FurtherTopic, InputMap,
+    JointUnit, NotFinite, PoseColumns, RotationColumns, RotationForm, SeenColumns, SlideUnit, Source, StampSource,
+    TableFormat, TableLayout, TagNoise, TagUse, TimeColumn, Topics, WhileMoving, parse_input_map, read_input_map,
 };
 pub use recording::ExternalRecording;
 pub use table::{TableColumn, TableContents, read_table_contents};
