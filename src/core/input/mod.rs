@@ -13,6 +13,7 @@ mod external;
 mod images;
 mod joint_unit;
 mod joints;
+mod lerobot;
 mod map;
 mod message_type;
 mod recording;
@@ -30,6 +31,7 @@ pub use images::{
     CameraInfoLens, ImageDetector, ImageProblem, RecordedImage, TagCorners, lens_of_camera_info, read_camera_info,
 };
 pub use joints::Reading;
+pub use lerobot::{LerobotCalibration, LerobotMotors, LerobotValues};
 pub use map::{
     ChildFrame, ConditionKind, ConditionTopics, CornerOrder, DEFAULT_MAX_GAP_S, Direction, FurtherTopic, InputMap,
     JointUnit, NotFinite, PoseColumns, RotationColumns, RotationForm, SeenColumns, SlideUnit, Source, StampSource,
