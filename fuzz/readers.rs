@@ -56,7 +56,7 @@ impl Scratch {
 pub type Read = fn(&Scratch, &[u8]) -> bool;
 
 /// By the names of the targets and of the folders of their corpora.
-pub const READERS: [(&str, Read); 27] = [
+pub const READERS: [(&str, Read); 28] = [
     ("urdf", urdf),
     ("new_robot", new_robot),
     ("recording", recording),
@@ -70,6 +70,7 @@ pub const READERS: [(&str, Read); 27] = [
     ("tags", tags),
     ("cameras", cameras),
     ("link_poses", link_poses),
+    ("lerobot", lerobot),
     ("tag_map", tag_map),
     ("input_map", input_map),
     ("table_csv", table_csv),
@@ -226,6 +227,18 @@ fn link_poses(scratch: &Scratch, bytes: &[u8]) -> bool {
     let poses = armcal::export::parse_link_poses(file, &text(bytes));
     poses.is_ok_and(|poses| {
         let _ = poses.written_into(file, (Path::new("arm.urdf"), &scratch.robot.urdf_text));
+        true
+    })
+}
+
+/// As the JSON that an input map names.
+fn lerobot(scratch: &Scratch, bytes: &[u8]) -> bool {
+    const MAP: &[u8] = b"version = 1\n[joint_sensors]\ntopic = \"/j\"\nlerobot = { file = \"arm.json\", motors = \
+        \"feetech\", values = \"degrees\" }\n[tags]\ntopic = \"/t\"\nuse = \"corners\"\n";
+    scratch.write("arm.json", bytes);
+    let map = armcal::input::read_input_map(&scratch.write("input.toml", MAP));
+    map.is_ok_and(|map| {
+        let _ = map.check_robot(Path::new("input.toml"), &scratch.robot);
         true
     })
 }

@@ -3,6 +3,7 @@
 mod data_forms;
 mod driver_forms;
 mod golden;
+mod lerobot;
 mod link_poses;
 
 use std::path::{Path, PathBuf};
