@@ -56,7 +56,7 @@ impl Scratch {
 pub type Read = fn(&Scratch, &[u8]) -> bool;
 
 /// By the names of the targets and of the folders of their corpora.
-pub const READERS: [(&str, Read); 26] = [
+pub const READERS: [(&str, Read); 28] = [
     ("urdf", urdf),
     ("new_robot", new_robot),
     ("recording", recording),
@@ -69,6 +69,8 @@ pub const READERS: [(&str, Read); 26] = [
     ("compact", compact),
     ("tags", tags),
     ("cameras", cameras),
+    ("link_poses", link_poses),
+    ("lerobot", lerobot),
     ("tag_map", tag_map),
     ("input_map", input_map),
     ("table_csv", table_csv),
@@ -102,8 +104,17 @@ fn new_robot(scratch: &Scratch, bytes: &[u8]) -> bool {
     fs::write(given.join("hand.obj"), "v 0 0 0\nv 0 9 0\nv 9 0 0\nv 0 0 9\nf 1 2 3\nf 1 3 4\nf 1 4 2\n")
         .expect("written");
     let urdf = scratch.write("given/arm.urdf", bytes);
-    let wanted =
-        NewRobot { urdf: &urdf, base: None, tip: None, camera: None, name: None, touching: &[], clear_rad: None };
+    let wanted = NewRobot {
+        urdf: &urdf,
+        text: None,
+        base: None,
+        tip: None,
+        camera: None,
+        name: None,
+        lens: None,
+        touching: &[],
+        clear_rad: None,
+    };
     let Ok(drafted) = draft_robot(&wanted, DraftedMeshes::Read) else { return false };
     let made = tempfile::tempdir_in(scratch.folder.path()).expect("a folder");
     for file in drafted.files {
@@ -208,6 +219,28 @@ fn compact(scratch: &Scratch, bytes: &[u8]) -> bool {
 
 fn tags(_: &Scratch, bytes: &[u8]) -> bool {
     parse_tags(Path::new("tags.yaml"), &text(bytes)).is_ok()
+}
+
+/// As those of the arm's own URDF, written into it.
+fn link_poses(scratch: &Scratch, bytes: &[u8]) -> bool {
+    let file = Path::new("kinematics.yaml");
+    let poses = armcal::export::parse_link_poses(file, &text(bytes));
+    poses.is_ok_and(|poses| {
+        let _ = poses.written_into(file, (Path::new("arm.urdf"), &scratch.robot.urdf_text));
+        true
+    })
+}
+
+/// As the JSON that an input map names.
+fn lerobot(scratch: &Scratch, bytes: &[u8]) -> bool {
+    const MAP: &[u8] = b"version = 1\n[joint_sensors]\ntopic = \"/j\"\nlerobot = { file = \"arm.json\", motors = \
+        \"feetech\", values = \"degrees\" }\n[tags]\ntopic = \"/t\"\nuse = \"corners\"\n";
+    scratch.write("arm.json", bytes);
+    let map = armcal::input::read_input_map(&scratch.write("input.toml", MAP));
+    map.is_ok_and(|map| {
+        let _ = map.check_robot(Path::new("input.toml"), &scratch.robot);
+        true
+    })
 }
 
 fn cameras(_: &Scratch, bytes: &[u8]) -> bool {

@@ -3,6 +3,8 @@
 mod data_forms;
 mod driver_forms;
 mod golden;
+mod lerobot;
+mod link_poses;
 
 use std::path::{Path, PathBuf};
 

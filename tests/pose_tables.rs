@@ -170,3 +170,59 @@ fn what_a_table_lacks_is_named() {
     let json: serde_json::Value = serde_json::from_slice(&json.stdout).expect("JSON");
     assert_eq!((&json["rows"], &json["joints"][1]), (&3.into(), &"j2".into()));
 }
+
+#[test]
+fn corners_of_tags_are_found_and_proposed() {
+    let _texts = Texts::of("corners_of_tags_are_found_and_proposed");
+    let folder = temp();
+    let titan_folder = root().join("robots/titan4");
+    let titan = load(&titan_folder).expect("it reads");
+    let joints = titan.joint_names();
+    let square = [[10.0, 30.0], [31.0, 30.5], [30.0, 9.0], [10.5, 10.0]];
+    let head = format!("time,{},tag_id", joints.join(","));
+    let words = |pose: usize| format!("{pose},1,2,3,4,5,6");
+    let eight = |names: [&str; 8]| {
+        let cells: Vec<String> = square.as_flattened().iter().map(f64::to_string).collect();
+        format!("{head},{}\n{},7,{cells}\n{},7,{cells}\n", names.join(","), words(1), words(2), cells = cells.join(","))
+    };
+    let mut each = format!("{head},corner,u,v\n");
+    let mut nested = String::new();
+    for pose in [1, 2] {
+        for (k, [u, v]) in square.iter().enumerate() {
+            writeln!(each, "{},7,{k},{u},{v}", words(pose)).expect("text");
+        }
+        let named: Vec<String> = joints.iter().zip(1..).map(|(joint, k)| format!("{joint}: {k}")).collect();
+        writeln!(nested, "- {{ time: {pose}, joints: {{ {} }}, tag: 7, corners: {square:?} }}", named.join(", "))
+            .expect("text");
+    }
+    let tables = [
+        ("each.csv", each),
+        ("u0.csv", eight(["u0", "v0", "u1", "v1", "u2", "v2", "u3", "v3"])),
+        (
+            "corner1_x.csv",
+            eight([
+                "corner1_x",
+                "corner1_y",
+                "corner2_x",
+                "corner2_y",
+                "corner3_x",
+                "corner3_y",
+                "corner4_x",
+                "corner4_y",
+            ]),
+        ),
+        ("px_0.csv", eight(["px_0", "py_0", "px_1", "py_1", "px_2", "py_2", "px_3", "py_3"])),
+        ("nested.yaml", nested),
+    ];
+    for (name, text) in tables {
+        let table = place(folder.path(), name);
+        write(&table, &text);
+        let map = table.with_extension("map.toml");
+        inspect(&table, Some(&titan_folder), Some(&map)).expect(name, 0, &["joints", "pixel", "written"]);
+        let parsed = parse_input_map(&map, &read(&map)).expect("it reads");
+        let recording = read_external(&table, &parsed, &titan).expect(name);
+        assert_eq!(recording.readings.len(), 2, "{name}");
+        let seen = &recording.frames[1].tags[0];
+        assert_eq!((seen.id, seen.seen), (Some(7), armcal::input::RawMeasurement::Corners(square)), "{name}");
+    }
+}

@@ -247,7 +247,8 @@ fn describe_input(map: &InputMap) -> String {
         Source::Table(table) => {
             let columns = match &table.seen {
                 SeenColumns::Pose(pose) => pose.position.join(", "),
-                SeenColumns::Pixel(pixel) => pixel.join(", "),
+                SeenColumns::Pixel(pixel) | SeenColumns::TagCorner { pixel, .. } => pixel.join(", "),
+                SeenColumns::TagCorners { columns, .. } => columns.join(", "),
             };
             format!("input map: a table, {what} in {columns}")
         }

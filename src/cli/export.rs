@@ -13,13 +13,14 @@ use crate::cli::exit::{Exit, UsageError};
 use crate::cli::file_kind::{FileKind, expect_kind};
 use crate::cli::stdout::{complain, say, warn};
 use crate::export::{
-    MAX_POINTS, MIN_POINTS, SensorTable, calibrated_urdf, camchain, csv_rows, joints_with_terms, ros_parameters,
-    ros2_control, tagslam_map,
+    LinkPoseForm, MAX_POINTS, MIN_POINTS, SensorTable, calibrated_link_poses, calibrated_urdf, camchain, csv_rows,
+    joints_with_terms, lerobot_homings, ros_parameters, ros2_control, ros2_control_offsets, tagslam_map,
 };
 use armcal_belief::calib::{
     Calibration, CalibrationFileError, CompactCalibration, CovarianceTable, LookupTable, Status, metric,
 };
 use armcal_core::files::{self, FileKind as Size};
+use armcal_core::input::read_input_map;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::{ArmSensors, SensorModel};
 
@@ -30,13 +31,16 @@ pub(super) struct ExportArgs {
     /// Output form
     #[arg(long = "as", value_enum)]
     form: Form,
-    /// Robot folder that the calibration was made with: required by urdf, ros2-control, ros-parameters, table and
-    /// kalibr; expands a compact line to the keys of calibration.toml
+    /// Robot folder that the calibration was made with: required by urdf, ros2-control, ros-parameters, table,
+    /// kalibr, ur, franka and lerobot; expands a compact line to the keys of calibration.toml
     #[arg(long, value_name = "DIR")]
     robot: Option<PathBuf>,
     /// Points per joint of a table, 2 to 10000; default: as few as keep the tool within 0.02 mm
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(MIN_POINTS as i64..=MAX_POINTS as i64))]
     points: Option<u16>,
+    /// Input map of the recording, which names LeRobot's JSON: required by lerobot
+    #[arg(long, value_name = "MAP")]
+    input: Option<PathBuf>,
     /// Also write a refused calibration
     #[arg(long)]
     refused: bool,
@@ -66,9 +70,21 @@ enum Form {
     Kalibr,
     /// Mapped tags as TagSLAM's tagslam.yaml
     Tagslam,
+    /// Each joint's offset as a `<param>` of its `ros2_control` joint
+    Ros2ControlOffset,
+    /// LeRobot's calibration JSON with homing offsets as calibrated
+    Lerobot,
+    /// Link poses as Universal Robots' kinematics.yaml; sensors are not included
+    Ur,
+    /// Link poses as Franka's kinematics.yaml; sensors are not included
+    Franka,
 }
 
 impl Form {
+    fn link_poses(self) -> LinkPoseForm {
+        if self == Self::Ur { LinkPoseForm::Ur } else { LinkPoseForm::Franka }
+    }
+
     fn name(self) -> String {
         self.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
     }
@@ -139,16 +155,45 @@ fn of_full(calibration: &Calibration, robot: Option<&Robot>, args: &ExportArgs) 
         Form::RosParameters => ros_parameters(drawing(robot, args.form)?, calibration),
         Form::Urdf => {
             let urdf = calibrated_urdf(file, calibration, drawing(robot, args.form)?)?;
-            for what in urdf.left_out {
-                warn(Code::ExportIncomplete, format_args!("left out, for a URDF cannot hold it: {what}"));
-            }
+            warn_left_out("a URDF", &urdf.left_out);
             urdf.text
+        }
+        Form::Ros2ControlOffset => {
+            let robot = drawing(robot, args.form)?;
+            let (text, left_out) = ros2_control_offsets(robot, &calibration.sensors(robot)?);
+            warn_left_out("an offset", &left_out);
+            text
+        }
+        Form::Lerobot => of_lerobot(calibration, drawing(robot, args.form)?, args)?,
+        Form::Ur | Form::Franka => {
+            let poses = calibrated_link_poses(file, calibration, drawing(robot, args.form)?, args.form.link_poses())?;
+            warn_left_out("a file of link poses", &poses.left_out);
+            poses.text
         }
         Form::Ros2Control | Form::Table => {
             let robot = drawing(robot, args.form)?;
             of_sensors(robot, &calibration.sensors(robot)?, args)
         }
     })
+}
+
+/// LeRobot's JSON that the input map names, with new homing offsets.
+fn of_lerobot(calibration: &Calibration, robot: &Robot, args: &ExportArgs) -> Result<String> {
+    let missing = || UsageError::new(Code::UsageInvalid, NO_MAP.to_owned());
+    let map_file = args.input.as_deref().ok_or_else(missing)?;
+    let map = read_input_map(map_file)?;
+    let sensors = calibration.sensors(robot)?;
+    let homings = lerobot_homings((map_file, &map), calibration, (robot, &sensors))?;
+    warn_left_out("LeRobot's JSON", &homings.left_out);
+    Ok(homings.text)
+}
+
+const NO_MAP: &str = "--as lerobot needs the input map that names LeRobot's JSON: add --input MAP";
+
+fn warn_left_out(form: &str, left_out: &[String]) {
+    for what in left_out {
+        warn(Code::ExportIncomplete, format_args!("left out, for {form} cannot hold it: {what}"));
+    }
 }
 
 fn of_compact(compact: &CompactCalibration, robot: Option<&Robot>, args: &ExportArgs) -> Result<String> {
@@ -168,7 +213,18 @@ fn of_compact(compact: &CompactCalibration, robot: Option<&Robot>, args: &Export
             let robot = drawing(robot, args.form)?;
             of_sensors(robot, &sensors.map_or_else(|| compact.sensors(robot), Ok)?, args)
         }
-        (Form::Urdf | Form::RosParameters | Form::Csv | Form::Kalibr | Form::Tagslam, _) => {
+        (
+            Form::Urdf
+            | Form::RosParameters
+            | Form::Csv
+            | Form::Kalibr
+            | Form::Tagslam
+            | Form::Ur
+            | Form::Franka
+            | Form::Lerobot
+            | Form::Ros2ControlOffset,
+            _,
+        ) => {
             let (file, form) = (args.file.display(), args.form.name());
             let problem =
                 format!("{file}: is a compact calibration, which lacks what {form} needs; give calibration.toml");

@@ -9,9 +9,13 @@ use clap::Args;
 use crate::cli::closing::say_wrapped;
 use crate::cli::exit::{Exit, UsageError};
 use crate::cli::file_kind::{FileKind, expect_kind};
+use crate::export::parse_link_poses;
 use crate::output;
 use armcal_belief::plan::{always_near, clear_angles};
+use armcal_belief::tagmap::files::read_cameras;
+use armcal_core::optics::CameraModel;
 use armcal_core::robot::{self, DraftedMeshes, DraftedRobot, NewFile, NewRobot, Robot, RobotError, draft_robot};
+use armcal_core::text::counted;
 
 #[derive(Debug, Args)]
 pub(super) struct NewRobotArgs {
@@ -32,17 +36,27 @@ pub(super) struct NewRobotArgs {
     /// Name of the robot; default: the name in the URDF
     #[arg(long, value_name = "NAME")]
     name: Option<String>,
+    /// Link poses for the URDF: kinematics.yaml of Universal Robots (calibration.yaml) or of Franka
+    #[arg(long, value_name = "FILE")]
+    kinematics: Option<PathBuf>,
+    /// Lens of the camera: camchain.yaml of Kalibr or cameras.yaml of TagSLAM, its first camera
+    #[arg(long, value_name = "FILE")]
+    lens: Option<PathBuf>,
 }
 
 pub(super) fn new_robot(args: &NewRobotArgs) -> Result<Exit> {
     expect_kind(&args.urdf, &[FileKind::Urdf])?;
     refuse_full(&args.out)?;
+    let text = args.kinematics.as_deref().map(|file| with_link_poses(&args.urdf, file)).transpose()?;
+    let lens = args.lens.as_deref().map(first_lens).transpose()?;
     let wanted = NewRobot {
         urdf: &args.urdf,
+        text: text.as_deref(),
         base: args.base.as_deref(),
         tip: args.tip.as_deref(),
         camera: args.camera_link.as_deref(),
         name: args.name.as_deref(),
+        lens: lens.as_ref().map(|(source, lens)| (source.as_str(), lens)),
         touching: &[],
         clear_rad: None,
     };
@@ -61,6 +75,21 @@ pub(super) fn new_robot(args: &NewRobotArgs) -> Result<Exit> {
     write(&files, &args.out)?;
     say_wrapped(&described(&files, &robot, &left_out, &args.out))?;
     Ok(Exit::Ok)
+}
+
+/// The first camera of a file, and where it is from, in words.
+fn first_lens(file: &Path) -> Result<(String, CameraModel)> {
+    let cameras = read_cameras(file)?;
+    let name = file.file_name().unwrap_or_default().to_string_lossy();
+    let n = cameras.len();
+    let first = cameras.into_iter().next().context("a file without cameras is refused")?;
+    Ok((format!("{} of {name}, the first of {}", first.name, counted(n, "camera")), first.model))
+}
+
+/// The URDF's text with the link poses of a manufacturer's file.
+fn with_link_poses(urdf: &Path, file: &Path) -> Result<String, RobotError> {
+    let poses = parse_link_poses(file, &robot::read_text(file)?)?;
+    poses.written_into(file, (urdf, &robot::read_text(urdf)?))
 }
 
 /// Random poses for links that are near each other at nearly all of them, and for one at which none are.

@@ -1,4 +1,7 @@
 //! The camera as Kalibr's camchain.yaml, with the place that the calibration found for it.
+//!
+//! `T_cn_cnm1` maps the frame of the camera before to that of the camera: ethz-asl/kalibr 1f60227,
+//! kalibr_common/ConfigReader.py, lines 675 to 704.
 
 use armcal_core::codes::Code;
 use std::fmt::Write as _;
@@ -20,29 +23,37 @@ const HEAD: &str = "\
 ";
 
 /// camchain.yaml with `cam0` and on: model, intrinsics and distortion of robot.toml, `T_link_camera` of the
-/// calibration, or of the drawing where that has none. `file` is that of the calibration, for messages.
+/// calibration, or of the drawing where that has none, and `T_cn_cnm1` between cameras of one link. `file` is that of
+/// the calibration, for messages.
 ///
 /// # Errors
 /// [`FileIssue`]: a mount out of range, or a lens that Kalibr has no model for.
 pub fn camchain(file: &Path, calibration: &Calibration, robot: &Robot) -> Result<String, FileIssue> {
     let mount = calibration.camera_mount.as_ref();
     let place = mount.map(|mount| link_from_camera(file, mount)).transpose()?;
-    let mut text = format!("{HEAD}{}", entry(robot, (0, "camera"), &robot.camera, place)?);
+    let mut last = (robot.camera.mount.n_joints, place.unwrap_or(robot.camera.mount.link_from_frame));
+    let mut text = format!("{HEAD}{}", entry(robot, (0, "camera"), &robot.camera, &last.1)?);
     let with_lens = robot.further_cameras.iter().enumerate().filter(|(_, camera)| camera.lens.is_known());
     for (number, (at, camera)) in with_lens.enumerate() {
         let found = calibration.further_camera.iter().find(|found| found.name == camera.name);
         let place = found.map(|found| further_from_camera(file, found)).transpose()?;
-        text += &entry(robot, (number + 1, &format!("further_camera[{}]", at + 1)), camera, place)?;
+        let place = place.unwrap_or(camera.mount.link_from_frame);
+        text += &entry(robot, (number + 1, &format!("further_camera[{}]", at + 1)), camera, &place)?;
+        // Between cameras on two links it is no constant.
+        if camera.mount.n_joints == last.0 {
+            text += &matrix("T_cn_cnm1", &(place.inverse() * last.1));
+        }
+        last = (camera.mount.n_joints, place);
     }
     Ok(text)
 }
 
-/// `cam` of that number, which robot.toml has as `key`, at `place`, or else where the drawing has it.
+/// `cam` of that number, which robot.toml has as `key`, at `place` on its link.
 fn entry(
     robot: &Robot,
     (number, key): (usize, &str),
     camera: &CameraSpec,
-    place: Option<Isometry3<f64>>,
+    place: &Isometry3<f64>,
 ) -> Result<String, FileIssue> {
     let robot_file = robot.folder.join("robot.toml");
     if camera.lens.port.is_some() {
@@ -65,15 +76,17 @@ fn entry(
             return Err(FileIssue::new(Code::KeyMissing, &robot_file, format!("[{key}]"), problem));
         }
     };
-    let pose = place.unwrap_or(camera.mount.link_from_frame).to_homogeneous();
     let ([fx, fy], [cx, cy]) = (camera.lens.focal_px(), camera.lens.center_px());
     let intrinsics = doubles([fx, fy, cx, cy]);
     let mut text = format!("cam{number}:\n  camera_model: pinhole\n  intrinsics: {intrinsics}\n");
     let _ = write!(text, "  distortion_model: {model}\n  distortion_coeffs: {}\n", doubles(coefficients));
     let _ = writeln!(text, "  resolution: {:?}", camera.lens.resolution_px());
-    let _ = write!(text, "  link: {}\n  T_link_camera:\n", quoted(carrier(robot, camera)));
-    for row in 0..4 {
-        let _ = writeln!(text, "  - {}", doubles([0, 1, 2, 3].map(|column| pose[(row, column)])));
-    }
-    Ok(text)
+    let _ = writeln!(text, "  link: {}", quoted(carrier(robot, camera)));
+    Ok(text + &matrix("T_link_camera", place))
+}
+
+fn matrix(key: &str, pose: &Isometry3<f64>) -> String {
+    let pose = pose.to_homogeneous();
+    let row = |row: usize| format!("  - {}\n", doubles([0, 1, 2, 3].map(|column| pose[(row, column)])));
+    format!("  {key}:\n{}", [0, 1, 2, 3].map(row).concat())
 }

@@ -46,6 +46,38 @@ pub fn ros2_control(robot: &Robot, sensors: &ArmSensors) -> String {
     text
 }
 
+const OFFSETS_HEAD: &str = "\
+<!--
+  Joint offsets as calibrated by armcal, rad (m of prismatic joints), for a driver that reads this parameter of a joint
+  and adds it: angle = angle by the datasheet + offset. Gains and terms are not in it.
+-->
+";
+
+/// The joints of a `<ros2_control>` block with their offsets at mid-range as `<param name="offset">`, and in words what
+/// these leave out.
+#[must_use]
+pub fn ros2_control_offsets(robot: &Robot, sensors: &ArmSensors) -> (String, Vec<String>) {
+    let mut text = OFFSETS_HEAD.to_owned();
+    let mut left_out = Vec::new();
+    for (joint, model) in sensors.models.iter().enumerate() {
+        let (name, offset) = (escape(&model.spec.joint), model.correction.offset_rad + 0.0);
+        let _ = writeln!(text, "<joint name=\"{name}\">\n  <param name=\"offset\">{offset}</param>\n</joint>");
+        left_out.extend(gain_in_words(robot, joint, model));
+    }
+    left_out.extend(joints_with_terms(sensors).map(|joint| format!("the terms of {joint}")));
+    (text, left_out)
+}
+
+/// Gains closer to the datasheet's than this are its own.
+const GAIN_WITHIN: f64 = 1e-9;
+
+/// A joint's gain, where it is not the datasheet's.
+pub(super) fn gain_in_words(robot: &Robot, joint: usize, model: &SensorModel) -> Option<String> {
+    let gain = gain_over_datasheet(robot, joint, model);
+    let text = || format!("the gain of {}, {:+.3} %", model.spec.joint, 100.0 * (gain - 1.0));
+    ((gain - 1.0).abs() > GAIN_WITHIN).then(text)
+}
+
 /// Names of the joints whose sensors are no straight line.
 pub fn joints_with_terms(sensors: &ArmSensors) -> impl Iterator<Item = &str> {
     let bent = sensors.models.iter().filter(|model| !model.correction.terms.are_zero());

@@ -1,7 +1,8 @@
 //! The robot's URDF with the calibrated geometry written in.
 
 use armcal_core::codes::Code;
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::Deserialize;
@@ -59,6 +60,22 @@ struct Changes {
 /// # Errors
 /// [`RobotError`] naming file and key: values out of range, or a URDF that is an exported one already.
 pub fn calibrated_urdf(file: &Path, calibration: &Calibration, robot: &Robot) -> Result<CalibratedUrdf, RobotError> {
+    let (_, urdf) = read_urdf(robot)?;
+    let mut changes = Changes::default();
+    move_joints(file, calibration, robot, &urdf, &mut changes)?;
+    place_camera(file, calibration, robot, &urdf, &mut changes)?;
+    add_further_cameras(file, calibration, robot, &urdf, &mut changes)?;
+    let left_out = left_out(calibration);
+    let comment = comment(calibration, &changes, &left_out);
+    let text = urdf.edited(&changes.origins, &comment, &changes.added);
+    Ok(CalibratedUrdf { text, camera_link: changes.camera_link, left_out })
+}
+
+/// The robot's URDF and its file.
+///
+/// # Errors
+/// [`RobotError`] for a URDF that is an exported one already.
+pub(super) fn read_urdf(robot: &Robot) -> Result<(PathBuf, UrdfText), RobotError> {
     let urdf_file = robot.folder.join(&robot.urdf_name);
     if robot.urdf_text.contains(MARK) {
         let problem = format!(
@@ -71,14 +88,19 @@ pub fn calibrated_urdf(file: &Path, calibration: &Calibration, robot: &Robot) ->
         file: urdf_file.clone(),
         message,
     })?;
+    Ok((urdf_file, urdf))
+}
+
+/// Origins of the text's joints that a link correction moves.
+pub(super) fn moved_joints(
+    file: &Path,
+    calibration: &Calibration,
+    robot: &Robot,
+    urdf: &UrdfText,
+) -> Result<BTreeMap<usize, Isometry3<f64>>, FileIssue> {
     let mut changes = Changes::default();
-    move_joints(file, calibration, robot, &urdf, &mut changes)?;
-    place_camera(file, calibration, robot, &urdf, &mut changes)?;
-    add_further_cameras(file, calibration, robot, &urdf, &mut changes)?;
-    let left_out = left_out(calibration);
-    let comment = comment(calibration, &changes, &left_out);
-    let text = urdf.edited(&changes.origins, &comment, &changes.added);
-    Ok(CalibratedUrdf { text, camera_link: changes.camera_link, left_out })
+    move_joints(file, calibration, robot, urdf, &mut changes)?;
+    Ok(changes.origins.into_iter().collect())
 }
 
 /// Joints with a link correction. The chain's place of a joint includes fixed joints before it; the joint's own origin
@@ -208,7 +230,7 @@ fn place(file: &Path, table: &str, position_m: [f64; 3], [w, x, y, z]: [f64; 4])
     Ok(Isometry3::from_parts(Translation3::from(Vector3::from(position_m)), rotation))
 }
 
-fn left_out(calibration: &Calibration) -> Vec<String> {
+pub(super) fn left_out(calibration: &Calibration) -> Vec<String> {
     let sag = calibration.sag.iter().map(|_| "how the arm bends under its weight ([sag])".to_owned());
     let failed = calibration.failed_joint.iter().map(|failed| format!("the failed joint {}", failed.joint));
     sag.chain(failed).collect()

@@ -174,7 +174,7 @@ pub(super) fn xyz_rpy(pose: &Isometry3<f64>) -> String {
 }
 
 /// `Rz(yaw) Ry(pitch) Rx(roll)`. At a pitch of a quarter turn roll and yaw are one; then yaw makes up for what roll is.
-fn roll_pitch_yaw(rotation: &UnitQuaternion<f64>) -> [f64; 3] {
+pub(super) fn roll_pitch_yaw(rotation: &UnitQuaternion<f64>) -> [f64; 3] {
     let turn = rotation.to_rotation_matrix();
     let m = turn.matrix();
     let roll = m[(2, 1)].atan2(m[(2, 2)]);

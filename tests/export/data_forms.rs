@@ -9,8 +9,8 @@ use armcal::tagmap::files::{parse_cameras, parse_tags};
 use nalgebra::Matrix4;
 use serde_json::Value;
 
-use super::{as_calibrated, calibration, calibration_file, export, exported};
-use crate::support::{robot_folder, root, temp, titan, write};
+use super::{arm_in, as_calibrated, calibration, calibration_file, export, exported};
+use crate::support::{answer, program, read, robot_folder, root, temp, titan, write};
 
 fn sample() -> std::path::PathBuf {
     root().join("recordings/sample/calibration.toml")
@@ -143,9 +143,33 @@ fn the_camchain_is_the_robots_camera_at_its_calibrated_place() {
     let written = Matrix4::from_fn(|i, k| of["T_link_camera"][i][k].as_f64().expect("a number"));
     let calibrated = as_calibrated(&titan(), &calibration()).camera.mount.link_from_frame.to_homogeneous();
     assert!((written - calibrated).amax() < 1e-15, "{written}");
+    let folder = temp();
+    write(&folder.path().join("camchain.yaml"), &text);
+    let mut command = program();
+    command.current_dir(folder.path()).arg("new-robot").arg(robot_folder().join("titan4.urdf"));
+    answer(command.args(["--out", "made", "--lens", "camchain.yaml"])).expect("new-robot", 0, &[]);
+    let back = arm_in(&folder.path().join("made")).camera.lens;
+    assert_eq!((back.intrinsics(), back.resolution_px()), (lens.intrinsics(), lens.resolution_px()));
     let drawn = yaml(&export(&sample(), Some(&robot_folder()), "kalibr").stdout);
     let x = drawn["cam0"]["T_link_camera"][0][3].as_f64().expect("a number");
     assert!((x + 0.124).abs() < 1e-12, "the drawing's, where the calibration has none");
+}
+
+#[test]
+fn cameras_of_one_link_have_kalibrs_pose_between_them() {
+    let mut robot = titan();
+    let mut second = robot.camera.clone();
+    second.name = "second".to_owned();
+    second.mount.link_from_frame *= nalgebra::Translation3::new(0.1, 0.0, 0.0);
+    robot.further_cameras.push(second.clone());
+    second.mount.n_joints -= 1;
+    robot.further_cameras.push(second);
+    let sample = Calibration::parse(&sample(), &read(&sample())).expect("it reads");
+    let found = yaml(&armcal::export::camchain(Path::new("c.toml"), &sample, &robot).expect("a chain"));
+    let between = Matrix4::from_fn(|i, k| found["cam1"]["T_cn_cnm1"][i][k].as_f64().expect("a number"));
+    let expected = Matrix4::new_translation(&nalgebra::Vector3::new(-0.1, 0.0, 0.0));
+    assert!((between - expected).amax() < 1e-12, "{between}");
+    assert!(found["cam2"]["T_cn_cnm1"].is_null(), "on another link it is no constant");
 }
 
 fn mapped(tag: &SurveyedTag) -> MapTag {

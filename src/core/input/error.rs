@@ -77,6 +77,13 @@ pub enum InputError {
     )]
     Unit { file: String, joint: String, value: f64, stated: JointUnit, likely: JointUnit },
     #[error(
+        "{file}: joint `{joint}` has {value:.3}, which LeRobot's {values} cannot be: {} to {}; set `values` of \
+         joint_sensors.lerobot in the input map to what was recorded",
+        allowed[0],
+        allowed[1]
+    )]
+    Lerobot { file: String, joint: String, value: f64, values: String, allowed: [f64; 2] },
+    #[error(
         "{file}: the slides' numbers are {}, not {}: `{joint}` is {value:.3}, far outside of its range; set \
          joint_sensors.slide_unit = \"{}\" in the input map",
         likely.name(),
@@ -121,7 +128,7 @@ impl Coded for InputError {
             Self::NoPositions { .. } => Code::ReadingsMissing,
             Self::Disorder { .. } => Code::StampsDisordered,
             Self::JointNames { .. } => Code::JointsMismatch,
-            Self::Unit { .. } | Self::SlideUnit { .. } => Code::InputUnit,
+            Self::Unit { .. } | Self::SlideUnit { .. } | Self::Lerobot { .. } => Code::InputUnit,
             Self::TooLong { .. } => Code::RecordingTooLong,
             Self::NoTags { .. } => Code::TagsNotSeen,
             Self::Unreadable { .. } => Code::FileUnreadable,

@@ -2,6 +2,7 @@
 
 use super::error::InputError;
 use super::joints::{Reading, n_needed};
+use super::lerobot::LerobotCalibration;
 use super::map::{InputMap, JointUnit, SlideUnit};
 use crate::robot::{JointSensorSpec, Robot};
 
@@ -19,6 +20,8 @@ const STOOD_RAD: f64 = 0.12;
 const MOVED_RAD: f64 = 0.3;
 /// Angles in radians are smaller.
 const LARGEST_RAD: f64 = 7.0;
+/// LeRobot's numbers are single precision.
+const ROUNDED: f64 = 1e-3;
 
 /// What speaks for another unit without proving it; `None` where nothing does.
 ///
@@ -30,6 +33,9 @@ pub(super) fn check_unit(
     robot: &Robot,
     readings: &[Reading],
 ) -> Result<Option<String>, InputError> {
+    if let Some(lerobot) = &map.lerobot {
+        check_lerobot(file, map, lerobot, (robot, readings))?;
+    }
     let values = Values { stated: map.joint_unit, sensors: &robot.sensors[..n_needed(robot)], readings };
     let stated = map.joint_unit;
     if stated != JointUnit::Counts {
@@ -57,6 +63,27 @@ pub(super) fn check_unit(
             stated.name()
         )
     }))
+}
+
+/// Refuses ticks that no number of LeRobot's stands for.
+fn check_lerobot(
+    file: &str,
+    map: &InputMap,
+    lerobot: &LerobotCalibration,
+    (robot, readings): (&Robot, &[Reading]),
+) -> Result<(), InputError> {
+    let allowed = lerobot.values().allowed();
+    for (joint, spec) in robot.sensors.iter().enumerate().take(n_needed(robot)) {
+        let recorded = map.recorded_name(&spec.joint);
+        let [zero, one] = [0.0, 1.0].map(|value| lerobot.tick(recorded, value));
+        let values = readings.iter().map(|reading| (reading.counts[joint] - zero) / (one - zero));
+        let is_outside = |value: &f64| *value < allowed[0] - ROUNDED || *value > allowed[1] + ROUNDED;
+        if let Some(value) = values.into_iter().find(is_outside) {
+            let (file, joint, values) = (file.to_owned(), spec.joint.clone(), lerobot.values().key().to_owned());
+            return Err(InputError::Lerobot { file, joint, value, values, allowed });
+        }
+    }
+    Ok(())
 }
 
 /// The recorded numbers of the joints that move the camera.

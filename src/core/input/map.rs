@@ -11,6 +11,8 @@
 //! names = { elbow = "joint_3" }      # optional: the robot's joint = the recorded name, where they differ
 //! unit = "counts"                    # optional: or "rad", "deg": angles made of the sensors by their datasheet
 //! slide_unit = "m"                   # optional, with "rad" or "deg": or "mm", of joints that slide
+//! # optional: LeRobot's calibration JSON, next to this file; then unit stays "counts", which are the motors' ticks
+//! lerobot = { file = "arm.json", motors = "feetech", values = "degrees" }   # or "range_m100_100", "range_0_100", "ticks"
 //! [tags]
 //! topic = "/tf"                      # tf2_msgs/msg/TFMessage, apriltag_msgs/msg/AprilTagDetectionArray, or
 //!                                    # sensor_msgs/msg/Image or CompressedImage (with use = "corners")
@@ -42,10 +44,12 @@ use nalgebra::{Quaternion, UnitQuaternion};
 use serde::Deserialize;
 
 pub use self::table::{
-    Direction, PoseColumns, RotationColumns, RotationForm, SeenColumns, TableFormat, TableLayout, TimeColumn,
+    CornerOrder, Direction, PoseColumns, RotationColumns, RotationForm, SeenColumns, TableFormat, TableLayout,
+    TimeColumn,
 };
 use self::table::{TableToml, TagColumnsToml};
 pub use self::units::{JointUnit, SlideUnit};
+use super::lerobot::{LerobotCalibration, LerobotToml};
 use crate::optics::TagFamily;
 use crate::robot::{FileIssue, JointSensorSpec, Robot, RobotError, parse_toml, read_text};
 
@@ -258,6 +262,8 @@ pub struct InputMap {
     pub joint_unit: JointUnit,
     /// What those of slides are, where `joint_unit` is one of angles.
     pub slide_unit: SlideUnit,
+    /// LeRobot's calibration, by which its numbers become ticks.
+    pub lerobot: Option<LerobotCalibration>,
     /// Names of the tags' frames; `None` with [`TagUse::Corners`] alone.
     pub child_frame: Option<ChildFrame>,
     /// What is printed on the tags in images; `None`: what is on the robot's.
@@ -287,6 +293,10 @@ impl InputMap {
             let problem = format!("`{name}` is no joint of the robot; it has {joints:?}");
             return Err(FileIssue::new(Code::NameUnknown, file, "joint_sensors.names", problem));
         }
+        if let Some(lerobot) = &self.lerobot {
+            let mut sensors = robot.sensors.iter();
+            sensors.try_for_each(|spec| lerobot.check_joint(self.recorded_name(&spec.joint), spec))?;
+        }
         let cameras: Vec<&String> = robot.further_cameras.iter().map(|camera| &camera.name).collect();
         match self.further().iter().find(|further| !cameras.contains(&&further.camera)) {
             None => Ok(()),
@@ -299,6 +309,9 @@ impl InputMap {
 
     /// The raw reading that a recorded number stands for.
     pub(super) fn counts(&self, spec: &JointSensorSpec, value: f64) -> f64 {
+        if let Some(lerobot) = &self.lerobot {
+            return lerobot.tick(self.recorded_name(&spec.joint), value);
+        }
         let is_metric = self.joint_unit != JointUnit::Counts && spec.moves.is_slide();
         self.joint_unit.counts(spec, if is_metric { value * self.slide_unit.in_m() } else { value })
     }
@@ -313,7 +326,8 @@ impl InputMap {
     }
 
     /// The name that the recording has for `joint` of the robot.
-    pub(super) fn recorded_name<'a>(&'a self, joint: &'a String) -> &'a String {
+    #[must_use]
+    pub fn recorded_name<'a>(&'a self, joint: &'a String) -> &'a String {
         self.joint_names.get(joint).unwrap_or(joint)
     }
 }
@@ -365,6 +379,7 @@ struct JointsToml {
     #[serde(default)]
     unit: JointUnit,
     slide_unit: Option<SlideUnit>,
+    lerobot: Option<LerobotToml>,
 }
 
 #[derive(Deserialize)]
@@ -422,15 +437,22 @@ fn usual_gap_s() -> f64 {
 /// # Errors
 /// [`RobotError`] with file, key and allowed range.
 pub fn read_input_map(file: &Path) -> Result<InputMap, RobotError> {
-    parse_input_map(file, &read_text(file)?)
+    let raw: MapToml = parse_toml(file, &read_text(file)?)?;
+    let lerobot = raw.joint_sensors.lerobot.clone();
+    let map = checked(file, raw)?;
+    let lerobot = lerobot.map(|lerobot| LerobotCalibration::read(file, &lerobot)).transpose()?;
+    Ok(InputMap { lerobot, ..map })
 }
 
-/// The same from a text; `file` names it in errors.
+/// The same from a text, without the file of LeRobot that it may name; `file` names it in errors.
 ///
 /// # Errors
 /// As [`read_input_map`].
 pub fn parse_input_map(file: &Path, text: &str) -> Result<InputMap, RobotError> {
-    let raw: MapToml = parse_toml(file, text)?;
+    checked(file, parse_toml(file, text)?)
+}
+
+fn checked(file: &Path, raw: MapToml) -> Result<InputMap, RobotError> {
     FileIssue::check_range(file, "version", f64::from(raw.version), 1.0..=1.0)?;
     let child_frame = raw.tags.child_frame.as_deref().map(|frame| child_frame(file, frame)).transpose()?;
     let family = |text: &String| {
@@ -443,6 +465,10 @@ pub fn parse_input_map(file: &Path, text: &str) -> Result<InputMap, RobotError> 
     if raw.tags.tag_use == TagUse::BoardCorners && !matches!(child_frame, Some(ChildFrame::Plain(_))) {
         let problem = "must be the plain name of the board in the tag map; its corners have numbers of their own";
         return Err(FileIssue::new(Code::ValueInvalid, file, "tags.child_frame", problem).into());
+    }
+    if raw.joint_sensors.lerobot.is_some() && raw.joint_sensors.unit != JointUnit::Counts {
+        let problem = "is for numbers without `lerobot`, which says what they are by its `values`; leave one out";
+        return Err(FileIssue::new(Code::KeysConflict, file, "joint_sensors.unit", problem).into());
     }
     let tag_noise = raw.tags.noise(file)?;
     let source = match raw.table {
@@ -462,6 +488,7 @@ pub fn parse_input_map(file: &Path, text: &str) -> Result<InputMap, RobotError> 
         joint_names: raw.joint_sensors.names,
         joint_unit: raw.joint_sensors.unit,
         slide_unit: slide_unit(file, raw.joint_sensors.unit, raw.joint_sensors.slide_unit)?,
+        lerobot: None,
         child_frame,
         tag_family: tag_family.transpose()?,
         tag_use: raw.tags.tag_use,

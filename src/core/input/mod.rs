@@ -13,6 +13,7 @@ mod external;
 mod images;
 mod joint_unit;
 mod joints;
+mod lerobot;
 mod map;
 mod message_type;
 mod recording;
@@ -30,10 +31,11 @@ pub use images::{
     CameraInfoLens, ImageDetector, ImageProblem, RecordedImage, TagCorners, lens_of_camera_info, read_camera_info,
 };
 pub use joints::Reading;
+pub use lerobot::{LerobotCalibration, LerobotMotors, LerobotValues};
 pub use map::{
-    ChildFrame, ConditionKind, ConditionTopics, DEFAULT_MAX_GAP_S, Direction, FurtherTopic, InputMap, JointUnit,
-    NotFinite, PoseColumns, RotationColumns, RotationForm, SeenColumns, SlideUnit, Source, StampSource, TableFormat,
-    TableLayout, TagNoise, TagUse, TimeColumn, Topics, WhileMoving, parse_input_map, read_input_map,
+    ChildFrame, ConditionKind, ConditionTopics, CornerOrder, DEFAULT_MAX_GAP_S, Direction, FurtherTopic, InputMap,
+    JointUnit, NotFinite, PoseColumns, RotationColumns, RotationForm, SeenColumns, SlideUnit, Source, StampSource,
+    TableFormat, TableLayout, TagNoise, TagUse, TimeColumn, Topics, WhileMoving, parse_input_map, read_input_map,
 };
 pub use recording::ExternalRecording;
 pub use table::{TableColumn, TableContents, read_table_contents};

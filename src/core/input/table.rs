@@ -1,5 +1,6 @@
 //! Tables of poses at rest: CSV and YAML files by the columns of an input map.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use nalgebra::Isometry3;
@@ -7,7 +8,7 @@ use nalgebra::Isometry3;
 use super::error::{BadPlace, InputError};
 use super::joint_unit::check_unit;
 use super::joints::{Reading, n_needed};
-use super::map::{InputMap, NotFinite, SeenColumns, TableFormat, TableLayout, TagUse};
+use super::map::{CornerOrder, InputMap, NotFinite, SeenColumns, TableFormat, TableLayout, TagUse};
 use super::recording::ExternalRecording;
 use super::tags::{ExternalDetection, MIN_DISTANCE_M, RawMeasurement, TagFrame};
 use crate::files::{FileKind, read_text};
@@ -52,14 +53,21 @@ pub(super) fn read_table(
     let absent_joints: Vec<usize> =
         (0..robot.n_joints()).filter(|&joint| !found.columns.contains(&columns.names[joint])).collect();
     let recording = ExternalRecording { path: path.to_owned(), absent_joints, ..ExternalRecording::default() };
-    let mut reader = TableReader { file: &file, map, layout, robot, columns: &columns, recording };
+    let keys = BTreeSet::new();
+    let mut reader = TableReader { file: &file, map, layout, robot, columns: &columns, recording, keys };
     for row in &found.rows {
         reader.take(row)?;
     }
-    if reader.recording.frames.is_empty() {
-        return Err(InputError::Table { file, problem: "no row of it could be used".to_owned() });
-    }
     let mut recording = reader.recording;
+    if matches!(layout.seen, SeenColumns::TagCorner { .. }) {
+        join_corners(&mut recording);
+    }
+    if recording.frames.is_empty() {
+        let why: Vec<String> = recording.left_out.iter().map(|(why, n)| format!("{n} {why}")).collect();
+        let problem = format!("no row of it could be used: it has {}", why.join(", "));
+        return Err(InputError::Table { file, problem });
+    }
+    recording.frames.iter_mut().for_each(|frame| frame.tags.sort_by_key(ExternalDetection::key));
     recording.unit_doubt = check_unit(&file, map, robot, &recording.readings)?;
     Ok(recording)
 }
@@ -108,6 +116,36 @@ struct TableReader<'a> {
     robot: &'a Robot,
     columns: &'a Columns,
     recording: ExternalRecording,
+    /// What the last frame holds.
+    keys: BTreeSet<Key>,
+}
+
+/// [`ExternalDetection::key`].
+type Key = (Option<u32>, Option<u32>);
+
+/// Makes tags of the rows' corners, which a frame holds as those of a board each.
+fn join_corners(recording: &mut ExternalRecording) {
+    let mut incomplete = 0;
+    for frame in &mut recording.frames {
+        let mut tags: BTreeMap<Option<u32>, [Option<[f64; 2]>; 4]> = BTreeMap::new();
+        for ExternalDetection { id, seen } in std::mem::take(&mut frame.tags) {
+            if let RawMeasurement::BoardCorner { number, pixel } = seen {
+                tags.entry(id).or_default()[number as usize] = Some(pixel);
+            }
+        }
+        for (id, corners) in tags {
+            match corners {
+                [Some(a), Some(b), Some(c), Some(d)] => {
+                    frame.tags.push(ExternalDetection { id, seen: RawMeasurement::Corners([a, b, c, d]) });
+                }
+                _ => incomplete += 1,
+            }
+        }
+    }
+    recording.frames.retain(|frame| !frame.tags.is_empty());
+    if incomplete > 0 {
+        recording.left_out.insert("tags with fewer than four corners at a pose".to_owned(), incomplete);
+    }
 }
 
 impl TableReader<'_> {
@@ -120,17 +158,19 @@ impl TableReader<'_> {
         let tag = self.detection(row, &values)?;
         let stamp = self.stamp(row, &values, (&counts, &tag))?;
         let digest = digest(stamp, &values);
+        let key = tag.key();
         match self.recording.frames.last_mut().filter(|frame| frame.stamp == stamp) {
             Some(frame) => {
                 frame.tags.push(tag);
-                frame.tags.sort_by_key(ExternalDetection::key);
                 frame.digests.push(digest);
             }
             None => {
+                self.keys.clear();
                 self.recording.readings.push(Reading { stamp, counts, digest });
                 self.recording.frames.push(TagFrame { stamp, tags: vec![tag], digests: vec![digest] });
             }
         }
+        self.keys.insert(key);
         Ok(())
     }
 
@@ -176,15 +216,42 @@ impl TableReader<'_> {
         Ok(Some(value as u32))
     }
 
+    /// Place of the row's corner in armcal's order.
+    fn corner(&self, row: &Row, values: &[f64], order: CornerOrder) -> Result<u32, InputError> {
+        let Some(at) = self.columns.corner else { return Ok(0) };
+        match [0.0, 1.0, 2.0, 3.0].iter().position(|number| *number == values[at]) {
+            Some(number) => Ok(order.place(number) as u32),
+            None => {
+                let name = &self.columns.names[at];
+                self.problem(
+                    row,
+                    format!(
+                        "`{name}` is {}, not a corner's number, 0 to 3; subtract 1 where they begin with 1",
+                        values[at]
+                    ),
+                )
+            }
+        }
+    }
+
     fn detection(&self, row: &Row, values: &[f64]) -> Result<ExternalDetection, InputError> {
         let id = self.id(row, values)?;
         let place = self.columns.place.clone().map(|at| values[at]);
+        let pixel = |k: usize| [values[self.columns.place.start + 2 * k], values[self.columns.place.start + 2 * k + 1]];
         let layout = match &self.layout.seen {
             SeenColumns::Pose(layout) => layout,
             SeenColumns::Pixel(_) => {
-                let pixel = [values[self.columns.place.start], values[self.columns.place.start + 1]];
-                let seen = RawMeasurement::BoardCorner { number: id.unwrap_or_default(), pixel };
+                let seen = RawMeasurement::BoardCorner { number: id.unwrap_or_default(), pixel: pixel(0) };
                 return Ok(ExternalDetection { id: None, seen });
+            }
+            SeenColumns::TagCorner { order, .. } => {
+                let seen = RawMeasurement::BoardCorner { number: self.corner(row, values, *order)?, pixel: pixel(0) };
+                return Ok(ExternalDetection { id, seen });
+            }
+            // Both orders are their own inverse.
+            SeenColumns::TagCorners { order, .. } => {
+                let seen = RawMeasurement::Corners([0, 1, 2, 3].map(|k| pixel(order.place(k))));
+                return Ok(ExternalDetection { id, seen });
             }
         };
         let rotation: Vec<f64> = self.columns.rotation.clone().map(|at| values[at]).collect();
@@ -205,9 +272,9 @@ impl TableReader<'_> {
     /// Rows of one time are of one pose. Without a time, so are rows of different tags with the same joint readings.
     fn stamp(&self, row: &Row, values: &[f64], pose: (&JointCounts, &ExternalDetection)) -> Result<Stamp, InputError> {
         let last = self.recording.readings.last().zip(self.recording.frames.last());
-        let is_again = |frame: &TagFrame| frame.tags.iter().any(|tag| tag.key() == pose.1.key());
+        let is_again = self.keys.contains(&pose.1.key());
         let Some((time, at)) = self.layout.time.as_ref().zip(self.columns.time) else {
-            let same = last.filter(|(reading, frame)| reading.counts == *pose.0 && !is_again(frame));
+            let same = last.filter(|(reading, _)| reading.counts == *pose.0 && !is_again);
             let next = Stamp::default().plus_s(ROW_S * row.number as f64);
             return Ok(same.map_or(next, |(reading, _)| reading.stamp));
         };
@@ -216,11 +283,11 @@ impl TableReader<'_> {
             return self.problem(row, format!("the time {} is no time after 1970", values[at]));
         }
         let stamp = Stamp { nanos: nanos.round() as i64 };
-        let Some((reading, frame)) = last else { return Ok(stamp) };
+        let Some((reading, _)) = last else { return Ok(stamp) };
         let after_s = stamp.since_s(reading.stamp);
         if stamp == reading.stamp {
-            return match (is_again(frame), reading.counts == *pose.0) {
-                (true, _) => self.problem(row, "has the time and the tag of the row before".to_owned()),
+            return match (is_again, reading.counts == *pose.0) {
+                (true, _) => self.problem(row, "has the time and the tag (or corner) of a row before".to_owned()),
                 (false, false) => self.problem(row, "has the time of the row before and other joints".to_owned()),
                 (false, true) => Ok(stamp),
             };

@@ -14,12 +14,15 @@ use super::urdf::{MAX_COLLISION_SHAPES, UrdfChain, UrdfModel};
 use super::urdf_mesh::places;
 use crate::files::{self, FileKind};
 use crate::kinematics::{Chain, ChainJoint, JointKind};
+use crate::optics::{CameraModel, LensModel};
 
 /// What a robot folder is made from.
 #[derive(Clone, Copy, Debug)]
 pub struct NewRobot<'a> {
     /// The URDF.
     pub urdf: &'a Path,
+    /// Its text, where that is no longer the file's.
+    pub text: Option<&'a str>,
     /// Link whose frame is the base frame; the root, or what stands on a root called `world`.
     pub base: Option<&'a str>,
     /// Link of the tool; the end of the longest chain of joints.
@@ -28,6 +31,8 @@ pub struct NewRobot<'a> {
     pub camera: Option<&'a str>,
     /// Name of the robot; that of the URDF.
     pub name: Option<&'a str>,
+    /// The camera's lens, and the words that say where it is from.
+    pub lens: Option<(&'a str, &'a CameraModel)>,
     /// Links that overlap or are near each other at nearly every pose.
     pub touching: &'a [[String; 2]],
     /// Angles at which the arm is clear of itself, rad (m of slides), base first.
@@ -84,7 +89,8 @@ pub fn draft_robot(wanted: &NewRobot<'_>, meshes: DraftedMeshes<'_>) -> Result<D
 
 /// The URDF, and the arm in it.
 fn read_arm(wanted: &NewRobot<'_>) -> Result<(UrdfModel, FoundArm), RobotError> {
-    let urdf = UrdfModel::parse(wanted.urdf, read_text(wanted.urdf)?)?;
+    let text = wanted.text.map_or_else(|| read_text(wanted.urdf), |text| Ok(text.to_owned()))?;
+    let urdf = UrdfModel::parse(wanted.urdf, text)?;
     let arm = find_arm(&urdf, &Ends { base: wanted.base, tip: wanted.tip, camera: wanted.camera })?;
     Ok((urdf, arm))
 }
@@ -274,7 +280,8 @@ impl Draft<'_> {
 
     fn camera(&self, out: &mut String) {
         if let Some(link) = self.arm.camera.as_ref().filter(|link| self.stands_still(link)) {
-            let _ = write!(out, "\n[camera]\nname = {0}\n# Read.\nlink = {0}\n{STANDING}{LENS}", quoted(link));
+            let _ = write!(out, "\n[camera]\nname = {0}\n# Read.\nlink = {0}\n{STANDING}", quoted(link));
+            self.lens(out);
             return;
         }
         let (link, whose, std_m, std_rad) = match &self.arm.camera {
@@ -293,9 +300,30 @@ impl Draft<'_> {
             out,
             "\n[camera]\nname = {}\n{whose}\nlink = {}\n\
              # Assumed: how well its place on the link is known, one sigma per axis. Measure it: they are priors.\n\
-             mount_std_m = {std_m:?}\nmount_std_rad = {std_rad:?}\n{LENS}",
+             mount_std_m = {std_m:?}\nmount_std_rad = {std_rad:?}\n",
             quoted(link),
             quoted(link)
+        );
+        self.lens(out);
+    }
+
+    fn lens(&self, out: &mut String) {
+        let Some((source, lens)) = self.wanted.lens else { return out.push_str(LENS) };
+        let (model, widest) = match &lens.lens {
+            LensModel::Equidistant(fisheye) => {
+                ("equidistant", format!("max_view_angle_rad = {:?}\n", fisheye.max_view_angle_rad))
+            }
+            _ => ("pinhole", String::new()),
+        };
+        let _ = write!(
+            out,
+            "# Read: the lens, {}.\nmodel = \"{model}\"\nresolution_px = {:?}\nfocal_px = {:?}\ncenter_px = {:?}\n\
+             distortion = {:?}\n{widest}corner_std_px = 0.3  # assumed\n",
+            on_line(source),
+            lens.resolution_px(),
+            lens.focal_px(),
+            lens.center_px(),
+            lens.distortion()
         );
     }
 }

@@ -10,6 +10,7 @@ pub(super) use self::link::{ShapeElement, UrdfLink, UrdfShape};
 use self::scan::Scan;
 pub(super) use self::scan::Skipped;
 
+mod driver;
 mod joint;
 mod link;
 mod scan;
@@ -60,6 +61,7 @@ impl UrdfFile {
                 "link" => file.add_link(&mut scan, at, &colors),
                 "joint" => file.joints.push(joint::read_joint(&mut scan, at)?),
                 "material" => {}
+                "ros2_control" | "transmission" => driver::note_offsets(&mut scan, &tree, at),
                 other if OF_OTHER_TOOLS.contains(&other) => {}
                 other => scan.skip("robot", at, format!("the element `{other}` is not part of URDF: skipped")),
             }
@@ -137,6 +139,27 @@ mod tests {
         assert_eq!(told(quiet), Vec::<String>::new());
         let [wheel] = &told("<wheel/>")[..] else { panic!("one note") };
         assert!(wheel.contains("`wheel`"), "{wheel}");
+    }
+
+    #[test]
+    fn what_a_driver_applies_is_named_by_its_joint() {
+        let exported = "<ros2_control name=\"a\"><joint name=\"j\"><param name=\"offset\">-0.5</param>\
+                        <state_interface name=\"position\"><param name=\"offset\">2048</param></state_interface></joint>\
+                        <transmission name=\"t\"><joint name=\"k\"><mechanical_reduction>1.02</mechanical_reduction>\
+                        <offset>x</offset></joint></transmission></ros2_control>";
+        let mut named: Vec<String> =
+            told(exported).iter().map(|note| note.replace(": the driver applies", "#")).collect();
+        named.sort_unstable();
+        let owners: Vec<&str> = named.iter().filter_map(|note| note.split('#').next()).collect();
+        let expected = [
+            "mechanical_reduction = 1.02 of joint `k`",
+            "offset = -0.5 of joint `j`",
+            "offset = 2048 of joint `j`",
+            "offset = x of joint `k`",
+        ];
+        assert_eq!(owners, expected);
+        let quiet = exported.replace("-0.5", "0").replace("2048", "0.0").replace("1.02", "1").replace(">x<", ">0<");
+        assert_eq!(told(&quiet), Vec::<String>::new());
     }
 
     #[test]

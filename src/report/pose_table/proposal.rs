@@ -101,18 +101,32 @@ fn joints(table: &TableContents, roles: &Roles, robot: Option<&Robot>) -> String
     text + &format!("{unit}   # the largest value is {largest:.4}\n")
 }
 
-fn tags(table: &TableContents, roles: &Roles) -> String {
-    let list = |names: &[String]| names.iter().map(|name| quoted(name)).collect::<Vec<_>>().join(", ");
-    let mut text = "\n[tags]\n".to_owned();
-    let Some(position) = &roles.position else {
-        let pixel = roles.pixel.as_ref().map_or(String::new(), |pixel| list(pixel));
-        let id = roles.id.as_ref().map_or(String::new(), |id| quoted(id));
-        return text
-            + &format!(
-                "child_frame = \"board\"   # as the tag map calls it, with its squares and square_m\nuse = \
-                 \"board_corners\"\n\n[tags.columns]\nid = {id}\npixel = [{pixel}]\n"
+fn list(names: &[String]) -> String {
+    names.iter().map(|name| quoted(name)).collect::<Vec<_>>().join(", ")
+}
+
+/// Corners of tags where a column has the tag's number, otherwise of a board.
+fn corners(roles: &Roles) -> String {
+    let pixel = roles.pixel.as_ref().map_or(String::new(), |pixel| list(pixel));
+    let id = roles.id.as_ref().map_or(String::new(), |id| quoted(id));
+    let order =
+        "corner_order = \"apriltag\"   # bottom left first, counter-clockwise; or \"opencv\": top left, clockwise\n";
+    let of_tag = match (&roles.corners, &roles.corner) {
+        (Some(columns), _) => format!("corners = [{}]\n{order}", list(columns)),
+        (None, Some(corner)) => format!("corner = {}\npixel = [{pixel}]\n{order}", quoted(corner)),
+        (None, None) => {
+            return format!(
+                "\n[tags]\nchild_frame = \"board\"   # as the tag map calls it, with its squares and square_m\n\
+                 use = \"board_corners\"\n\n[tags.columns]\nid = {id}\npixel = [{pixel}]\n"
             );
+        }
     };
+    format!("\n[tags]\nuse = \"corners\"\n\n[tags.columns]\nid = {id}   # the tag's number\n{of_tag}")
+}
+
+fn tags(table: &TableContents, roles: &Roles) -> String {
+    let mut text = "\n[tags]\n".to_owned();
+    let Some(position) = &roles.position else { return corners(roles) };
     if roles.id.is_none() {
         text += "child_frame = \"board\"   # as the tag map calls the landmark\n";
     }

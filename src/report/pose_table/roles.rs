@@ -28,12 +28,21 @@ pub(super) struct Roles {
     pub other_positions: Vec<Columns>,
     pub rotation: Option<Rotation>,
     pub pixel: Option<[String; 2]>,
+    /// A corner's number, where the tag's is in another column.
+    pub corner: Option<String>,
+    /// Columns of a tag's four corners.
+    pub corners: Option<[String; 8]>,
     pub id: Option<String>,
 }
 
 /// Names of a column of times, of ids, and words for what the camera sees and for the arm itself.
 const TIMES: [&str; 8] = ["t", "time", "stamp", "timestamp", "secs", "seconds", "nanos", "time_s"];
-const IDS: [&str; 8] = ["id", "tag", "tag_id", "marker", "marker_id", "corner", "corner_id", "landmark"];
+const IDS: [&str; 6] = ["id", "tag", "tag_id", "marker", "marker_id", "landmark"];
+const CORNERS: [&str; 5] = ["corner", "corner_id", "corner_index", "corner_idx", "point"];
+/// Names of a corner's two columns, u and v.
+const PIXELS: [[&str; 2]; 4] = [["u", "v"], ["x", "y"], ["px", "py"], ["u_px", "v_px"]];
+/// Longer names of columns are not looked into.
+const MAX_NAME: usize = 100;
 const SEEN_WORDS: [&str; 10] =
     ["tag", "board", "marker", "target", "track", "cam", "object", "pattern", "aruco", "landmark"];
 const ARM_WORDS: [&str; 6] = ["robot", "tool", "base", "flange", "tcp", "ee"];
@@ -49,7 +58,10 @@ impl Roles {
             TIMES.contains(&name.as_str()) || name.starts_with("time") || name.starts_with("stamp")
         };
         roles.time = names.iter().find(is_time).cloned();
-        roles.id = names.iter().find(|name| IDS.contains(&last_part(name).as_str())).cloned();
+        let called = |words: &[&str]| names.iter().find(|name| words.contains(&last_part(name).as_str())).cloned();
+        roles.corner = called(&CORNERS);
+        roles.id = called(&IDS).or_else(|| roles.corner.take());
+        roles.corners = four_corners(&names);
         let mut places = triples(&names);
         let rotations: Vec<Columns> = extracted(&mut places, is_rotation);
         places.sort_by_key(|columns| seen_rank(&columns.stem));
@@ -65,7 +77,8 @@ impl Roles {
     fn used(&self) -> BTreeSet<&String> {
         let places = self.position.iter().chain(&self.other_positions).flat_map(|columns| &columns.names);
         let rotation = self.rotation.iter().flat_map(|(columns, _)| &columns.names);
-        places.chain(rotation).chain(&self.time).chain(&self.id).chain(self.pixel.iter().flatten()).collect()
+        let pixels = self.pixel.iter().flatten().chain(self.corners.iter().flatten());
+        places.chain(rotation).chain(&self.time).chain(&self.id).chain(&self.corner).chain(pixels).collect()
     }
 
     fn match_joints(&mut self, names: &[String], other_names: &BTreeMap<String, String>, robot: Option<&Robot>) {
@@ -116,13 +129,15 @@ impl Roles {
             "time"
         } else if self.id.as_ref() == Some(name) {
             "number of a tag or corner"
+        } else if self.corner.as_ref() == Some(name) {
+            "number of a corner"
         } else if self.position.as_ref().is_some_and(is_of) {
             "position"
         } else if self.other_positions.iter().any(is_of) {
             "another position"
         } else if self.rotation.as_ref().is_some_and(|(columns, _)| is_of(columns)) {
             "rotation"
-        } else if self.pixel.iter().flatten().any(|column| column == name) {
+        } else if self.pixel.iter().flatten().chain(self.corners.iter().flatten()).any(|column| column == name) {
             "pixel"
         } else {
             ""
@@ -224,4 +239,32 @@ fn matrix(names: &[String]) -> Option<Columns> {
 fn pixel(names: &[String]) -> Option<[String; 2]> {
     let find = |words: [&str; 3]| names.iter().find(|name| words.contains(&last_part(name).as_str())).cloned();
     Some([find(["u", "px", "u_px"])?, find(["v", "py", "v_px"])?])
+}
+
+/// Columns such as `u0`, `v0` to `u3`, `v3`, `corner1_x` to `corner4_y`, or `corners.0.0` to `corners.3.1`.
+fn four_corners(names: &[String]) -> Option<[String; 8]> {
+    let all: BTreeSet<&str> = names.iter().map(String::as_str).collect();
+    let with = |(before, after): (&str, &str), from: usize| {
+        let at = |k: usize, letter: &str| format!("{before}{}{after}", k + from).replace('\0', letter);
+        let pair = |letters: [&str; 2]| [0, 1, 2, 3].map(|k| letters.map(|letter| at(k, letter)));
+        let letters = PIXELS.into_iter().chain([["0", "1"]]);
+        let found =
+            letters.map(pair).find(|columns| columns.iter().flatten().all(|name| all.contains(name.as_str())))?;
+        let [[a, b], [c, d], [e, f], [g, h]] = found;
+        Some([a, b, c, d, e, f, g, h])
+    };
+    names.iter().filter(|name| name.len() <= MAX_NAME).find_map(|name| {
+        // The first corner's first column: its digit, and next to it or at the end the letter.
+        name.char_indices().filter(|(_, digit)| ['0', '1'].contains(digit)).find_map(|(at, digit)| {
+            let (before, after) = (&name[..at], &name[at + 1..]);
+            let letters = PIXELS.iter().map(|pair| pair[0]).chain(["0"]);
+            letters.into_iter().find_map(|letter| {
+                let (end, start) = (after.strip_suffix(letter), before.strip_suffix(letter));
+                let behind = end.map(|end| (before.to_owned(), format!("{end}\0")));
+                let ahead = start.filter(|_| letter != "0").map(|start| (format!("{start}\0"), after.to_owned()));
+                let from = usize::from(digit == '1');
+                behind.into_iter().chain(ahead).find_map(|(before, after)| with((&before, &after), from))
+            })
+        })
+    })
 }

@@ -74,13 +74,14 @@ pub(super) fn missing(table: &TableContents, roles: &Roles) -> Vec<String> {
     } else if roles.joints.is_empty() {
         missing.push("columns of joint readings (--robot DIR matches their names)".to_owned());
     }
-    match (&roles.position, &roles.pixel) {
-        (None, None) => {
-            missing.push(
-                "columns of what the camera saw: x, y, z of a tag or board, or a corner's id and u, v".to_owned(),
-            );
+    match (&roles.position, &roles.pixel, &roles.corners) {
+        (None, None, None) => {
+            let text = "columns of what the camera saw: x, y, z of a tag or board, a corner's id and u, v, or a tag's \
+                        id and u, v of its corners";
+            missing.push(text.to_owned());
         }
-        (None, Some(_)) if roles.id.is_none() => missing.push("a column of the corner's number".to_owned()),
+        (None, _, Some(_)) if roles.id.is_none() => missing.push("a column of the tag's number".to_owned()),
+        (None, Some(_), _) if roles.id.is_none() => missing.push("a column of the corner's number".to_owned()),
         _ => {}
     }
     for column in table.columns.iter().filter(|column| !roles.of_column(&column.name).is_empty()) {

@@ -69,6 +69,25 @@ pub enum Direction {
     TagFromCamera,
 }
 
+/// Which corner of a tag is the first, and which way round the others follow; as the tag is printed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum CornerOrder {
+    /// Bottom left, bottom right, top right, top left: AprilRobotics/apriltag 1c21707, apriltag.h, line 220.
+    #[default]
+    Apriltag,
+    /// Top left, top right, bottom right, bottom left: OpenCV's `ArucoDetector::detectMarkers` (clockwise).
+    Opencv,
+}
+
+impl CornerOrder {
+    /// Place of the corner `number`, 0 to 3, in the first order.
+    #[must_use]
+    pub fn place(self, number: usize) -> usize {
+        if self == Self::Apriltag { number } else { 3 - number }
+    }
+}
+
 /// Where a row's rotation is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RotationColumns {
@@ -120,6 +139,17 @@ pub struct TimeColumn {
 /// id = "corner"                            # column of the corner's number
 /// pixel = ["u", "v"]                       # columns of its place in the image, px
 /// ```
+///
+/// With `use = "corners"` a row is one corner of a tag, or the four of one tag:
+///
+/// ```toml
+/// [tags.columns]
+/// id = "tag"                               # column of the tag's number
+/// corner = "corner"                        # column of the corner's number, 0 to 3
+/// pixel = ["u", "v"]                       # columns of its place in the image, px
+/// # corners = ["u0", "v0", "u1", "v1", "u2", "v2", "u3", "v3"]   # instead of corner and pixel
+/// corner_order = "apriltag"                # optional: "apriltag" | "opencv"
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct TableLayout {
     /// `None`: by the end of the file's name.
@@ -141,6 +171,22 @@ pub enum SeenColumns {
     Pose(PoseColumns),
     /// Columns of u and v of one corner of a board, raw pixels.
     Pixel([String; 2]),
+    /// One corner of a tag.
+    TagCorner {
+        /// Column of its number, 0 to 3.
+        corner: String,
+        /// Columns of u and v, raw pixels.
+        pixel: [String; 2],
+        /// Order of the numbers.
+        order: CornerOrder,
+    },
+    /// The four corners of a tag.
+    TagCorners {
+        /// Columns of u and v, corner by corner, raw pixels.
+        columns: [String; 8],
+        /// Order of the corners.
+        order: CornerOrder,
+    },
 }
 
 /// Where a row's pose is.
@@ -203,6 +249,9 @@ pub(super) struct TagColumnsToml {
     direction: Option<Direction>,
     position: Option<[String; 3]>,
     pixel: Option<[String; 2]>,
+    corner: Option<String>,
+    corners: Option<[String; 8]>,
+    corner_order: Option<CornerOrder>,
     #[serde(default)]
     position_unit: LengthUnit,
     rotation: Option<Vec<String>>,
@@ -223,8 +272,12 @@ pub(super) fn layout(
         return Err(issue("tags.columns", "is missing; a [table] needs it: direction, position, rotation"));
     };
     let (tag_use, child_frame) = tags;
-    if tag_use == TagUse::Corners {
-        return Err(issue("tags.use", "is \"corners\"; a table has \"position\", \"pose\" or \"board_corners\""));
+    if tag_use == TagUse::Corners && child_frame.is_some() {
+        let problem = "is for the one landmark of a table; corners have the tags' numbers: leave it out";
+        return Err(FileIssue::new(Code::KeysConflict, file, "tags.child_frame", problem));
+    }
+    if tag_use == TagUse::Corners && columns.id.is_none() {
+        return Err(issue("tags.columns.id", "is missing; name the column of the tag's number"));
     }
     let time = table.time.map(time_column);
     let rows = table.rows.map(|rows| rows.split('.').map(str::to_owned).collect()).unwrap_or_default();
@@ -236,8 +289,11 @@ pub(super) fn layout(
         let problem = "a table has either child_frame, the plain name of its one landmark, or tags.columns.id";
         return Err(issue("tags.child_frame", problem));
     }
-    let pose = pose(file, &columns, tag_use)?;
-    of(SeenColumns::Pose(pose), columns.id)
+    let seen = match tag_use {
+        TagUse::Corners => tag_corners(file, &columns)?,
+        _ => SeenColumns::Pose(pose(file, &columns, tag_use)?),
+    };
+    of(seen, columns.id)
 }
 
 fn time_column(time: TimeToml) -> TimeColumn {
@@ -250,22 +306,52 @@ fn time_column(time: TimeToml) -> TimeColumn {
     TimeColumn { column: time.column, unit_nanos }
 }
 
+/// Refuses keys that belong to another `tags.use`.
+fn refuse(file: &Path, keys: &[(&str, bool)], problem: &str) -> Result<(), FileIssue> {
+    match keys.iter().find(|(_, is_given)| *is_given) {
+        Some((key, _)) => Err(FileIssue::new(Code::ValueInvalid, file, format!("tags.columns.{key}"), problem)),
+        None => Ok(()),
+    }
+}
+
+fn of_poses(columns: &TagColumnsToml) -> [(&'static str, bool); 3] {
+    let TagColumnsToml { direction, position, rotation, .. } = columns;
+    [("direction", direction.is_some()), ("position", position.is_some()), ("rotation", rotation.is_some())]
+}
+
+fn of_tags(columns: &TagColumnsToml) -> [(&'static str, bool); 3] {
+    let TagColumnsToml { corner, corners, corner_order, .. } = columns;
+    [("corner", corner.is_some()), ("corners", corners.is_some()), ("corner_order", corner_order.is_some())]
+}
+
 fn pixel(file: &Path, columns: &TagColumnsToml) -> Result<[String; 2], FileIssue> {
     let issue = |key: &str, problem: &str| {
         Err(FileIssue::new(Code::ValueInvalid, file, format!("tags.columns.{key}"), problem))
     };
-    let of_poses = [
-        ("direction", columns.direction.is_some()),
-        ("position", columns.position.is_some()),
-        ("rotation", columns.rotation.is_some()),
-    ];
-    if let Some((key, _)) = of_poses.into_iter().find(|(_, is_given)| *is_given) {
-        return issue(key, "is for poses; \"board_corners\" has id and pixel alone");
-    }
+    refuse(file, &of_poses(columns), "is for poses; \"board_corners\" has id and pixel alone")?;
+    refuse(file, &of_tags(columns), "is for corners of tags; set use = \"corners\"")?;
     match (&columns.pixel, &columns.id) {
         (Some(pixel), Some(_)) => Ok(pixel.clone()),
         (None, _) => issue("pixel", "is missing; name the columns of a corner's u and v, px"),
         (_, None) => issue("id", "is missing; name the column of the corner's number on the board"),
+    }
+}
+
+fn tag_corners(file: &Path, columns: &TagColumnsToml) -> Result<SeenColumns, FileIssue> {
+    let issue =
+        |code, key: &str, problem: &str| Err(FileIssue::new(code, file, format!("tags.columns.{key}"), problem));
+    refuse(file, &of_poses(columns), "is for poses; \"corners\" has id with corner and pixel, or with corners")?;
+    let order = columns.corner_order.unwrap_or_default();
+    match (&columns.corners, &columns.corner, &columns.pixel) {
+        (Some(columns), None, None) => Ok(SeenColumns::TagCorners { columns: columns.clone(), order }),
+        (None, Some(corner), Some(pixel)) => {
+            Ok(SeenColumns::TagCorner { corner: corner.clone(), pixel: pixel.clone(), order })
+        }
+        (Some(_), ..) => issue(Code::KeysConflict, "corners", "has a tag's four corners; leave corner and pixel out"),
+        (None, None, _) => {
+            issue(Code::KeyMissing, "corner", "is missing; name the column of the corner's number, 0 to 3, or corners")
+        }
+        (None, Some(_), None) => issue(Code::KeyMissing, "pixel", "is missing; name the columns of u and v, px"),
     }
 }
 
@@ -275,6 +361,7 @@ fn pose(file: &Path, columns: &TagColumnsToml, tag_use: TagUse) -> Result<PoseCo
     if columns.pixel.is_some() {
         return Err(issue("pixel", "is for corners of a board; set use = \"board_corners\""));
     }
+    refuse(file, &of_tags(columns), "is for corners of tags; set use = \"corners\"")?;
     let (Some(direction), Some(position)) = (columns.direction, columns.position.clone()) else {
         let key = if columns.direction.is_none() { "direction" } else { "position" };
         return Err(issue(key, "is missing; which pose the columns hold, and the columns of x, y, z"));
@@ -311,7 +398,7 @@ fn rotation(file: &Path, raw: &TagColumnsToml) -> Result<Option<RotationColumns>
 #[cfg(test)]
 mod tests {
     use crate::input::map::tests::{parse, told};
-    use crate::input::map::{SeenColumns, Source};
+    use crate::input::map::{CornerOrder, SeenColumns, Source};
 
     const GOOD: &str = "version = 1\n[table]\n[joint_sensors]\n[tags]\nchild_frame = \"board\"\nuse = \"pose\"\n\
         [tags.columns]\ndirection = \"tag_from_camera\"\nposition = [\"x\", \"y\", \"z\"]\n\
@@ -329,6 +416,7 @@ mod tests {
             ("[joint_sensors]\n", "[joint_sensors]\ntopic = \"/j\"\n"),
             ("[joint_sensors]\n", "[joint_sensors]\nunit = \"gon\"\n"),
             ("\"pose\"", "\"corners\""),
+            ("\"deg\"\n", "\"deg\"\ncorner = \"k\"\n"),
             ("\"c\"]", "\"c\", \"d\"]"),
             ("rotation_form = \"fixed_xyz\"\n", ""),
             ("fixed_xyz", "rotation_matrix"),
@@ -353,5 +441,26 @@ mod tests {
             ("board_corners", "pose"),
         ];
         insta::assert_snapshot!("board_columns", told(BOARD, &faults));
+    }
+    #[test]
+    fn a_row_may_be_a_corner_of_a_tag_or_all_four() {
+        const TAGS: &str = "version = 1\n[table]\n[joint_sensors]\n[tags]\nuse = \"corners\"\n\
+            [tags.columns]\nid = \"tag\"\ncorner = \"k\"\npixel = [\"u\", \"v\"]\n";
+        let Source::Table(layout) = parse(TAGS).expect("good").source else { panic!("a table") };
+        assert!(matches!(layout.seen, SeenColumns::TagCorner { order: CornerOrder::Apriltag, .. }));
+        let columns = "corners = [\"a\", \"b\", \"c\", \"d\", \"e\", \"f\", \"g\", \"h\"]\n";
+        let all = TAGS.replace("corner = \"k\"\npixel = [\"u\", \"v\"]\n", columns);
+        let Source::Table(layout) = parse(&all).expect("good").source else { panic!("a table") };
+        assert!(matches!(layout.seen, SeenColumns::TagCorners { .. }));
+        let faults = [
+            ("id = \"tag\"\n", ""),
+            ("corner = \"k\"\n", ""),
+            ("pixel = [\"u\", \"v\"]\n", ""),
+            ("pixel = [\"u\", \"v\"]\n", columns),
+            ("corner = \"k\"\n", "corner = \"k\"\ncorner_order = \"clockwise\"\n"),
+            ("corner = \"k\"\n", "direction = \"camera_from_tag\"\n"),
+            ("use = \"corners\"", "use = \"corners\"\nchild_frame = \"board\""),
+        ];
+        insta::assert_snapshot!("tag_corner_columns", told(TAGS, &faults));
     }
 }

@@ -13,12 +13,14 @@ const MAX_LISTED: usize = 30;
 /// Where in `names` the columns of each quantity are; the joints of the robot come first.
 pub(super) struct Columns {
     pub names: Vec<String>,
-    /// Three, of x, y, z, or two, of a pixel.
+    /// Three, of x, y, z, or two, of a pixel, or eight, of four.
     pub place: Range<usize>,
     /// As many as the form has; none without a rotation.
     pub rotation: Range<usize>,
     pub time: Option<usize>,
     pub id: Option<usize>,
+    /// Number of a tag's corner.
+    pub corner: Option<usize>,
 }
 
 impl Columns {
@@ -31,12 +33,17 @@ impl Columns {
         };
         let (of_place, of_rotation): (&[String], &[String]) = match &layout.seen {
             SeenColumns::Pose(pose) => (&pose.position, pose.rotation.as_ref().map_or(&[], |turn| &turn.columns)),
-            SeenColumns::Pixel(pixel) => (pixel, &[]),
+            SeenColumns::Pixel(pixel) | SeenColumns::TagCorner { pixel, .. } => (pixel, &[]),
+            SeenColumns::TagCorners { columns, .. } => (columns, &[]),
         };
         let (place, rotation) = (add(of_place), add(of_rotation));
         let time = layout.time.as_ref().map(|time| add(std::slice::from_ref(&time.column)).start);
         let id = layout.id.as_ref().map(|id| add(std::slice::from_ref(id)).start);
-        Self { names, place, rotation, time, id }
+        let corner = match &layout.seen {
+            SeenColumns::TagCorner { corner, .. } => Some(add(std::slice::from_ref(corner)).start),
+            _ => None,
+        };
+        Self { names, place, rotation, time, id, corner }
     }
 
     /// Checks that the table has all columns but those of joints that may be absent.

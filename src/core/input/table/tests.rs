@@ -208,3 +208,71 @@ fn what_is_wrong_with_a_table_is_named() {
     ]);
     insta::assert_snapshot!("table", told.collect::<String>());
 }
+
+const CORNERS: &str = "version = 1\n[table]\n[joint_sensors]\n[tags]\nuse = \"corners\"\n[tags.columns]\n\
+    id = \"tag\"\n";
+/// Bottom left, bottom right, top right, top left of two tags.
+const SQUARES: [[[f64; 2]; 4]; 2] =
+    [[[10.0, 30.5], [31.0, 30.0], [30.0, 9.0], [10.5, 10.0]], [[50.0, 70.5], [71.0, 70.0], [70.0, 49.0], [50.5, 50.0]]];
+
+/// Rows of one tag each.
+const ALL_IN_ONE: &str = "a,b,c,d,e,f,g,h";
+
+/// Two tags at two poses, in these columns; `order` has the corners' places as printed.
+fn corner_rows(order: [usize; 4], columns: &str) -> String {
+    let mut text = format!("{JOINTS},tag,{columns}\n");
+    for (pose, tag) in [(1, 0), (1, 1), (2, 1)] {
+        let square = order.map(|place| SQUARES[tag][place]);
+        if columns == ALL_IN_ONE {
+            let cells = square.as_flattened().iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+            text += &format!("{pose},2,3,4,5,6,{tag},{cells}\n");
+        } else {
+            let rows = square.iter().enumerate().map(|(k, [u, v])| format!("{pose},2,3,4,5,6,{tag},{k},{u},{v}\n"));
+            text.extend(rows);
+        }
+    }
+    text
+}
+
+#[test]
+fn corners_of_tags_are_rows_each_or_eight_columns() {
+    let each = format!("{CORNERS}corner = \"k\"\npixel = [\"u\", \"v\"]\n");
+    let eight = format!("{CORNERS}corners = [\"a\", \"b\", \"c\", \"d\", \"e\", \"f\", \"g\", \"h\"]\n");
+    let opencv = "corner_order = \"opencv\"\n";
+    for (map, columns) in [(&each, "k,u,v"), (&eight, ALL_IN_ONE)] {
+        for (map, order) in [(map.clone(), [0, 1, 2, 3]), (format!("{map}{opencv}"), [3, 2, 1, 0])] {
+            let found = read_with(&map, "corners.csv", &corner_rows(order, columns)).expect(&map);
+            let read =
+                |frame: &crate::input::TagFrame| frame.tags.iter().map(|tag| (tag.id, tag.seen)).collect::<Vec<_>>();
+            let [first, second] = [0, 1].map(|k| (Some(k as u32), RawMeasurement::Corners(SQUARES[k])));
+            let frames: Vec<_> = found.frames.iter().map(read).collect();
+            assert_eq!(frames, [vec![first, second], vec![second]], "{map}");
+            assert!(found.left_out.is_empty());
+        }
+    }
+    let text = corner_rows([0, 1, 2, 3], "k,u,v");
+    let part = text.replace("2,2,3,4,5,6,1,3,50.5,50\n", "");
+    let found = read_with(&each, "corners.csv", &part).expect("a tag is left");
+    assert_eq!((found.frames.len(), found.left_out.values().sum::<u64>()), (1, 1));
+    let timed = each.replace("[table]\n", "[table]\ntime = { column = \"wrist_rotate\" }\n");
+    let told = [
+        problem(&each, "a.csv", &text.replace("1,2,3,4,5,6,0,3,", "1,2,3,4,5,6,0,4,")),
+        problem(&each, "a.csv", &text.replace(",k,", ",corner,")),
+        problem(&timed, "a.csv", &text.replace("1,2,3,4,5,6,0,3,", "1,2,3,4,5,6,0,2,")),
+        problem(&each, "a.csv", &text.lines().take(4).collect::<Vec<_>>().join("\n")),
+        problem(&eight, "a.csv", &corner_rows([0, 1, 2, 3], ALL_IN_ONE).replace(",70.5,", ",,")),
+    ];
+    insta::assert_snapshot!("tag_corners", told.concat());
+}
+
+/// Reading is linear in the rows: all of them may be of one pose.
+#[test]
+fn many_corners_of_one_pose_are_read_at_once() {
+    let map = format!("{CORNERS}corner = \"k\"\npixel = [\"u\", \"v\"]\n");
+    let mut text = format!("{JOINTS},tag,k,u,v\n");
+    for k in (0..super::rows::MAX_ROWS).rev() {
+        text += &format!("1,2,3,4,5,6,{},{},{k},{k}\n", k / 4, k % 4);
+    }
+    let found = read_with(&map, "a.csv", &text).expect("it reads");
+    assert_eq!((found.frames.len(), found.frames[0].tags.len()), (1, super::rows::MAX_ROWS / 4));
+}

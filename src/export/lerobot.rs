@@ -1,0 +1,59 @@
+//! LeRobot's calibration JSON with the homing offsets as calibrated.
+
+use std::path::Path;
+
+use serde::Serialize;
+use serde_json::ser::{PrettyFormatter, Serializer};
+
+use crate::export::ros2_control::{gain_in_words, joints_with_terms};
+use crate::export::urdf::left_out;
+use armcal_belief::calib::Calibration;
+use armcal_core::codes::Code;
+use armcal_core::input::InputMap;
+use armcal_core::robot::{FileIssue, Robot};
+use armcal_core::sensor::{ArmSensors, SensorModel};
+
+/// A calibration JSON of LeRobot, and in words what it cannot hold.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LerobotHomings {
+    /// The file's text.
+    pub text: String,
+    /// What of the calibration is not in it.
+    pub left_out: Vec<String>,
+}
+
+/// The JSON that `map`, read from `file`, names, with homing offsets by which the middle of each motor's range reads as
+/// the angle that robot.toml has for it. The offsets are whole ticks; LeRobot's scale is fixed, so gains are left out.
+///
+/// # Errors
+/// [`FileIssue`]: a map that names no such JSON, a joint without a motor, or an offset that a motor cannot hold.
+pub fn lerobot_homings(
+    (file, map): (&Path, &InputMap),
+    calibration: &Calibration,
+    (robot, sensors): (&Robot, &ArmSensors),
+) -> Result<LerobotHomings, FileIssue> {
+    let Some(given) = &map.lerobot else {
+        let problem = "is missing; name the JSON that the recording was made with: file, motors, values";
+        return Err(FileIssue::new(Code::KeyMissing, file, "joint_sensors.lerobot", problem));
+    };
+    map.check_robot(file, robot)?;
+    let mut homed = given.clone();
+    let mut not_held = Vec::new();
+    for (joint, model) in sensors.models.iter().enumerate() {
+        let recorded = map.recorded_name(&model.spec.joint);
+        let middle = given.middle_tick(recorded)?;
+        let ahead = model.counts(SensorModel::nominal(&robot.sensors[joint]).angle_rad(middle)) - middle;
+        let turn = model.spec.wrap_counts;
+        homed.rehome(recorded, middle + ahead - turn * (ahead / turn).round(), middle)?;
+        not_held.extend(gain_in_words(robot, joint, model));
+    }
+    let terms = joints_with_terms(sensors).map(|joint| format!("the terms of {joint}"));
+    let links = calibration.link.iter().map(|link| format!("the link correction of {}", link.joint));
+    let mount = calibration.camera_mount.iter().map(|_| "the camera's mount".to_owned());
+    not_held.extend(terms.chain(links).chain(mount).chain(left_out(calibration)));
+    let mut text = Vec::new();
+    // As LeRobot indents it.
+    let written = homed.serialize(&mut Serializer::with_formatter(&mut text, PrettyFormatter::with_indent(b"    ")));
+    let text = written.ok().and_then(|()| String::from_utf8(text).ok()).unwrap_or_default();
+    Ok(LerobotHomings { text, left_out: not_held })
+}
