@@ -18,7 +18,7 @@ use armcal_core::sensor::{ArmSensors, SensorModel};
 pub struct LerobotHomings {
     /// The file's text.
     pub text: String,
-    /// What of the calibration is not in it.
+    /// Parts of the calibration that are not in it.
     pub left_out: Vec<String>,
 }
 
@@ -52,7 +52,7 @@ pub fn lerobot_homings(
     let mount = calibration.camera_mount.iter().map(|_| "the camera's mount".to_owned());
     not_held.extend(terms.chain(links).chain(mount).chain(left_out(calibration)));
     let mut text = Vec::new();
-    // As LeRobot indents it.
+    // LeRobot indents by four.
     let written = homed.serialize(&mut Serializer::with_formatter(&mut text, PrettyFormatter::with_indent(b"    ")));
     let text = written.ok().and_then(|()| String::from_utf8(text).ok()).unwrap_or_default();
     Ok(LerobotHomings { text, left_out: not_held })

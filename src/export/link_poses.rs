@@ -32,7 +32,7 @@ const NEAR_RAD: f64 = 0.3;
 /// The YAML reader's advice to programmers.
 const READERS_ADVICE: &str = ", set DuplicateKeyPolicy in Options if acceptable";
 
-/// Whose file it is.
+/// Maker of the arm that a file is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LinkPoseForm {
     /// `kinematics: shoulder: {x, y, z, roll, pitch, yaw}` to `wrist_3`, and a hash.
@@ -49,7 +49,7 @@ impl LinkPoseForm {
         }
     }
 
-    /// As a key of the file has it.
+    /// Path of a key in the file.
     fn place(self, key: &str) -> String {
         match self {
             Self::Ur => format!("kinematics.{key}"),
@@ -128,7 +128,7 @@ struct FrankaJoint {
 /// Link poses of a file, in the order of its form's keys.
 #[derive(Debug, PartialEq)]
 pub struct LinkPoses {
-    /// Whose file it is.
+    /// Maker of the arm that a file is about.
     pub form: LinkPoseForm,
     poses: Vec<Isometry3<f64>>,
 }
@@ -213,7 +213,7 @@ impl LinkPoses {
 pub struct CalibratedLinkPoses {
     /// The file's text.
     pub text: String,
-    /// What of the calibration is not in it.
+    /// Parts of the calibration that are not in it.
     pub left_out: Vec<String>,
 }
 
@@ -258,7 +258,7 @@ pub fn calibrated_link_poses(
 fn head(calibration: &Calibration) -> String {
     let Calibration { messages_hash, .. } = calibration;
     format!(
-        "# Link poses calibrated by armcal, messages_hash {messages_hash}. Joint angles are calibrated angles: gain and\n\
-         # offset of the joint sensors are not in this file. Apply them once, where readings become angles.\n"
+        "# Link poses calibrated by armcal, messages_hash {messages_hash}. Joint angles are calibrated angles:\n\
+         # gain and offset of the joint sensors are not in this file. Apply them once, where readings become angles.\n"
     )
 }

@@ -1,11 +1,12 @@
 //! LeRobot's calibration JSON: what its recorded numbers are in ticks of the motors, and the homing offsets.
 //!
 //! huggingface/lerobot 7427f31, src/lerobot/motors/motors_bus.py, lines 176 to 181 (fields) and 854 to 881
-//! (`_normalize`): degrees are `(tick - (range_min + range_max) / 2) 360 / 4095`, `drive_mode` turns percents alone, and
-//! these where motors/feetech/feetech.py, line 95 (not motors/dynamixel/dynamixel.py, line 100) says so. Ticks are the
-//! motor's `Present_Position`: `Actual - Homing_Offset` of Feetech (feetech.py, line 281), `Actual + Homing_Offset` of
-//! Dynamixel (dynamixel.py, line 226). The older form, before e23b41e, robot_devices/motors/feetech.py, lines 448 to 478:
-//! degrees are `(+-tick + homing_offset) / 2048 * 180`, percents `(tick - start_pos) / (end_pos - start_pos) * 100`.
+//! (`_normalize`): degrees are `(tick - (range_min + range_max) / 2) 360 / 4095`, `drive_mode` turns percents alone,
+//! and these of Feetech (motors/feetech/feetech.py, line 95), not of Dynamixel (motors/dynamixel/dynamixel.py, line
+//! 100). Ticks are the motor's `Present_Position`: `Actual - Homing_Offset` of Feetech (feetech.py, line 281),
+//! `Actual + Homing_Offset` of Dynamixel (dynamixel.py, line 226). The older form, before e23b41e,
+//! robot_devices/motors/feetech.py, lines 448 to 478: degrees are `(+-tick + homing_offset) / 2048 * 180`, percents
+//! `(tick - start_pos) / (end_pos - start_pos) * 100`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -51,16 +52,16 @@ impl LerobotMotors {
     }
 }
 
-/// What LeRobot recorded, by its own names (`MotorNormMode`, motors_bus.py, lines 169 to 172).
+/// Kind of the recorded numbers, by LeRobot's own names (`MotorNormMode`, motors_bus.py, lines 169 to 172).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LerobotValues {
-    /// Of the middle of the range; of the older form's `DEGREE`.
+    /// Degrees from the middle of the range; the older form's `DEGREE`.
     Degrees,
-    /// Percents of half the range about its middle.
+    /// Percents of half the range, about its middle.
     #[serde(rename = "range_m100_100")]
     RangeM100To100,
-    /// Percents of the range; of the older form's `LINEAR`.
+    /// Percents of the range; the older form's `LINEAR`.
     #[serde(rename = "range_0_100")]
     Range0To100,
     /// Not normalized.
@@ -68,7 +69,7 @@ pub enum LerobotValues {
 }
 
 impl LerobotValues {
-    /// As the input map writes it.
+    /// Name in the input map.
     pub(super) fn key(self) -> &'static str {
         match self {
             Self::Degrees => "degrees",
@@ -246,7 +247,7 @@ impl LerobotCalibration {
         }
     }
 
-    /// What was recorded.
+    /// Kind of the recorded numbers.
     pub(super) fn values(&self) -> LerobotValues {
         self.values
     }
@@ -256,8 +257,8 @@ impl LerobotCalibration {
         let per_turn = spec.counts_per_rad.abs() * std::f64::consts::TAU;
         if (per_turn / TICKS - 1.0).abs() > TICK_WITHIN {
             let problem = format!(
-                "joint {} has {per_turn:.1} counts per turn; LeRobot's ticks are {TICKS} per turn: scale_counts_per_deg = \
-                 {:.5} and wrap_counts = {TICKS}, offset_counts = the tick at angle zero",
+                "joint {} has {per_turn:.1} counts per turn; LeRobot's ticks are {TICKS} per turn: \
+                 scale_counts_per_deg = {:.5} and wrap_counts = {TICKS}, offset_counts = the tick at angle zero",
                 spec.joint,
                 TICKS / 360.0
             );

@@ -12,7 +12,7 @@
 //! unit = "counts"                    # optional: or "rad", "deg": angles made of the sensors by their datasheet
 //! slide_unit = "m"                   # optional, with "rad" or "deg": or "mm", of joints that slide
 //! # optional: LeRobot's calibration JSON, next to this file; then unit stays "counts", which are the motors' ticks
-//! lerobot = { file = "arm.json", motors = "feetech", values = "degrees" }   # or "range_m100_100", "range_0_100", "ticks"
+//! lerobot = { file = "arm.json", motors = "feetech", values = "degrees" }   # or "range_m100_100", "ticks" ..
 //! [tags]
 //! topic = "/tf"                      # tf2_msgs/msg/TFMessage, apriltag_msgs/msg/AprilTagDetectionArray, or
 //!                                    # sensor_msgs/msg/Image or CompressedImage (with use = "corners")

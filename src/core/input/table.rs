@@ -114,7 +114,7 @@ struct TableReader<'a> {
     robot: &'a Robot,
     columns: &'a Columns,
     recording: ExternalRecording,
-    /// What the last frame holds.
+    /// Keys in the last frame.
     keys: BTreeSet<Key>,
 }
 

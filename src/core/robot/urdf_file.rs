@@ -144,7 +144,8 @@ mod tests {
     #[test]
     fn what_a_driver_applies_is_named_by_its_joint() {
         let exported = "<ros2_control name=\"a\"><joint name=\"j\"><param name=\"offset\">-0.5</param>\
-                        <state_interface name=\"position\"><param name=\"offset\">2048</param></state_interface></joint>\
+                        <state_interface name=\"position\"><param name=\"offset\">2048</param></state_interface>\
+                        </joint>\
                         <transmission name=\"t\"><joint name=\"k\"><mechanical_reduction>1.02</mechanical_reduction>\
                         <offset>x</offset></joint></transmission></ros2_control>";
         let mut named: Vec<String> =

@@ -8,8 +8,8 @@
 use super::scan::Scan;
 use crate::robot::xml_tree::XmlTree;
 
-const APPLIED: &str = "the driver applies it: recorded angles have it in them, and armcal does not apply it again. Take \
-    it out where an export of armcal replaces it";
+const APPLIED: &str = "the driver applies it: recorded angles have it in them, and armcal does not apply it again. \
+    Take it out where an export of armcal replaces it";
 
 /// Notes the joints whose readings a driver shifts or scales, below the element `at`.
 pub(super) fn note_offsets(scan: &mut Scan<'_>, tree: &XmlTree, at: usize) {
@@ -31,7 +31,7 @@ pub(super) fn note_offsets(scan: &mut Scan<'_>, tree: &XmlTree, at: usize) {
     }
 }
 
-/// What an element says of its joint's reading, and the number that changes nothing.
+/// Returns the correction that an element states, and the number that changes nothing.
 fn correction(element: &str, name: Option<&str>) -> Option<(&'static str, f64)> {
     match (element, name) {
         ("offset", _) | ("param", Some("offset")) => Some(("offset", 0.0)),
