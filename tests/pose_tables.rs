@@ -180,7 +180,7 @@ fn corners_of_tags_are_found_and_proposed() {
     let joints = titan.joint_names();
     let square = [[10.0, 30.0], [31.0, 30.5], [30.0, 9.0], [10.5, 10.0]];
     let head = format!("time,{},tag_id", joints.join(","));
-    let words = |pose: usize| format!("{pose},1,2,3,4,5,6");
+    let words = |pose: usize| format!("{pose},0.01,0.02,0.03,0.04,0.05,0.06");
     let eight = |names: [&str; 8]| {
         let cells: Vec<String> = square.as_flattened().iter().map(f64::to_string).collect();
         format!("{head},{}\n{},7,{cells}\n{},7,{cells}\n", names.join(","), words(1), words(2), cells = cells.join(","))
@@ -191,7 +191,7 @@ fn corners_of_tags_are_found_and_proposed() {
         for (k, [u, v]) in square.iter().enumerate() {
             writeln!(each, "{},7,{k},{u},{v}", words(pose)).expect("text");
         }
-        let named: Vec<String> = joints.iter().zip(1..).map(|(joint, k)| format!("{joint}: {k}")).collect();
+        let named: Vec<String> = joints.iter().zip(1..).map(|(joint, k)| format!("{joint}: 0.0{k}")).collect();
         writeln!(nested, "- {{ time: {pose}, joints: {{ {} }}, tag: 7, corners: {square:?} }}", named.join(", "))
             .expect("text");
     }

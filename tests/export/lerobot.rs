@@ -72,9 +72,9 @@ fn numbers_of_lerobot_are_read_as_ticks() {
     let map = files(folder.path(), &robot, "feetech", "range_m100_100");
     write(&table, &format!("{},x,y,z\n{},0,0,1\n", head.join(","), vec!["101"; robot.n_joints()].join(",")));
     let told = read_external(&table, &read_map(&map), &robot).expect_err("no percent").to_string();
-    assert!(told.contains("range_m100_100") && told.contains("-100 to 100"), "{told}");
+    assert!(told.contains("range_m100_100"), "{told}");
     let told = read_map(&map).check_robot(&map, &titan()).expect_err("other counts").to_string();
-    assert!(told.contains("scale_counts_per_deg = 11.37778"), "{told}");
+    assert!(told.contains("11.37778"), "{told}");
     let mut other = robot.clone();
     other.sensors[2].joint = "elbow".to_owned();
     let told = read_map(&map).check_robot(&map, &other).expect_err("no motor").to_string();
@@ -95,8 +95,8 @@ fn homing_offsets_put_the_middle_of_the_range_at_its_angle() {
             model.correction.gain = 1.003;
         }
         let found = lerobot_homings((&map_file, &map), &calibration(), (&robot, &sensors)).expect("homings");
-        assert!(found.left_out.iter().any(|what| what.contains("gain") && what.contains("+0.300 %")), "{found:?}");
-        assert!(found.left_out.iter().any(|what| what.contains("link correction")), "{found:?}");
+        assert!(found.left_out.iter().any(|what| what.contains("+0.300")), "{found:?}");
+        assert!(found.left_out.iter().any(|what| what.contains("shoulder_pitch")), "{found:?}");
         let [before, after] = [read(&folder.path().join("arm.json")), found.text].map(|text| {
             let json: serde_json::Value = serde_json::from_str(&text).expect("JSON");
             json

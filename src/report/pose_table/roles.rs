@@ -248,8 +248,9 @@ fn four_corners(names: &[String]) -> Option<[String; 8]> {
         let at = |k: usize, letter: &str| format!("{before}{}{after}", k + from).replace('\0', letter);
         let pair = |letters: [&str; 2]| [0, 1, 2, 3].map(|k| letters.map(|letter| at(k, letter)));
         let letters = PIXELS.into_iter().chain([["0", "1"]]);
-        let found =
-            letters.map(pair).find(|columns| columns.iter().flatten().all(|name| all.contains(name.as_str())))?;
+        let is_there = |columns: &[[String; 2]; 4]| columns.iter().flatten().all(|name| all.contains(name.as_str()));
+        // Rows of a matrix have a third column.
+        let found = letters.map(pair).find(is_there).filter(|_| !all.contains(at(0, "2").as_str()))?;
         let [[a, b], [c, d], [e, f], [g, h]] = found;
         Some([a, b, c, d, e, f, g, h])
     };
