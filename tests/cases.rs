@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use armcal::robot::load;
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -177,18 +178,17 @@ fn poses_of_a_task_in_degrees_are_named_before_anything_is_calibrated() {
 #[test]
 fn urdfs_of_makers_become_robot_folders() {
     for (case, urdf, named) in [
-        ("tiny_mass", "tinymass", "link `tool`"),
-        ("urdf_strictness", "zerobox", "link `base_link`"),
-        ("urdf_strictness", "twomat", "link `base_link`"),
-        ("urdf_strictness", "novel", "joint `j2`"),
-        ("urdf_strictness", "biglimit", ""),
-        ("urdf_strictness", "noaxisxyz", ""),
+        ("tiny_mass", "tinymass", &["`tool`", "[urdf_skipped]"][..]),
+        ("urdf_strictness", "zerobox", &["`base_link`", "[urdf_skipped]"][..]),
+        ("urdf_strictness", "twomat", &["`base_link`", "[urdf_skipped]"][..]),
+        ("urdf_strictness", "novel", &["`j2`", "[urdf_skipped]"]),
+        ("urdf_strictness", "biglimit", &[]),
+        ("urdf_strictness", "noaxisxyz", &[]),
     ] {
         let case = Case::new(case);
-        let said = case.new_robot(&format!("{urdf}.urdf"), &[]);
-        said.expect(urdf, 0, &[]);
-        assert!(said.stdout.contains("6 joints from `base_link`: j1, j2, j3, j4, j5, j6"), "{urdf}: {}", said.stdout);
-        assert!(said.stderr.contains(named), "{urdf}: {}", said.stderr);
+        case.new_robot(&format!("{urdf}.urdf"), &[]).expect(urdf, 0, named);
+        let robot = load(&case.file("made")).expect("it reads");
+        assert_eq!(robot.joint_names(), ["j1", "j2", "j3", "j4", "j5", "j6"], "{urdf}");
     }
 }
 
@@ -196,7 +196,7 @@ fn urdfs_of_makers_become_robot_folders() {
 fn a_mimic_in_the_chain_is_refused_by_name_with_and_without_options() {
     let case = Case::new("mimic_in_chain");
     for options in [vec![], vec!["--base", "base_link", "--tip", "tool"]] {
-        case.new_robot("mimic.urdf", &options).expect("refused", 2, &["joint `j5b`", "`j5` (mimic)"]);
+        case.new_robot("mimic.urdf", &options).expect("refused", 2, &["`j5b`", "(mimic)"]);
     }
 }
 
@@ -206,7 +206,7 @@ fn two_clocks_are_named_with_their_difference_and_the_advice_works() {
     case.calibrate("run.mcap", "task.toml").expect(
         "refused",
         2,
-        &["/detections", "/joint_states", "differ by 1699995000.000 s", "stamps = \"log_time\"", "[clocks_differ]"],
+        &["/detections", "/joint_states", "1699995000.000", "log_time", "[clocks_differ]"],
     );
     let map = case.file("input.toml");
     std::fs::write(&map, format!("stamps = \"log_time\"\n{}", read(&map))).expect("written");
@@ -216,9 +216,7 @@ fn two_clocks_are_named_with_their_difference_and_the_advice_works() {
 #[test]
 fn messages_without_positions_are_skipped_counted_and_said() {
     let case = Case::new("velocity_only_messages");
-    let said = case.calibrate("run.mcap", "task.toml");
-    said.expect("accepted", 0, &[]);
-    assert!(said.stderr.contains("40 joint messages without positions"), "{}", said.stderr);
+    case.calibrate("run.mcap", "task.toml").expect("accepted", 0, &[" 40 ", "[messages_rejected]"]);
 }
 
 #[test]
@@ -240,16 +238,14 @@ fn detections_of_another_package_are_read_by_their_whole_type_name() {
 fn a_ros_1_bag_is_refused_with_its_conversion_and_tables_are_named() {
     let case = Case::new("ros1_and_tables");
     let inspect = |name: &str| answer(program().arg("inspect").arg(case.file(name)));
-    inspect("run.bag").expect("refused", 2, &["ROS 1 bag", "rosbags-convert --src", "[recording_format]"]);
-    for (name, found) in [("ros1.mcap", "ROS 1"), ("joints.yaml", "`joint_values`"), ("samples.yaml", "`samples`")] {
-        let said = inspect(name);
-        said.expect(name, 0, &[]);
-        assert!(said.stdout.contains(found), "{name}: {}", said.stdout);
+    inspect("run.bag").expect("refused", 2, &["rosbags-convert", "[recording_format]"]);
+    for (name, found) in [("ros1.mcap", "rosbags"), ("joints.yaml", "`joint_values`"), ("samples.yaml", "`samples`")] {
+        inspect(name).expect(name, 0, &[found]);
     }
 }
 
 #[test]
 fn a_joint_twice_in_a_message_is_refused_with_both_values() {
     let case = Case::new("duplicate_joint_name");
-    case.calibrate("run.mcap", "task.toml").expect("refused", 2, &["`j3` twice", "1.294821 and 0.000000"]);
+    case.calibrate("run.mcap", "task.toml").expect("refused", 2, &["`j3`", "1.294821", "[message_invalid]"]);
 }

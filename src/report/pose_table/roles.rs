@@ -258,11 +258,14 @@ fn four_corners(names: &[String]) -> Option<[String; 8]> {
         // The first corner's first column: its digit, and next to it or at the end the letter.
         name.char_indices().filter(|(_, digit)| ['0', '1'].contains(digit)).find_map(|(at, digit)| {
             let (before, after) = (&name[..at], &name[at + 1..]);
+            let letter_and_before = before.trim_end_matches(['_', '.', '-']);
+            let between = &before[letter_and_before.len()..];
             let letters = PIXELS.iter().map(|pair| pair[0]).chain(["0"]);
             letters.into_iter().find_map(|letter| {
-                let (end, start) = (after.strip_suffix(letter), before.strip_suffix(letter));
+                let (end, start) = (after.strip_suffix(letter), letter_and_before.strip_suffix(letter));
                 let behind = end.map(|end| (before.to_owned(), format!("{end}\0")));
-                let ahead = start.filter(|_| letter != "0").map(|start| (format!("{start}\0"), after.to_owned()));
+                let ahead =
+                    start.filter(|_| letter != "0").map(|start| (format!("{start}\0{between}"), after.to_owned()));
                 let from = usize::from(digit == '1');
                 behind.into_iter().chain(ahead).find_map(|(before, after)| with((&before, &after), from))
             })

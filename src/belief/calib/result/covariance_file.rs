@@ -118,11 +118,10 @@ pub fn covariance_file(calibration: &Path) -> PathBuf {
 /// Hash (blake3) of a file's lines, whatever comments, indents and empty lines it got, less the key of its counterpart.
 fn content_hash(text: &str) -> String {
     let mut hasher = blake3::Hasher::new();
-    // As the file is written.
-    let text = printable(text);
     let lines = text.lines().map(str::trim);
     for line in lines.filter(|l| !l.is_empty() && !l.starts_with('#') && !l.starts_with(CALIBRATION_HASH)) {
-        hasher.update(line.as_bytes());
+        // As the file is written.
+        hasher.update(printable(line).as_bytes());
         hasher.update(b"\n");
     }
     hasher.finalize().to_hex().to_string()
