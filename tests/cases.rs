@@ -174,7 +174,7 @@ fn poses_of_a_task_in_degrees_are_named_before_anything_is_calibrated() {
     case.calibrate("run.mcap", "poses-in-degrees.toml").expect("refused", 2, &["poses_rad[0]", "[joint_limit]"]);
 }
 
-/// What calibration does not need is left out, and named with its link or joint.
+/// Elements that calibration does not need are left out, and the warning names their link or joint.
 #[test]
 fn urdfs_of_makers_become_robot_folders() {
     for (case, urdf, named) in [

@@ -51,6 +51,15 @@ fn edits(from: &str, to: &str) -> usize {
     rows[from.len()][to.len()]
 }
 
+/// The YAML reader's advice to programmers.
+const READERS_ADVICE: &str = ", set DuplicateKeyPolicy in Options if acceptable";
+
+/// Words of an error of the YAML reader for those who wrote the file.
+#[must_use]
+pub fn yaml_problem(error: &str) -> String {
+    with_nearest(error).replace(READERS_ADVICE, "; name it once")
+}
+
 /// A reader's message about an unknown name, with the likeliest of those that it lists: unknown field `a`, expected
 /// one of `b`, `c`.
 #[must_use]

@@ -22,9 +22,9 @@ const HEAD: &str = "\
 # Kalibr's own tools want `rostopic`, the topic of the images, as well.
 ";
 
-/// camchain.yaml with `cam0` and on: model, intrinsics and distortion of robot.toml, `T_link_camera` of the
-/// calibration, or of the drawing where that has none, and `T_cn_cnm1` between cameras of one link. `file` is that of
-/// the calibration, for messages.
+/// Writes camchain.yaml with `cam0` and on: model, intrinsics and distortion of robot.toml; `T_link_camera` of the
+/// calibration, or the drawing's without one; `T_cn_cnm1` between cameras of one link. `file`, the calibration's, is
+/// named in messages.
 ///
 /// # Errors
 /// [`FileIssue`]: a mount out of range, or a lens that Kalibr has no model for.

@@ -20,7 +20,7 @@ use crate::export::yaml_text::double;
 use armcal_belief::calib::Calibration;
 use armcal_core::codes::Code;
 use armcal_core::robot::{FileIssue, Robot, RobotError, syntax_code};
-use armcal_core::text::with_nearest;
+use armcal_core::text::yaml_problem;
 
 /// Allowed numbers: m, rad.
 const MAX_M: f64 = 10.0;
@@ -28,9 +28,6 @@ const MAX_RAD: f64 = 7.0;
 /// Farther from the URDF's own pose than this, m and rad, a pose is another arm's. Assumed: links are made to 1 mm.
 const NEAR_M: f64 = 0.05;
 const NEAR_RAD: f64 = 0.3;
-
-/// The YAML reader's advice to programmers.
-const READERS_ADVICE: &str = ", set DuplicateKeyPolicy in Options if acceptable";
 
 /// Maker of the arm that a file is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -162,7 +159,7 @@ pub fn parse_link_poses(file: &Path, text: &str) -> Result<LinkPoses, RobotError
 
 fn yaml<T: DeserializeOwned>(file: &Path, text: &str) -> Result<T, RobotError> {
     serde_saphyr::from_str(text).map_err(|error| {
-        let message = with_nearest(&error.to_string()).replace(READERS_ADVICE, "; name it once");
+        let message = yaml_problem(&error.to_string());
         RobotError::Syntax { code: syntax_code(&message), file: file.to_owned(), message }
     })
 }

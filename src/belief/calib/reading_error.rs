@@ -75,7 +75,7 @@ pub struct MisreadReadings {
     pub alternatives: Vec<ReadingError>,
     /// Root mean square distance between predicted and surveyed tags, by the datasheet and the readings as they are, m.
     pub tag_error_m: f64,
-    /// That distance with the readings corrected and calibrated, m; absent where no tag was predicted.
+    /// The same root mean square after correction and calibration, m; absent where no tag was predicted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub corrected_m: Option<f64>,
 }

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::codes::Code;
 use crate::robot::{FileIssue, JointSensorSpec, RobotError, read_text, syntax_code};
-use crate::text::with_nearest;
+use crate::text::yaml_problem;
 
 /// Ticks of a turn: feetech/tables.py, lines 186 to 192; dynamixel/tables.py, lines 132 to 141.
 const TICKS: f64 = 4096.0;
@@ -28,9 +28,6 @@ const FEETECH_HOMING: f64 = 2047.0;
 const DYNAMIXEL_HOMING: f64 = 1_044_479.0;
 /// Degrees that a joint can have.
 const MAX_DEG: f64 = 400.0;
-
-/// The YAML reader's advice to programmers.
-const READERS_ADVICE: &str = ", set DuplicateKeyPolicy in Options if acceptable";
 
 /// Make of the motors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
@@ -367,7 +364,7 @@ fn motor_name(recorded: &str) -> &str {
 /// JSON is a part of YAML, whose reader refuses a key that is there twice.
 fn json<T: serde::de::DeserializeOwned>(file: &Path, text: &str) -> Result<T, RobotError> {
     serde_saphyr::from_str(text).map_err(|error| {
-        let message = with_nearest(&error.to_string()).replace(READERS_ADVICE, "; name it once");
+        let message = yaml_problem(&error.to_string());
         RobotError::Syntax { code: syntax_code(&message), file: file.to_owned(), message }
     })
 }

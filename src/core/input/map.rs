@@ -444,7 +444,7 @@ pub fn read_input_map(file: &Path) -> Result<InputMap, RobotError> {
     Ok(InputMap { lerobot, ..map })
 }
 
-/// The same from a text, without the file of LeRobot that it may name; `file` names it in errors.
+/// Parses the text of an input map; `file` names it in errors. LeRobot's JSON, which it may name, is not read.
 ///
 /// # Errors
 /// As [`read_input_map`].

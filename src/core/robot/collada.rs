@@ -334,7 +334,7 @@ enum Kind {
 struct Soup {
     triangles: Vec<Triangle>,
     room: usize,
-    /// Of all geometries of the file.
+    /// Limit of the triangles of all geometries together.
     max: usize,
 }
 

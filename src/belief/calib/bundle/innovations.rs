@@ -51,6 +51,8 @@ pub struct JointInnovation {
     pub normalised: f64,
 }
 
+/// Probability of the region that a view is compared with; U95 has the same.
+const CONTAINED: f64 = 0.95;
 /// Size of a camera's error that says nothing of its pose, m and rad.
 const FREE_CAMERA: f64 = 100.0;
 /// The share of its prior variance that a view must tell of a joint's error, for it to be looked at.
@@ -114,7 +116,7 @@ impl Estimate<'_> {
                 within_95.views += 1;
                 let observations = observations_of(&problem, view_idx).cloned().collect();
                 let chi2 = self.chi2_of_view(input, &views[view_idx..=view_idx], observations)?;
-                within_95.within += usize::from(chi2 <= chi_square_quantile(0.95, dof));
+                within_95.within += usize::from(chi2 <= chi_square_quantile(CONTAINED, dof));
             }
         }
         problem.scales.camera_error_std = Some([FREE_CAMERA; 2]);
