@@ -1,7 +1,7 @@
 """Coverage of U95 in closed loops: how often the true tool error exceeds it, by stratum, with and without geometry errors.
 
     coverage.py run ARMCAL FOLDER [--seconds S] [--size 50] [--blocks N] [--first SEED] [--strata NAME,..] [--threads 1]
-    coverage.py table FOLDER
+    coverage.py table FOLDER [--short]
 
 `run` makes blocks of --size seeds for each line of strata.txt in two cases, for which see CASES; FOLDER gets one campaign table a
 block. Finished blocks are skipped, a block that was broken off continues, and no block begins after --seconds. The program's hash is
@@ -158,7 +158,32 @@ def line(name, case, rows):
     return "| " + " | ".join(cells) + " |"
 
 
+def shares(rows):
+    """Runs, per cent of targets beyond U95 with its interval, 95 % of error over U95, and the number beyond 3 U95."""
+    runs = [targets for row in rows if (targets := targets_of(row))]
+    ratios = [error / u95 for targets in runs for error, u95, _ in targets]
+    low, high = interval([(sum(error > u95 for error, u95, _ in targets), len(targets)) for targets in runs])
+    beyond = 100 * sum(ratio > 1 for ratio in ratios) / len(ratios)
+    return len(runs), f"{beyond:.1f} ({100 * low:.1f} to {100 * high:.1f})", f"{quantile(ratios, 0.95):.2f}", sum(ratio > 3 for ratio in ratios)
+
+
+def short_table(folder):
+    """One line a stratum: nominal, then drawn."""
+    print("| stratum | runs | nominal: beyond, % | 95 % of error/U95 | drawn: beyond, % | 95 % of error/U95 |\n|---|--:|--:|--:|--:|--:|")
+    rows = {case: {name: rows_of(folder, name, case) for name in strata()} for case in CASES}
+    every = {case: [row for of_name in rows[case].values() for row in of_name] for case in CASES}
+    for name in [*strata(), "all"]:
+        found = [shares(of) for case in CASES if (of := every[case] if name == "all" else rows[case][name])]
+        if len(found) == len(CASES):
+            cells = [name, ", ".join(str(n) for n, *_ in found), *(cell for _, beyond, ratio, _ in found for cell in (beyond, ratio))]
+            print("| " + " | ".join(cells) + " |")
+    print(f"\nTargets beyond 3 U95: {sum(shares(every[case])[3] for case in CASES)}")
+
+
 def table(args):
+    if args.short:
+        short_table(args.folder)
+        return
     print("| stratum | geometry | runs (without result) | targets | beyond U95, % | 99 % interval, % | beyond 3 U95 | error/U95, 95 % of targets "
           "| U95, median, mm | NEES, mean (3) | PIT in ten bins, % |")
     print("|---|---|--:|--:|--:|--:|--:|--:|--:|--:|---|")
@@ -183,6 +208,7 @@ def main():
     of_run.set_defaults(do=run)
     of_table = commands.add_parser("table", help="print the table of FOLDER")
     of_table.add_argument("folder", type=Path)
+    of_table.add_argument("--short", action="store_true", help="one line a stratum")
     of_table.set_defaults(do=table)
     args = parser.parse_args()
     args.do(args)

@@ -124,30 +124,46 @@ def kinds(table):
     return found
 
 
-def write_simulated(folder, seed):
-    """A six-joint arm with a wrist camera that looks at a board, sensors off by 0.3 deg and poses by 0.3 mm and 1 mrad -> its table."""
-    rng = np.random.default_rng(seed)
-    origins = np.array([[0, 0, 0.3], [0.08, 0, 0.12], [0, 0, 0.45], [0.2, 0, 0.04], [0.22, 0, 0], [0.09, 0, 0]])
-    axes = np.array([[0, 0, 1], [0, 1, 0], [0, 1, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0]])
+ORIGINS = np.array([[0, 0, 0.3], [0.08, 0, 0.12], [0, 0, 0.45], [0.2, 0, 0.04], [0.22, 0, 0], [0.09, 0, 0]])
+AXES = np.array([[0, 0, 1], [0, 1, 0], [0, 1, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0]])
+BOARD_M, BOARD = np.array([1.2, 0.0, -0.4]), Rotation.from_euler("x", np.pi)
+
+
+def write_urdf(folder):
+    """The six-joint arm with a wrist camera that is simulated here."""
     links = "".join(f'<link name="l{k}"/>' for k in range(7))
     text = "".join(
-        f'<joint name="j{k + 1}" type="revolute"><parent link="l{k}"/><child link="l{k + 1}"/><origin xyz="{" ".join(map(str, origins[k]))}"/>'
-        f'<axis xyz="{" ".join(map(str, axes[k]))}"/><limit lower="-2.8" upper="2.8" effort="1" velocity="1"/></joint>' for k in range(6))
+        f'<joint name="j{k + 1}" type="revolute"><parent link="l{k}"/><child link="l{k + 1}"/><origin xyz="{" ".join(map(str, ORIGINS[k]))}"/>'
+        f'<axis xyz="{" ".join(map(str, AXES[k]))}"/><limit lower="-2.8" upper="2.8" effort="1" velocity="1"/></joint>' for k in range(6))
     camera = ('<link name="camera"/><joint name="c" type="fixed"><parent link="l6"/><child link="camera"/>'
               '<origin xyz="0.05 0 0.06" rpy="-1.5707963 0 -1.5707963"/></joint>')
     (folder / "arm.urdf").write_text(f'<robot name="bench_arm">{links}{text}{camera}</robot>')
+
+
+def readings_at_views(rng, n_views):
     center = np.array([0.0, 0.6, 0.4, 0.0, 0.5, 0.0])
-    told = center + rng.uniform(-1, 1, (60, 6)) * [0.5, 0.4, 0.4, 0.8, 0.5, 1.0]
+    return center + rng.uniform(-1, 1, (n_views, 6)) * [0.5, 0.4, 0.4, 0.8, 0.5, 1.0]
+
+
+def camera_at(angles):
+    """Position and rotation of the camera in the base frame."""
+    xyz, turn = np.zeros(3), Rotation.identity()
+    for origin, axis, angle in zip(ORIGINS, AXES, angles):
+        xyz, turn = xyz + turn.apply(origin), turn * Rotation.from_rotvec(angle * axis)
+    return xyz + turn.apply([0.05, 0, 0.06]), turn * Rotation.from_euler("xyz", [-np.pi / 2, 0, -np.pi / 2])
+
+
+def write_simulated(folder, seed):
+    """The arm that looks at a board, sensors off by 0.3 deg and poses by 0.3 mm and 1 mrad -> its table."""
+    rng = np.random.default_rng(seed)
+    write_urdf(folder)
+    told = readings_at_views(rng, 60)
     offsets = rng.normal(0, np.radians(0.3), 6)
-    board_xyz, board = np.array([1.2, 0.0, -0.4]), Rotation.from_euler("x", np.pi)
     poses = np.tile(np.eye(4), (len(told), 1, 1))
     for k, angles in enumerate(told + offsets):
-        xyz, turn = np.zeros(3), Rotation.identity()
-        for origin, axis, angle in zip(origins, axes, angles):
-            xyz, turn = xyz + turn.apply(origin), turn * Rotation.from_rotvec(angle * axis)
-        xyz, turn = xyz + turn.apply([0.05, 0, 0.06]), turn * Rotation.from_euler("xyz", [-np.pi / 2, 0, -np.pi / 2])
-        poses[k, :3, 3] = turn.inv().apply(board_xyz - xyz) + rng.normal(0, 3e-4, 3)
-        poses[k, :3, :3] = (Rotation.from_rotvec(rng.normal(0, 1e-3, 3)) * turn.inv() * board).as_matrix()
+        xyz, turn = camera_at(angles)
+        poses[k, :3, 3] = turn.inv().apply(BOARD_M - xyz) + rng.normal(0, 3e-4, 3)
+        poses[k, :3, :3] = (Rotation.from_rotvec(rng.normal(0, 1e-3, 3)) * turn.inv() * BOARD).as_matrix()
     return Table([f"j{k + 1}" for k in range(6)], told, poses)
 
 
