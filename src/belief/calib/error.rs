@@ -56,8 +56,8 @@ pub enum CalibError {
     PriorSag { recording: String },
     #[error("{recording}: {n} of {of} messages rejected on {what}: too many to go on")]
     NotFinite { recording: String, what: String, n: u64, of: u64 },
-    #[error("{recording}: no view is left: {reasons}")]
-    AllRejected { recording: String, reasons: String },
+    #[error("{recording}: no view is left: {reasons}; {todo}")]
+    AllRejected { recording: String, reasons: String, todo: &'static str },
     #[error("{recording}: {problem}")]
     Clocks { recording: String, problem: String },
     #[error("{recording}: topic {topic}: {disorder}")]

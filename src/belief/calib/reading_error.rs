@@ -4,6 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+use crate::calib::wrong_input::turn_in_words;
 use armcal_core::codes::{Code, Coded};
 use armcal_core::kinematics::JointKind;
 
@@ -63,6 +64,19 @@ pub enum ReadingError {
         /// Angle over reading.
         factor: f64,
     },
+    /// Each view has the readings of another view.
+    Shifted {
+        /// So many views later are its own readings; negative: before.
+        views: i32,
+    },
+    /// The camera is not where robot.toml says.
+    Camera {
+        /// The link that carries it, where that is another one.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        link: Option<String>,
+        /// Rotation that follows the stated `quaternion_wxyz`: w, x, y, z.
+        turn: [f64; 4],
+    },
 }
 
 /// The reading error that explains the views, with those that explain them nearly as well.
@@ -108,8 +122,26 @@ impl fmt::Display for ReadingError {
                      far as it says"
                 )
             }
+            Self::Shifted { views } => {
+                let side = if *views > 0 { "previous" } else { "next" };
+                write!(f, "each view has the joint readings of the {side} one")
+            }
+            Self::Camera { link, turn } => {
+                f.write_str("the camera is not as robot.toml says: ")?;
+                match link {
+                    Some(link) if is_turned(turn) => {
+                        write!(f, "it is on {link}, its frame turned by {}", turn_in_words(turn))
+                    }
+                    Some(link) => write!(f, "it is on {link}"),
+                    None => write!(f, "its frame is turned by {}", turn_in_words(turn)),
+                }
+            }
         }
     }
+}
+
+fn is_turned(turn: &[f64; 4]) -> bool {
+    turn[0].abs() < 1.0 - 1e-6
 }
 
 impl fmt::Display for MisreadReadings {
@@ -151,10 +183,22 @@ impl MisreadReadings {
             }
             ReadingError::Scaled { joint, factor } => {
                 format!(
-                    "correct the unit of {joint} in the input map, or its scale: multiply scale_counts_per_deg in \
-                     robot.toml by {:.4}",
+                    "correct the unit of {joint} in the input map, or its scale: multiply scale_counts_per_deg (of a \
+                     slide, scale_counts_per_mm) in robot.toml by {:.4}",
                     1.0 / factor
                 )
+            }
+            ReadingError::Shifted { .. } => {
+                "give each view the joint readings of its own pose: check the rows of the table, or the stamps"
+                    .to_owned()
+            }
+            ReadingError::Camera { link, turn } => {
+                let link = link.as_ref().map(|link| format!("link = \"{link}\""));
+                let [w, x, y, z] = turn.map(|value| format!("{value:.4}"));
+                let by = is_turned(turn)
+                    .then(|| format!("quaternion_wxyz multiplied by [{w}, {x}, {y}, {z}] from the right"));
+                let lines: Vec<String> = link.into_iter().chain(by).collect();
+                format!("set in [camera] of robot.toml: {}", lines.join(", "))
             }
         }
     }
@@ -168,6 +212,8 @@ impl Coded for MisreadReadings {
             ReadingError::OtherTurns { .. } => Code::JointTurns,
             ReadingError::Zeros { .. } => Code::JointZeros,
             ReadingError::Scaled { .. } => Code::SensorLine,
+            ReadingError::Shifted { .. } => Code::ReadingsShifted,
+            ReadingError::Camera { .. } => Code::InputCamera,
         }
     }
 }

@@ -56,16 +56,24 @@ pub enum WrongInputKind {
         /// At least.
         seen_px: [f64; 2],
     },
+    /// Corners have negative columns or rows; the smallest ones.
+    NegativePixels([f64; 2]),
+    /// Corners are shares of the image, not pixels.
+    ImageShares,
     /// The lens is that of an image of so many times the recorded one's size.
     ImageScale(f64),
     /// The lens has so many times its stated focal length.
     FocalLength(f64),
     /// The lens is of the other model: a fisheye called a pinhole, or the other way round.
     LensModel,
+    /// The corners come from images without the distortion that robot.toml states.
+    Distortion,
     /// All tags are of so many times their stated size.
     TagSize(f64),
     /// The map's positions are in this unit, and not in metres.
     MapUnit(String),
+    /// The map's axes are others, in words: `(y, x, z)`, `(x, -y, z)`.
+    MapAxes(String),
     /// All tags of the map are turned alike: the rotation, w, x, y, z, that follows each `quaternion_wxyz`.
     TagFrames([f64; 4]),
     /// These tags hang in one another's places.
@@ -129,8 +137,7 @@ pub(crate) fn wrong_input(data: &CaptureData, tags: &[SurveyedTag], robot: &Robo
     let views: Vec<&View> = of_first.take(MAX_VIEWS).collect();
     let lens = &robot.camera.lens;
     let stated_px = lens.resolution_px();
-    if beyond(stated_px, data.largest_px) {
-        let input = WrongInputKind::ImageSize { stated_px, seen_px: data.largest_px };
+    if let Some(input) = beside_image(stated_px, data) {
         return Some(WrongInput { input, mismatch: 1.0, mismatch_otherwise: None, size_hint: None });
     }
     match mismatch(&views, tags, lens) {
@@ -139,9 +146,19 @@ pub(crate) fn wrong_input(data: &CaptureData, tags: &[SurveyedTag], robot: &Robo
     }
 }
 
-fn beyond(stated_px: [u32; 2], seen_px: [f64; 2]) -> bool {
-    let is_beyond = |axis: usize| seen_px[axis] > BEYOND_IMAGE * f64::from(stated_px[axis]);
-    stated_px[0] > 0 && (is_beyond(0) || is_beyond(1))
+/// Corners that are no pixels of an image of that size.
+fn beside_image(stated_px: [u32; 2], data: &CaptureData) -> Option<WrongInputKind> {
+    let (smallest_px, largest_px) = (data.smallest_px, data.largest_px);
+    let sides_px = stated_px.map(f64::from);
+    let is_any = |is_so: &dyn Fn(usize) -> bool| stated_px[0] > 0 && (is_so(0) || is_so(1));
+    if is_any(&|axis| largest_px[axis] > BEYOND_IMAGE * sides_px[axis]) {
+        Some(WrongInputKind::ImageSize { stated_px, seen_px: largest_px })
+    } else if is_any(&|axis| smallest_px[axis] < (1.0 - BEYOND_IMAGE) * sides_px[axis]) {
+        Some(WrongInputKind::NegativePixels(smallest_px))
+    } else {
+        let are_shares = largest_px.iter().all(|px| *px > 0.0 && *px <= BEYOND_IMAGE);
+        are_shares.then_some(WrongInputKind::ImageShares)
+    }
 }
 
 fn by_pairs(views: &[&View], tags: &[SurveyedTag], robot: &Robot, as_written: &Pairs) -> Option<WrongInput> {
@@ -160,6 +177,11 @@ fn by_pairs(views: &[&View], tags: &[SurveyedTag], robot: &Robot, as_written: &P
         consider(WrongInputKind::ImageScale(scale), mismatch(views, tags, &scaled(lens, 1.0 / scale)));
     }
     consider(WrongInputKind::LensModel, mismatch(views, tags, &of_other_model(lens)));
+    consider(WrongInputKind::Distortion, mismatch(views, tags, &without_distortion(lens)));
+    for (words, axes) in other_axes() {
+        let placed: Vec<SurveyedTag> = tags.iter().map(|tag| with_axes(tag, axes)).collect();
+        consider(WrongInputKind::MapAxes(words), mismatch(views, &placed, lens));
+    }
     let steps = (-FOCAL_STEPS..=FOCAL_STEPS).map(|k| (f64::from(k) * FOCAL_STEP).exp());
     for ratio in steps.filter(|ratio| (ratio - 1.0).abs() > SIZE_TOLERANCE) {
         consider(WrongInputKind::FocalLength(ratio), mismatch(views, tags, &of_focal_length(lens, ratio)));
@@ -211,6 +233,38 @@ fn of_focal_length(lens: &CameraModel, ratio: f64) -> CameraModel {
     lens.with_intrinsics([fx * ratio, fy * ratio, cx, cy, a, b, c, d])
 }
 
+/// The lens with its stated focal length and centre alone.
+fn without_distortion(lens: &CameraModel) -> CameraModel {
+    let [fx, fy, cx, cy, ..] = lens.intrinsics();
+    lens.with_intrinsics([fx, fy, cx, cy, 0.0, 0.0, 0.0, 0.0])
+}
+
+/// An axis each, and its sign.
+type SignedAxes = [(usize, f64); 3];
+
+/// Left-handed readings of a position, in words: one axis of the other sign, or two axes exchanged. What is
+/// right-handed turns the map as a whole, and the arm has a part in it.
+fn other_axes() -> impl Iterator<Item = (String, SignedAxes)> {
+    const READINGS: [SignedAxes; 6] = [
+        [(0, -1.0), (1, 1.0), (2, 1.0)],
+        [(0, 1.0), (1, -1.0), (2, 1.0)],
+        [(0, 1.0), (1, 1.0), (2, -1.0)],
+        [(1, 1.0), (0, 1.0), (2, 1.0)],
+        [(0, 1.0), (2, 1.0), (1, 1.0)],
+        [(2, 1.0), (1, 1.0), (0, 1.0)],
+    ];
+    let word = |(axis, sign): (usize, f64)| format!("{}{}", if sign < 0.0 { "-" } else { "" }, ["x", "y", "z"][axis]);
+    READINGS.into_iter().map(move |axes| (format!("({})", axes.map(word).join(", ")), axes))
+}
+
+/// The tag at its position read by these axes; its rotation stays.
+fn with_axes(tag: &SurveyedTag, axes: SignedAxes) -> SurveyedTag {
+    let pose = tag.base_from_tag.isometry();
+    let place = Vector3::from(axes.map(|(axis, sign)| sign * pose.translation.vector[axis]));
+    let placed = Isometry3::from_parts(place.into(), pose.rotation);
+    SurveyedTag { base_from_tag: Pose::from_isometry(placed), ..tag.clone() }
+}
+
 /// In what medium a lens shows a focal length of `ratio` times the stated one: sea water has the refractive index 1.34,
 /// by which a flat window in front of the lens multiplies the focal length (Treibitz et al. 2012).
 pub(crate) fn medium_of_lens(ratio: f64) -> &'static str {
@@ -237,7 +291,7 @@ fn of_other_model(lens: &CameraModel) -> CameraModel {
 
 /// The 23 rotations that take a cube to itself and are not the identity, w at least 0: the conventions of tag frames
 /// differ by one of them, whichever corner is the first and wherever z points.
-fn quarter_turns() -> impl Iterator<Item = UnitQuaternion<f64>> {
+pub(crate) fn quarter_turns() -> impl Iterator<Item = UnitQuaternion<f64>> {
     let about = |axis: Vector3<f64>, n: u8| UnitQuaternion::from_scaled_axis(axis * (f64::from(n) * FRAC_PI_2));
     let faces = (0..4).map(move |n| about(Vector3::x(), n)).chain([1, 3].map(|n| about(Vector3::y(), n)));
     let all = faces.flat_map(move |face| (0..4).map(move |n| face * about(Vector3::z(), n)));
@@ -438,12 +492,16 @@ impl Coded for WrongInput {
             WrongInputKind::MapQuaternions => Code::InputOrder,
             WrongInputKind::RecordedQuaternions => Code::InputRotation,
             WrongInputKind::RecordedDirection => Code::InputDirection,
-            WrongInputKind::ImageSize { .. } | WrongInputKind::ImageScale(_) => Code::InputImageSize,
-            WrongInputKind::LensModel => Code::InputLensModel,
+            WrongInputKind::ImageSize { .. }
+            | WrongInputKind::ImageScale(_)
+            | WrongInputKind::NegativePixels(_)
+            | WrongInputKind::ImageShares => Code::InputImageSize,
+            WrongInputKind::LensModel | WrongInputKind::Distortion => Code::InputLensModel,
             WrongInputKind::FocalLength(_) => Code::LensContradicted,
             WrongInputKind::TagSize(_) => Code::InputTagSize,
             WrongInputKind::ExchangedIds(_) => Code::InputTagIds,
             WrongInputKind::MapUnit(_) => Code::InputMapUnit,
+            WrongInputKind::MapAxes(_) => Code::InputMapAxes,
             WrongInputKind::TagFrames(_) => Code::InputTagFrames,
             WrongInputKind::OtherMap => Code::InputTagMap,
         }
@@ -463,6 +521,18 @@ impl WrongInput {
         match &self.input {
             WrongInputKind::TagFrames(_) => "",
             WrongInputKind::MapUnit(_) => "write position_m and position_std_m of the tag map in metres",
+            WrongInputKind::MapAxes(_) => "write position_m of the tag map in a right-handed frame",
+            WrongInputKind::NegativePixels(_) => {
+                "record columns and rows in pixels from the top left corner of the image, or state the lens of the \
+                 image that these count from in [camera] of robot.toml"
+            }
+            WrongInputKind::ImageShares => {
+                "multiply the recorded columns and rows by the width and height of the image"
+            }
+            WrongInputKind::Distortion => {
+                "set distortion of [camera] in robot.toml to zeros, and the focal length and centre to those of the \
+                 rectified images"
+            }
             WrongInputKind::MapQuaternions => "write quaternion_wxyz of the tag map in the order w, x, y, z",
             WrongInputKind::RecordedQuaternions => {
                 "set the other one of quaternion_wxyz and quaternion_xyzw as \
@@ -505,6 +575,10 @@ impl WrongInput {
                     f,
                     "the positions of the tag map are in {unit}, not in metres: so many of them are seen as one metre"
                 )
+            }
+            WrongInputKind::MapAxes(axes) => {
+                write!(f, "the positions of the tag map are those of a mirrored frame: read as {axes}, ")?;
+                write!(f, "the tags of a view fit each other within {of_pairs}")
             }
             WrongInputKind::TagFrames(turn) => {
                 write!(f, "the frames of all tags are turned alike against the tag map, by {}: ", turn_in_words(turn))?;
@@ -566,6 +640,18 @@ impl fmt::Display for WrongInput {
                 write!(f, "the lens is not that of robot.toml: with {ratio:.2} times its focal length ")?;
                 write!(f, "the tags of a view fit each other within {of_pairs}{}", medium_of_lens(*ratio))
             }
+            WrongInputKind::NegativePixels([x, y]) => write!(
+                f,
+                "corners of the recording have negative columns or rows, down to ({x:.0}, {y:.0}) px: they do not \
+                 count from the image's top left corner"
+            ),
+            WrongInputKind::ImageShares => {
+                f.write_str("all corners of the recording are within 1 px: they are shares of the image, not pixels")
+            }
+            WrongInputKind::Distortion => {
+                write!(f, "the corners come from rectified images: without the distortion of robot.toml ")?;
+                write!(f, "the tags of a view fit each other within {of_pairs}")
+            }
             WrongInputKind::LensModel => {
                 write!(
                     f,
@@ -579,7 +665,7 @@ impl fmt::Display for WrongInput {
 }
 
 /// `180 deg about x`, `120 deg about (1, 1, -1)`.
-fn turn_in_words([w, x, y, z]: &[f64; 4]) -> String {
+pub(crate) fn turn_in_words([w, x, y, z]: &[f64; 4]) -> String {
     let turn = UnitQuaternion::new_normalize(Quaternion::new(*w, *x, *y, *z));
     let axis = turn.axis().map_or(Vector3::z(), |axis| axis.into_inner() / axis.amax());
     let signs = [axis.x, axis.y, axis.z].map(|along| along.round() as i32);

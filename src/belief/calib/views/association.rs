@@ -308,12 +308,40 @@ pub(crate) fn check_square(
 ) -> Result<SquarePose, ObservationRejection> {
     let solved = solve_square(&camera.lens, size_m, &seen.corners_px).map_err(|e| match e {
         SquareError::OutOfView => ObservationRejection::OutOfView,
-        SquareError::Degenerate => ObservationRejection::NotASquare,
+        SquareError::Degenerate => not_a_square(&seen.corners_px),
     })?;
-    if solved.rms_px > MAX_SQUARE_RMS_PX { Err(ObservationRejection::NotASquare) } else { Ok(solved) }
+    if solved.rms_px > MAX_SQUARE_RMS_PX { Err(not_a_square(&seen.corners_px)) } else { Ok(solved) }
+}
+
+/// Seen from the front, the corners run counterclockwise with v downwards: each turn from side to side is to the left.
+fn not_a_square(corners_px: &[[f64; 2]; 4]) -> ObservationRejection {
+    let side = |k: usize| [0, 1].map(|axis| corners_px[(k + 1) % 4][axis] - corners_px[k % 4][axis]);
+    let turns = [0, 1, 2, 3].map(|k| {
+        let ([u, v], [to_u, to_v]) = (side(k), side(k + 1));
+        u * to_v - v * to_u
+    });
+    let to_the_right = turns.iter().filter(|turn| **turn > 0.0).count();
+    if to_the_right < 2 { ObservationRejection::NotASquare } else { ObservationRejection::CornerOrder }
 }
 
 fn widen(range: &mut Option<(f64, f64)>, value: f64) {
     let (low, high) = range.unwrap_or((value, value));
     *range = Some((low.min(value), high.max(value)));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn corners_that_run_the_other_way_round_or_cross_are_told_from_other_shapes() {
+        let square = [[10.0, 30.0], [30.0, 30.0], [30.0, 10.0], [10.0, 10.0]];
+        let in_order = |order: [usize; 4]| not_a_square(&order.map(|k| square[k]));
+        for order in [[3, 2, 1, 0], [0, 3, 2, 1], [3, 2, 0, 1], [0, 2, 1, 3]] {
+            assert_eq!(in_order(order), ObservationRejection::CornerOrder, "{order:?}");
+        }
+        assert_eq!(in_order([1, 2, 3, 0]), ObservationRejection::NotASquare);
+        let dented = [[10.0, 30.0], [30.0, 30.0], [14.0, 26.0], [10.0, 10.0]];
+        assert_eq!(not_a_square(&dented), ObservationRejection::NotASquare);
+    }
 }

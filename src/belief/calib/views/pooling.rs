@@ -129,6 +129,7 @@ fn add(data: &mut CaptureData, part: CaptureData, first_pose_idx: u32) {
         *data.rejected.entry(why).or_default() += n;
     }
     data.ids_seen.extend(part.ids_seen);
+    data.smallest_px = [0, 1].map(|axis| data.smallest_px[axis].min(part.smallest_px[axis]));
     data.largest_px = [0, 1].map(|axis| data.largest_px[axis].max(part.largest_px[axis]));
     let ranges =
         [(&mut data.oil_c, part.oil_c), (&mut data.water_c, part.water_c), (&mut data.pressure_pa, part.pressure_pa)];

@@ -200,6 +200,8 @@ pub enum ObservationRejection {
     UnknownTag,
     /// The corners are not those of a square seen from its front.
     NotASquare,
+    /// The corners run the other way round, as in a mirror, or their sides cross.
+    CornerOrder,
     /// A corner has no bearing in the lens model.
     OutOfView,
     /// The mark's span holds no joint readings.
@@ -221,12 +223,32 @@ impl ObservationRejection {
         match self {
             Self::UnknownTag => "unknown_tag",
             Self::NotASquare => "not_a_square",
+            Self::CornerOrder => "corner_order",
             Self::OutOfView => "out_of_view",
             Self::NoReadings => "no_joint_readings",
             Self::InconsistentFrame => "inconsistent_frame",
             Self::Outlier => "outlier",
             Self::ArmMoving => "arm_moving",
             Self::Detector(reason) => reason.name(),
+        }
+    }
+
+    /// What to do where no detection is left because of it.
+    pub(crate) fn remedy(self) -> &'static str {
+        match self {
+            Self::UnknownTag => "give a tag map that has the tags' ids",
+            Self::NotASquare => {
+                "check which columns or fields hold the corners, and the lens in [camera] of robot.toml"
+            }
+            Self::CornerOrder => {
+                "state the order in which the corners are recorded (tags.columns.corner_order of the input map of a \
+                 table), and check that u counts to the right and v down"
+            }
+            Self::OutOfView => "check model, resolution and distortion of the lens in [camera] of robot.toml",
+            Self::NoReadings => "check that joint readings and tags are of the same time",
+            Self::InconsistentFrame | Self::Outlier => "check the tag ids, and that no id is used twice",
+            Self::ArmMoving => "record while the arm stands still",
+            Self::Detector(_) => "check the images: light, focus, size of the tags",
         }
     }
 }
@@ -254,6 +276,8 @@ pub struct CaptureData {
     pub rejected: BTreeMap<ObservationRejection, usize>,
     /// Ids seen in any view, unknown ones included; ascending, each once.
     pub ids_seen: Vec<u32>,
+    /// The smallest column and row of any corner, px; at most zero.
+    pub smallest_px: [f64; 2],
     /// The largest column and row of any corner, px; zero without corners.
     pub largest_px: [f64; 2],
     /// Stated noise of positions and poses of tags, where there is one.
@@ -289,9 +313,10 @@ impl CaptureData {
         Some(TaskRests { task: self.task.as_ref()?, rests: &self.rests })
     }
 
-    /// Widens `largest_px`; each corner once.
+    /// Widens `smallest_px` and `largest_px`; each corner once.
     pub(crate) fn note_corners(&mut self, corners_px: &[[f64; 2]]) {
         for corner in corners_px {
+            self.smallest_px = std::array::from_fn(|axis| self.smallest_px[axis].min(corner[axis]));
             self.largest_px = std::array::from_fn(|axis| self.largest_px[axis].max(corner[axis]));
         }
     }

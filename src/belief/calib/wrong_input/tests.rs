@@ -124,6 +124,47 @@ fn a_lens_of_another_image_size_is_told() {
     assert!(matches!(found(&data, &half), Some(WrongInputKind::ImageSize { stated_px: [612, 512], .. })));
 }
 
+/// Surveys in a left-handed frame: an axis of the other sign, or two exchanged.
+#[test]
+fn a_mirrored_survey_is_told_with_its_axes() {
+    let (data, robot) = sample();
+    for (words, axes) in other_axes() {
+        let mirrored = |_: usize, pose: &Isometry3<f64>| {
+            let place = Vector3::from(axes.map(|(axis, sign)| sign * pose.translation.vector[axis]));
+            Isometry3::from_parts(place.into(), pose.rotation)
+        };
+        assert_eq!(found(&data, &with_tags(&robot, mirrored)), Some(WrongInputKind::MapAxes(words)));
+    }
+}
+
+#[test]
+fn corners_that_are_no_pixels_of_the_image_are_told() {
+    let (data, robot) = sample();
+    let [center_x, center_y] = robot.camera.lens.center_px();
+    let sides_px = robot.camera.lens.resolution_px().map(f64::from);
+    let with_extent = |of: &dyn Fn([f64; 2]) -> [f64; 2]| CaptureData {
+        smallest_px: of(data.smallest_px),
+        largest_px: of(data.largest_px),
+        ..data.clone()
+    };
+    let from_center = with_extent(&|[x, y]| [x - center_x, y - center_y]);
+    assert_eq!(found(&from_center, &robot), Some(WrongInputKind::NegativePixels(from_center.smallest_px)));
+    let shares = with_extent(&|px| [px[0] / sides_px[0], px[1] / sides_px[1]]);
+    assert_eq!(found(&shares, &robot), Some(WrongInputKind::ImageShares));
+    // A detector that rounds reaches a little over the edge.
+    let rounded = with_extent(&|[x, y]| [x - 2.0, y - 2.0]);
+    assert_eq!(found(&rounded, &robot), None);
+}
+
+/// Rectified images, with the lens as it was before.
+#[test]
+fn a_distortion_that_the_images_do_not_have_is_told() {
+    let (data, mut robot) = sample();
+    let [fx, fy, cx, cy, ..] = robot.camera.lens.intrinsics();
+    robot.camera.lens = robot.camera.lens.with_intrinsics([fx, fy, cx, cy, 0.25, 0.1, 0.0, 0.0]);
+    assert_eq!(found(&data, &robot), Some(WrongInputKind::Distortion));
+}
+
 #[test]
 fn a_tag_size_is_told_and_the_margin_of_the_print() {
     let (data, robot) = sample();

@@ -2,6 +2,8 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
+use nalgebra::{Quaternion, UnitQuaternion};
+
 use crate::calib::bundle::tests::failures::{Case, case};
 use crate::calib::reading_error::ReadingError;
 use crate::calib::refusal::Refusal;
@@ -94,6 +96,37 @@ fn a_scale_that_is_far_off_is_named_with_its_size() {
             other => panic!("seed {seed}: {other:?}"),
         };
         assert!(of == name && (factor * scale - 1.0).abs() < 0.2, "seed {seed}: {of} {factor}");
+    }
+}
+
+#[test]
+fn readings_of_the_next_or_the_previous_view_are_named() {
+    for (seed, by) in [(27, 1), (28, -1), (29, 1)] {
+        let mut case = case(seed, None);
+        let read: Vec<JointAngles> = case.views.iter().map(|view| view.travel_rad).collect();
+        let n = read.len() as isize;
+        for (k, view) in case.views.iter_mut().enumerate() {
+            // Put right, the readings are those of the view `by` later.
+            view.travel_rad = read[(k as isize - by).rem_euclid(n) as usize];
+        }
+        assert_eq!(found(case), ReadingError::Shifted { views: by as i32 }, "seed {seed}");
+    }
+}
+
+/// A link before or after the stated one, and the axes of a body's frame in place of an optical one.
+#[test]
+fn a_camera_on_another_link_or_with_other_axes_is_named() {
+    let optical = UnitQuaternion::new_normalize(Quaternion::new(0.5, -0.5, 0.5, -0.5));
+    for (seed, less, turn) in [(30, 1, UnitQuaternion::identity()), (31, 0, optical), (32, 2, optical)] {
+        let mut case = case(seed, None);
+        let mount = &mut case.robot.camera.mount;
+        let (carrier, stated) = (mount.n_joints, mount.link_from_frame.rotation);
+        mount.n_joints -= less;
+        mount.link_from_frame.rotation = stated * turn.inverse();
+        let link = case.robot.chain.joints()[carrier - 1].child_link.clone();
+        let ReadingError::Camera { link: on, turn: by } = found(case) else { panic!("seed {seed}: no camera") };
+        let by = UnitQuaternion::new_normalize(Quaternion::new(by[0], by[1], by[2], by[3]));
+        assert!(on == (less > 0).then_some(link) && by.angle_to(&turn) < 1e-6, "seed {seed}: {on:?} {by}");
     }
 }
 

@@ -95,10 +95,11 @@ fn names_of(recordings: &[ExternalRecording]) -> String {
 }
 
 fn no_views(recording: String, robot: &Robot, data: &CaptureData) -> CalibError {
-    if data.rejected.keys().any(|why| *why != ObservationRejection::UnknownTag) {
+    let known = data.rejected.iter().filter(|(why, _)| **why != ObservationRejection::UnknownTag);
+    if let Some((most, _)) = known.max_by_key(|(_, n)| **n) {
         let reasons = data.rejected_by_reason();
         let reasons: Vec<String> = reasons.iter().map(|(why, n)| format!("{n} {}", why.replace('_', " "))).collect();
-        return CalibError::AllRejected { recording, reasons: reasons.join(", ") };
+        return CalibError::AllRejected { recording, reasons: reasons.join(", "), todo: most.remedy() };
     }
     let known = robot.tags.iter().map(|tag| tag.id).collect();
     CalibError::NoTags { recording, robot: robot.name.clone(), known, seen: data.ids_seen.clone() }
