@@ -226,3 +226,32 @@ fn corners_of_tags_are_found_and_proposed() {
         assert_eq!((seen.id, seen.seen), (Some(7), armcal::input::RawMeasurement::Corners(square)), "{name}");
     }
 }
+
+/// Corners as OpenCV's detector lists them, read as those of AprilTag: seen so they are a mirror image.
+#[test]
+fn corners_in_another_order_are_refused_with_the_key_to_change() {
+    let _texts = Texts::of("corners_in_another_order_are_refused_with_the_key_to_change");
+    let folder = temp();
+    let titan_folder = root().join("robots/titan4");
+    let titan = load(&titan_folder).expect("it reads");
+    let tag = titan.tags[0].id;
+    let mut table = format!("time,{},tag,u0,v0,u1,v1,u2,v2,u3,v3\n", titan.joint_names().join(","));
+    for pose in 1..7 {
+        let at = 500.0 + 10.0 * f64::from(pose);
+        let corners =
+            [[at, at], [at + 90.0, at], [at + 90.0, at + 90.0], [at, at + 90.0]].map(|[u, v]| format!("{u},{v}"));
+        let angles = [0.01; 6].map(|angle| (angle * f64::from(pose)).to_string());
+        writeln!(table, "{pose},{},{tag},{}", angles.join(","), corners.join(",")).expect("text");
+    }
+    let (table_file, map) = (place(folder.path(), "corners.csv"), place(folder.path(), "map.toml"));
+    write(&table_file, &table);
+    inspect(&table_file, Some(&titan_folder), Some(&map)).expect("a table", 0, &["written"]);
+    let mut command = program();
+    command.arg("calibrate").arg(&table_file).arg("--robot").arg(&titan_folder).arg("--input").arg(&map);
+    answer(&mut command).expect("mirrored", 2, &["6 corner order", "corner_order"]);
+    let proposed = read(&map);
+    assert!(!proposed.contains("corner_order"), "{proposed}");
+    write(&map, &proposed.replace("[tags.columns]\n", "[tags.columns]\ncorner_order = \"opencv\"\n"));
+    let so_read = answer(&mut command);
+    so_read.expect("in the other order", 4, &["REFUSED"]);
+}

@@ -1,7 +1,9 @@
 //! May the result be used, why, and what to do next: the same words for report.html, the replay and the terminal.
 
 use crate::report::summary::{Condition, RunSummary, VerdictSummary};
-use armcal_belief::calib::{FailedJointTable, Finding, FindingKind, PriorTable, Refusal, Reservation, Status};
+use armcal_belief::calib::{
+    FailedJointTable, Finding, FindingKind, PriorTable, Refusal, Reservation, Status, with_advice,
+};
 use armcal_belief::judge::RULE;
 use armcal_core::codes::{Code, Coded};
 use armcal_core::robot::FailedKind;
@@ -49,7 +51,7 @@ pub(super) fn verdict(summary: &RunSummary) -> Verdict {
         let mut next: Vec<String> = Vec::new();
         let beside = beside_refusal(summary);
         reasons.extend(beside.iter().map(|repair| sentence(&repair.cause)));
-        let remedies = summary.refusals.iter().map(|refusal| sentence(&refusal.remedy()));
+        let remedies = with_advice(&summary.refusals).iter().map(|refusal| sentence(&refusal.remedy()));
         for remedy in remedies.chain(beside.iter().map(|repair| sentence(&repair.remedy))) {
             if !next.contains(&remedy) {
                 next.push(remedy);
@@ -160,18 +162,22 @@ fn repairs_of(findings: &[Finding], failed: &[FailedJointTable], since: &str) ->
 }
 
 /// Findings that a user can act on, in the order in which they are told.
-const REPAIRS: [FindingKind; 10] = [
+const REPAIRS: [FindingKind; 11] = [
     FindingKind::SensorScale,
     FindingKind::SensorSlip,
     FindingKind::TagMoved,
     FindingKind::TagsMoved,
     FindingKind::TagSwapped,
     FindingKind::TagSize,
+    FindingKind::TagLeftOut,
     FindingKind::Lens,
     FindingKind::CameraMount,
     FindingKind::Base,
     FindingKind::Link,
 ];
+
+/// A focal length that is off by less is not what was found of a lens, relative.
+const LEAST_FOCAL: f64 = 1e-3;
 
 fn of_finding(found: &Finding, since: &str) -> Option<Repair> {
     let name = &found.name;
@@ -211,8 +217,18 @@ fn of_finding(found: &Finding, since: &str) -> Option<Repair> {
             "measure the side of its black square, and correct the survey".to_owned(),
             "the result uses the estimated size",
         ),
+        FindingKind::TagLeftOut => (
+            format!("tag {name} is left out: none of its observations fits the other tags"),
+            format!("check id, size and pose of tag {name} in the tag map"),
+            "the result does without it",
+        ),
         FindingKind::Lens => (
-            format!("the focal length is {} than robot.toml says", differs(found, ["longer", "shorter"])),
+            match found.size {
+                Some(ratio) if ratio.abs() < LEAST_FOCAL => {
+                    "centre or distortion of the lens differ from robot.toml".to_owned()
+                }
+                _ => format!("the focal length is {} than robot.toml says", differs(found, ["longer", "shorter"])),
+            },
             "measure the intrinsics again".to_owned(),
             "the result uses the estimated lens",
         ),
@@ -386,6 +402,9 @@ mod tests {
             finding(FindingKind::Link, "forearm_link", 0.05, FindingUnit::Metre),
             finding(FindingKind::TagSize, "all", 0.25, FindingUnit::One),
             finding(FindingKind::TagSwapped, "0, 2 and 1", 0.0, FindingUnit::One),
+            finding(FindingKind::TagLeftOut, "3", 12.0, FindingUnit::One),
+            finding(FindingKind::Lens, "camera", 0.0002, FindingUnit::One),
+            finding(FindingKind::Lens, "camera", -0.02, FindingUnit::One),
             finding(FindingKind::Sag, "base", 0.1, FindingUnit::RadianPerNewtonMetre),
         ];
         let others = causes(&others, &[]);
@@ -394,7 +413,7 @@ mod tests {
         findings[0].repaired = false;
         let told = failed(FailedKind::Jumps, "the sensor slipped by 1.74 deg", Some(3));
         let once = causes(&findings, &[told]);
-        assert_eq!([slipped.len(), others.len(), once.len()], [2, 3, 1]);
+        assert_eq!([slipped.len(), others.len(), once.len()], [2, 6, 1]);
         insta::assert_snapshot!("repairs", [slipped, others, once].concat().join("\n"));
     }
 }

@@ -41,6 +41,8 @@ pub enum FindingKind {
     TagSize,
     /// Tags with one another's ids: two, or more in a ring.
     TagSwapped,
+    /// A tag of which no observation fits the others; the size is their number.
+    TagLeftOut,
     /// The lens against robot.toml; the size is the relative error of its focal length.
     Lens,
     /// A link's length or twist against the drawing.
@@ -77,6 +79,7 @@ impl Coded for FindingKind {
             Self::TagsMoved => Code::TagsMoved,
             Self::TagSize => Code::TagSize,
             Self::TagSwapped => Code::TagSwapped,
+            Self::TagLeftOut => Code::TagLeftOut,
             Self::Lens => Code::Lens,
             Self::Link => Code::Link,
             Self::Sag => Code::Sag,
@@ -109,6 +112,7 @@ impl FindingKind {
             Self::TagsMoved => "tags moved together",
             Self::TagSize => "tag of another size",
             Self::TagSwapped => "tags swapped",
+            Self::TagLeftOut => "tag left out",
             Self::Lens => "lens differs from robot.toml",
             Self::Link => "link differs from the URDF",
             Self::Sag => "compliance under weight",

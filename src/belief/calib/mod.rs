@@ -45,7 +45,7 @@ pub use methods::{
 };
 pub use parameters::{JointParameters, Parameter, ParameterKind, WornSpot};
 pub use reading_error::{JointZero, MisreadReadings, ReadingError};
-pub use refusal::{InnovationQuantity, Refusal, in_files as refusals_in_files};
+pub use refusal::{InnovationQuantity, Refusal, in_files as refusals_in_files, with_advice};
 pub use refusal_conditions::{MIN_HELD_OUT_VIEWS, MIN_VIEWS_PER_PARAMETER, fewest_views};
 pub use reservation::Reservation;
 pub use result::{

@@ -147,6 +147,15 @@ pub enum Refusal {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         length_m: Option<f64>,
     },
+    /// The size of a tag, or of all, differs from the tag map's by more than a repair may.
+    TagSizeRepair {
+        /// The tag, or all.
+        element: String,
+        /// Estimated size over the stated one.
+        ratio: f64,
+        /// The stated one of the tag, or of the first, m.
+        stated_m: f64,
+    },
     /// The focal length differs from the stated one by more than a repair may.
     Lens {
         /// Estimated focal length over that of robot.toml.
@@ -370,16 +379,23 @@ impl Refusal {
     /// Which reason is told first: what makes all others a consequence. Those of one rank stay in their order.
     pub(crate) fn rank(&self) -> u8 {
         match self {
-            Self::TooFewViews { .. } | Self::TooFewViewsSinceSlip { .. } => 0,
-            Self::WrongInput(_) | Self::MisreadReadings(_) | Self::Lens { .. } | Self::PriorReused => 1,
+            // A wrong file explains why few views are left.
+            Self::WrongInput(_) => 0,
+            Self::TooFewViews { .. } | Self::TooFewViewsSinceSlip { .. } => 1,
+            Self::MisreadReadings(_) | Self::Lens { .. } | Self::PriorReused => 2,
             // Under a prior that does not hold, links and sensors seem to be off.
-            Self::PriorContradicted { .. } => 2,
+            Self::PriorContradicted { .. } => 3,
             // Where hardly any observation fits, the solver's end and every test of the rest say nothing.
-            Self::Outliers { outliers, observations } if 2 * outliers > *observations => 3,
+            Self::Outliers { outliers, observations } if 2 * outliers > *observations => 4,
             // Another scale makes offsets and links seem off.
-            Self::SensorLine { .. } | Self::SensorUnit { .. } => 4,
-            _ => 5,
+            Self::SensorLine { .. } | Self::SensorUnit { .. } => 5,
+            _ => 6,
         }
+    }
+
+    /// A wrong file or reading, which the further reasons follow from: what they advise is moot.
+    fn explains_others(&self) -> bool {
+        matches!(self, Self::WrongInput(_) | Self::MisreadReadings(_) | Self::Lens { .. })
     }
 
     /// What to do about it.
@@ -389,8 +405,8 @@ impl Refusal {
             Self::MisreadReadings(misread) => misread.remedy().into(),
             Self::WrongInput(wrong) => wrong.remedy(),
             Self::SensorLine { joint, slope } if *slope > 0.0 => format!(
-                "correct the scale of {joint}: multiply scale_counts_per_deg in robot.toml by {:.4}, or correct the \
-                 unit of its readings",
+                "correct the scale of {joint}: multiply scale_counts_per_deg (of a slide, scale_counts_per_mm) in \
+                 robot.toml by {:.4}, or correct the unit of its readings",
                 1.0 / slope
             )
             .into(),
@@ -438,15 +454,16 @@ impl Refusal {
             Self::RepairTooLarge { .. } => {
                 "check the zeros, order and units of the joint readings; then measure this element and correct its file"
             }
+            Self::TagSizeRepair { .. } => "measure the border square of one tag and correct size_m, in metres",
             Self::CornerNoise { .. } => "check lens, corner noise and tag sizes in robot.toml, and the tag map",
             Self::SensorError { .. } | Self::SensorFailed { .. } => "check that joint's sensor",
-            Self::SensorLine { .. } => "swap its ends, or change the sign of scale_counts_per_deg in robot.toml",
+            Self::SensorLine { .. } => "swap its ends, or change the sign of its scale in robot.toml",
             Self::Nonlinearity { .. } => "replace the sensor, or state its linearity in robot.toml",
             Self::OffsetsWalk { .. } => {
                 "calibrate right before the work and again during it, follow the estimate online, or replace the sensor"
             }
             Self::BeyondDatasheet { .. } => "check joint and sensor, and robot.toml against the installed sensor",
-            Self::Outliers { .. } => "check tag map, tag ids and the URDF",
+            Self::Outliers { .. } => "check tag map, tag ids, the lens and the URDF",
             Self::Innovations { .. } => "look for what moved or warmed up during the capture",
             Self::Touch { .. } => {
                 "measure the tool point ([tool] point_m of robot.toml), the links beyond the camera and the camera \
@@ -460,6 +477,13 @@ impl Refusal {
 }
 
 /// Cause, evidence, what to do next, and the code.
+/// Those whose advice is told: all, or the first one where it explains the others.
+#[must_use]
+pub fn with_advice(refusals: &[Refusal]) -> &[Refusal] {
+    let explains = refusals.first().is_some_and(Refusal::explains_others);
+    if explains { &refusals[..1] } else { refusals }
+}
+
 impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.fmt_cause(f)?;
@@ -485,7 +509,7 @@ impl Coded for Refusal {
             Self::WrongInput(wrong) => wrong.code(),
             Self::MisreadReadings(misread) => misread.code(),
             Self::Geometry(_) => Code::GeometryContradicted,
-            Self::RepairTooLarge { .. } => Code::RepairTooLarge,
+            Self::RepairTooLarge { .. } | Self::TagSizeRepair { .. } => Code::RepairTooLarge,
             Self::Lens { .. } => Code::LensContradicted,
             Self::SensorUnit { .. } => Code::SensorUnit,
             Self::RotationNoise { .. } => Code::RotationNoise,

@@ -28,6 +28,8 @@ const NAMED_SIGMAS: f64 = 4.0;
 const MAX_REPAIR_SIGMAS: f64 = 10.0;
 /// Largest repair in default sigmas, where robot.toml states none: 20 mm and 1.1 deg, the largest sizes tried.
 const MAX_UNSTATED_REPAIR_SIGMAS: f64 = 40.0;
+/// Largest repair of a tag's size, as a factor: margins of prints make 0.55 to 1.8; 2 is off by its own length.
+const MAX_SIZE_FACTOR: f64 = 2.05;
 /// Links whose joints meet have no length that could bound a repair, m.
 const LEAST_LENGTH_M: f64 = 0.02;
 
@@ -75,8 +77,11 @@ impl Estimate<'_> {
         }
         calibration.refuse_for(found.iter().find_map(Departure::beyond_bound));
         calibration.refuse_first_for(self.lens_beyond_bound());
+        calibration.refuse_for(drawing.tags.iter().find_map(|fault| self.size_beyond_bound(fault)));
         let of_tags = drawing.tags.iter().filter_map(|fault| self.tag_finding(fault));
-        for (finding, words) in self.sag_findings(task).into_iter().chain(self.lens_finding()).chain(of_tags) {
+        let of_lens = self.lens_finding().into_iter();
+        let left_out = self.left_out_tags().map(|(tag, n)| self.left_out_finding(tag, n));
+        for (finding, words) in self.sag_findings(task).into_iter().chain(of_lens).chain(of_tags).chain(left_out) {
             warnings.push(Warning::new(finding.code(), words));
             findings.push(finding);
         }
@@ -230,6 +235,29 @@ impl Estimate<'_> {
         };
         let unit = size.map(|_| FindingUnit::One);
         Some((Finding { kind, name, size, unit, tool_error_m: None, time_s: None, repaired: true }, words))
+    }
+
+    /// A size that differs from the tag map's by more than a repair may.
+    fn size_beyond_bound(&self, fault: &TagFault) -> Option<Refusal> {
+        let tags = &self.problem.robot.tags;
+        let (tag_idx, ratio, element) = match *fault {
+            TagFault::Size { tag_idx, ratio } => (tag_idx, ratio, format!("tag {}", tags[tag_idx].id)),
+            TagFault::AllSizes { ratio } => (0, ratio, "all tags".to_owned()),
+            _ => return None,
+        };
+        let stated_m = tags[tag_idx].size_m / ratio;
+        (ratio.max(ratio.recip()) > MAX_SIZE_FACTOR).then_some(Refusal::TagSizeRepair { element, ratio, stated_m })
+    }
+
+    fn left_out_finding(&self, tag_idx: usize, n: usize) -> (Finding, String) {
+        let name = self.problem.robot.tags[tag_idx].id.to_string();
+        let words = format!(
+            "tag {name} is left out: none of its {n} observations fits the others. Check its id, its size and its \
+             pose in the tag map"
+        );
+        let (size, unit) = (Some(n as f64), Some(FindingUnit::One));
+        let kind = FindingKind::TagLeftOut;
+        (Finding { kind, name, size, unit, tool_error_m: None, time_s: None, repaired: true }, words)
     }
 
     fn covariance3(&self, first: usize) -> Matrix3<f64> {

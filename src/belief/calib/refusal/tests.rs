@@ -29,6 +29,20 @@ fn the_words_of_each_reason() {
     assert_eq!(in_words(&[]), None);
 }
 
+/// What else a wrong file brings about needs no advice of its own.
+#[test]
+fn the_advice_of_a_wrong_input_is_the_only_one() {
+    let outliers = || Refusal::Outliers { outliers: 40, observations: 100 };
+    let exchanged = misread(ReadingError::Exchanged { joints: ["shoulder".to_owned(), "elbow".to_owned()] });
+    for (reasons, n) in [(vec![exchanged, outliers()], 1), (vec![outliers(), Refusal::NoHeldOutTag], 2)] {
+        assert_eq!(with_advice(&reasons).len(), n);
+        let words = in_words(&reasons).expect("words");
+        for (k, reason) in reasons.iter().enumerate() {
+            assert!(words.contains(&reason.cause()) && words.contains(&*reason.remedy()) == (k < n), "{words}");
+        }
+    }
+}
+
 fn geometry() -> Refusal {
     Refusal::Geometry(GeometryError {
         element: "upperarm_link".to_owned(),
@@ -113,6 +127,10 @@ fn measured() -> Vec<Refusal> {
         misread(ReadingError::Zeros {
             joints: vec![JointZero { joint: joint(), off_rad: 1.57, moves: JointKind::Revolute, offset_counts: -1.57 }],
         }),
+        misread(ReadingError::Shifted { views: 1 }),
+        misread(ReadingError::Camera { link: Some("wrist".to_owned()), turn: [1.0, 0.0, 0.0, 0.0] }),
+        misread(ReadingError::Camera { link: None, turn: [0.5, -0.5, 0.5, -0.5] }),
+        Refusal::TagSizeRepair { element: "tag 3".to_owned(), ratio: 0.015, stated_m: 9.9 },
         Refusal::TooFewViewsSinceSlip { joint: joint(), evidence: "it slipped".to_owned(), views: 4 },
         Refusal::SensorFailed {
             joint: joint(),

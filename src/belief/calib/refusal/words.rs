@@ -3,8 +3,9 @@
 use std::fmt;
 
 use crate::calib::baseline_comparison::SIGNIFICANCE;
-use crate::calib::refusal::{HeldOutLimitSource, MIN_USED_SHARE, Refusal};
+use crate::calib::refusal::{HeldOutLimitSource, MIN_USED_SHARE, Refusal, with_advice};
 use crate::calib::wrong_input::medium_of_lens;
+use armcal_core::codes::Coded;
 
 /// A refusal without its remedy.
 struct Cause<'a>(&'a Refusal);
@@ -25,7 +26,10 @@ impl Refusal {
     /// Cause and evidence.
     pub(super) fn fmt_cause(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Lens { .. } | Self::RepairTooLarge { .. } | Self::BeyondDatasheet { .. } => self.fmt_of_size(f),
+            Self::Lens { .. }
+            | Self::RepairTooLarge { .. }
+            | Self::TagSizeRepair { .. }
+            | Self::BeyondDatasheet { .. } => self.fmt_of_size(f),
             Self::WrongInput(_)
             | Self::MisreadReadings(_)
             | Self::Geometry(_)
@@ -211,6 +215,10 @@ impl Refusal {
                     None => write!(f, ", at most {most_sigmas:.0} are repaired"),
                 }
             }
+            Self::TagSizeRepair { element, ratio, stated_m } => {
+                write!(f, "{element} would have {ratio:.3} times the stated size ({:.0} mm)", 1e3 * stated_m)?;
+                f.write_str(": a size is repaired up to twice or half of it")
+            }
             Self::BeyondDatasheet { parameter, sigmas, off, unit } => {
                 let [off, std] = [*off, off.abs() / sigmas].map(|value| unit.in_words(value));
                 write!(
@@ -344,6 +352,9 @@ fn percent(probability: f64) -> String {
 /// All reasons in one line, the first one first; `None` where there is none.
 #[must_use]
 pub fn in_words(refusals: &[Refusal]) -> Option<String> {
-    let words: Vec<String> = refusals.iter().map(ToString::to_string).collect();
+    let advised = with_advice(refusals).len();
+    let (full, causes) = refusals.split_at(advised);
+    let causes = causes.iter().map(|refusal| format!("{} [{}]", refusal.cause(), refusal.code()));
+    let words: Vec<String> = full.iter().map(ToString::to_string).chain(causes).collect();
     (!words.is_empty()).then(|| words.join("; also: "))
 }

@@ -134,6 +134,15 @@ impl Estimate<'_> {
         Some((most.tag_idx, most.place(1.0)))
     }
 
+    /// Tags of which no observation fits, with the number of these.
+    pub(crate) fn left_out_tags(&self) -> impl Iterator<Item = (usize, usize)> {
+        let observations = &self.problem.observations;
+        let n_of = |tag: usize| observations.iter().filter(|observation| observation.tag == tag).count();
+        let is_unused = |tag: &usize| !observations.iter().any(|seen| seen.tag == *tag && seen.is_used);
+        let unused = (0..self.problem.robot.tags.len()).filter(is_unused);
+        unused.map(move |tag| (tag, n_of(tag))).filter(|(_, n)| *n >= MIN_OBSERVATIONS)
+    }
+
     /// Tags that do not fit, or that the data have elsewhere.
     pub(crate) fn doubtful_tags(&self) -> Vec<usize> {
         let elsewhere = self.departed_tags();

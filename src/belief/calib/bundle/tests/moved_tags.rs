@@ -1,6 +1,8 @@
 //! A tag that was knocked aside is found, named and measured; good surveys and wrong links are left to others.
 
-use nalgebra::{Isometry3, Vector3};
+use std::f64::consts::FRAC_PI_2;
+
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use crate::calib::bundle::drawing::Drawing;
 use crate::calib::bundle::estimate::estimate;
@@ -8,8 +10,12 @@ use crate::calib::bundle::tags::freed::MovedTags;
 use crate::calib::bundle::tags::identity::TagFault;
 use crate::calib::bundle::tests::arms::{Built, arm};
 use crate::calib::bundle::tests::data::titan;
+use crate::calib::bundle::tests::failures::case;
 use crate::calib::bundle::tests::score_test::{input, views_of_changed};
+use crate::calib::finding::{Finding, FindingKind};
+use armcal_core::codes::{Code, Coded};
 use armcal_core::robot::Robot;
+use armcal_core::spatial::Pose;
 
 #[test]
 fn a_tag_that_was_knocked_aside_is_named() {
@@ -144,6 +150,33 @@ fn a_tag_that_is_rejected_altogether_is_freed_where_the_observations_have_it() {
     }
     println!("freed {n_freed} of {n_rejected}, at most {:.1} mm from its place", 1e3 * worst_m);
     assert!(n_rejected >= 5 && n_freed == n_rejected && worst_m < 0.02, "{n_freed} of {n_rejected}, {worst_m} m");
+}
+
+/// Turned where it hangs, so that it is not elsewhere: it is left out, and the result says so.
+#[test]
+fn a_tag_of_which_no_observation_fits_is_named() {
+    let mut case = case(3, None);
+    let turn = UnitQuaternion::from_scaled_axis(Vector3::z() * FRAC_PI_2);
+    let tag = &mut case.robot.tags[1];
+    tag.base_from_tag = Pose::from_isometry(tag.base_from_tag.isometry() * turn);
+    let id = tag.id.to_string();
+    let n_seen = case.views.iter().filter(|view| view.tags.iter().any(|tag| tag.tag_idx == 1)).count();
+    let findings = case.calibrated().findings;
+    let named: Vec<&Finding> = findings.iter().filter(|found| found.kind == FindingKind::TagLeftOut).collect();
+    let [left_out] = named[..] else { panic!("{findings:?}") };
+    assert_eq!((&left_out.name, left_out.size), (&id, Some(n_seen as f64)));
+}
+
+#[test]
+fn a_size_is_repaired_up_to_twice_the_stated_one() {
+    for (factor, is_repaired) in [(1.25, true), (0.6, true), (3.0, false), (0.3, false)] {
+        let mut case = case(4, None);
+        case.robot.tags[1].size_m *= factor;
+        let calibration = case.calibrated();
+        let is_named = calibration.findings.iter().any(|found| found.kind == FindingKind::TagSize);
+        let is_refused = calibration.refusals.iter().any(|refusal| refusal.code() == Code::RepairTooLarge);
+        assert_eq!((is_named, is_refused), (true, !is_repaired), "{factor}: {:?}", calibration.findings);
+    }
 }
 
 #[test]
