@@ -1,5 +1,5 @@
-//! Searches for a way to read the joints, or to carry the camera, that explains views which no arm of this URDF explains
-//! as they are read.
+//! Searches for a way to read the joints, or to carry the camera, that explains views which no arm of this URDF
+//! explains as they are read.
 //!
 //! Each [`Hypothesis`] changes the readings of all views alike, or the nominal mount; the joints are then estimated by
 //! the datasheet's scales. The score is that of
