@@ -88,12 +88,14 @@ impl MovedTags {
     }
 
     /// The freed tags as findings, which refuse nothing: those in one another's places, and those that were moved
-    /// together, in one.
+    /// together, in one. A tag that is left out all the same is told as such.
     pub(crate) fn report(&self, estimate: &Estimate<'_>, calibration: &mut Calibration) {
         let rings = self.rings(estimate);
         let is_left = |tag: &&usize| !rings.iter().flatten().any(|of_ring| of_ring == *tag);
         let group: Vec<usize> = self.group.iter().filter(is_left).copied().collect();
-        let alone = self.freed.iter().filter(|tag| !self.group.contains(tag)).filter(is_left).map(std::slice::from_ref);
+        let left_out: Vec<usize> = estimate.left_out_tags().map(|(tag, _)| tag).collect();
+        let is_alone = |tag: &&usize| !self.group.contains(tag) && !left_out.contains(tag);
+        let alone = self.freed.iter().filter(is_alone).filter(is_left).map(std::slice::from_ref);
         let moved = (!group.is_empty()).then_some(&group[..]).into_iter().chain(alone);
         let moved = moved.map(|tags| self.finding(estimate, tags));
         for (finding, words) in rings.iter().map(|ring| self.ring_finding(ring)).chain(moved) {

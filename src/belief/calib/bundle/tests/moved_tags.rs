@@ -171,7 +171,10 @@ fn a_tag_of_which_no_observation_fits_is_named() {
 fn a_size_is_repaired_up_to_twice_the_stated_one() {
     for (factor, is_repaired) in [(1.25, true), (0.6, true), (3.0, false), (0.3, false)] {
         let mut case = case(4, None);
-        case.robot.tags[1].size_m *= factor;
+        let n_seen =
+            |idx: &usize| case.views.iter().flat_map(|view| &view.tags).filter(|tag| tag.tag_idx == *idx).count();
+        let most = (0..case.robot.tags.len()).max_by_key(n_seen).expect("tags");
+        case.robot.tags[most].size_m *= factor;
         let calibration = case.calibrated();
         let is_named = calibration.findings.iter().any(|found| found.kind == FindingKind::TagSize);
         let is_refused = calibration.refusals.iter().any(|refusal| refusal.code() == Code::RepairTooLarge);
