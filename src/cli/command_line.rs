@@ -14,6 +14,7 @@ use tracing_subscriber::util::SubscriberInitExt;
 use crate::cli::examples::with_examples;
 #[cfg(feature = "sim")]
 use crate::cli::live::discover;
+use crate::cli::log_lines::LogLines;
 #[cfg(feature = "viewer")]
 use crate::cli::replay;
 use crate::cli::stdout::{be_quiet, complain, is_written};
@@ -175,8 +176,8 @@ fn begin_log(level: tracing::Level) {
         .with_target("rustdds::network", LevelFilter::ERROR)
         .with_target("ros2_client::distributions", LevelFilter::ERROR);
     tracing_subscriber::fmt()
-        .with_writer(std::io::stderr)
-        .with_ansi(std::io::stderr().is_terminal())
+        .with_writer(LogLines::new(level, std::io::stderr))
+        .with_ansi(false)
         .without_time()
         .with_target(false)
         .with_max_level(level)
