@@ -195,7 +195,7 @@ def samples_stamped_in_the_future(peer):
 
 def claimed(name, total, times=1, writers=1, topic=JOINTS, type_name=STATES):
     def fragments(peer):
-        driver = sound(peer)
+        sound(peer)
         writer = announced(peer, topic, type_name)
         for k in range(writers):
             prefix = peer.prefix if k == 0 else os.urandom(12)
@@ -204,7 +204,6 @@ def claimed(name, total, times=1, writers=1, topic=JOINTS, type_name=STATES):
                 peer.send(peer.user, piece, prefix=prefix)
                 time.sleep(0.001)
         time.sleep(LASTS_S)
-        del driver
 
     fragments.__name__ = name
     attack("discover", "listen")(fragments)
@@ -221,13 +220,12 @@ claimed("fragments_of_many_writers", 10_000_000, writers=300)
 @attack("listen", "search")
 def fragments_of_images_without_end(peer):
     """Images of 2 MB of which one fragment each comes."""
-    driver = sound(peer)
+    sound(peer)
     writer = announced(peer, IMAGES, IMAGE)
     end = time.monotonic() + LASTS_S
     while time.monotonic() < end:
         peer.send(peer.user, fragment(ANYBODY, writer, peer.next(writer), 1, 60_000, 2_000_000, bytes(60_000)))
         time.sleep(0.01)
-    del driver
 
 
 @attack("discover", "listen")
@@ -243,18 +241,17 @@ def fragments_that_lie_about_their_place(peer):
 
 @attack("discover", "listen")
 def ten_thousand_participants(peer):
-    driver = sound(peer)
+    sound(peer)
     for n in range(10_000):
         peer.announce(prefix=b"\1\20" + n.to_bytes(10, "big"))
         if n % 20 == 0:
             time.sleep(0.004)
     time.sleep(1)
-    del driver
 
 
 @attack("discover", "listen")
 def ten_thousand_topics(peer):
-    driver = sound(peer)
+    sound(peer)
     peer.join()
     for n in range(10_000):
         kind = (PUBLICATIONS, SUBSCRIPTIONS)[n % 2]
@@ -262,32 +259,29 @@ def ten_thousand_topics(peer):
         if n % 20 == 0:
             time.sleep(0.004)
     time.sleep(1)
-    del driver
 
 
 @attack("discover", "listen")
 def three_thousand_topics_of_joints(peer):
     """A listener to each is a thing of its own."""
-    driver = sound(peer)
+    sound(peer)
     peer.join()
     for n in range(3000):
         peer.writer(n + 10, f"/joints_{n}", STATES)
         if n % 20 == 0:
             time.sleep(0.01)
     time.sleep(1)
-    del driver
 
 
 @attack("discover", "listen")
 def three_thousand_writers_of_the_joints(peer):
-    driver = sound(peer)
+    sound(peer)
     peer.join()
     for n in range(3000):
         peer.writer(n + 10, JOINTS, STATES)
         if n % 20 == 0:
             time.sleep(0.01)
     time.sleep(1)
-    del driver
 
 
 @attack("discover")
@@ -302,7 +296,7 @@ def services_without_end(peer):
 
 @attack("discover", "listen")
 def names_of_topics_that_steer_the_terminal(peer):
-    driver = sound(peer)
+    sound(peer)
     peer.join()
     for n, name in enumerate(["\x1b[2J\x1b]0;mine\x07", "\u202e\u2066\u200fevil", "a\nversion = 9\n#", "\x9b31m\r\b", "x" * 20_000]):
         for kind in (PUBLICATIONS, SUBSCRIPTIONS):
@@ -313,7 +307,6 @@ def names_of_topics_that_steer_the_terminal(peer):
         # Of a node, with properties and user data that say as much.
         peer.announce(None, parameter(0x62, text(name)), parameter(0x2C, text(name)))
     time.sleep(2)
-    del driver
 
 
 @attack("discover", "listen")
@@ -328,7 +321,7 @@ def long_names_of_topics(peer):
 @attack("discover", "listen")
 def readers_that_ask_for_what_is_not_offered(peer):
     """One complaint each."""
-    driver = sound(peer)
+    sound(peer)
     peer.join()
     for n in range(3000):
         persistent = parameter(0x1D, struct.pack("<I", 3))
@@ -337,27 +330,24 @@ def readers_that_ask_for_what_is_not_offered(peer):
         if n % 20 == 0:
             time.sleep(0.01)
     time.sleep(1)
-    del driver
 
 
 @attack("discover", "listen")
 def heartbeats_of_all_numbers(peer):
-    driver = sound(peer)
+    sound(peer)
     peer.join()
     for kind in (PUBLICATIONS, SUBSCRIPTIONS):
         peer.send(peer.metatraffic, heartbeat(entity(kind, BUILTIN_READER), entity(kind, BUILTIN_WRITER), 1, (1 << 62), 1))
     time.sleep(LASTS_S)
-    del driver
 
 
 @attack("discover", "listen")
 def a_gap_of_all_numbers(peer):
-    driver = sound(peer)
+    sound(peer)
     peer.join()
     for kind in (PUBLICATIONS, SUBSCRIPTIONS):
         peer.send(peer.metatraffic, gap(entity(kind, BUILTIN_READER), entity(kind, BUILTIN_WRITER), 2, (1 << 62)))
     time.sleep(LASTS_S)
-    del driver
 
 
 @attack("discover", "listen")
@@ -417,7 +407,7 @@ def locators_without_end(peer):
 @attack("discover", "listen")
 def graphs_of_many_nodes(peer):
     """ros_discovery_info: names of nodes, with the identities of what they have."""
-    driver = sound(peer)
+    sound(peer)
     peer.join()
     writer = entity(5, USER_WRITER)
     peer.endpoint(PUBLICATIONS, writer, "ros_discovery_info", "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_", 2, parameter(0x1D, struct.pack("<I", 1)))
@@ -430,7 +420,6 @@ def graphs_of_many_nodes(peer):
     for _ in range(20):
         peer.publish_large(writer, bytes(body.bytes))
         time.sleep(0.1)
-    del driver
 
 
 def image(body, claimed=None, form="jpeg"):
@@ -446,9 +435,8 @@ def jpeg(width, height):
 
 @attack("discover", "listen", "search")
 def images_that_claim_more_than_they_carry(peer):
-    driver = sound(peer)
+    sound(peer)
     repeat(peer, image(b"\xff\xd8", CLAIM), image(jpeg(65535, 65535)), image(jpeg(1224, 1024)), image(b""), topic=IMAGES, type_name=IMAGE)
-    del driver
 
 
 @attack("search")
@@ -460,25 +448,25 @@ def images_of_many_pixels(peer):
 
     rows = zlib.compress(bytes(20_001 * 2000), 9)
     png = b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", 20_000, 20_000, 8, 0, 0, 0, 0)) + chunk(b"IDAT", rows) + chunk(b"IEND", b"")
-    driver = sound(peer)
+    sound(peer)
     writer = announced(peer, IMAGES, IMAGE)
     again(lambda: peer.publish_large(writer, image(png, form="png")), 0.1)
-    del driver
 
 
 @attack("discover", "listen")
 def images_of_5_mb(peer):
     """Whole, as fast as they go."""
-    driver = sound(peer)
+    sound(peer)
     writer = announced(peer, IMAGES, IMAGE)
     body = image(bytes(5_000_000))
     again(lambda: peer.publish_large(writer, body), 0.1)
-    del driver
 
 
-@attack("drive")
-def nothing_in_motion(peer):
-    """What is spent where nobody harms."""
+def wait_for_motion():
+    """The recording grows from the first motion on."""
+    recording = Path("out/run.mcap.partial")
+    while not recording.is_file() or recording.stat().st_size < 150_000:
+        time.sleep(0.05)
 
 
 def while_it_moves(name, total):
@@ -486,9 +474,8 @@ def while_it_moves(name, total):
 
     def fragment_of(peer):
         writer = announced(peer)
-        time.sleep(20.0)
+        wait_for_motion()
         peer.send(peer.user, fragment(ANYBODY, writer, 1, 1, 60_000, total, bytes(60_000)))
-        time.sleep(60.0)
 
     fragment_of.__name__ = name
     attack("drive")(fragment_of)
@@ -501,9 +488,8 @@ while_it_moves("one_fragment_of_3_gb_in_motion", 3_000_000_000)
 @attack("drive")
 def heartbeats_of_all_numbers_in_motion(peer):
     peer.join()
-    time.sleep(20.0)
+    wait_for_motion()
     peer.send(peer.metatraffic, heartbeat(entity(PUBLICATIONS, BUILTIN_READER), entity(PUBLICATIONS, BUILTIN_WRITER), 1, (1 << 62), 1))
-    time.sleep(60.0)
 
 
 @attack("serve")
@@ -553,12 +539,13 @@ def meet(program, one, command):
         child = measured.Child([program, *map(str, COMMAND[command])], folder, ADDRESS_BYTES)
         attacker = os.fork()
         if attacker == 0:
+            os.chdir(folder)
             play(one, sent, 1 if arm else 0)
         spent = child.wait()
         measured.end(attacker)
         if arm:
-            was_told = "told to stop" in arm.stop().said
-            spent.said = f"[the arm was {'' if was_told else 'not '}told to stop] {spent.said}"
+            arm_ended = "[arm_was_stopped]" if "told to stop" in arm.stop().said else "[arm_was_not_stopped]"
+            spent.said = f"{arm_ended} {spent.said}"
         return struct.unpack("<q", sent)[0], spent
     finally:
         shutil.rmtree(folder, ignore_errors=True)
@@ -580,7 +567,7 @@ def wait_for(participant):
 
 
 def play(one, sent, participant):
-    """Attacks as soon as the other side listens; this process ends with it."""
+    """Attacks as soon as the other side listens, until this process is ended."""
     lock = threading.Lock()
 
     def count(n):
@@ -590,6 +577,8 @@ def play(one, sent, participant):
     try:
         wait_for(participant)
         one(Peer(count, other=participant))
+        # A sound driver next to it works on.
+        time.sleep(measured.WALL_LIMIT_S)
     except BaseException as problem:
         print(f"{one.__name__}: {problem!r}", file=sys.stderr, flush=True)
         os._exit(1)

@@ -75,6 +75,12 @@ class Child:
         return Spent(status, used, said)
 
 
+def shortened(said):
+    """The beginning, and the code at the end."""
+    code = said[said.rfind("[") :] if said.endswith("]") else ""
+    return said if len(said) <= SHOWN else f"{said[:SHOWN]} .. {code}"
+
+
 def end(pid):
     """Ends a child that may have ended."""
     os.kill(pid, signal.SIGKILL)
@@ -97,7 +103,7 @@ class Table:
 
     def add(self, names, n_bytes, spent):
         is_within = spent.is_within(n_bytes)
-        said = "".join(c if c.isprintable() else "?" for c in spent.said[:SHOWN])
+        said = "".join(c if c.isprintable() else "?" for c in shortened(spent.said))
         row = [*names, n_bytes, round(spent.peak_bytes / 1e6), round(spent.processor_s, 1), spent.code, "yes" if is_within else "NO", said]
         self.n, self.beyond = self.n + 1, self.beyond + (not is_within)
         self.csv.writerow(row)

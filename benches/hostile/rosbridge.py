@@ -195,7 +195,7 @@ def pings_without_end(client):
 @attack
 def a_compressed_bomb(client):
     packer = zlib.compressobj(9, zlib.DEFLATED, -15)
-    packed = packer.compress(b" " * (1 << 30)) + packer.flush(zlib.Z_SYNC_FLUSH)
+    packed = packer.compress(b" " * (1 << 27)) + packer.flush(zlib.Z_SYNC_FLUSH)
     client.frame(packed[:-4], more=0x40)
     time.sleep(1)
 
