@@ -1,5 +1,7 @@
 //! The commands: parse, dispatch, exit code.
 
+mod log_lines;
+
 use std::io::{IsTerminal, Write};
 use std::process::ExitCode;
 use std::sync::LazyLock;
@@ -11,10 +13,10 @@ use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::layer::SubscriberExt;
 use tracing_subscriber::util::SubscriberInitExt;
 
+use self::log_lines::LogLines;
 use crate::cli::examples::with_examples;
 #[cfg(feature = "sim")]
 use crate::cli::live::discover;
-use crate::cli::log_lines::LogLines;
 #[cfg(feature = "viewer")]
 use crate::cli::replay;
 use crate::cli::stdout::{be_quiet, complain, is_written};

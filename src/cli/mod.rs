@@ -24,7 +24,6 @@ mod interrupt;
 #[cfg(feature = "sim")]
 mod live;
 mod live_view;
-mod log_lines;
 mod losses;
 mod new_robot;
 mod overrides;

@@ -19,8 +19,8 @@ pub enum LiveError {
     #[error("rosbridge at {url}: {problem}")]
     Rosbridge { url: String, problem: String },
     #[error(
-        "the program grew by {grown_mb} MB since it joined the ROS domain; the limit is {limit_mb} MB. A peer floods the \
-         domain or claims samples that are too large: find it, or move the arm to a domain of its own"
+        "the program grew by {grown_mb} MB since it joined the ROS domain; the limit is {limit_mb} MB. A peer floods \
+         the domain or claims samples that are too large: find it, or move the arm to a domain of its own"
     )]
     Memory { grown_mb: u64, limit_mb: u64 },
     #[error("the arm is not ready: {0}")]
