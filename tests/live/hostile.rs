@@ -73,7 +73,7 @@ fn floods_of_a_domain_stay_within_the_budget() {
     ];
     for row in attacked("dds.py", &names) {
         assert_eq!((row.exit_code.as_str(), row.within.as_str()), ("0", "yes"), "{row:?}");
-        assert!(row.peak_mb < 150.0, "{row:?}");
+        assert!(row.peak_mb < 200.0, "{row:?}");
     }
 }
 
