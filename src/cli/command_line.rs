@@ -1,5 +1,7 @@
 //! The commands: parse, dispatch, exit code.
 
+mod log_lines;
+
 use std::io::{IsTerminal, Write};
 use std::process::ExitCode;
 use std::sync::LazyLock;
@@ -11,6 +13,7 @@ use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::layer::SubscriberExt;
 use tracing_subscriber::util::SubscriberInitExt;
 
+use self::log_lines::LogLines;
 use crate::cli::examples::with_examples;
 #[cfg(feature = "sim")]
 use crate::cli::live::discover;
@@ -175,8 +178,8 @@ fn begin_log(level: tracing::Level) {
         .with_target("rustdds::network", LevelFilter::ERROR)
         .with_target("ros2_client::distributions", LevelFilter::ERROR);
     tracing_subscriber::fmt()
-        .with_writer(std::io::stderr)
-        .with_ansi(std::io::stderr().is_terminal())
+        .with_writer(LogLines::new(level, std::io::stderr))
+        .with_ansi(false)
         .without_time()
         .with_target(false)
         .with_max_level(level)

@@ -4,6 +4,8 @@
 mod connected;
 pub(super) mod discover;
 #[cfg(feature = "live")]
+mod ending;
+#[cfg(feature = "live")]
 mod nudging;
 
 use armcal_core::codes::Code;
@@ -13,6 +15,8 @@ use crate::cli::exit::UsageError;
 use crate::cli::interrupt::Interrupt;
 #[cfg(feature = "live")]
 pub(super) use connected::ConnectedArm;
+#[cfg(feature = "live")]
+pub(super) use ending::watch_memory;
 #[cfg(not(feature = "live"))]
 pub(super) use unconnected::ConnectedArm;
 

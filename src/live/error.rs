@@ -18,6 +18,11 @@ pub enum LiveError {
     Nobody { domain: u16, seconds: f64 },
     #[error("rosbridge at {url}: {problem}")]
     Rosbridge { url: String, problem: String },
+    #[error(
+        "the program grew by {grown_mb} MB since it joined the ROS domain; the limit is {limit_mb} MB. A peer floods \
+         the domain or claims samples that are too large: find it, or move the arm to a domain of its own"
+    )]
+    Memory { grown_mb: u64, limit_mb: u64 },
     #[error("the arm is not ready: {0}")]
     NotReady(String),
     #[error("a message cannot be written: {0}")]
@@ -41,7 +46,9 @@ impl Coded for LiveError {
     fn code(&self) -> Code {
         match self {
             Self::File(error) => error.code(),
-            Self::Dds { .. } | Self::Rosbridge { .. } | Self::Nobody { .. } => Code::ArmConnection,
+            Self::Dds { .. } | Self::Rosbridge { .. } | Self::Nobody { .. } | Self::Memory { .. } => {
+                Code::ArmConnection
+            }
             Self::NotReady(_) => Code::ArmNotReady,
             Self::Encode(_) | Self::Thread(_) => Code::Internal,
         }

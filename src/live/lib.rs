@@ -7,6 +7,7 @@
 //! for tags in a wire's images.
 //! `discover` proposes an arm.toml from what a domain has.
 //! [`serve`] puts any `Arm`, such as the simulated one, behind the topics of a connection.
+//! `memory` ends a program that peers of its domain make grow.
 //! None of this is a safety device.
 #![warn(missing_docs)]
 
@@ -17,6 +18,7 @@ mod guard;
 mod image_search;
 mod leaps;
 mod live_arm;
+mod memory;
 mod messages;
 mod nudge;
 mod ros2;
@@ -34,8 +36,9 @@ pub use error::LiveError;
 pub use guard::StopReason;
 pub use image_search::{ImageSearch, TagFinder};
 pub use live_arm::{LiveArm, Survey};
+pub use memory::MemoryWatch;
 pub use nudge::{Nudge, NudgeProblem};
-pub use ros2::{Ros2Wire, look_around};
+pub use ros2::{Ros2Wire, WatchedWire, look_around};
 pub use rosbridge::RosbridgeWire;
 pub use server::{Pace, Served, serve};
 pub use tag_check::TagCheck;

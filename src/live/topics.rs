@@ -7,6 +7,10 @@ use armcal_core::log::{Stream, decode};
 use armcal_core::streams::{JointCounts, JointSensorSample};
 use armcal_core::time::Stamp;
 
+/// Names that are listed of a message's, and characters of each.
+const MAX_LISTED: usize = 20;
+const MAX_NAME_CHARS: usize = 40;
+
 /// What a topic carries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Content {
@@ -70,9 +74,17 @@ fn joints(bytes: &[u8], names: &[String]) -> Result<JointSensorSample, String> {
         let position = index.and_then(|index| message.position.get(index)).copied();
         counts[joint] = position
             .filter(|position| position.is_finite())
-            .ok_or_else(|| format!("joint readings: no finite position of {name} among {:?}", message.name))?;
+            .ok_or_else(|| format!("joint readings: no finite position of {name} among {}", listed(&message.name)))?;
     }
     Ok(JointSensorSample { stamp, counts })
+}
+
+/// The first names of a message, which may have very many and long ones.
+fn listed(names: &[String]) -> String {
+    let shown: Vec<String> =
+        names.iter().take(MAX_LISTED).map(|name| name.chars().take(MAX_NAME_CHARS).collect()).collect();
+    let further = names.len() - shown.len();
+    if further == 0 { format!("{shown:?}") } else { format!("{shown:?} and {further} more") }
 }
 
 /// The latest stamp of joint readings, `before` where there is none later.
@@ -82,4 +94,32 @@ pub(crate) fn newest_stamp(heard: &[Heard], before: Stamp) -> Stamp {
         _ => None,
     });
     stamps.fold(before, Stamp::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use armcal_core::log::encode;
+    use armcal_core::log::ros::{Header, Time};
+
+    /// Readings of joints that nobody asked for.
+    fn unusable(name: Vec<String>) -> String {
+        let header = Header { stamp: Time { sec: 1, nanosec: 0 }, frame_id: String::new() };
+        let position = vec![0.0; name.len()];
+        let mut bytes = Vec::new();
+        encode(&JointState { header, name, position, ..JointState::default() }, &mut bytes).expect("it is written");
+        match read(Content::Joints, &bytes, &["elbow".to_owned()]) {
+            Heard::Unusable(why) => why,
+            heard => panic!("{heard:?}"),
+        }
+    }
+
+    #[test]
+    fn many_and_long_names_are_listed_in_part() {
+        let numbered = |n: usize| (0..n).map(|k| format!("j{k}")).collect::<Vec<_>>();
+        assert!(unusable(numbered(MAX_LISTED)).ends_with("\"j19\"]"));
+        assert!(unusable(numbered(100_000)).ends_with("\"j19\"] and 99980 more"));
+        let long = unusable(vec!["n".repeat(60_000); MAX_LISTED]);
+        assert!(long.len() < MAX_LISTED * (MAX_NAME_CHARS + 4) + 100, "{} bytes", long.len());
+    }
 }

@@ -18,6 +18,7 @@ use serde_json::Value;
 
 mod discover;
 mod faults;
+mod hostile;
 mod rosbridge;
 #[path = "../support/mod.rs"]
 #[allow(dead_code, reason = "the other tests use the rest")]

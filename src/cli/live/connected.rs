@@ -5,8 +5,8 @@ use std::path::Path;
 
 use anyhow::Result;
 
-use super::Way;
 use super::nudging::nudge_one;
+use super::{Way, watch_memory};
 use crate::cli::interrupt::Interrupt;
 use crate::cli::stdout::note;
 use crate::recorded_images::LiveTagFinder;
@@ -15,7 +15,7 @@ use armcal_belief::session::Progress;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::ArmSensors;
 use armcal_core::stats::quantile;
-use armcal_live::{Connection, ImageSearch, LiveArm, Ros2Wire, RosbridgeWire, Survey, TagCheck, Wire};
+use armcal_live::{Connection, ImageSearch, LiveArm, RosbridgeWire, Survey, TagCheck, WatchedWire, Wire};
 
 /// An arm that was found ready.
 pub struct ConnectedArm(LiveArm<Box<dyn Wire>>);
@@ -53,7 +53,10 @@ impl ConnectedArm {
     pub fn open(way: Way, file: &Path, inputs: &RunInputs) -> Result<Self> {
         let connection = Connection::load(file)?;
         let wire: Box<dyn Wire> = match way {
-            Way::Dds => Box::new(Ros2Wire::open(&connection, &inputs.robot)?),
+            Way::Dds => {
+                let memory = watch_memory(Some(&inputs.robot.camera.lens))?;
+                Box::new(WatchedWire::open(&connection, &inputs.robot, memory)?)
+            }
             Way::Rosbridge => {
                 let bridge = connection.require_rosbridge(file)?;
                 Box::new(RosbridgeWire::open(&connection, bridge, &inputs.robot)?)

@@ -5,6 +5,7 @@ use anyhow::{Context, Result};
 use super::ServeArgs;
 use crate::cli::exit::Exit;
 use crate::cli::interrupt::Interrupt;
+use crate::cli::live::watch_memory;
 use crate::cli::stdout::note;
 use crate::run::RunInputs;
 use armcal_live::{Connection, Pace};
@@ -30,9 +31,12 @@ pub(super) fn serve(args: &ServeArgs) -> Result<Exit> {
         inputs.robot.name, connection.domain, connection.joint_sensors, connection.commands.topic
     ));
     let pace = Pace { factor: args.factor, seconds: args.seconds };
-    let served = armcal_live::serve(&mut world, &inputs.robot, &connection, pace, &|| interrupt.is_requested());
+    let memory = watch_memory(Some(&inputs.robot.camera.lens))?;
+    let is_over = || interrupt.is_requested() || memory.check().is_err();
+    let served = armcal_live::serve(&mut world, &inputs.robot, &connection, pace, &is_over);
     world.finish_truth().context("the truth")?;
     let served = served?;
+    memory.check()?;
     note(format_args!(
         "served {:.1} s of the arm's time in {:.1} s: {} set-points, {} of no use{}",
         served.arm_s,

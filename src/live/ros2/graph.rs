@@ -14,8 +14,12 @@ use armcal_core::time::Stamp;
 
 /// The longest time between two looks at the domain.
 const LISTEN: Duration = Duration::from_millis(20);
+/// A look that takes longer than that is followed by a pause of so many times its length.
+const PAUSES_PER_LOOK: u32 = 4;
 /// Topics and services, and names of one topic's joints, that are kept.
 const MAX_NAMES: usize = 2000;
+/// Topics whose messages are heard: the middleware loses those who would listen to a thousand at once.
+const MAX_LISTENED: usize = 200;
 /// As Cyclone DDS announces itself.
 const CYCLONE_VENDOR: [u8; 2] = [1, 16];
 
@@ -42,11 +46,13 @@ pub fn look_around(domain: &Domain, seconds: f64, is_over: &dyn Fn() -> bool) ->
     let node = Node::new(domain.number, &domain.networks, "armcal_discover")?;
     let start = Instant::now();
     let mut topics: BTreeMap<(String, String), SeenTopic> = BTreeMap::new();
-    let mut heard: BTreeMap<(String, String), Listening> = BTreeMap::new();
+    let mut heard: BTreeMap<(String, String), Option<Listening>> = BTreeMap::new();
     let mut cyclones = Vec::new();
-    let mut services = Vec::new();
+    let (mut services, mut last_look) = (Vec::new(), Duration::ZERO);
     while start.elapsed().as_secs_f64() < seconds && !is_over() {
-        std::thread::sleep(LISTEN);
+        // A domain of thousands of endpoints is looked at less often.
+        std::thread::sleep(LISTEN.max(last_look * PAUSES_PER_LOOK));
+        let look = Instant::now();
         cyclones.extend(new_cyclones(&node));
         let endpoints = endpoints(&node);
         services = endpoints.iter().filter_map(|endpoint| service(endpoint, &cyclones)).take(MAX_NAMES).collect();
@@ -56,16 +62,20 @@ pub fn look_around(domain: &Domain, seconds: f64, is_over: &dyn Fn() -> bool) ->
             if topics.len() >= MAX_NAMES && !topics.contains_key(&key) {
                 continue;
             }
-            if endpoint.is_writer && !heard.contains_key(&key) && is_of_a_stream(&key.1) {
-                let reader = node.reader(&key.0, &key.1)?;
-                heard.insert(key.clone(), Listening { reader, first: None, last: Stamp { nanos: 0 } });
+            let is_new = heard.len() < MAX_LISTENED && !heard.contains_key(&key);
+            if is_new && endpoint.is_writer && is_of_a_stream(&key.1) {
+                // A name that two types share can be listened to once: the rest of the domain counts all the same.
+                let reader = node.reader(&key.0, &key.1).ok();
+                let listening = reader.map(|reader| Listening { reader, first: None, last: Stamp { nanos: 0 } });
+                heard.insert(key.clone(), listening);
             }
             let topic = topics.entry(key.clone()).or_insert_with(|| SeenTopic::new(key.0, key.1));
             *if endpoint.is_writer { &mut topic.publishers } else { &mut topic.subscribers } += 1;
         }
-        for (key, listening) in &mut heard {
+        for (key, listening) in heard.iter_mut().filter_map(|(key, own)| own.as_mut().map(|own| (key, own))) {
             topics.entry(key.clone()).and_modify(|topic| listening.take_all(topic));
         }
+        last_look = look.elapsed();
     }
     Ok(Seen { domain: domain.clone(), topics: topics.into_values().collect(), services })
 }

@@ -1,9 +1,11 @@
 //! A participant of a ROS 2 domain, with readers and writers of raw messages.
 
 use std::net::Ipv4Addr;
+use std::sync::mpsc::channel;
+use std::time::Duration;
 
 use rustdds::no_key::{DataWriter, SimpleDataReader};
-use rustdds::policy::{History, Reliability};
+use rustdds::policy::{History, Reliability, ResourceLimits};
 use rustdds::{
     DomainParticipant, DomainParticipantBuilder, DomainParticipantStatusEvent, DomainParticipantStatusListener, GUID,
     QosPolicies, QosPolicyBuilder, RTPSEntity, StatusEvented, TopicKind,
@@ -11,9 +13,13 @@ use rustdds::{
 
 use super::raw::Raw;
 use crate::LiveError;
+use armcal_core::log::Stream;
 
-/// Messages that a reader keeps while nobody listens.
+/// Messages that a reader keeps while nobody listens, and images: the middleware also keeps those that were taken.
 const DEPTH: i32 = 200;
+const IMAGE_DEPTH: i32 = 4;
+/// The middleware may take so long to leave the domain: a flood of participants keeps it busy for minutes.
+const LEAVE_LIMIT: Duration = Duration::from_secs(2);
 
 /// Our place in the domain.
 pub(crate) struct Node {
@@ -22,6 +28,26 @@ pub(crate) struct Node {
     subscriber: rustdds::Subscriber,
     pub(super) status: DomainParticipantStatusListener,
     pub(super) participant: DomainParticipant,
+    /// Last: everything else of the node is gone before.
+    _leaving: Leaving,
+}
+
+/// Leaves the domain on another thread, and waits for that no longer than the limit.
+struct Leaving(Option<DomainParticipant>);
+
+impl Drop for Leaving {
+    fn drop(&mut self) {
+        let participant = self.0.take();
+        let (told, left) = channel();
+        let leave = move || {
+            drop(participant);
+            // Nobody may wait any more.
+            let _ = told.send(());
+        };
+        if std::thread::Builder::new().name("leaving".to_owned()).spawn(leave).is_ok() {
+            let _ = left.recv_timeout(LEAVE_LIMIT);
+        }
+    }
 }
 
 /// Reads one topic.
@@ -48,8 +74,8 @@ impl Node {
         let publisher =
             participant.create_publisher(&reliable()).map_err(LiveError::dds("no publisher can be made"))?;
         let subscriber =
-            participant.create_subscriber(&best_effort()).map_err(LiveError::dds("no subscriber can be made"))?;
-        Ok(Self { participant, publisher, subscriber, status, ros })
+            participant.create_subscriber(&best_effort(DEPTH)).map_err(LiveError::dds("no subscriber can be made"))?;
+        Ok(Self { _leaving: Leaving(Some(participant.clone())), participant, publisher, subscriber, status, ros })
     }
 
     /// Everything of ours has this prefix.
@@ -58,7 +84,7 @@ impl Node {
     }
 
     pub fn reader(&self, topic: &str, ros_type: &str) -> Result<Reader, LiveError> {
-        let qos = best_effort();
+        let qos = best_effort(if ros_type == Stream::Images.schema().name { IMAGE_DEPTH } else { DEPTH });
         let dds_topic = self.topic(topic, ros_type, &qos)?;
         let reader = self.subscriber.create_simple_datareader_no_key(&dds_topic, Some(qos));
         Ok(Reader(reader.map_err(LiveError::dds(topic))?))
@@ -109,9 +135,10 @@ impl Writer {
 }
 
 /// Matches every writer.
-fn best_effort() -> QosPolicies {
-    let builder = QosPolicyBuilder::new().reliability(Reliability::BestEffort);
-    builder.history(History::KeepLast { depth: DEPTH }).build()
+fn best_effort(depth: i32) -> QosPolicies {
+    let limits = ResourceLimits { max_samples: depth, max_instances: depth, max_samples_per_instance: depth };
+    let builder = QosPolicyBuilder::new().reliability(Reliability::BestEffort).resource_limits(limits);
+    builder.history(History::KeepLast { depth }).build()
 }
 
 /// Matches every reader.

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::ServiceMapping;
+
 /// std_srvs/srv/Trigger, asked; an empty request is one byte.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct TriggerRequest {
@@ -18,3 +20,11 @@ pub(crate) struct TriggerResponse {
 }
 
 impl ros2_client::Message for TriggerResponse {}
+
+/// The middleware's name of a mapping.
+pub(crate) fn service_mapping(mapping: ServiceMapping) -> ros2_client::ServiceMapping {
+    match mapping {
+        ServiceMapping::Enhanced => ros2_client::ServiceMapping::Enhanced,
+        ServiceMapping::Cyclone => ros2_client::ServiceMapping::Cyclone,
+    }
+}

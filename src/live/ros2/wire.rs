@@ -4,11 +4,11 @@ use std::time::{Duration, Instant};
 
 use rustdds::mio1::{Events, Interest, Poll, Token};
 
-use super::{MAX_TAKEN, Node, Reader, TriggerRequest, TriggerResponse, Writer};
-use crate::messages::{BOOL, Bool, Command};
+use super::stopper::Stopper;
+use super::{MAX_TAKEN, Node, Reader, Writer};
+use crate::messages::Command;
 use crate::topics::{Content, contents, newest_stamp, read};
-use crate::{Connection, Heard, LiveError, ServiceMapping, Wire};
-use armcal_core::log::encode;
+use crate::{Connection, Heard, LiveError, Wire};
 use armcal_core::robot::Robot;
 use armcal_core::streams::JointCounts;
 use armcal_core::time::Stamp;
@@ -20,8 +20,7 @@ pub struct Ros2Wire {
     names: Vec<String>,
     readers: Vec<(Content, Reader)>,
     commands: Writer,
-    stop: Option<Writer>,
-    stop_service: Option<ros2_client::Client<TriggerRequest, TriggerResponse>>,
+    stop: Stopper,
     poll: Poll,
     events: Events,
     start: Instant,
@@ -39,9 +38,7 @@ impl Ros2Wire {
         let mut node = Node::new(connection.domain, &connection.networks, "armcal")?;
         let names = robot.joint_names().iter().map(|name| connection.driver_name(name).to_owned()).collect();
         let commands = node.writer(&connection.commands.topic, connection.commands.message_type.name())?;
-        let stop = &connection.stop;
-        let stop_topic = (!stop.topic.is_empty()).then(|| node.writer(&stop.topic, BOOL)).transpose()?;
-        let stop_service = (!stop.service.is_empty()).then(|| trigger(&mut node, connection)).transpose()?;
+        let stop = Stopper::new(&mut node, connection)?;
         let poll = Poll::new().map_err(LiveError::dds("polling"))?;
         let mut readers = Vec::new();
         for (content, topic) in contents(connection) {
@@ -56,8 +53,7 @@ impl Ros2Wire {
             names,
             readers,
             commands,
-            stop: stop_topic,
-            stop_service,
+            stop,
             poll,
             events: Events::with_capacity(64),
             start: Instant::now(),
@@ -76,24 +72,6 @@ impl Ros2Wire {
         }
         self.newest = newest_stamp(&heard[before..], self.newest);
         heard.len() > before
-    }
-}
-
-fn trigger(
-    node: &mut Node,
-    connection: &Connection,
-) -> Result<ros2_client::Client<TriggerRequest, TriggerResponse>, LiveError> {
-    let name = ros2_client::Name::parse(&connection.stop.service).map_err(LiveError::dds("stop.service"))?;
-    let mapping = service_mapping(connection.stop.mapping);
-    let qos = ros2_client::QosProfile::publisher_default();
-    let type_name = ros2_client::ServiceTypeName::new("std_srvs", "Trigger");
-    node.ros.create_client(mapping, &name, &type_name, qos.clone(), qos).map_err(LiveError::dds("stop.service"))
-}
-
-pub(crate) fn service_mapping(mapping: ServiceMapping) -> ros2_client::ServiceMapping {
-    match mapping {
-        ServiceMapping::Enhanced => ros2_client::ServiceMapping::Enhanced,
-        ServiceMapping::Cyclone => ros2_client::ServiceMapping::Cyclone,
     }
 }
 
@@ -125,16 +103,6 @@ impl Wire for Ros2Wire {
     }
 
     fn stop(&mut self) -> Result<(), LiveError> {
-        let by_service = self.stop_service.as_ref().map(|client| {
-            let sent = client.send_request(TriggerRequest::default());
-            sent.map(|_| ()).map_err(LiveError::dds("the stop service"))
-        });
-        let by_topic = self.stop.as_ref().map(|stop| {
-            let mut bytes = Vec::new();
-            encode(&Bool { data: true }, &mut bytes).map_err(|error| LiveError::Encode(error.into()))?;
-            stop.write(bytes)
-        });
-        let mut all = by_service.into_iter().chain(by_topic);
-        all.try_for_each(|sent| sent)
+        self.stop.stop()
     }
 }

@@ -10,9 +10,12 @@ use crate::{Connection, Heard, LiveError};
 use armcal_core::log::encode;
 use armcal_core::log::ros::{AprilTagDetectionArray, CompressedImage, FluidPressure, Imu, JointState, Temperature};
 use armcal_core::log::{RosMessage, Stream};
+use armcal_core::text::printable;
 
 /// Most values of one message: each takes many bytes of memory for two of text.
 const MAX_VALUES: usize = 4 << 20;
+/// Most keys of one message: each takes ten times as much as a value.
+const MAX_KEYS: usize = 200_000;
 /// Of what the other side says, so many characters are repeated.
 const MAX_SHOWN: usize = 200;
 
@@ -48,8 +51,12 @@ impl Listener {
 
     /// One message of the bridge, whatever it is.
     pub fn read(&self, text: &str) -> Said {
-        if text.bytes().filter(|byte| *byte == b',').count() >= MAX_VALUES {
+        let n_bytes = |wanted: u8| text.bytes().filter(|byte| *byte == wanted).count();
+        if n_bytes(b',') >= MAX_VALUES {
             return Said::Complaint(format!("it sent a message of {MAX_VALUES} values or more"));
+        }
+        if n_bytes(b':') >= MAX_KEYS {
+            return Said::Complaint(format!("it sent a message of {MAX_KEYS} keys or more"));
         }
         let message: Value = match serde_json::from_str(text) {
             Ok(message) => message,
@@ -137,7 +144,8 @@ fn answer(message: &Value) -> Said {
 
 /// The beginning of a text of the other side, in one line.
 pub(super) fn shown(text: &str) -> String {
-    text.chars().take(MAX_SHOWN).map(|c| if c.is_control() { ' ' } else { c }).collect()
+    let line: String = text.chars().take(MAX_SHOWN).map(|c| if c.is_control() { ' ' } else { c }).collect();
+    printable(&line).into_owned()
 }
 
 /// What is said first: everything that is heard of the arm, and everything that it will be told.

@@ -385,18 +385,20 @@ fn what_says_nothing_usable_is_told() {
         message.to_string()
     };
     let many = format!("{{\"op\":\"publish\",\"msg\":[0{}]}}", ",0".repeat(4 << 20));
+    let keys = format!("{{\"op\":\"publish\",\"msg\":{{\"a\":0{}}}}}", ",\"a\":0".repeat(200_000));
     let texts = [
         "",
         "[[[",
         "7",
         &"[".repeat(100_000),
         &many,
+        &keys,
         "{\"op\":\"fragment\"}",
         "{\"op\":\"publish\",\"topic\":\"/other\",\"msg\":{}}",
         "{\"op\":\"publish\",\"topic\":\"/joint_sensors\"}",
         &reading(2, 0.5, &stowed()).to_string(),
         &unfinite,
-        "{\"op\":\"status\",\"level\":\"error\",\"msg\":\"no\\nsuch type\"}",
+        "{\"op\":\"status\",\"level\":\"error\",\"msg\":\"no\\nsuch\\u202e type\"}",
         "{\"op\":\"service_response\",\"service\":\"/halt\",\"result\":false,\"values\":\"gone\"}",
         "{\"op\":\"service_response\",\"service\":\"/halt\",\"result\":true,\"values\":{\"success\":false}}",
     ];

@@ -7,6 +7,7 @@ use super::DiscoverArgs;
 use crate::cli::calibration_inputs::load_robot;
 use crate::cli::exit::{Exit, UsageError};
 use crate::cli::interrupt::Interrupt;
+use crate::cli::live::watch_memory;
 use crate::cli::stdout::{note, say};
 use crate::output;
 use armcal_core::text::counted;
@@ -21,7 +22,9 @@ pub(super) fn discover(args: &DiscoverArgs) -> Result<Exit> {
     }
     let interrupt = Interrupt::install()?;
     let domain = Domain { number: args.domain, networks: args.networks.clone() };
-    let seen = look_around(&domain, args.seconds, &|| interrupt.is_requested())?;
+    let memory = watch_memory(None)?;
+    let seen = look_around(&domain, args.seconds, &|| interrupt.is_requested() || memory.check().is_err())?;
+    memory.check()?;
     if seen.topics.is_empty() {
         return Err(LiveError::Nobody { domain: args.domain, seconds: args.seconds }.into());
     }
