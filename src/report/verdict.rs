@@ -192,36 +192,11 @@ fn of_finding(found: &Finding, since: &str) -> Option<Repair> {
             format!("correct the scale of {name} in robot.toml"),
             "the result uses the estimated scale",
         ),
-        FindingKind::TagMoved => (
-            format!("tag {name} is {} from its surveyed position", size(found)),
-            format!("fasten tag {name}, or correct the survey"),
-            "the result uses the estimated position",
-        ),
-        FindingKind::TagsMoved => (
-            format!("tags {name} are {} (median) from their surveyed positions", size(found)),
-            format!("fasten tags {name}, or correct the survey"),
-            "the result uses the estimated positions",
-        ),
-        FindingKind::TagSwapped => (
-            format!("tags {name} are exchanged"),
-            "correct their ids in the survey".to_owned(),
-            "the result uses the estimated positions",
-        ),
-        FindingKind::TagSize if name == "all" => (
-            format!("all tags are {} than the survey says", differs(found, ["larger", "smaller"])),
-            "measure the side of one black square, and correct the survey".to_owned(),
-            "the result uses the estimated size",
-        ),
-        FindingKind::TagSize => (
-            format!("tag {name} is {} than the survey says", differs(found, ["larger", "smaller"])),
-            "measure the side of its black square, and correct the survey".to_owned(),
-            "the result uses the estimated size",
-        ),
-        FindingKind::TagLeftOut => (
-            format!("tag {name} is left out: none of its observations fits the other tags"),
-            format!("check id, size and pose of tag {name} in the tag map"),
-            "the result does without it",
-        ),
+        FindingKind::TagMoved
+        | FindingKind::TagsMoved
+        | FindingKind::TagSwapped
+        | FindingKind::TagSize
+        | FindingKind::TagLeftOut => of_tags(found),
         FindingKind::Lens => (
             match found.size {
                 Some(ratio) if ratio.abs() < LEAST_FOCAL => {
@@ -250,6 +225,43 @@ fn of_finding(found: &Finding, since: &str) -> Option<Repair> {
         _ => return None,
     };
     Some(Repair { code: found.code(), cause, remedy, taken })
+}
+
+/// Cause, remedy and what the result does about tags that are not as surveyed.
+fn of_tags(found: &Finding) -> (String, String, &'static str) {
+    let name = &found.name;
+    match found.kind {
+        FindingKind::TagMoved => (
+            format!("tag {name} is {} from its surveyed position", size(found)),
+            format!("fasten tag {name}, or correct the survey"),
+            "the result uses the estimated position",
+        ),
+        FindingKind::TagsMoved => (
+            format!("tags {name} are {} (median) from their surveyed positions", size(found)),
+            format!("fasten tags {name}, or correct the survey"),
+            "the result uses the estimated positions",
+        ),
+        FindingKind::TagSwapped => (
+            format!("tags {name} are exchanged"),
+            "correct their ids in the survey".to_owned(),
+            "the result uses the estimated positions",
+        ),
+        FindingKind::TagSize if name == "all" => (
+            format!("all tags are {} than the survey says", differs(found, ["larger", "smaller"])),
+            "measure the side of one black square, and correct the survey".to_owned(),
+            "the result uses the estimated size",
+        ),
+        FindingKind::TagSize => (
+            format!("tag {name} is {} than the survey says", differs(found, ["larger", "smaller"])),
+            "measure the side of its black square, and correct the survey".to_owned(),
+            "the result uses the estimated size",
+        ),
+        _ => (
+            format!("tag {name} is left out: none of its observations fits the other tags"),
+            format!("check id, size and pose of tag {name} in the tag map"),
+            "the result does without it",
+        ),
+    }
 }
 
 /// `25.0 % larger`.

@@ -477,7 +477,7 @@ impl Refusal {
 }
 
 /// Cause, evidence, what to do next, and the code.
-/// Those whose advice is told: all, or the first one where it explains the others.
+/// Those whose advice counts: all, or the first one where it explains the others.
 #[must_use]
 pub fn with_advice(refusals: &[Refusal]) -> &[Refusal] {
     let explains = refusals.first().is_some_and(Refusal::explains_others);

@@ -30,7 +30,6 @@ mod permutation_test;
 pub(crate) mod prior_terms;
 pub(crate) mod priors;
 pub(crate) mod problem;
-mod reading_hypothesis;
 mod reading_search;
 mod reservations;
 mod robust_start;

@@ -6,6 +6,8 @@
 //! [`failure_detection`](crate::calib::bundle::failure_detection). A hypothesis is named if it is likelier than the
 //! readings as they are by [`MARGIN`], and if its estimate leaves no sensor suspicious.
 
+mod hypothesis;
+
 use std::f64::consts::TAU;
 
 use crate::calib::angles_by_camera::distance_cost;
@@ -14,7 +16,7 @@ use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::failure_detection::{is_suspicious, score};
 use crate::calib::bundle::failures::{Failure, FailureAdjusted};
 use crate::calib::bundle::input::HyperparameterMode;
-use crate::calib::bundle::reading_hypothesis::{Hypothesis, SCALE_STD, ZERO_STD_RAD, has_known_mount};
+use crate::calib::bundle::reading_search::hypothesis::{Hypothesis, SCALE_STD, ZERO_STD_RAD, has_known_mount};
 use crate::calib::methods::position_problem::PositionProblem;
 use crate::calib::parameters::JointParameters;
 use crate::calib::reading_error::{JointZero, MisreadReadings, ReadingError};

@@ -88,7 +88,7 @@ impl MovedTags {
     }
 
     /// The freed tags as findings, which refuse nothing: those in one another's places, and those that were moved
-    /// together, in one. A tag that is left out all the same is told as such.
+    /// together, in one. A tag that is left out has a finding of its own.
     pub(crate) fn report(&self, estimate: &Estimate<'_>, calibration: &mut Calibration) {
         let rings = self.rings(estimate);
         let is_left = |tag: &&usize| !rings.iter().flatten().any(|of_ring| of_ring == *tag);

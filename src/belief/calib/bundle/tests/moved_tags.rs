@@ -175,6 +175,7 @@ fn a_size_is_repaired_up_to_twice_the_stated_one() {
             |idx: &usize| case.views.iter().flat_map(|view| &view.tags).filter(|tag| tag.tag_idx == *idx).count();
         let most = (0..case.robot.tags.len()).max_by_key(n_seen).expect("tags");
         case.robot.tags[most].size_m *= factor;
+        case.views.iter_mut().for_each(|view| view.see_through(&case.robot));
         let calibration = case.calibrated();
         let is_named = calibration.findings.iter().any(|found| found.kind == FindingKind::TagSize);
         let is_refused = calibration.refusals.iter().any(|refusal| refusal.code() == Code::RepairTooLarge);

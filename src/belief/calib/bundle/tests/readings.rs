@@ -113,7 +113,7 @@ fn readings_of_the_next_or_the_previous_view_are_named() {
     }
 }
 
-/// A link before or after the stated one, and the axes of a body's frame in place of an optical one.
+/// A link before or after the stated one, and the axes of a body's frame instead of an optical one.
 #[test]
 fn a_camera_on_another_link_or_with_other_axes_is_named() {
     let optical = UnitQuaternion::new_normalize(Quaternion::new(0.5, -0.5, 0.5, -0.5));

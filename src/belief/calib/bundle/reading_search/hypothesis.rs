@@ -44,7 +44,7 @@ pub(super) enum Hypothesis {
         joint: usize,
         factor: f64,
     },
-    /// The readings of each view stand at the view so many later.
+    /// Each view has its own readings at the view so many later.
     Shifted(isize),
     /// The camera is behind so many joints, and its frame is turned.
     Camera {
