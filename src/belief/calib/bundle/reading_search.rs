@@ -29,14 +29,15 @@ use armcal_core::sensor::wrap_symmetric;
 const MARGIN: f64 = 60.0;
 /// Hypotheses within this of the best one are printed with it, in the same unit: odds of e^5.
 const ALTERNATIVE: f64 = 10.0;
-/// A camera elsewhere is as rare as this against a sensor's zero, in the same unit: some of both look alike.
+/// Added to the score of a camera hypothesis, in the same unit (assumed): where it explains the views as well as a
+/// sensor's zero does, the zero is named first.
 const CAMERA_HANDICAP: f64 = 5.0;
 const MAX_ALTERNATIVES: usize = 2;
 /// More views do not change the answer; they would cost time.
 const MAX_VIEWS: usize = 40;
 /// Hypotheses that are estimated: those under which the nominal arm places the tags nearest to their survey.
 const MAX_ESTIMATED: usize = 36;
-/// So many of them are of the camera.
+/// Hypotheses among them that move or turn the camera.
 const MAX_OF_CAMERA: usize = 6;
 /// A zero error in stated sigmas below which a sensor is as stated.
 const MIN_SIGMAS: f64 = 4.0;
@@ -64,8 +65,8 @@ pub(crate) struct ReadingSearch<'a> {
 impl ReadingSearch<'_> {
     /// The reading error, if one explains the views and the readings as they are do not.
     pub(crate) fn find(&self) -> Option<MisreadReadings> {
-        let stride = self.views.len().div_ceil(MAX_VIEWS).max(1);
-        let views = self.views_by(&Hypothesis::Shifted(0));
+        let stride = self.stride();
+        let views: Vec<View> = self.views.iter().step_by(stride).cloned().collect();
         let before_m = PositionProblem::new(self.robot, &views).rms_m(&JointParameters::default())?;
         let as_read = self.score_as_read(&views, stride);
         let turned = Hypothesis::other_turns(self.robot, self.views).and_then(|hypothesis| self.attempt(hypothesis));
@@ -95,14 +96,18 @@ impl ReadingSearch<'_> {
         Some(MisreadReadings { found, alternatives, tag_error_m: before_m, corrected_m: best.tag_error_m })
     }
 
-    /// At most about [`MAX_VIEWS`] of the views, read that way.
+    /// One view of so many is looked at.
+    fn stride(&self) -> usize {
+        self.views.len().div_ceil(MAX_VIEWS).max(1)
+    }
+
+    /// Some of the views, read that way.
     fn views_by(&self, hypothesis: &Hypothesis) -> Vec<View> {
-        let stride = self.views.len().div_ceil(MAX_VIEWS).max(1);
-        let is_neighbour = matches!(hypothesis, Hypothesis::Shifted(_));
-        if is_neighbour {
-            return hypothesis.applied(self.robot, self.views).into_iter().step_by(stride).collect();
+        // Only readings of another view need all of them.
+        if matches!(hypothesis, Hypothesis::Shifted(_)) {
+            return hypothesis.applied(self.robot, self.views).into_iter().step_by(self.stride()).collect();
         }
-        let views: Vec<View> = self.views.iter().step_by(stride).cloned().collect();
+        let views: Vec<View> = self.views.iter().step_by(self.stride()).cloned().collect();
         hypothesis.applied(self.robot, &views)
     }
 

@@ -29,7 +29,7 @@ fn the_words_of_each_reason() {
     assert_eq!(in_words(&[]), None);
 }
 
-/// What else a wrong file brings about needs no advice of its own.
+/// Reasons that follow from a wrong input come without advice.
 #[test]
 fn the_advice_of_a_wrong_input_is_the_only_one() {
     let outliers = || Refusal::Outliers { outliers: 40, observations: 100 };

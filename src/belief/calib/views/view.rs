@@ -233,7 +233,7 @@ impl ObservationRejection {
         }
     }
 
-    /// What to do where no detection is left because of it.
+    /// Advice for a recording that lost all detections for this reason.
     pub(crate) fn remedy(self) -> &'static str {
         match self {
             Self::UnknownTag => "give a tag map that has the tags' ids",

@@ -53,7 +53,7 @@ pub(super) enum Hypothesis {
     },
 }
 
-/// The nominal mount tells where the camera is.
+/// True where the stated sigmas of the camera mount are within [`KNOWN_MOUNT`].
 pub(super) fn has_known_mount(robot: &Robot) -> bool {
     robot.camera.mount_std_m <= KNOWN_MOUNT[0] && robot.camera.mount_std_rad <= KNOWN_MOUNT[1]
 }
