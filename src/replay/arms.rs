@@ -1,8 +1,8 @@
 //! The true and the believed arm, the camera's view cone, captured views and the tool's path.
 
+use crate::rerun::components::Radius;
+use crate::rerun::{LineStrips3D, Points3D};
 use nalgebra::Vector3;
-use rerun::components::Radius;
-use rerun::{LineStrips3D, Points3D};
 
 use crate::colors;
 use crate::entities::BASE;

@@ -3,17 +3,17 @@
 
 use std::collections::BTreeSet;
 
-use rerun::AsComponents;
-use rerun::external::re_sdk_types::blueprint::archetypes::{
+use crate::rerun::AsComponents;
+use re_sdk_types::blueprint::archetypes::{
     Background, ContainerBlueprint, EyeControls3D, LineGrid3D, PanelBlueprint, PlotLegend, ScalarAxis, TextLogColumns,
     TimeAxis, TimePanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint, VisualBounds2D,
 };
-use rerun::external::re_sdk_types::blueprint::components::{
+use re_sdk_types::blueprint::components::{
     BackgroundKind, ContainerKind, Corner2D, PanelState, PlayState, RootContainer,
 };
-use rerun::external::re_sdk_types::blueprint::datatypes::{TextLogColumn, TextLogColumnKind};
-use rerun::external::re_sdk_types::datatypes::{Range1D, Range2D, TimeInt, TimeRange, TimeRangeBoundary};
-use rerun::external::uuid::Uuid;
+use re_sdk_types::blueprint::datatypes::{TextLogColumn, TextLogColumnKind};
+use re_sdk_types::datatypes::{Range1D, Range2D, TimeInt, TimeRange, TimeRangeBoundary};
+use re_sdk_types::external::uuid::Uuid;
 
 use crate::axis::labelled_range;
 use crate::colors;

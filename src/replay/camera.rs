@@ -1,7 +1,7 @@
 //! The wrist camera's image plane: detections, rejects, and tags as the belief predicts them.
 
+use crate::rerun::{EncodedImage, Image, LineStrips2D, Radius};
 use nalgebra::{Isometry3, Point3, Vector2, Vector3};
-use rerun::{EncodedImage, Image, LineStrips2D, Radius};
 
 use crate::colors;
 use crate::entities::CAMERA;

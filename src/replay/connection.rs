@@ -3,10 +3,9 @@
 use std::sync::mpsc::channel;
 use std::time::Duration;
 
-use rerun::external::re_grpc_client::write::ClientConnectionState;
-use rerun::log::LogMsg;
-use rerun::sink::{GrpcSink, LogSink};
-use rerun::{StoreId, StoreKind};
+use crate::rerun::log::LogMsg;
+use crate::rerun::{StoreId, StoreKind};
+use re_grpc_client::write::{Client, ClientConnectionState, Options};
 
 use crate::error::ReplayError;
 use crate::news::Update;
@@ -35,7 +34,7 @@ pub(super) enum Taken {
 /// A viewer that listens, or may listen some day.
 pub(super) struct Viewer {
     address: String,
-    sink: GrpcSink,
+    client: Client,
     recording: StoreId,
     n_layouts: usize,
 }
@@ -54,11 +53,11 @@ impl Viewer {
             return Err(wrong());
         }
         let uri = format!("rerun+http://{address}/proxy").parse().map_err(|_| wrong())?;
-        Ok(Self { address: address.to_owned(), sink: GrpcSink::new(uri), recording, n_layouts: 0 })
+        Ok(Self { address: address.to_owned(), client: Client::new(uri, Options::default()), recording, n_layouts: 0 })
     }
 
     pub fn state(&self) -> State {
-        match self.sink.status() {
+        match self.client.status() {
             ClientConnectionState::Connecting { .. } => State::Away,
             ClientConnectionState::Connected => State::Connected,
             ClientConnectionState::Disconnected(_) => State::Lost,
@@ -73,16 +72,16 @@ impl Viewer {
     /// Sends an update; waits while the viewer takes nothing.
     pub fn tell(&mut self, update: Update) -> Result<(), ReplayError> {
         if let Some(layout) = update.layout {
-            self.sink.send(rrd::store_info(&self.recording));
+            self.client.send_blocking(rrd::store_info(&self.recording));
             self.n_layouts += 1;
             let id = format!("layout-{}-{}", self.recording.recording_id(), self.n_layouts);
             for message in rrd::layout(&self.recording, &id, &layout).map_err(ReplayError::Live)? {
-                self.sink.send(message);
+                self.client.send_blocking(message);
             }
         }
         for chunk in update.chunks {
             let message = chunk.to_arrow_msg().map_err(|error| ReplayError::Live(error.into()))?;
-            self.sink.send(LogMsg::ArrowMsg(self.recording.clone(), message));
+            self.client.send_blocking(LogMsg::ArrowMsg(self.recording.clone(), message));
         }
         Ok(())
     }
@@ -90,14 +89,14 @@ impl Viewer {
     /// Ends the connection; what the viewer does not take within `patience` it does not get.
     pub fn finish(self, patience: Duration) -> Taken {
         if self.state() != State::Connected {
-            // A sink that is dropped waits for whoever is not there.
-            std::mem::forget(self.sink);
+            // A client that is dropped waits for whoever is not there.
+            std::mem::forget(self.client);
             return Taken::InPart;
         }
         let (done, is_done) = channel();
         // Dropped it waits until all was taken, for ever where nothing is.
         let finish = move || {
-            drop(self.sink);
+            drop(self.client);
             let _ = done.send(());
         };
         let started = std::thread::Builder::new().name("live view's end".to_owned()).spawn(finish);

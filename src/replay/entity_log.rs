@@ -5,15 +5,15 @@
 
 use std::collections::BTreeMap;
 
+use crate::rerun::log::{Chunk, ChunkId, RowId, TimeColumn};
+use crate::rerun::time::{TimeCell, TimePoint, Timeline};
+use crate::rerun::{AsComponents, Clear, EntityPath, SerializedComponentBatch, Transform3D};
 use nalgebra::Isometry3;
-use rerun::external::arrow::array::{Array, ListArray};
-use rerun::external::arrow::buffer::{NullBuffer, OffsetBuffer};
-use rerun::external::arrow::datatypes::Field;
-use rerun::external::re_log_encoding::EncodeError;
-use rerun::external::re_log_types::external::re_tuid::Tuid;
-use rerun::log::{Chunk, ChunkId, RowId, TimeColumn};
-use rerun::time::{TimeCell, TimePoint, Timeline};
-use rerun::{AsComponents, Clear, EntityPath, SerializedComponentBatch, Transform3D};
+use re_log_encoding::EncodeError;
+use re_log_types::external::re_tuid::Tuid;
+use re_sdk_types::external::arrow::array::{Array, ListArray};
+use re_sdk_types::external::arrow::buffer::{NullBuffer, OffsetBuffer};
+use re_sdk_types::external::arrow::datatypes::Field;
 
 use crate::poses::{quaternion, transform, vector};
 use crate::shown::Shown;
@@ -240,16 +240,16 @@ fn poses_chunk(
 
 #[cfg(test)]
 mod tests {
+    use crate::rerun::log::LogMsg;
+    use crate::rerun::{StoreId, StoreKind};
     use nalgebra::{UnitQuaternion, Vector3};
-    use rerun::external::re_log_encoding::{Encoder, EncodingOptions};
-    use rerun::log::LogMsg;
-    use rerun::{StoreId, StoreKind};
+    use re_log_encoding::{Encoder, EncodingOptions};
 
     use super::*;
 
     fn bytes(chunk: &Chunk) -> Vec<u8> {
         let mut out = Vec::new();
-        let version = rerun::build_info().version;
+        let version = crate::rerun::CrateVersion::LOCAL;
         let mut encoder = Encoder::new_eager(version, EncodingOptions::PROTOBUF_COMPRESSED, &mut out).unwrap();
         encoder.do_not_emit_footer();
         let store = StoreId::new(StoreKind::Recording, "test", "test");

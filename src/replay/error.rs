@@ -3,7 +3,7 @@
 use armcal_core::codes::{Code, Coded};
 use std::path::PathBuf;
 
-use rerun::external::re_log_encoding::EncodeError;
+use re_log_encoding::EncodeError;
 
 use armcal_core::log::{CdrError, LogError};
 

@@ -27,6 +27,7 @@ mod plots;
 mod poses;
 mod read;
 mod recording;
+mod rerun;
 mod residuals;
 mod rrd;
 mod scene;

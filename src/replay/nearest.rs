@@ -3,11 +3,11 @@
 //! Which parts these are, and how far apart, is the truth's or, without any, what planning measures at the believed
 //! angles; the points are found between the shapes of the two as they are drawn.
 
+use crate::rerun::LineStrips3D;
 use nalgebra::{Isometry3, Vector3};
 use parry3d::math::{Pose3, Vec3};
 use parry3d::query::{self, ClosestPoints};
 use parry3d::shape::SharedShape;
-use rerun::LineStrips3D;
 
 use crate::colors::{self, Rgba};
 use crate::entities::BASE;

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use rerun::log::{Chunk, ChunkId, RowId};
+use crate::rerun::log::{Chunk, ChunkId, RowId};
 
 use crate::ReplayError;
 use crate::blueprint::{self, Entry};

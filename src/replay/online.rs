@@ -1,6 +1,6 @@
 //! What was believed online: the error expected of the tool, how far each sensor's offset has come, and what happened.
 
-use rerun::{Scalars, SeriesLines, StateChange, StateConfiguration};
+use crate::rerun::{Scalars, SeriesLines, StateChange, StateConfiguration};
 
 use crate::colors;
 use crate::entities::{EVENTS_LANE, OFFSET_CHANGE, TOOL_ERROR};

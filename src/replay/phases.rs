@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use rerun::{StateChange, StateConfiguration, TextLog, TextLogLevel};
+use crate::rerun::{StateChange, StateConfiguration, TextLog, TextLogLevel};
 
 use crate::colors::{self, Rgba};
 use crate::entities::{LOG, PHASE_LANE, TARGETS_LANE, VIEWS_LANE};

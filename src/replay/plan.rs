@@ -5,8 +5,8 @@
 
 use std::path::{Path, PathBuf};
 
-use rerun::components::MarkerShape;
-use rerun::{Boxes3D, FillMode, LineStrips3D, Points3D, Scalars, SeriesLines, SeriesPoints};
+use crate::rerun::components::MarkerShape;
+use crate::rerun::{Boxes3D, FillMode, LineStrips3D, Points3D, Scalars, SeriesLines, SeriesPoints};
 
 use crate::colors::{self, Rgba};
 use crate::entities::{BASE, CLEARANCE, PREDICTED};

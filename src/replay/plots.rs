@@ -1,7 +1,7 @@
 //! Scalars over time.
 
-use rerun::components::MarkerShape;
-use rerun::{Scalars, SeriesLines, SeriesPoints};
+use crate::rerun::components::MarkerShape;
+use crate::rerun::{Scalars, SeriesLines, SeriesPoints};
 
 use crate::colors::{self, Rgba};
 use crate::entities::{COUNTS, JOINT_ANGLE, JOINT_ERROR, TEMPERATURE, TOOL_ERROR};

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use rerun::{Boxes3D, FillMode, Points3D};
+use crate::rerun::{Boxes3D, FillMode, Points3D};
 
 use crate::colors::{self, Rgba};
 use crate::entities::BASE;

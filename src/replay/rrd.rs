@@ -4,11 +4,11 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-use rerun::external::re_log_encoding::{EncodeError, Encoder, EncodingOptions};
-use rerun::external::re_log_types::external::re_tuid::Tuid;
-use rerun::external::re_log_types::{BlueprintActivationCommand, SetStoreInfo, StoreInfo, StoreSource};
-use rerun::log::LogMsg;
-use rerun::{StoreId, StoreKind};
+use crate::rerun::log::LogMsg;
+use crate::rerun::{StoreId, StoreKind};
+use re_log_encoding::{EncodeError, Encoder, EncodingOptions};
+use re_log_types::external::re_tuid::Tuid;
+use re_log_types::{BlueprintActivationCommand, SetStoreInfo, StoreInfo, StoreSource};
 
 use crate::blueprint::Entry;
 use crate::entity_log::{EntityLog, IDENTITY_NANOS};
@@ -26,7 +26,7 @@ pub(super) fn write(out: &Path, identity: &Identity, blueprint: &[Entry], drawn:
 
 fn encode(file: impl Write, identity: &Identity, entries: &[Entry], drawn: EntityLog) -> Result<(), EncodeError> {
     let recording = StoreId::new(StoreKind::Recording, APPLICATION, identity.recording_id.clone());
-    let version = rerun::build_info().version;
+    let version = crate::rerun::CrateVersion::LOCAL;
     let mut encoder = Encoder::new_eager(version, EncodingOptions::PROTOBUF_COMPRESSED, file)?;
     // A footer is an index that viewers do without, and the encoder orders it by chance.
     encoder.do_not_emit_footer();

@@ -1,7 +1,7 @@
 //! Surroundings of the arm: seafloor, obstacles, tags, and the moving vehicle.
 
+use crate::rerun::{Boxes3D, FillMode, ViewCoordinates};
 use nalgebra::{Isometry3, Translation3};
-use rerun::{Boxes3D, FillMode, ViewCoordinates};
 
 use crate::colors;
 use crate::entities::{BASE, VEHICLE, WORLD};

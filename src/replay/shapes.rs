@@ -1,7 +1,7 @@
 //! Primitives and poses in Rerun's terms.
 
+use crate::rerun::{Boxes3D, Capsules3D, Cylinders3D, Ellipsoids3D, FillMode, Mesh3D};
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
-use rerun::{Boxes3D, Capsules3D, Cylinders3D, Ellipsoids3D, FillMode, Mesh3D};
 
 use crate::colors::Rgba;
 use crate::entity_log::EntityLog;
@@ -36,7 +36,7 @@ impl Batch {
         self.places.iter().map(|place| vector(&place.translation.vector)).collect()
     }
 
-    fn turns(&self) -> Vec<rerun::Quaternion> {
+    fn turns(&self) -> Vec<crate::rerun::Quaternion> {
         self.places.iter().map(|place| quaternion(&place.rotation)).collect()
     }
 
@@ -120,7 +120,7 @@ fn mesh(hull: &Hull, place: &Isometry3<f64>, color: Rgba) -> Mesh3D {
     let n = corners.len() as u32;
     let triangles = (0..n / 3).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]);
     let [r, g, b, a] = color;
-    let color = rerun::Rgba32::from_unmultiplied_rgba(r, g, b, a);
+    let color = crate::rerun::Rgba32::from_unmultiplied_rgba(r, g, b, a);
     Mesh3D::new(corners).with_vertex_normals(normals).with_triangle_indices(triangles).with_albedo_factor(color)
 }
 

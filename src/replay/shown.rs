@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use crate::rerun::SerializedComponentBatch;
 use nalgebra::Isometry3;
-use rerun::SerializedComponentBatch;
 
 /// Rows are drawn at most this long after their time, s: a mark is recorded when its span is over.
 const LATE_S: f64 = 60.0;

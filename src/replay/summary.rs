@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use rerun::TextDocument;
+use crate::rerun::TextDocument;
 
 use crate::entities::SUMMARY;
 use crate::entity_log::EntityLog;

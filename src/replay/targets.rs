@@ -1,7 +1,7 @@
 //! The reach task: targets, and the true rest position of the tool for each.
 
+use crate::rerun::{LineStrips3D, Points3D};
 use nalgebra::Vector3;
-use rerun::{LineStrips3D, Points3D};
 
 use crate::colors::{self, Rgba};
 use crate::entities::BASE;

@@ -245,15 +245,15 @@ fn input<'a>(recording: &'a Recording, robot: &'a Robot) -> ReplayInput<'a> {
 }
 
 /// Chunks of the recording in a file, as Rerun's own decoder reads it.
-fn chunks(rrd: &Path) -> Vec<rerun::log::Chunk> {
-    use rerun::external::re_log_encoding::DecoderApp;
+fn chunks(rrd: &Path) -> Vec<crate::rerun::log::Chunk> {
+    use re_log_encoding::DecoderApp;
     let file = std::io::BufReader::new(std::fs::File::open(rrd).unwrap());
     let mut chunks = Vec::new();
     for message in DecoderApp::decode_eager(file).unwrap() {
-        if let rerun::log::LogMsg::ArrowMsg(store, message) = message.unwrap()
+        if let crate::rerun::log::LogMsg::ArrowMsg(store, message) = message.unwrap()
             && store.is_recording()
         {
-            chunks.push(rerun::log::Chunk::from_arrow_msg(&message).unwrap());
+            chunks.push(crate::rerun::log::Chunk::from_arrow_msg(&message).unwrap());
         }
     }
     chunks
@@ -297,7 +297,7 @@ fn images_and_rejects_are_shown_where_there_are_any() {
     assert!(!entities.contains_key("/camera/background"));
     // The viewer panics where one chunk holds images and their end.
     let of_image = chunks(&out).into_iter().filter(|chunk| chunk.entity_path().to_string() == "/camera/image");
-    let has = |chunk: &rerun::log::Chunk, archetype: &str| {
+    let has = |chunk: &crate::rerun::log::Chunk, archetype: &str| {
         chunk.component_descriptors().any(|c| c.archetype.is_some_and(|name| name.short_name() == archetype))
     };
     let kinds: Vec<_> = of_image.map(|chunk| (has(&chunk, "EncodedImage"), has(&chunk, "Clear"))).collect();

@@ -1,6 +1,6 @@
 //! Where the tool touched surveyed surfaces: the point, the surface's normal and its name.
 
-use rerun::{Arrows3D, Points3D};
+use crate::rerun::{Arrows3D, Points3D};
 
 use crate::colors;
 use crate::entities::BASE;

@@ -5,9 +5,9 @@
 
 use std::collections::BTreeSet;
 
+use crate::rerun::components::Radius;
+use crate::rerun::{Ellipsoids3D, FillMode, Points3D};
 use nalgebra::{Isometry3, Matrix3, Rotation3, SymmetricEigen, UnitQuaternion, Vector3};
-use rerun::components::Radius;
-use rerun::{Ellipsoids3D, FillMode, Points3D};
 
 use crate::arms::{believed_arm, body_entity};
 use crate::colors;

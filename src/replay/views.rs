@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use crate::rerun::{LineStrips3D, Points3D, Scalars, SeriesPoints, TextDocument};
 use nalgebra::Point3;
-use rerun::{LineStrips3D, Points3D, Scalars, SeriesPoints, TextDocument};
 
 use crate::entities::{BASE, SIGHTING, SUMMARY};
 use crate::entity_log::EntityLog;

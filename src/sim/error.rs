@@ -30,6 +30,10 @@ pub enum SimError {
     FreeBase,
     #[error("world spec cannot be written as text: {0}")]
     SpecText(#[from] toml::ser::Error),
+    #[error(
+        "world.camera.mode = \"rendered\": this build of armcal reads no images; build it with `--features images`"
+    )]
+    ImagesNotBuilt,
     #[error("the tag detector: {0}")]
     Detector(String),
     #[error("an image could not be compressed: {0}")]
@@ -48,6 +52,7 @@ impl Coded for SimError {
             Self::NoEffort { .. } => Code::ValueOutOfRange,
             Self::StowedInside { .. } => Code::ClearanceTooSmall,
             Self::Joint { .. } | Self::FreeBase => Code::SimulationUnsupported,
+            Self::ImagesNotBuilt => Code::BuildFeatureMissing,
             Self::SpecText(_) | Self::Detector(_) | Self::Jpeg(_) => Code::Internal,
             Self::Truth(_) => Code::FileUnwritable,
             Self::TruthFile { .. } => Code::TruthInvalid,

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
+use crate::rerun::components::{Color, HalfSize3D, LineStrip3D, Text, Translation3D};
+use crate::rerun::{Boxes3D, Component, ComponentDescriptor, Ellipsoids3D, LineStrips3D, Points3D};
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
-use rerun::components::{Color, HalfSize3D, LineStrip3D, Text, Translation3D};
-use rerun::{Boxes3D, Component, ComponentDescriptor, Ellipsoids3D, LineStrips3D, Points3D};
 
 use super::{chunks, entities, input, small};
 use crate::*;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::net::TcpListener;
 use std::time::{Duration, Instant};
 
-use rerun::external::arrow::array::Array;
+use re_sdk_types::external::arrow::array::Array;
 
 use super::{input, small};
 use crate::news::{LiveDrawings, News};
@@ -28,7 +28,7 @@ struct Drawn {
 }
 
 impl Drawn {
-    fn add(&mut self, chunks: &[rerun::log::Chunk]) {
+    fn add(&mut self, chunks: &[crate::rerun::log::Chunk]) {
         for chunk in chunks {
             let entity = chunk.entity_path().to_string();
             if chunk.is_static() {

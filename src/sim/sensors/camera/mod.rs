@@ -14,6 +14,10 @@ mod rendered_camera;
 mod scenery;
 mod tag_projection;
 mod tag_reading;
+#[cfg(feature = "images")]
+mod tag_search;
+#[cfg(not(feature = "images"))]
+#[path = "no_tag_search.rs"]
 mod tag_search;
 mod wrist_camera;
 

@@ -16,7 +16,6 @@ use armcal_core::robot::{FileIssue, Robot, Vehicle};
 use armcal_core::routine::Scene;
 use armcal_core::streams::{ImageDemand, LateMessages};
 use armcal_core::time::Stamp;
-use armcal_detect::DetectorSettings;
 
 /// Parts of a world that make a rendered camera.
 #[derive(Clone, Copy)]
@@ -76,8 +75,7 @@ impl RenderedCamera {
         let mut imager = Imager::new(&ported.lens, &image, &lights, seed);
         imager.set_solids(&scenery.shapes);
         // The detector knows the lens of the drawing.
-        let settings = DetectorSettings::of_family(robot.tag_family);
-        let search = TagSearch::start(&robot.camera.lens, settings, image.jpeg_quality.round() as u8)?;
+        let search = TagSearch::start(&robot.camera.lens, robot.tag_family, image.jpeg_quality.round() as u8)?;
         Ok(Self {
             imager,
             scenery,

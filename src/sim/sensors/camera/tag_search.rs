@@ -5,7 +5,7 @@ use std::thread;
 
 use crate::error::SimError;
 use crate::imaging::Frame;
-use armcal_core::optics::CameraModel;
+use armcal_core::optics::{CameraModel, TagFamily};
 use armcal_core::streams::{
     CameraImage, DetectionRejects, LateError, LateMessages, LateSender, Message, TagDetections,
 };
@@ -46,7 +46,8 @@ impl TagSearch {
     ///
     /// # Errors
     /// [`SimError::Detector`] where the detector or the thread does not start.
-    pub(super) fn start(lens: &CameraModel, settings: DetectorSettings, jpeg_quality: u8) -> Result<Self, SimError> {
+    pub(super) fn start(lens: &CameraModel, family: TagFamily, jpeg_quality: u8) -> Result<Self, SimError> {
+        let settings = DetectorSettings::of_family(family);
         let (images, jobs) = sync_channel::<Job>(QUEUE);
         let (started, has_started) = sync_channel(1);
         let lens = *lens;

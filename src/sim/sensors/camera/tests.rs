@@ -17,6 +17,7 @@ use armcal_core::routine::Scene;
 use armcal_core::streams::{ImageDemand, JointAngles, Message, TagDetections};
 use armcal_core::time::{SIMULATION_EPOCH, Stamp};
 
+#[cfg(feature = "images")]
 mod rendered;
 mod watched;
 
