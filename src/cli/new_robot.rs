@@ -9,21 +9,28 @@ use clap::Args;
 use crate::cli::closing::say_wrapped;
 use crate::cli::exit::{Exit, UsageError};
 use crate::cli::file_kind::{FileKind, expect_kind};
+use crate::cli::stdout::say;
 use crate::export::parse_link_poses;
 use crate::output;
-use armcal_belief::plan::{always_near, clear_angles};
+use armcal_belief::plan::{always_near, clear_angles, sample_self_pairs};
 use armcal_belief::tagmap::files::read_cameras;
 use armcal_core::optics::CameraModel;
-use armcal_core::robot::{self, DraftedMeshes, DraftedRobot, NewFile, NewRobot, Robot, RobotError, draft_robot};
+use armcal_core::robot::{
+    self, DraftedMeshes, DraftedRobot, NewFile, NewRobot, Robot, RobotError, SELF_COLLISION_FILE, draft_robot,
+};
 use armcal_core::text::counted;
 
 #[derive(Debug, Args)]
 pub(super) struct NewRobotArgs {
     /// URDF of the arm; meshes are searched in its folder and in the folders above
-    urdf: PathBuf,
+    #[arg(required_unless_present = "self_collision", conflicts_with = "self_collision")]
+    urdf: Option<PathBuf>,
     /// Folder to write; it must be empty or absent
-    #[arg(long, value_name = "DIR")]
-    out: PathBuf,
+    #[arg(long, value_name = "DIR", required_unless_present = "self_collision")]
+    out: Option<PathBuf>,
+    /// In place of a new folder: find which links of an arm can come near each other, and store it in its folder
+    #[arg(long, value_name = "DIR", exclusive = true)]
+    self_collision: Option<PathBuf>,
     /// Link whose frame is the base frame; default: the root
     #[arg(long, value_name = "LINK")]
     base: Option<String>,
@@ -45,12 +52,39 @@ pub(super) struct NewRobotArgs {
 }
 
 pub(super) fn new_robot(args: &NewRobotArgs) -> Result<Exit> {
-    expect_kind(&args.urdf, &[FileKind::Urdf])?;
-    refuse_full(&args.out)?;
-    let text = args.kinematics.as_deref().map(|file| with_link_poses(&args.urdf, file)).transpose()?;
+    match (&args.self_collision, &args.urdf, &args.out) {
+        (Some(folder), _, _) => self_collision(folder),
+        (None, Some(urdf), Some(out)) => new_folder(args, urdf, out),
+        _ => Err(UsageError::new(Code::UsageInvalid, "a URDF and --out are needed").into()),
+    }
+}
+
+/// Random configurations; pairs that only rarer ones bring together are missed.
+const N_CONFIGURATIONS: u64 = 200_000;
+
+/// Finds which links can come near each other, and stores it in the robot's folder.
+fn self_collision(folder: &Path) -> Result<Exit> {
+    let robot = robot::load_without_pairs(folder)?;
+    let found = sample_self_pairs(&robot, N_CONFIGURATIONS, 1);
+    let file = folder.join(SELF_COLLISION_FILE);
+    let text = found.to_toml(&file, &robot)?;
+    output::write_together(&[(file.as_path(), text.as_bytes())])?;
+    let mut lines = String::new();
+    for pair in &found.pairs {
+        let [inner, outer] = pair.bodies.map(|body| robot.bodies[body].name.as_str());
+        lines += &format!("{inner:<20} {outer:<20} {:>7.3} m\n", pair.nearest_m);
+    }
+    say(&format!("{lines}written      {}", file.display()))?;
+    Ok(Exit::Ok)
+}
+
+fn new_folder(args: &NewRobotArgs, urdf: &Path, out: &Path) -> Result<Exit> {
+    expect_kind(urdf, &[FileKind::Urdf])?;
+    refuse_full(out)?;
+    let text = args.kinematics.as_deref().map(|file| with_link_poses(urdf, file)).transpose()?;
     let lens = args.lens.as_deref().map(first_lens).transpose()?;
     let wanted = NewRobot {
-        urdf: &args.urdf,
+        urdf,
         text: text.as_deref(),
         base: args.base.as_deref(),
         tip: args.tip.as_deref(),
@@ -61,19 +95,19 @@ pub(super) fn new_robot(args: &NewRobotArgs) -> Result<Exit> {
         clear_rad: None,
     };
     let DraftedRobot { files, left_out } = draft_robot(&wanted, DraftedMeshes::Read)?;
-    let (files, robot) = match trial(&files, &args.out)? {
-        Ok(robot) => with_shapes(&wanted, robot, &args.out)?,
+    let (files, robot) = match trial(&files, out)? {
+        Ok(robot) => with_shapes(&wanted, robot, out)?,
         Err(why) => {
             let without = draft_robot(&wanted, DraftedMeshes::Ignored(&why.to_string()))?.files;
-            let robot = trial(&without, &args.out)??;
+            let robot = trial(&without, out)??;
             if robot.planning_issues.iter().all(|issue| issue.key != "collision_meshes") {
                 return Err(why.into());
             }
             (without, robot)
         }
     };
-    write(&files, &args.out)?;
-    say_wrapped(&described(&files, &robot, &left_out, &args.out))?;
+    write(&files, out)?;
+    say_wrapped(&described(&files, &robot, &left_out, out))?;
     Ok(Exit::Ok)
 }
 

@@ -22,7 +22,6 @@ mod poses;
 mod scenes;
 mod sensitivity;
 mod tables;
-mod tracking_error;
 mod trials;
 mod worlds;
 
@@ -42,6 +41,5 @@ pub use poses::{PoseGrid, PoseRow, PoseStudyError, pose_study, poses_csv, poses_
 pub use scenes::{Condition, TAG_SIZE_M, conditions, water_name};
 pub use sensitivity::{Sensitivity, SensitivityPoint, sensitivity};
 pub use tables::{conditions_csv, report, trials_csv, truth_csv};
-pub use tracking_error::{JointTrackingError, TrackingErrorStudy, tracking_error_study};
 pub use trials::{DetectionStudy, Outcome, StudyError, TagTrial, Watcher, detection_study};
 pub use worlds::{DrawnWorld, drawn_world};

@@ -1,4 +1,4 @@
-//! `armcal study bound`: closed loops against the Bayesian bound of their views, for many seeds.
+//! `armcal-lab bound`: closed loops against the Bayesian bound of their views, for many seeds.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,16 +7,16 @@ use anyhow::{Context, Result};
 use clap::Args;
 use rayon::prelude::*;
 
-use crate::cli::exit::Exit;
-use crate::cli::stdout::say;
-use crate::cli::study_dive::run_dive;
-use crate::output;
+use super::dive::run_dive;
+use armcal::cli::Exit;
+use armcal::cli::say;
+use armcal::output;
 use armcal_belief::calib::Calibration;
 use armcal_core::log::read_recording;
 use armcal_core::routine::{self, Override, Overrides};
+use armcal_lab::{AS_MODELLED, BoundInput, BoundRun, bound_csv, bound_run, bound_table};
 use armcal_sim::WorldSpec;
 use armcal_sim::truth::read_truth;
-use armcal_study::{AS_MODELLED, BoundInput, BoundRun, bound_csv, bound_run, bound_table};
 
 #[derive(Debug, Args)]
 pub(super) struct BoundArgs {

@@ -1,77 +1,26 @@
-//! `armcal study`: parts on their own, against known truth.
-
-mod bound;
+//! `armcal-lab detection`: tags rendered, detected and compared with the truth.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Context, Result};
-use clap::{Args, Subcommand};
+use clap::Args;
 
-use self::paper::{PaperArgs, paper};
-use self::poses::{PosesArgs, poses};
-use crate::cli::exit::Exit;
-use crate::cli::stdout::{note, say};
-use crate::cli::study::bound::{BoundArgs, bound};
-use crate::cli::study_dive::{DiveArgs, dive};
-use crate::cli::study_dive_faults::{DiveFaultsArgs, dive_faults};
-use crate::cli::study_falsified::{FalsifiedArgs, falsified};
-use crate::cli::study_plan::{
-    EdgesArgs, PathsArgs, SelfCollisionArgs, TrackingErrorArgs, edges, paths, self_collision, tracking_error,
-};
-use crate::cli::study_worlds::{WorldsArgs, worlds};
-use crate::cli::waiting::Waiting;
-use crate::output;
+use armcal::cli::Exit;
+use armcal::cli::Waiting;
+use armcal::cli::{note, say};
+use armcal::output;
 use armcal_core::optics::CameraModel;
 use armcal_core::stats::quantile;
 use armcal_detect::{DetectorSettings, GreyImage};
-use armcal_sim::WaterKind;
-use armcal_study::{
+use armcal_lab::{
     StudyError, Watcher, conditions, conditions_csv, detection_study, fit_noise, report, trials_csv, truth_csv,
 };
-
-mod paper;
-mod poses;
+use armcal_sim::WaterKind;
 
 #[derive(Debug, Args)]
-pub(super) struct StudyArgs {
-    #[command(subcommand)]
-    study: Study,
-}
-
-#[derive(Debug, Subcommand)]
-enum Study {
-    /// Render tags at set ranges and incidences in three kinds of water, detect them, and compare with the truth
-    Detection(DetectionArgs),
-    /// Compare the paper's methods with least squares and with the bound, on landmark positions with noise
-    Paper(PaperArgs),
-    /// Certify random edges of an arm and scan each by brute force
-    Edges(EdgesArgs),
-    /// Plan between random poses at several sites, under wide and narrow bounds
-    Paths(PathsArgs),
-    /// Find which links of an arm can come near each other, and store it in the robot's folder
-    #[command(alias = "pairs")]
-    SelfCollision(SelfCollisionArgs),
-    /// Measure how far the joints of a recording left the straight lines of their set-points
-    #[command(alias = "stray")]
-    TrackingError(TrackingErrorArgs),
-    /// Choose poses by each criterion and at random, and compare the tool error that they leave
-    Poses(PosesArgs),
-    /// Falsify drawing, survey or a sensor after a capture, and compare the verdict with the truth
-    Falsified(FalsifiedArgs),
-    /// Run a routine in worlds drawn from all that `[world]` allows, and look for what must not be
-    Worlds(WorldsArgs),
-    /// Run a closed loop for several seeds, and compare the tool error with the Bayesian bound of the views
-    Bound(BoundArgs),
-    /// Run a dive for several seeds, follow each recording online, and compare the belief with the truth at each task
-    Dive(DiveArgs),
-    /// Run dives with each kind of fault, and compare when it is named with when an oracle could tell it
-    DiveFaults(DiveFaultsArgs),
-}
-
-#[derive(Debug, Args)]
-struct DetectionArgs {
+pub(super) struct DetectionArgs {
     /// Folder for trials.csv, conditions.csv and report.txt
     #[arg(long, value_name = "DIR", default_value = "recordings/study-detection")]
     out: PathBuf,
@@ -95,24 +44,7 @@ struct DetectionArgs {
     images: Option<PathBuf>,
 }
 
-pub(super) fn study(args: &StudyArgs) -> Result<Exit> {
-    match &args.study {
-        Study::Detection(args) => detection(args),
-        Study::Paper(args) => paper(args),
-        Study::Edges(args) => edges(args),
-        Study::Paths(args) => paths(args),
-        Study::SelfCollision(args) => self_collision(args),
-        Study::TrackingError(args) => tracking_error(args),
-        Study::Poses(args) => poses(args),
-        Study::Falsified(args) => falsified(args),
-        Study::Worlds(args) => worlds(args),
-        Study::Bound(args) => bound(args),
-        Study::Dive(args) => dive(args),
-        Study::DiveFaults(args) => dive_faults(args),
-    }
-}
-
-fn detection(args: &DetectionArgs) -> Result<Exit> {
+pub(super) fn detection(args: &DetectionArgs) -> Result<Exit> {
     let lens: CameraModel = armcal_core::robot::load(&args.robot)?.camera.lens;
     let settings = DetectorSettings {
         decimation: args.decimation,

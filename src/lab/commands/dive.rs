@@ -1,4 +1,4 @@
-//! `armcal study dive`: the online belief over a dive, for many seeds.
+//! `armcal-lab dive`: the online belief over a dive, for many seeds.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -8,14 +8,14 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use rayon::prelude::*;
 
-use crate::cli::exit::Exit;
-use crate::cli::stdout::say;
-use crate::output;
+use armcal::cli::Exit;
+use armcal::cli::say;
+use armcal::output;
 use armcal_belief::calib::Calibration;
 use armcal_core::log::read_recording;
 use armcal_core::routine;
+use armcal_lab::{AtStart, DiveStudy, DiveTask, dive_csv, dive_study, dive_table};
 use armcal_sim::truth::read_truth;
-use armcal_study::{AtStart, DiveStudy, DiveTask, dive_csv, dive_study, dive_table};
 
 #[derive(Debug, Args)]
 pub(super) struct DiveArgs {

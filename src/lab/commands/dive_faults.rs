@@ -1,4 +1,4 @@
-//! `armcal study dive-faults`: when the online belief names what happens on a dive.
+//! `armcal-lab dive-faults`: when the online belief names what happens on a dive.
 
 use armcal_core::codes::Code;
 use std::fs;
@@ -8,15 +8,13 @@ use anyhow::{Context, Result};
 use clap::Args;
 use rayon::prelude::*;
 
-use crate::cli::exit::{Exit, UsageError};
-use crate::cli::stdout::say;
-use crate::cli::study_dive::run_dive;
-use crate::output;
+use super::dive::run_dive;
+use armcal::cli::say;
+use armcal::cli::{Exit, UsageError};
+use armcal::output;
 use armcal_core::log::read_recording;
 use armcal_core::routine::{self, Step};
-use armcal_study::{
-    DiveFaultKind, DiveFaultRow, dive_fault_study, dive_faults_csv, dive_faults_table, drawn_dive_fault,
-};
+use armcal_lab::{DiveFaultKind, DiveFaultRow, dive_fault_study, dive_faults_csv, dive_faults_table, drawn_dive_fault};
 
 #[derive(Debug, Args)]
 pub(super) struct DiveFaultsArgs {

@@ -1,4 +1,4 @@
-//! `armcal study falsified`: the verdict where drawing, survey or a sensor is wrong.
+//! `armcal-lab falsified`: the verdict where drawing, survey or a sensor is wrong.
 
 use armcal_core::codes::Code;
 use std::fs;
@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use clap::Args;
 
-use crate::cli::exit::{Exit, UsageError};
-use crate::cli::stdout::say;
-use crate::output;
-use armcal_study::{
+use armcal::cli::say;
+use armcal::cli::{Exit, UsageError};
+use armcal::output;
+use armcal_lab::{
     Case, CaseKind, Tier, falsified_cases, falsified_csv, falsified_markdown, falsified_study, touched_cases,
 };
 

@@ -1,4 +1,4 @@
-//! `armcal study paper`: the paper's comparison, in one command.
+//! `armcal-lab paper`: the paper's comparison, in one command.
 
 use std::fs;
 use std::path::PathBuf;
@@ -6,10 +6,10 @@ use std::path::PathBuf;
 use anyhow::{Context, Result};
 use clap::Args;
 
-use crate::cli::exit::Exit;
-use crate::cli::stdout::{note, say};
-use crate::output;
-use armcal_study::paper::{Tier, experiments, paper_csv, paper_figures, paper_markdown, run_experiment};
+use armcal::cli::Exit;
+use armcal::cli::{note, say};
+use armcal::output;
+use armcal_lab::paper::{Tier, experiments, paper_csv, paper_figures, paper_markdown, run_experiment};
 
 #[derive(Debug, Args)]
 pub(super) struct PaperArgs {

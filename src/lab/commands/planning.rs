@@ -1,4 +1,4 @@
-//! `armcal study edges`, `paths` and `pairs`: the geometry of planning on its own.
+//! `armcal-lab edges` and `paths`: the geometry of planning on its own.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,17 +7,15 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use clap::Args;
 
-use crate::cli::exit::Exit;
-use crate::cli::stdout::{note, say};
-use crate::output;
-use armcal_belief::plan::{ClearanceModel, sample_self_pairs};
-use armcal_core::log::read_recording;
-use armcal_core::robot::{SELF_COLLISION_FILE, load, load_vehicle, load_without_pairs};
+use armcal::cli::Exit;
+use armcal::cli::{note, say};
+use armcal::output;
+use armcal_belief::plan::ClearanceModel;
+use armcal_core::robot::{load, load_vehicle};
 use armcal_core::routine::{self, Scene};
-use armcal_core::streams::Message;
-use armcal_study::{
+use armcal_lab::{
     Belief, EdgeStudy, PathQueries, PathSite, PathStudy, edge_study, edges_csv, edges_json, mean_time_under_s,
-    path_study, paths_csv, problem_json, queries_json, random_edges, tracking_error_study,
+    path_study, paths_csv, problem_json, queries_json, random_edges,
 };
 
 /// Free water that the studies keep, m.
@@ -69,39 +67,6 @@ pub(super) struct PathsArgs {
     /// Seed of queries and planner
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-}
-
-#[derive(Debug, Args)]
-pub(super) struct SelfCollisionArgs {
-    /// Robot folder; its self_collision.toml is written
-    robot: PathBuf,
-    /// Random configurations
-    #[arg(
-        long, value_name = "N", default_value_t = 200_000,
-        value_parser = clap::value_parser!(u64).range(1..=1_000_000_000)
-    )]
-    n: u64,
-    /// Seed of the configurations
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    seed: u64,
-}
-
-#[derive(Debug, Args)]
-pub(super) struct TrackingErrorArgs {
-    /// The recording (run.mcap)
-    recording: PathBuf,
-    /// Robot folder of the arm
-    #[arg(long, value_name = "DIR", default_value = "robots/titan4")]
-    robot: PathBuf,
-}
-
-/// How far the arm left the lines that it was sent along.
-pub(super) fn tracking_error(args: &TrackingErrorArgs) -> Result<Exit> {
-    let robot = load(&args.robot)?;
-    let recording = read_recording(&args.recording)?;
-    let messages: Vec<Message> = recording.messages.into_iter().map(|(_, message)| message).collect();
-    say(&tracking_error_study(&robot, &messages).summary())?;
-    Ok(Exit::Ok)
 }
 
 pub(super) fn edges(args: &EdgesArgs) -> Result<Exit> {
@@ -160,21 +125,6 @@ pub(super) fn paths(args: &PathsArgs) -> Result<Exit> {
     write(&args.out, &written)?;
     let rows: Vec<String> = studies.iter().map(PathStudy::summary).collect();
     say(&format!("{}\n{}\nwritten      {}", PathStudy::heading(), rows.join("\n"), args.out.display()))?;
-    Ok(Exit::Ok)
-}
-
-pub(super) fn self_collision(args: &SelfCollisionArgs) -> Result<Exit> {
-    let robot = load_without_pairs(&args.robot)?;
-    let found = sample_self_pairs(&robot, args.n, args.seed);
-    let file = args.robot.join(SELF_COLLISION_FILE);
-    fs::write(&file, found.to_toml(&file, &robot)?)
-        .with_context(|| format!("{}: cannot be written", file.display()))?;
-    let mut text = String::new();
-    for pair in &found.pairs {
-        let [inner, outer] = pair.bodies.map(|body| robot.bodies[body].name.as_str());
-        text += &format!("{inner:<20} {outer:<20} {:>7.3} m\n", pair.nearest_m);
-    }
-    say(&format!("{text}written      {}", file.display()))?;
     Ok(Exit::Ok)
 }
 

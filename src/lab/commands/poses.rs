@@ -1,4 +1,4 @@
-//! `armcal study poses`: error over poses and time, chosen and random.
+//! `armcal-lab poses`: error over poses and time, chosen and random.
 
 use std::fs;
 use std::path::PathBuf;
@@ -6,11 +6,11 @@ use std::path::PathBuf;
 use anyhow::{Context, Result};
 use clap::Args;
 
-use crate::cli::exit::Exit;
-use crate::cli::stdout::say;
-use crate::output;
+use armcal::cli::Exit;
+use armcal::cli::say;
+use armcal::output;
+use armcal_lab::{PoseGrid, pose_study, poses_csv, poses_figure, poses_table};
 use armcal_sim::WorldSpec;
-use armcal_study::{PoseGrid, pose_study, poses_csv, poses_figure, poses_table};
 
 #[derive(Debug, Args)]
 pub(super) struct PosesArgs {

@@ -1,4 +1,4 @@
-//! `armcal sensitivity`: the paper's Figures 4 and 7 for a routine's arm and tags.
+//! `armcal-lab sensitivity`: the paper's Figures 4 and 7 for a routine's arm and tags.
 
 use armcal_core::codes::Code;
 use std::fs;
@@ -7,14 +7,14 @@ use std::path::PathBuf;
 use anyhow::{Context, Result};
 use clap::Args;
 
-use crate::cli::exit::{Exit, UsageError};
-use crate::cli::file_kind::expect_routine;
-use crate::cli::overrides::OverrideArgs;
-use crate::cli::stdout::say;
-use crate::output;
+use armcal::cli::OverrideArgs;
+use armcal::cli::expect_routine;
+use armcal::cli::say;
+use armcal::cli::{Exit, UsageError};
+use armcal::output;
 use armcal_belief::plan::ClearanceModel;
 use armcal_core::routine;
-use armcal_study as study;
+use armcal_lab as lab;
 
 #[derive(Debug, Args)]
 pub(super) struct SensitivityArgs {
@@ -43,7 +43,7 @@ pub(super) fn sensitivity(args: &SensitivityArgs) -> Result<Exit> {
     output::check_takes_files(&args.out)?;
     let clearance = ClearanceModel::new(&robot, &vehicle, &routine.scene);
     let (poses, min_tags) = (usize::from(args.poses), usize::from(args.min_tags));
-    let found = study::sensitivity(&robot, &clearance, poses, min_tags, args.seed.unwrap_or(routine.seed))
+    let found = lab::sensitivity(&robot, &clearance, poses, min_tags, args.seed.unwrap_or(routine.seed))
         .map_err(|problem| UsageError::new(Code::UsageInvalid, format!("{}: {problem}", args.routine.display())))?;
     let statement = found.statement();
     output::make_folder(&args.out)?;

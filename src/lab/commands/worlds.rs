@@ -1,4 +1,4 @@
-//! `armcal study worlds`: closed loops of this program in worlds drawn from all that is allowed.
+//! `armcal-lab worlds`: closed loops of this program in worlds drawn from all that is allowed.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -13,16 +13,16 @@ use anyhow::{Context, Result};
 use clap::Args;
 use rayon::prelude::*;
 
-use crate::cli::exit::Exit;
-use crate::cli::stdout::say;
-use crate::output;
-use crate::report::RunSummary;
+use armcal::cli::Exit;
+use armcal::cli::say;
+use armcal::output;
+use armcal::report::RunSummary;
 use armcal_belief::calib::Status;
 use armcal_core::files::{self, FileKind};
 use armcal_core::log::read_recording;
 use armcal_core::routine;
 use armcal_core::streams::Message;
-use armcal_study::{DrawnWorld, drawn_world};
+use armcal_lab::{DrawnWorld, drawn_world};
 
 /// 99.9 % of the errors whose root mean square is 1, whatever their directions: that of one dimension is the largest.
 const SIGMAS_99_9: f64 = 3.29;

@@ -7,7 +7,8 @@ use serde::Serialize;
 
 use crate::report::inspection::arm::is_capture;
 use crate::report::inspection::observable_parameters::observable_parameters;
-use crate::report::inspection::{ArmContents, ObservableParameters, TopicContents, arm, topics};
+use crate::report::inspection::tracking_error::Motions;
+use crate::report::inspection::{ArmContents, ObservableParameters, TopicContents, TrackingError, arm, topics};
 use armcal_core::log::topics as log_topics;
 use armcal_core::log::{Completeness, FileContents, LogError, ROS1_ADVICE, RawSummary, TopicMap, scan_recording};
 use armcal_core::robot::Robot;
@@ -44,6 +45,9 @@ pub struct Inspection {
     /// What a robot's calibration could take from it; `None` where no robot was named.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub observable: Option<ObservableParameters>,
+    /// How far the joints left the lines of their set-points; `None` where no robot was named or nothing was driven.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tracking_error: Option<TrackingError>,
     /// What a user may want to know or do.
     pub hints: Vec<String>,
 }
@@ -97,12 +101,16 @@ pub struct Metadata {
 pub fn inspect(path: &Path, robot: Option<&Robot>) -> Result<Inspection, LogError> {
     let mut topics = topics::Collector::default();
     let mut arm = arm::Collector::default();
+    let mut motions = Motions::default();
     let (recording, summary) = scan_recording(
         path,
         &TopicMap::default(),
         |raw| topics.take(raw),
         |_, message| {
             arm.take(message);
+            if robot.is_some() {
+                motions.take(message);
+            }
             matches!(message, Message::Task(_)) || is_capture(message)
         },
     )?;
@@ -139,6 +147,7 @@ pub fn inspect(path: &Path, robot: Option<&Robot>) -> Result<Inspection, LogErro
         metadata: metadata(&summary.contents),
         arm,
         observable: determined,
+        tracking_error: robot.and_then(|robot| motions.finish(robot)),
         hints: Vec::new(),
     };
     inspection.hints = hints(&inspection);

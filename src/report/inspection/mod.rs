@@ -1,16 +1,19 @@
 //! What `armcal inspect` tells of a recording: what is in it, whether it is whole, what could be calibrated from it.
 //!
 //! One pass over the file counts and keeps nothing but marks and the task, so a recording of any length can be looked
-//! at; with a robot, a second pass keeps the readings within the captured spans and asks `calib` what they determine.
+//! at; with a robot, a second pass keeps the readings within the captured spans and asks `calib` what they
+//! determine. `tracking_error` compares readings with set-points.
 
 mod arm;
 mod contents;
 mod observable_parameters;
 mod text;
 mod topics;
+mod tracking_error;
 
 pub use arm::{ArmContents, TagSeen, TaskSeen};
 pub use contents::{Attachment, CompletenessReport, Compression, Inspection, Metadata, State, inspect};
 pub use observable_parameters::ObservableParameters;
 pub use text::to_text;
 pub use topics::TopicContents;
+pub use tracking_error::{JointTrackingError, TrackingError};

@@ -25,6 +25,10 @@ pub fn to_text(inspection: &Inspection, width: Option<usize>) -> String {
         lines.push(String::new());
         lines.extend(determined_lines(determined));
     }
+    if let Some(tracking_error) = &inspection.tracking_error {
+        lines.push(String::new());
+        lines.push(tracking_error.to_text());
+    }
     if !inspection.hints.is_empty() {
         lines.push(String::new());
         lines.extend(inspection.hints.iter().map(|hint| format!("note         {hint}")));

@@ -4,10 +4,12 @@
 //! joint by joint: what is left over is what the joints lag, droop and overshoot each in its own way, which planning
 //! bounds by robot.toml's `[motion]` (`plan::Stray`).
 
+use serde::Serialize;
+
 use armcal_belief::plan::{Edge as Motion, Timing, TrackingErrorBound};
 use armcal_core::robot::Robot;
 use armcal_core::sensor::ArmSensors;
-use armcal_core::streams::{JointAngles, Message};
+use armcal_core::streams::{JointAngles, JointCounts, Message};
 use armcal_core::time::Stamp;
 
 /// Set-points within this of a line are on it, rad.
@@ -24,8 +26,8 @@ const LEAST_RATE_SHARE: f64 = 0.1;
 const NOISE_SIGMAS: f64 = 4.0;
 
 /// What the readings on all edges show.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TrackingErrorStudy {
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TrackingError {
     pub n_edges: usize,
     pub n_readings: usize,
     /// Readings of which some joint is off the line by more than the bound and its noise, on the way and where the edge
@@ -35,7 +37,7 @@ pub struct TrackingErrorStudy {
 }
 
 /// The same of one joint, noise taken off.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct JointTrackingError {
     pub name: String,
     /// Largest distance from the line, rad.
@@ -58,24 +60,45 @@ struct Edge {
     end: Stamp,
 }
 
-/// Compares readings with set-points, both by the datasheet's scale.
-#[must_use]
-pub fn tracking_error_study(robot: &Robot, messages: &[Message]) -> TrackingErrorStudy {
-    let sensors = ArmSensors::nominal(robot);
-    let mut commands = Vec::new();
-    let mut readings = Vec::new();
-    for message in messages {
+/// Set-points and readings, kept while a recording is read.
+#[derive(Default)]
+pub(super) struct Motions {
+    commands: Vec<(Stamp, JointCounts)>,
+    readings: Vec<(Stamp, JointCounts)>,
+}
+
+impl Motions {
+    pub fn take(&mut self, message: &Message) {
         match message {
-            Message::JointCommand(command) => commands.push((command.stamp, sensors.angles(&command.counts))),
-            Message::JointSensors(sample) => readings.push((sample.stamp, sensors.angles(&sample.counts))),
+            Message::JointCommand(command) => self.commands.push((command.stamp, command.counts)),
+            Message::JointSensors(sample) => self.readings.push((sample.stamp, sample.counts)),
             _ => {}
         }
     }
+
+    /// Compares readings with set-points, both by the datasheet's scale; `None` where no edge was driven.
+    pub fn finish(self, robot: &Robot) -> Option<TrackingError> {
+        let n_joints = robot.n_joints();
+        let sensors = ArmSensors::nominal(robot);
+        let angles = |samples: Vec<(Stamp, JointCounts)>| {
+            let whole = samples.into_iter().filter(|(_, counts)| counts.len() == n_joints);
+            whole.map(|(stamp, counts)| (stamp, sensors.angles(&counts))).collect()
+        };
+        let found = tracking_error(robot, angles(self.commands), angles(self.readings));
+        (found.n_edges > 0).then_some(found)
+    }
+}
+
+fn tracking_error(
+    robot: &Robot,
+    mut commands: Vec<(Stamp, JointAngles)>,
+    mut readings: Vec<(Stamp, JointAngles)>,
+) -> TrackingError {
     commands.sort_by_key(|(stamp, _)| *stamp);
     readings.sort_by_key(|(stamp, _)| *stamp);
     let joints =
         robot.joint_names().into_iter().map(|name| JointTrackingError { name, ..JointTrackingError::default() });
-    let mut study = TrackingErrorStudy { n_edges: 0, n_readings: 0, n_beyond: [0; 2], joints: joints.collect() };
+    let mut study = TrackingError { n_edges: 0, n_readings: 0, n_beyond: [0; 2], joints: joints.collect() };
     let edges = edges(&commands);
     for (k, edge) in edges.iter().enumerate() {
         study.n_edges += 1;
@@ -139,7 +162,7 @@ fn nearest(from: &JointAngles, to: &JointAngles, at: &JointAngles) -> (f64, Join
     (share, JointAngles::from_fn(from.len(), |j| from[j] + share * (to[j] - from[j])))
 }
 
-impl TrackingErrorStudy {
+impl TrackingError {
     fn add(&mut self, robot: &Robot, edge: &Edge, stamp: Stamp, reading: &JointAngles) {
         let (share, on_line) = nearest(&edge.from, &edge.to, reading);
         let timing = Timing::new(robot);
@@ -183,11 +206,10 @@ impl TrackingErrorStudy {
     }
 
     /// As a table.
-    #[must_use]
-    pub fn summary(&self) -> String {
+    pub(super) fn to_text(&self) -> String {
         let [moving, at_end] = self.n_beyond;
         let mut text = format!(
-            "{} edges, {} readings, beyond the bound of [motion] {moving} on the way and {at_end} at the end\n\
+            "tracking     {} edges, {} readings, beyond the bound of [motion] {moving} on the way and {at_end} at the end\n\
              {:<18} {:>9} {:>9} {:>11} {:>14} {:>9}\n",
             self.n_edges, self.n_readings, "joint", "most rad", "lag s", "at end rad", "overshoot_rad", "of bound"
         );
@@ -215,7 +237,7 @@ mod tests {
     /// Two edges, driven without noise; joint 0 is late by 0.15 s, the others follow at once.
     #[test]
     fn a_known_lag_is_found() {
-        let folder = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots/titan4");
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/titan4");
         let mut robot = armcal_core::robot::load(&folder).expect("the robot reads");
         for sensor in &mut robot.sensors {
             sensor.noise_std_counts = 0.0;
@@ -228,7 +250,7 @@ mod tests {
             waypoints.push(JointAngles::from_fn(6, |j| last[j] + by.get(j).copied().unwrap_or(0.0)));
         }
         let lag_s = 0.15;
-        let mut messages = Vec::new();
+        let mut motions = Motions::default();
         let mut began_s = 0.0;
         for edge in waypoints.windows(2) {
             let duration_s = timing.least_duration_s(&edge[0], &edge[1]);
@@ -240,14 +262,14 @@ mod tests {
                 let set_point = at(f64::from(k));
                 let angles = JointAngles::from_fn(6, |j| if j == 0 { late[j] } else { set_point[j] });
                 if k % 4 == 0 {
-                    messages.push(Message::JointCommand(JointCommand { stamp, counts: sensors.counts(&set_point) }));
+                    motions.take(&Message::JointCommand(JointCommand { stamp, counts: sensors.counts(&set_point) }));
                 }
-                messages.push(Message::JointSensors(JointSensorSample { stamp, counts: sensors.counts(&angles) }));
+                motions.take(&Message::JointSensors(JointSensorSample { stamp, counts: sensors.counts(&angles) }));
             }
             began_s += 0.01 * f64::from(n + 61);
         }
-        let study = tracking_error_study(&robot, &messages);
-        assert_eq!(study.n_edges, 2, "{}", study.summary());
+        let study = motions.finish(&robot).expect("edges were driven");
+        assert_eq!(study.n_edges, 2, "{}", study.to_text());
         let lags: Vec<f64> = study.joints.iter().map(|joint| joint.most_lag_s).collect();
         // Against the nearest point of the line joint 0 is late by `lag (1 - u_0^2)` and the others by `-lag u_0^2`, u
         // the edge's direction: 0.139 s on the second edge, 0.083 s on the first. While the rate falls, what was lost
