@@ -13,12 +13,11 @@
 //! | layer | modules | job |
 //! |---|---|---|
 //! | belief | [`calib`], [`tagmap`], [`plan`], [`verify`], [`session`] | estimates, plans, acts |
-//! | truth | `sim` (feature `sim`) | the simulated arm, vehicle, water and sensors |
 //! | meeting place | [`streams`], [`log`], [`routine`], [`input`] | messages, recordings, routines |
-//! | arm | [`robot`], [`sensor`], [`kinematics`], [`optics`]; `detect` (feature `sim`) | nominal arm; tags in images |
+//! | arm | [`robot`], [`sensor`], [`kinematics`], [`optics`]; `detect` (feature `images`) | nominal arm; tags in images |
 //! | base | [`joints`], [`spatial`], [`stats`], [`time`] | units and frames as types; random streams; stamps |
 //!
-//! Without the default features `sim` and `viewer`, the library is the estimator and the planner alone.
+//! Without the default features `images`, `sim` and `viewer`, the library is the estimator and the planner alone.
 //!
 //! # The wall between truth and belief
 //!
@@ -70,9 +69,10 @@ pub use armcal_belief::{calib, plan, session, tagmap, verify};
 pub use armcal_core::{
     codes, input, joints, kinematics, log, optics, robot, routine, sensor, spatial, stats, streams, time,
 };
-#[cfg(feature = "sim")]
+#[cfg(feature = "images")]
 pub use armcal_detect as detect;
 #[cfg(feature = "sim")]
+#[doc(hidden)]
 pub use armcal_sim as sim;
 
 pub use armcal_belief::calib::{CalibError, Calibration, Status, calibrate, interim_estimate};
@@ -92,9 +92,6 @@ pub use armcal_core::time::Stamp;
 pub use armcal_replay as replay;
 #[cfg(feature = "sim")]
 #[doc(hidden)]
-pub use armcal_study as study;
-#[cfg(feature = "sim")]
-#[doc(hidden)]
 pub mod campaign;
 #[doc(hidden)]
 pub mod cli;
@@ -102,11 +99,11 @@ pub mod cli;
 pub mod export;
 #[doc(hidden)]
 pub mod output;
-#[cfg(feature = "sim")]
+#[cfg(feature = "images")]
 pub mod recorded_images;
 #[doc(hidden)]
 pub mod report;
-#[cfg(feature = "sim")]
+#[cfg(feature = "closed-loop")]
 #[doc(hidden)]
 pub mod run;
 #[doc(hidden)]

@@ -256,8 +256,9 @@ fn the_program_finds_both_mounts_and_hands_them_on() {
         let exported = answer(&mut command);
         exported.expect(form, 0, &[words]);
     }
-    let online = calibrate_in(folder.path(), &["--online", "--out", "online"]);
-    online.expect("online", 0, &[]);
+    let mut online = program();
+    online.current_dir(folder.path()).args(["watch", "arm.mcap", "--robot", "robot", "--input", "input.toml"]);
+    answer(&mut online).expect("online", 0, &[]);
     let other = calibrate_in(folder.path(), &["--method", "minimum_distance", "--out", "other"]);
     assert!(other.stderr.contains(" 21 "), "{other:?}");
 }

@@ -7,16 +7,7 @@ use crate::map::mapping_run;
 use crate::support::{Answer, answer, edit, program, robot_copy, robot_folder, temp};
 
 fn follow(recording: &Path, out: &Path) -> Answer {
-    answer(
-        program()
-            .arg("calibrate")
-            .arg(recording)
-            .arg("--online")
-            .arg("--robot")
-            .arg(robot_folder())
-            .arg("--out")
-            .arg(out),
-    )
+    answer(program().arg("watch").arg(recording).arg("--robot").arg(robot_folder()).arg("--out").arg(out))
 }
 
 fn root(path: &str) -> std::path::PathBuf {
@@ -50,7 +41,7 @@ fn a_recording_is_followed_and_its_belief_written() {
 fn a_stationary_belief_ends_at_the_batch() {
     let folder = temp();
     let mut command = program();
-    command.args(["calibrate", "--online", "--stationary"]).arg(root("recordings/sample/run.mcap"));
+    command.args(["watch", "--stationary"]).arg(root("recordings/sample/run.mcap"));
     let said = answer(command.arg("--robot").arg(robot_folder()).arg("--out").arg(folder.path()));
     said.expect("the sample", 0, &["batch        accepted"]);
     let line = said.stdout.lines().find(|line| line.starts_with("difference")).expect("a line of the difference");
@@ -68,58 +59,10 @@ fn what_cannot_be_followed_is_refused() {
     edit(&robot.join("robot.toml"), "joint = \"wrist_yaw\"", "joint = \"wrist_sway\"");
     edit(&robot.join("titan4.urdf"), "joint name=\"wrist_yaw\"", "joint name=\"wrist_sway\"");
     let mut other = program();
-    other.arg("calibrate").arg(root("recordings/sample/run.mcap")).arg("--online");
+    other.arg("watch").arg(root("recordings/sample/run.mcap"));
     let said = answer(other.arg("--robot").arg(robot).arg("--out").arg(folder.path()));
     said.expect("another arm", 2, &["run.mcap", "wrist_sway"]);
     assert!(!folder.path().join("belief.jsonl").exists(), "nothing was written");
-}
-
-/// An hour under water: tags are passed in every other task, and the tool stays known while the calibration of the
-/// start becomes wrong.
-#[test]
-#[ignore = "second tier: an hour of a dive, 11 s"]
-fn the_tool_stays_known_through_an_hour_of_a_dive() {
-    let folder = temp();
-    let mut study = program();
-    study.args(["study", "dive", "--first-seed", "3", "--seeds", "1", "--routine"]);
-    let said = answer(study.arg(root("routines/short-dive.toml")).arg("--out").arg(folder.path()));
-    said.expect("the study", 0, &["written"]);
-    let table = fs::read_to_string(folder.path().join("tasks.csv")).expect("written");
-    let column = |name: &str| -> Vec<f64> {
-        let mut lines = table.lines();
-        let at = lines.next().and_then(|head| head.split(',').position(|key| key == name)).expect(name);
-        let mut values: Vec<f64> =
-            lines.map(|line| line.split(',').nth(at).expect(name).parse().expect("a number")).collect();
-        values.sort_by(f64::total_cmp);
-        values
-    };
-    let (online, start) = (column("online_m"), column("start_m"));
-    let (n, median) = (online.len(), |values: &[f64]| values[values.len() / 2]);
-    assert!(n >= 20, "{n} tasks");
-    assert!(median(&online) < 0.003 && online[n * 95 / 100] < 0.008, "{online:?}");
-    assert!(median(&start) > 2.0 * median(&online), "{start:?}");
-    let nees = column("nees");
-    let mean = nees.iter().sum::<f64>() / nees.len() as f64;
-    assert!((0.5..8.0).contains(&mean), "{mean}");
-}
-
-/// A sensor that slips on the way is named within three views after an oracle could tell it, and nothing else is.
-#[test]
-#[ignore = "second tier: two dives of an hour with a fault, 23 s"]
-fn a_slip_on_a_dive_is_named_as_soon_as_views_tell_it() {
-    let folder = temp();
-    let mut study = program();
-    study.args(["study", "dive-faults", "--seeds", "2", "--only"]).arg("sensor slipped").arg("--routine");
-    let said = answer(study.arg(root("routines/short-dive.toml")).arg("--out").arg(folder.path()));
-    said.expect("the study", 0, &["| 2 | 2 | 2 | 0 | 0 | 2 | 2 | 0 | 0 |", "written"]);
-    let rows = fs::read_to_string(folder.path().join("rows.csv")).expect("written");
-    for row in rows.lines().skip(1) {
-        let [_, _, views, ..] = row.split('"').collect::<Vec<_>>()[..] else { panic!("{row}") };
-        let numbers: Vec<usize> =
-            views.trim_matches(',').split(',').map(|n| n.parse().expect("a number of views")).collect();
-        let [oracle, of_kind, named] = numbers[..] else { panic!("{row}") };
-        assert!(oracle <= of_kind && named <= oracle + 3, "{row}");
-    }
 }
 
 /// A sensor that is declared dead says nothing of the arm between views: not good enough, whatever the views say.
@@ -127,7 +70,7 @@ fn a_slip_on_a_dive_is_named_as_soon_as_views_tell_it() {
 fn with_a_dead_sensor_the_arm_is_not_good_enough() {
     let folder = temp();
     let mut declared = program();
-    declared.arg("calibrate").arg(root("recordings/sample/run.mcap")).arg("--online");
+    declared.arg("watch").arg(root("recordings/sample/run.mcap"));
     declared.args(["--failed", "forearm_pitch=dead", "--robot"]).arg(robot_folder()).arg("--out").arg(folder.path());
     answer(&mut declared).expect("a dead forearm", 4, &[]);
 }
@@ -144,7 +87,7 @@ fn tags_of_unknown_place_are_not_believed_in() {
     let by_one = follow(&run.join("run.mcap"), folder.path());
     assert!(by_one.stderr.contains("tags 1, 2, 3, 4, 5, 6, 7"), "{by_one:#?}");
     let mut mapped = program();
-    mapped.arg("calibrate").arg(run.join("run.mcap")).args(["--online", "--robot"]).arg(robot_folder());
+    mapped.arg("watch").arg(run.join("run.mcap")).arg("--robot").arg(robot_folder());
     mapped.arg("--tag-map").arg(run.join("tagmap.toml")).arg("--out").arg(folder.path());
     let by_map = answer(&mut mapped);
     assert!(n_views(&by_map) > 2 * n_views(&by_one), "{by_map:#?}");

@@ -10,7 +10,8 @@ use armcal::sim::truth::read_truth;
 use armcal::streams::{JointCounts, Message, Sink};
 
 use crate::support::{
-    SHARED_PUMP_FLOW_L_MIN, SHARED_SEED, calibrate, edit, read, robot_copy, robot_folder, root, shared_run, temp,
+    SHARED_PUMP_FLOW_L_MIN, SHARED_SEED, calibrate, edit, files_below, read, robot_copy, robot_folder, root,
+    shared_run, temp,
 };
 
 /// calibration.toml of a recording, made by the program.
@@ -220,4 +221,28 @@ fn the_robot_folder_does_matter() {
     let answer = calibrate(&run.file("run.mcap"), &robot, out.path());
     assert!([0, 4].contains(&answer.code), "{answer:?}");
     assert!(read(&out.path().join("calibration.toml")) != read(&run.file("calibration.toml")));
+}
+
+/// The crate `live` alone reaches an arm, and only `drive`, `discover` and `serve` know it: `run` and all that it is made
+/// of have no way to a socket but the replay's, to a viewer.
+#[test]
+fn only_drive_discover_and_serve_reach_an_arm() {
+    let src = root().join("src");
+    let knows = ["cli/drive/", "cli/discover", "cli/serve/", "cli/exit.rs", "recorded_images/live.rs", "live/"];
+    let sockets = ["std::net", "TcpStream", "UdpSocket"];
+    for file in files_below(&src, "rs") {
+        let path = file.strip_prefix(&src).expect("below").to_string_lossy().into_owned();
+        let (text, is_allowed) = (read(&file), |ways: &[&str]| ways.iter().any(|way| path.starts_with(way)));
+        assert!(is_allowed(&knows) || !text.contains("armcal_live"), "{path} knows live arms");
+        let is_free = is_allowed(&["cli/discover.rs", "live/", "replay/tests/"]);
+        assert!(is_free || !sockets.iter().any(|socket| text.contains(socket)), "{path} opens a socket");
+    }
+    // No other crate depends on what speaks over a network.
+    for manifest in ["", "src/core", "src/belief", "src/detect", "src/sim", "src/lab"] {
+        let file = root().join(manifest).join("Cargo.toml");
+        let table: toml::Table = read(&file).parse().expect("TOML");
+        let dependencies = table["dependencies"].as_table().expect("a table");
+        let ways = ["mio", "rustdds", "ros2-client", "tungstenite", "re_grpc_client"];
+        assert!(ways.iter().all(|way| !dependencies.contains_key(*way)), "{}", file.display());
+    }
 }

@@ -17,18 +17,18 @@ fn sample() -> PathBuf {
     root().join("recordings/sample/run.mcap")
 }
 
-/// belief.jsonl of a recording by `calibrate --online`.
-fn by_calibrate(recording: &Path) -> String {
+/// belief.jsonl of a recording that is read whole, in the order of time.
+fn of_whole(recording: &Path) -> String {
     let out = temp();
     let mut command = program();
-    command.arg("calibrate").arg(recording).arg("--online").arg("--robot").arg(robot_folder());
+    command.arg("watch").arg(recording).arg("--robot").arg(robot_folder());
     answer(command.arg("--out").arg(out.path()));
     read(&out.path().join("belief.jsonl"))
 }
 
 fn of_sample() -> &'static str {
     static BELIEF: OnceLock<String> = OnceLock::new();
-    BELIEF.get_or_init(|| by_calibrate(&sample()))
+    BELIEF.get_or_init(|| of_whole(&sample()))
 }
 
 fn watch(recording: &Path, words: &[&str]) -> Command {
@@ -168,7 +168,7 @@ fn a_recording_without_an_end_is_lost_data() {
         fs::write(&file, &bytes[..length]).expect("written");
         let said = answer(&mut watch(&file, &["--json", "--idle-s", "1"]));
         said.expect("cut", 3, &["run.mcap"]);
-        assert_eq!(said.stdout, by_calibrate(&file));
+        assert_eq!(said.stdout, of_whole(&file));
     }
 }
 
@@ -260,5 +260,5 @@ fn a_run_is_watched_while_it_lasts() {
     let said = watching.end();
     said.expect("a run", 0, &[]);
     assert!(said.stdout.lines().count() > 2, "{said:?}");
-    assert_eq!(said.stdout, by_calibrate(&out.join("run.mcap")));
+    assert_eq!(said.stdout, of_whole(&out.join("run.mcap")));
 }

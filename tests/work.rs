@@ -185,7 +185,7 @@ fn calibration_poses_are_asked_for_where_a_task_would_miss() {
     // What the run believed is what its recording says.
     let followed = folder.path().join("followed");
     let mut again = program();
-    again.arg("calibrate").arg(out.join("run.mcap")).args(["--online", "--robot"]).arg(robot_folder());
+    again.arg("watch").arg(out.join("run.mcap")).arg("--robot").arg(robot_folder());
     answer(again.arg("--out").arg(&followed)).expect("the recording", 0, &[]);
     let last = |folder: &Path| read(&folder.join("belief.jsonl")).lines().last().map(str::to_owned);
     assert_eq!(last(&out), last(&followed));

@@ -35,11 +35,11 @@ LASTS_S = 4.0
 ROUTINE = ROOT / "routines/titan4-quickstart.toml"
 MAP = 'networks = ["127.0.0.1"]\n[guard]\nconnect_s = 6.0\nready_s = 5.0\nstale_s = 2.0\n'
 COMMAND = {
-    "discover": ["live", "discover", "--network", "127.0.0.1", "--for", "6", "--robot", ROOT / "robots/titan4"],
-    "listen": ["run", ROUTINE, "--arm", "ros2:arm.toml", "--no-motion"],
-    "search": ["run", ROUTINE, "--arm", "ros2:search.toml", "--no-motion"],
+    "discover": ["discover", "--network", "127.0.0.1", "--for", "6", "--robot", ROOT / "robots/titan4"],
+    "listen": ["drive", ROUTINE, "--arm", "arm.toml", "--no-motion"],
+    "search": ["drive", ROUTINE, "--arm", "search.toml", "--no-motion"],
     "serve": ["serve", ROUTINE, "--arm", "arm.toml", "--for", "6"],
-    "drive": ["run", ROUTINE, "--arm", "ros2:arm.toml", "--unattended", "--out", "out"],
+    "drive": ["drive", ROUTINE, "--arm", "arm.toml", "--unattended", "--out", "out"],
 }
 ATTACKS = []
 

@@ -336,7 +336,7 @@ def meet(program, one):
             attacker = os.fork()
             if attacker == 0:
                 play(one, server, sent)
-        arguments = ["run", ROUTINE, "--arm", "rosbridge:arm.toml", "--no-motion"]
+        arguments = ["drive", ROUTINE, "--arm", "arm.toml", "--no-motion"]
         spent = measured.Child([program, *map(str, arguments)], folder).wait()
         measured.end(attacker)
         return struct.unpack("<q", sent)[0], spent

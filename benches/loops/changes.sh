@@ -16,7 +16,7 @@ change() {
     shift
     "$armcal" --quiet campaign "$routine" --seeds "$seeds" --threads "${THREADS:-1}" --out "$folder/$name.csv" "$@" > /dev/null || true
     code=0
-    "$armcal" --quiet regress "$routine" --baseline "$baseline" --rows "$folder/$name.csv" --markdown "$folder/$name.md" > /dev/null || code=$?
+    "$armcal" --quiet regress "$routine" --baseline "$baseline" --rows "$folder/$name.csv" --report "$folder/$name.md" > /dev/null || code=$?
     echo "$name: exit code $code ($(sed -n 3p "$folder/$name.md"))"
 }
 

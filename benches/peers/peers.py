@@ -18,8 +18,8 @@ Machine, date and versions stand at the top; a part that cannot run says why, an
 | maps | TagSLAM | TagSLAM's own tests, with the maps that it left there |
 | industrial | industrial_calibration | its own example data |
 | solvers | Ceres, NLopt | `bundle` and minimum distance, the same numbers |
-| detectors | pupil-apriltags, OpenCV | found tags, corner errors, time on `armcal study detection`'s images |
-| paths | OMPL with coal | RRT-Connect and edge checks on `armcal study edges` and `study paths` |
+| detectors | pupil-apriltags, OpenCV | found tags, corner errors, time on `armcal-lab detection`'s images |
+| paths | OMPL with coal | RRT-Connect and edge checks on `armcal-lab edges` and `armcal-lab paths` |
 | physics | MuJoCo, Pinocchio | steps and accelerations a second of the same arm |
 """
 

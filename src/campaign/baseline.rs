@@ -83,9 +83,9 @@ pub fn read_rows(path: &Path, prepared: &Prepared, baseline: &Table) -> Result<T
 fn command_options(request: &Request) -> String {
     let mut words = request.routine.display().to_string();
     let Overrides { robot, vehicle, .. } = &request.overrides;
-    for (option, path) in [("--robot", robot), ("--vehicle", vehicle)] {
+    for (option, path) in [("--robot ", robot), ("--set vehicle=", vehicle)] {
         if let Some(path) = path {
-            words += &format!(" {option} {}", path.display());
+            words += &format!(" {option}{}", path.display());
         }
     }
     words

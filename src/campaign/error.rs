@@ -42,6 +42,7 @@ pub enum CampaignError {
     Usage(String),
     #[error("{0}")]
     Output(#[from] OutputError),
+    #[cfg(feature = "parquet")]
     #[error("{}: cannot be written: {source}", path.display())]
     Parquet { path: PathBuf, source: parquet::errors::ParquetError },
     #[error("the summary has no text: {0}")]
@@ -60,15 +61,11 @@ impl CampaignError {
     /// Whether the user's input is at fault, not the machine. [`Self::Input`] leaves that to its source.
     #[must_use]
     pub fn is_invalid_input(&self) -> bool {
-        !matches!(
-            self,
-            Self::Output(_)
-                | Self::Machine { .. }
-                | Self::Input(_)
-                | Self::Parquet { .. }
-                | Self::Json(_)
-                | Self::Threads(_)
-        )
+        #[cfg(feature = "parquet")]
+        if matches!(self, Self::Parquet { .. }) {
+            return false;
+        }
+        !matches!(self, Self::Output(_) | Self::Machine { .. } | Self::Input(_) | Self::Json(_) | Self::Threads(_))
     }
 }
 
@@ -85,6 +82,7 @@ impl Coded for CampaignError {
             Self::Machine { source, .. } => source.code(),
             Self::Usage(_) => Code::UsageInvalid,
             Self::Output(error) => error.code(),
+            #[cfg(feature = "parquet")]
             Self::Parquet { .. } => Code::FileUnwritable,
             Self::Json(_) | Self::Threads(_) => Code::Internal,
         }

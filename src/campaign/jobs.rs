@@ -80,9 +80,9 @@ impl Prepared {
         let text = |path: &Path| path.display().to_string();
         let mut words =
             vec!["armcal".to_owned(), "run".to_owned(), text(routine), "--seed".to_owned(), seed.to_string()];
-        for (option, path) in [("--robot", &overrides.robot), ("--vehicle", &overrides.vehicle)] {
-            words.extend(path.iter().flat_map(|path| [option.to_owned(), text(path)]));
-        }
+        words.extend(overrides.robot.iter().flat_map(|path| ["--robot".to_owned(), text(path)]));
+        let vehicle = |path: &PathBuf| ["--set".to_owned(), format!("vehicle={}", text(path))];
+        words.extend(overrides.vehicle.iter().flat_map(vehicle));
         let set = overrides.set.iter().chain(&setting.set);
         words.extend(set.flat_map(|one| ["--set".to_owned(), one.to_string()]));
         words.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" ")

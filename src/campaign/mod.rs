@@ -17,6 +17,7 @@ mod matrix;
 mod merge;
 mod metric;
 mod origin;
+#[cfg(feature = "parquet")]
 mod parquet_file;
 mod regress;
 mod regress_report;

@@ -1,5 +1,6 @@
 //! Rows as Parquet: the same columns as the CSV, with types.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use arrow::array::{ArrayRef, Float64Array, StringArray, UInt8Array, UInt32Array, UInt64Array};
@@ -10,11 +11,17 @@ use parquet::errors::ParquetError;
 use parquet::file::properties::WriterProperties;
 
 use crate::campaign::columns::Columns;
-use crate::campaign::{Row, Table};
+use crate::campaign::{CampaignError, Row, Table};
+use crate::output;
 use armcal_core::units::Unit;
 
-/// The file's bytes; the same rows give the same bytes.
-pub(super) fn parquet_bytes(table: &Table) -> Result<Vec<u8>, ParquetError> {
+/// Writes the file; the same rows give the same bytes.
+pub(super) fn write_parquet(path: &Path, table: &Table) -> Result<(), CampaignError> {
+    let bytes = parquet_bytes(table).map_err(|source| CampaignError::Parquet { path: path.to_owned(), source })?;
+    Ok(output::write_whole(path, &bytes)?)
+}
+
+fn parquet_bytes(table: &Table) -> Result<Vec<u8>, ParquetError> {
     let batch = batch(table).map_err(|error| ParquetError::ArrowError(error.to_string()))?;
     let properties = WriterProperties::builder().set_compression(Compression::SNAPPY).build();
     let mut bytes = Vec::new();

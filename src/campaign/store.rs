@@ -11,7 +11,6 @@ use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use crate::campaign::html::campaign_page;
-use crate::campaign::parquet_file::parquet_bytes;
 use crate::campaign::statistics::{CampaignSummary, statistics};
 use crate::campaign::table_file::{Table, parse_table, read_table, row_line, table_text};
 use crate::campaign::tables::markdown;
@@ -119,7 +118,7 @@ impl Store {
 
     fn load(&mut self, partial: &Path, existing: ExistingRows) -> Result<(), CampaignError> {
         if existing == ExistingRows::Discard {
-            for path in results(&self.out) {
+            for path in results(&self.out).into_iter().chain([self.out.with_extension("parquet")]) {
                 output::remove(&path)?;
             }
             return self.restart();
@@ -242,21 +241,15 @@ fn whole_lines(bytes: &[u8]) -> Option<usize> {
 }
 
 /// The table and what is written beside it.
-fn results(out: &Path) -> [PathBuf; 5] {
+fn results(out: &Path) -> [PathBuf; 4] {
     let bare = out.with_extension("");
     let beside = |suffix| output::with_suffix(&bare, suffix);
-    [
-        out.to_owned(),
-        out.with_extension("parquet"),
-        beside("-summary.json"),
-        beside("-summary.md"),
-        beside("-report.html"),
-    ]
+    [out.to_owned(), beside("-summary.json"), beside("-summary.md"), beside("-report.html")]
 }
 
 /// The summary beside a table; `None` where there is none.
 pub(super) fn read_summary(out: &Path) -> Result<Option<CampaignSummary>, CampaignError> {
-    let [_, _, path, ..] = results(out);
+    let [_, path, ..] = results(out);
     match files::read_bytes(&path, FileKind::Table) {
         Ok(bytes) => serde_json::from_slice(&bytes)
             .map(Some)
@@ -266,14 +259,18 @@ pub(super) fn read_summary(out: &Path) -> Result<Option<CampaignSummary>, Campai
     }
 }
 
-/// Writes the table, sorted by the caller, as CSV and Parquet, and its summary as JSON, Markdown and a page.
+/// Writes the table, sorted by the caller, as CSV (and Parquet, where it is built), and its summary as JSON, Markdown
+/// and a page.
 ///
 /// # Errors
 /// [`CampaignError`] naming the file that could not be written.
 pub fn write_results(out: &Path, table: &Table, summary: &CampaignSummary) -> Result<(), CampaignError> {
-    let [csv, parquet, json, text, html] = results(out);
-    let bytes = parquet_bytes(table).map_err(|source| CampaignError::Parquet { path: parquet.clone(), source })?;
-    output::write_whole(&parquet, &bytes)?;
+    let [csv, json, text, html] = results(out);
+    #[cfg(feature = "parquet")]
+    crate::campaign::parquet_file::write_parquet(&out.with_extension("parquet"), table)?;
+    // One of another build would hold other rows.
+    #[cfg(not(feature = "parquet"))]
+    output::remove(&out.with_extension("parquet"))?;
     output::write_whole(&json, format!("{}\n", serde_json::to_string_pretty(summary)?).as_bytes())?;
     output::write_whole(&text, markdown(summary).as_bytes())?;
     output::write_whole(&html, campaign_page(table, summary).as_bytes())?;

@@ -7,7 +7,6 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use clap::Args;
 
-use crate::cli::calibrate_online::{Told, calibrate_online, stationary};
 use crate::cli::calibration_inputs::{Calibrated, CalibrationInputs, load_robot};
 use crate::cli::closing::ClosingArgs;
 use crate::cli::exit::Exit;
@@ -50,14 +49,6 @@ pub(super) struct CalibrateArgs {
     /// Folder for calibration.toml, summary.json and report.html
     #[arg(long, value_name = "DIR", default_value = ".")]
     out: PathBuf,
-    /// Follow the recording view by view and write the estimate over time (belief.jsonl); --json also prints its
-    /// lines
-    #[arg(long, conflicts_with_all = ["compact", "prior", "method", "details"])]
-    online: bool,
-    /// With --online: assume no drift, take model and scales from the batch of all views, and print the distance of
-    /// the last estimate from that batch
-    #[arg(long, requires = "online")]
-    stationary: bool,
     /// Print the calibration as one line below 512 bytes instead of the verdict
     #[arg(long, conflicts_with_all = ["details", "json"])]
     compact: bool,
@@ -79,10 +70,6 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
         task: args.task.as_deref(),
     };
     given.check_kinds()?;
-    if args.online {
-        let follow = if args.stationary { stationary } else { calibrate_online };
-        return follow(&given, &args.out, if args.closing.json { Told::Json } else { Told::Text });
-    }
     let started = Instant::now();
     let Calibrated { calibration, lost, external } = given.calibrate()?;
     let (views, tags, steps) = (calibration.fit.views, calibration.fit.tags_seen, calibration.fit.evaluations);

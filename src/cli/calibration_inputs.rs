@@ -1,7 +1,7 @@
 //! What `armcal calibrate` is given: recordings, and the files beside them, as the estimator takes them.
 
 use armcal_core::codes::Code;
-#[cfg(feature = "sim")]
+#[cfg(feature = "images")]
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -18,18 +18,18 @@ use armcal_belief::calib::{
     calibrate_data, calibrate_with_survey, check_joints, prepare_external, prepare_pooled, read_marked,
 };
 use armcal_belief::tagmap::files::{LandmarkFile, NamedSurvey, read_landmarks};
-#[cfg(not(feature = "sim"))]
+#[cfg(not(feature = "images"))]
 use armcal_core::input::read_external;
 use armcal_core::input::{
     CameraInfoLens, ChildFrame, ExternalRecording, InputMap, Source, TagUse, read_camera_info, read_input_map,
     read_task,
 };
-#[cfg(feature = "sim")]
+#[cfg(feature = "images")]
 use armcal_core::input::{ImageDetector, ImageProblem, RecordedImage, TagCorners, Topics, read_external_images};
-#[cfg(feature = "sim")]
+#[cfg(feature = "images")]
 use armcal_core::log::for_each_raw;
 use armcal_core::log::{Recording, TopicMap, scan_recording};
-#[cfg(feature = "sim")]
+#[cfg(feature = "images")]
 use armcal_core::optics::TagFamily;
 use armcal_core::robot::{self, FailedJoint, FileIssue, Robot, SELF_COLLISION_FILE, TagSurvey};
 use armcal_core::routine::Method;
@@ -333,7 +333,7 @@ impl CalibrationInputs<'_> {
 }
 
 /// Images are looked at as they are read, one at a time.
-#[cfg(feature = "sim")]
+#[cfg(feature = "images")]
 fn read_with_images(path: &Path, map: &InputMap, robot: &Robot) -> Result<ExternalRecording> {
     let family = map.tag_family.unwrap_or(robot.tag_family);
     let detector =
@@ -347,7 +347,7 @@ fn read_with_images(path: &Path, map: &InputMap, robot: &Robot) -> Result<Extern
 
 /// A sign of life for recordings whose tags are in images; their number is found in a pass of its own, which takes next
 /// to no time beside the search.
-#[cfg(feature = "sim")]
+#[cfg(feature = "images")]
 fn watched_images(path: &Path, topics: &Topics) -> Result<Option<Waiting>> {
     if !Waiting::on("looking for images").is_seen() {
         return Ok(None);
@@ -367,13 +367,13 @@ fn watched_images(path: &Path, topics: &Topics) -> Result<Option<Waiting>> {
 }
 
 /// A search of images that says how far it is.
-#[cfg(feature = "sim")]
+#[cfg(feature = "images")]
 struct Watched {
     detector: crate::recorded_images::RecordedImageDetector,
     waiting: Option<Waiting>,
 }
 
-#[cfg(feature = "sim")]
+#[cfg(feature = "images")]
 impl ImageDetector for Watched {
     fn family(&self) -> TagFamily {
         self.detector.family()
@@ -385,7 +385,7 @@ impl ImageDetector for Watched {
     }
 }
 
-#[cfg(not(feature = "sim"))]
+#[cfg(not(feature = "images"))]
 fn read_with_images(path: &Path, map: &InputMap, robot: &Robot) -> Result<ExternalRecording> {
     Ok(read_external(path, map, robot)?)
 }

@@ -35,8 +35,8 @@ pub(super) struct CampaignArgs {
     /// Run every N-th seed from the K-th on
     #[arg(long, value_name = "K/N")]
     shard: Option<Shard>,
-    /// Table (.csv); .parquet, -summary.json, -summary.md and -report.html are written next to it; default:
-    /// recordings/ROUTINE-NAME/campaign.csv
+    /// Table (.csv); -summary.json, -summary.md, -report.html and, where it is built, .parquet are written next to
+    /// it; default: recordings/ROUTINE-NAME/campaign.csv
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Stop when a rate is decided, such as "contacts < 0.001 at 95 %"; rates: contacts, missed, refused, failed,
@@ -64,8 +64,7 @@ pub(super) struct CampaignArgs {
     fresh: bool,
     /// Merge the tables of shards into --out
     #[arg(long, value_name = "FILE", num_args = 1.., requires = "out",
-          conflicts_with_all = ["seeds", "shard", "until", "threads", "keep", "keep_worst", "fresh", "set", "robot",
-                                "vehicle"])]
+          conflicts_with_all = ["seeds", "shard", "until", "threads", "keep", "keep_worst", "fresh", "set", "robot"])]
     merge: Vec<PathBuf>,
     /// Merge even if tables of some shards are missing
     #[arg(long, requires = "merge")]

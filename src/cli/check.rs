@@ -12,14 +12,13 @@ use crate::campaign::Request;
 use crate::cli::closing::say_wrapped;
 use crate::cli::exit::{Exit, UsageError, chain_of, code_of};
 use crate::cli::file_kind::FileKind;
-use crate::cli::overrides::OverrideArgs;
 use crate::cli::stdout::say;
 use armcal_belief::calib::{Calibration, CalibrationFileError, Status};
 use armcal_belief::plan::{ClearanceModel, PlanFile, SceneCheck, SceneIssues, grips_at_first};
 use armcal_belief::tagmap::files::read_landmarks;
 use armcal_core::input::{InputMap, SeenColumns, Source, TagUse, Topics, read_input_map, read_task};
 use armcal_core::robot::{self, Robot, Vehicle};
-use armcal_core::routine::{self, Overrides, Routine, Step};
+use armcal_core::routine::{self, Override, Overrides, Routine, Step};
 use armcal_core::stats::stream_rng;
 use armcal_core::text::counted;
 
@@ -32,12 +31,13 @@ pub(super) struct CheckArgs {
     #[arg(long)]
     json: bool,
     /// For the routines among them
-    #[command(flatten)]
-    overrides: OverrideArgs,
+    /// Replace a key of the routines, such as capture.poses=20; repeatable
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<Override>,
 }
 
 pub(super) fn check(args: &CheckArgs) -> Result<Exit> {
-    let context = Context { overrides: args.overrides.overrides(), robot: only_robot(&args.files) };
+    let context = Context { overrides: Overrides { set: args.set.clone(), ..Overrides::default() }, robot: only_robot(&args.files) };
     let checked = args.files.iter().map(|file| Checked::of(file, &context));
     let checked: Vec<Checked> = if args.json {
         let checked: Vec<Checked> = checked.collect();

@@ -14,21 +14,24 @@ use tracing_subscriber::layer::SubscriberExt;
 use tracing_subscriber::util::SubscriberInitExt;
 
 use self::log_lines::LogLines;
-use crate::cli::examples::with_examples;
-#[cfg(feature = "sim")]
-use crate::cli::live::discover;
+use crate::cli::examples::{EXAMPLES, with_examples};
+use crate::cli::groups::grouped;
 #[cfg(feature = "viewer")]
 use crate::cli::replay;
 use crate::cli::stdout::{be_quiet, complain, is_written};
 use crate::cli::{calibrate, check, completions, exit, explain, export, inspect, new_robot, plan, tagmap, watch};
 #[cfg(feature = "sim")]
-use crate::cli::{campaign, regress, run, sensitivity, serve, study};
+use crate::cli::{campaign, regress, run, serve};
+#[cfg(feature = "closed-loop")]
+use crate::cli::{discover, drive};
 
 /// What this build has of the parts that a build may leave out.
-const PARTS: [(bool, &str); 3] = [
+const PARTS: [(bool, &str); 5] = [
+    (cfg!(feature = "images"), "tags in images"),
     (cfg!(feature = "sim"), "simulator"),
     (cfg!(feature = "viewer"), "replays"),
     (cfg!(feature = "live"), "live arms over ROS 2 humble"),
+    (cfg!(feature = "parquet"), "Parquet"),
 ];
 
 /// Version, commit of a release (ARMCAL_COMMIT at compile time), parts: "0.3.0 (1a2b3c4d5e6f; simulator, replays)".
@@ -50,7 +53,7 @@ struct Cli {
 
 /// How much is said.
 #[derive(Debug, Args)]
-struct Loudness {
+pub struct Loudness {
     /// Print only the verdict and errors: no progress, notes, warnings or further lines
     #[arg(long, short, global = true, conflicts_with = "verbose")]
     quiet: bool,
@@ -70,104 +73,120 @@ impl Loudness {
     }
 }
 
+/// In the order of `GROUPS`.
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Calibrate from recordings of a simulated or real arm
+    Calibrate(calibrate::CalibrateArgs),
+    /// Plan poses and paths of a routine's first capture without moving
+    Plan(plan::PlanArgs),
+    /// Print what a recording holds, whether it is complete, and what it can calibrate
+    Inspect(inspect::InspectArgs),
+    /// Check files of all kinds for errors: robot folders, routines, tag maps, calibrations ...
+    Check(check::CheckArgs),
+    /// Print a calibration in the form that a driver or another program reads
+    Export(export::ExportArgs),
+    /// Open a recording in the Rerun viewer, or write it as .rrd
+    #[cfg(feature = "viewer")]
+    Replay(replay::ReplayArgs),
+    /// Compute a tag map from camera views only
+    Tagmap(tagmap::TagmapArgs),
+    /// Write a commented robot folder for an arm's URDF
+    NewRobot(new_robot::NewRobotArgs),
+    /// Carry out a routine on a real arm: the only command that moves one
+    #[cfg(feature = "closed-loop")]
+    Drive(Box<drive::DriveArgs>),
+    /// Find the topics of a real arm
+    #[cfg(feature = "closed-loop")]
+    Discover(discover::DiscoverArgs),
+    /// Follow a recording, whole or still being written, and print the current estimate
+    Watch(watch::WatchArgs),
     /// Run a routine in simulation: reach, plan, capture, calibrate, reach again
     #[cfg(feature = "sim")]
     Run(run::RunArgs),
-    /// Serve a routine's simulated arm on the ROS 2 topics of a real arm
-    #[cfg(feature = "sim")]
-    Serve(serve::ServeArgs),
-    /// Find the topics of a real arm
-    #[cfg(feature = "sim")]
-    Live(discover::LiveCommandArgs),
     /// Run a routine for many seeds and settings, and summarise the figures
     #[cfg(feature = "sim")]
     Campaign(Box<campaign::CampaignArgs>),
     /// Run a routine for the seeds of a baseline, and fail if it has become worse
     #[cfg(feature = "sim")]
     Regress(Box<regress::RegressArgs>),
-    /// Measure one part of the program against known truth
+    /// Serve a routine's simulated arm on the ROS 2 topics of a real arm
     #[cfg(feature = "sim")]
-    Study(study::StudyArgs),
-    /// Show the effect of one wrong joint offset on the paper's two objectives and on the tool
-    #[cfg(feature = "sim")]
-    Sensitivity(sensitivity::SensitivityArgs),
-    /// Plan poses and paths of a routine's first capture without moving: plan.toml and a replay of it
-    Plan(plan::PlanArgs),
-    /// Calibrate from recordings of a simulated or real arm
-    Calibrate(calibrate::CalibrateArgs),
-    /// Follow a recording while another program writes it, and print the current estimate
-    Watch(watch::WatchArgs),
-    /// Compute a tag map from camera views only
-    Tagmap(tagmap::TagmapArgs),
-    /// Print what a recording holds, whether it is complete, and what it can calibrate
-    Inspect(inspect::InspectArgs),
-    /// Print a calibration in the form that a driver or another program reads
-    Export(export::ExportArgs),
-    /// Open a recording in the Rerun viewer, or write it as .rrd
-    #[cfg(feature = "viewer")]
-    Replay(replay::ReplayArgs),
-    /// Write a commented robot folder for an arm's URDF
-    NewRobot(new_robot::NewRobotArgs),
-    /// Check robot folders, routines, vehicles, calibrations, input maps, tag maps, tasks and plans for errors
-    Check(check::CheckArgs),
+    Serve(serve::ServeArgs),
     /// Print cause, evidence, remedy and page of a code, or list all codes
     Explain(explain::ExplainArgs),
     /// Print the completion script of a shell
+    #[command(hide = true)]
     Completions(completions::CompletionsArgs),
     /// Write manual pages into a folder
+    #[command(hide = true)]
     Man(completions::ManArgs),
 }
 
 /// The definition of the command line, for those who check quoted command lines.
 #[must_use]
 pub fn command() -> clap::Command {
-    with_examples(Cli::command())
+    grouped(with_examples(Cli::command(), EXAMPLES))
 }
 
 /// Parses the command line, does what it says and gives the exit code; errors go to stderr once, here.
 #[must_use]
 pub fn main() -> ExitCode {
-    let parsed = command().try_get_matches().and_then(|matches| Cli::from_arg_matches(&matches));
-    let cli = match parsed {
+    let cli: Cli = match parsed(command()) {
         Ok(cli) => cli,
-        Err(answer) => return clap_answer(&answer),
+        Err(exit) => return exit,
     };
-    if cli.loudness.quiet {
+    carry_out(&cli.loudness, || cli.command.carry_out())
+}
+
+/// The words of this process as `command` understands them.
+///
+/// # Errors
+/// The exit code, where help was asked for and printed, or where they are wrong, which was said.
+pub fn parsed<C: FromArgMatches>(command: clap::Command) -> Result<C, ExitCode> {
+    let matches = command.try_get_matches().and_then(|matches| C::from_arg_matches(&matches));
+    matches.map_err(|answer| clap_answer(&answer))
+}
+
+/// Does a command's work, as loud as was asked for; says what failed, and gives the exit code.
+pub fn carry_out(loudness: &Loudness, work: impl FnOnce() -> Result<exit::Exit>) -> ExitCode {
+    if loudness.quiet {
         be_quiet();
     }
-    begin_log(cli.loudness.level());
-    let result = match cli.command {
-        #[cfg(feature = "sim")]
-        Command::Run(args) => run::run(&args),
-        #[cfg(feature = "sim")]
-        Command::Serve(args) => serve::serve(&args),
-        #[cfg(feature = "sim")]
-        Command::Live(args) => discover::live(&args),
-        #[cfg(feature = "sim")]
-        Command::Campaign(args) => campaign::campaign(&args),
-        #[cfg(feature = "sim")]
-        Command::Regress(args) => regress::regress(&args),
-        #[cfg(feature = "sim")]
-        Command::Study(args) => study::study(&args),
-        #[cfg(feature = "sim")]
-        Command::Sensitivity(args) => sensitivity::sensitivity(&args),
-        Command::Plan(args) => plan::plan(&args),
-        Command::Calibrate(args) => calibrate::calibrate(&args),
-        Command::Watch(args) => watch::watch(&args),
-        Command::Tagmap(args) => tagmap::tagmap(&args),
-        Command::Inspect(args) => inspect::inspect(&args),
-        Command::Export(args) => export::export(&args),
-        #[cfg(feature = "viewer")]
-        Command::Replay(args) => replay::replay(&args),
-        Command::NewRobot(args) => new_robot::new_robot(&args),
-        Command::Check(args) => check::check(&args),
-        Command::Explain(args) => explain::explain(&args),
-        Command::Completions(args) => completions::completions(&args, command()),
-        Command::Man(args) => completions::man(&args, command()),
-    };
-    ended(result)
+    begin_log(loudness.level());
+    ended(work())
+}
+
+impl Command {
+    fn carry_out(&self) -> Result<exit::Exit> {
+        match self {
+            Self::Calibrate(args) => calibrate::calibrate(args),
+            Self::Plan(args) => plan::plan(args),
+            Self::Inspect(args) => inspect::inspect(args),
+            Self::Check(args) => check::check(args),
+            Self::Export(args) => export::export(args),
+            #[cfg(feature = "viewer")]
+            Self::Replay(args) => replay::replay(args),
+            Self::Tagmap(args) => tagmap::tagmap(args),
+            Self::NewRobot(args) => new_robot::new_robot(args),
+            #[cfg(feature = "closed-loop")]
+            Self::Drive(args) => drive::drive(args),
+            #[cfg(feature = "closed-loop")]
+            Self::Discover(args) => discover::discover(args),
+            Self::Watch(args) => watch::watch(args),
+            #[cfg(feature = "sim")]
+            Self::Run(args) => run::run(args),
+            #[cfg(feature = "sim")]
+            Self::Campaign(args) => campaign::campaign(args),
+            #[cfg(feature = "sim")]
+            Self::Regress(args) => regress::regress(args),
+            #[cfg(feature = "sim")]
+            Self::Serve(args) => serve::serve(args),
+            Self::Explain(args) => explain::explain(args),
+            Self::Completions(args) => completions::completions(args, command()),
+            Self::Man(args) => completions::man(args, command()),
+        }
+    }
 }
 
 /// Words of the libraries go to stderr, but for what the middleware says of every long message, and of no ROS on this

@@ -1,30 +1,19 @@
-//! `armcal live discover`: what a ROS 2 domain has, as a proposed connection map.
+//! `armcal discover`: what a ROS 2 domain has, as a proposed connection map.
 
 use std::net::Ipv4Addr;
 use std::path::PathBuf;
 
 use anyhow::Result;
-use clap::{Args, Subcommand};
+use clap::Args;
 
 use crate::cli::exit::Exit;
 
 #[cfg(feature = "live")]
 mod looked;
 
+/// Listens to a ROS 2 domain, and proposes a connection map with the topics of the arm.
 #[derive(Debug, Args)]
-pub(in crate::cli) struct LiveCommandArgs {
-    #[command(subcommand)]
-    command: LiveCommand,
-}
-
-#[derive(Debug, Subcommand)]
-enum LiveCommand {
-    /// Listen to a ROS 2 domain and propose a connection map with the topics of the arm
-    Discover(DiscoverArgs),
-}
-
-#[derive(Debug, Args)]
-struct DiscoverArgs {
+pub(super) struct DiscoverArgs {
     /// ROS_DOMAIN_ID
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u16).range(0..=232))]
     domain: u16,
@@ -47,17 +36,12 @@ fn seconds(text: &str) -> Result<f64, String> {
     if (1.0..=3600.0).contains(&seconds) { Ok(seconds) } else { Err("it must be 1 .. 3600".to_owned()) }
 }
 
-pub(in crate::cli) fn live(args: &LiveCommandArgs) -> Result<Exit> {
-    let LiveCommand::Discover(args) = &args.command;
-    discover(args)
-}
-
 #[cfg(feature = "live")]
-fn discover(args: &DiscoverArgs) -> Result<Exit> {
+pub(super) fn discover(args: &DiscoverArgs) -> Result<Exit> {
     looked::discover(args)
 }
 
 #[cfg(not(feature = "live"))]
-fn discover(_: &DiscoverArgs) -> Result<Exit> {
-    Err(super::not_built("live discover"))
+pub(super) fn discover(_: &DiscoverArgs) -> Result<Exit> {
+    Err(crate::cli::exit::not_built("discover"))
 }

@@ -3,20 +3,24 @@
 use clap::Command;
 
 /// By the names of command and subcommand.
-const EXAMPLES: &[(&str, &[&str])] = &[
+pub(super) const EXAMPLES: &[(&str, &[&str])] = &[
     (
         "run",
         &[
             "armcal run routines/titan4-quickstart.toml",
             "armcal run routines/titan4-quickstart.toml --seed 2 --out dive-2 --details",
             "armcal run routines/titan4-quickstart.toml --set capture.poses=20 --json",
-            "armcal run routines/my-arm.toml --arm ros2:arm.toml --speed 0.2",
-            "armcal run routines/my-arm.toml --arm rosbridge:arm.toml --no-motion",
+        ],
+    ),
+    (
+        "drive",
+        &[
+            "armcal drive routines/my-arm.toml --arm arm.toml --no-motion",
+            "armcal drive routines/my-arm.toml --arm arm.toml --nudge --speed 0.2",
         ],
     ),
     ("serve", &["armcal serve routines/titan4-quickstart.toml --factor 5 --for 600"]),
-    ("live", &["armcal live discover --robot my-arm --out arm.toml"]),
-    ("live discover", &["armcal live discover --domain 7 --robot my-arm --out arm.toml"]),
+    ("discover", &["armcal discover --domain 7 --robot my-arm --out arm.toml"]),
     (
         "campaign",
         &[
@@ -29,10 +33,9 @@ const EXAMPLES: &[(&str, &[&str])] = &[
         "regress",
         &[
             "armcal regress routines/regression.toml --write-baseline baseline.csv --seeds 1..10",
-            "armcal regress routines/regression.toml --baseline baseline.csv --junit regress.xml",
+            "armcal regress routines/regression.toml --baseline baseline.csv --report regress.xml",
         ],
     ),
-    ("sensitivity", &["armcal sensitivity routines/titan4-quickstart.toml --poses 40 --out sensitivity"]),
     (
         "plan",
         &[
@@ -46,11 +49,16 @@ const EXAMPLES: &[(&str, &[&str])] = &[
             "armcal calibrate run.mcap --robot robots/titan4 --out result",
             "armcal calibrate field.mcap --robot my-arm --input map.toml --tag-map tags.toml --out result",
             "armcal calibrate day-1.mcap day-2.mcap --robot robots/titan4 --prior result/calibration.toml --out new",
-            "armcal calibrate dive.mcap --robot robots/titan4 --online --out belief",
         ],
     ),
     ("explain", &["armcal explain value_out_of_range", "armcal explain"]),
-    ("watch", &["armcal watch recordings/dive/run.mcap --robot robots/titan4 --json"]),
+    (
+        "watch",
+        &[
+            "armcal watch recordings/dive/run.mcap --robot robots/titan4 --json",
+            "armcal watch field.mcap --robot my-arm --input map.toml --tag-map tags.toml --out belief",
+        ],
+    ),
     (
         "tagmap",
         &[
@@ -73,7 +81,13 @@ const EXAMPLES: &[(&str, &[&str])] = &[
         ],
     ),
     ("replay", &["armcal replay recordings/dive/run.mcap", "armcal replay recordings/dive/run.mcap --save dive.rrd"]),
-    ("new-robot", &["armcal new-robot arm.urdf --out my-arm --tip tool0 --camera-link camera_optical"]),
+    (
+        "new-robot",
+        &[
+            "armcal new-robot arm.urdf --out my-arm --tip tool0 --camera-link camera_optical",
+            "armcal new-robot --self-collision my-arm",
+        ],
+    ),
     (
         "check",
         &[
@@ -83,38 +97,26 @@ const EXAMPLES: &[(&str, &[&str])] = &[
     ),
     ("completions", &["armcal completions bash"]),
     ("man", &["armcal man share/man/man1"]),
-    ("study", &["armcal study detection --repeats 10", "armcal study falsified --quick"]),
-    ("study detection", &["armcal study detection --repeats 10 --out detection"]),
-    ("study paper", &["armcal study paper --quick"]),
-    ("study edges", &["armcal study edges --n 1000"]),
-    ("study paths", &["armcal study paths --n 100"]),
-    ("study self-collision", &["armcal study self-collision my-arm --n 100000"]),
-    ("study tracking-error", &["armcal study tracking-error run.mcap --robot robots/titan4"]),
-    ("study poses", &["armcal study poses --seeds 5"]),
-    ("study falsified", &["armcal study falsified --kind tag --seeds 10"]),
-    ("study worlds", &["armcal study worlds --runs 100 --first-seed 1 --timeout-s 300"]),
-    ("study dive", &["armcal study dive --seeds 10 --keep"]),
-    ("study bound", &["armcal study bound --routine routines/titan4-pinhole.toml --seeds 20"]),
-    ("study dive-faults", &["armcal study dive-faults --seeds 5 --kind sensor"]),
 ];
 
 /// `command` with the examples in its help and in that of all below it.
-pub(super) fn with_examples(command: Command) -> Command {
+#[must_use]
+pub fn with_examples(command: Command, examples: &[(&str, &[&str])]) -> Command {
     let mut command = command;
     let names: Vec<String> = command.get_subcommands().map(|below| below.get_name().to_owned()).collect();
     for name in names {
-        command = command.mut_subcommand(&name, |below| named(below, &name));
+        command = command.mut_subcommand(&name, |below| named(below, &name, examples));
     }
     command
 }
 
-fn named(command: Command, name: &str) -> Command {
+fn named(command: Command, name: &str, examples: &[(&str, &[&str])]) -> Command {
     let mut command = command;
     let below: Vec<String> = command.get_subcommands().map(|below| below.get_name().to_owned()).collect();
     for below in below {
-        command = command.mut_subcommand(&below, |command| named(command, &format!("{name} {below}")));
+        command = command.mut_subcommand(&below, |command| named(command, &format!("{name} {below}"), examples));
     }
-    match EXAMPLES.iter().find(|(of, _)| *of == name) {
+    match examples.iter().find(|(of, _)| *of == name) {
         Some((_, lines)) => command.after_help(format!("Examples:\n  {}", lines.join("\n  "))),
         None => command,
     }

@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use crate::output::OutputError;
-#[cfg(feature = "sim")]
+#[cfg(feature = "closed-loop")]
 use crate::report::RunSummary;
 use crate::report::proposed_map::ProposalError;
 use armcal_belief::calib::{CalibError, CalibrationFileError, CompactError};
@@ -53,7 +53,7 @@ impl From<Exit> for ExitCode {
 }
 
 /// A run that came to its end: accepted and every limit held, or not.
-#[cfg(feature = "sim")]
+#[cfg(feature = "closed-loop")]
 pub(super) fn of_summary(summary: &RunSummary) -> Exit {
     if summary.is_good() { Exit::Ok } else { Exit::Refused }
 }
@@ -61,12 +61,13 @@ pub(super) fn of_summary(summary: &RunSummary) -> Exit {
 /// Something is wrong with the command line, or with a file that it names.
 #[derive(Debug, thiserror::Error)]
 #[error("{text}")]
-pub(super) struct UsageError {
+pub struct UsageError {
     code: Code,
     text: String,
 }
 
 impl UsageError {
+    /// With the code of what is wrong.
     pub fn new(code: Code, text: impl Into<String>) -> Self {
         Self { code, text: text.into() }
     }
@@ -76,6 +77,13 @@ impl Coded for UsageError {
     fn code(&self) -> Code {
         self.code
     }
+}
+
+/// This build has no such part.
+#[cfg(all(feature = "closed-loop", not(feature = "live")))]
+pub(super) fn not_built(command: &str) -> anyhow::Error {
+    let problem = "this build of armcal knows no live arms; build it with `--features live`";
+    UsageError::new(Code::BuildFeatureMissing, format!("{command}: {problem}")).into()
 }
 
 /// Input that cannot be used gives 2, recordings with nothing to fit too; all else 1.
@@ -198,17 +206,20 @@ fn code_of_cause(cause: &(dyn std::error::Error + 'static)) -> Option<Code> {
 
 /// Returns the code of an error of a crate that a build may leave out.
 fn of_features(cause: &(dyn std::error::Error + 'static)) -> Option<Code> {
+    #[cfg(feature = "closed-loop")]
+    if let Some(error) = cause.downcast_ref::<crate::run::RunError>() {
+        return Some(error.code());
+    }
+    #[cfg(feature = "images")]
+    if let Some(error) = cause.downcast_ref::<armcal_detect::DetectError>() {
+        return Some(error.code());
+    }
     #[cfg(feature = "sim")]
     {
         use crate::campaign::CampaignError;
-        use crate::run::RunError;
-        use armcal_detect::DetectError;
         use armcal_sim::SimError;
-        let of_run = cause.downcast_ref::<RunError>().map(Coded::code);
-        let of_campaign = || cause.downcast_ref::<CampaignError>().map(Coded::code);
-        let of_sim = || cause.downcast_ref::<SimError>().map(Coded::code);
-        let of_images = || cause.downcast_ref::<DetectError>().map(Coded::code);
-        if let Some(code) = of_run.or_else(of_campaign).or_else(of_sim).or_else(of_images) {
+        let of_campaign = cause.downcast_ref::<CampaignError>().map(Coded::code);
+        if let Some(code) = of_campaign.or_else(|| cause.downcast_ref::<SimError>().map(Coded::code)) {
             return Some(code);
         }
     }

@@ -111,13 +111,13 @@ impl FileKind {
             Self::RobotFile => "give its folder as --robot",
             Self::Urdf => "`armcal new-robot` makes a robot folder of it",
             Self::Routine | Self::RoutineWithoutVehicle => "`armcal run`, `plan`, `campaign` and `regress` take it",
-            Self::Vehicle => "give it as --vehicle, or name it in a routine",
+            Self::Vehicle => "name it in a routine, or give it as --set vehicle=FILE",
             Self::Calibration => "`armcal export` takes it, and --prior",
             Self::InputMap => "give it as --input to `armcal calibrate`",
             Self::TagMap => "give it as --tag-map to `armcal calibrate`, or as --tags to `armcal tagmap`",
             Self::Task => "give it as --task to `armcal calibrate` or `watch`",
             Self::Plan => "`armcal check` reads it",
-            Self::Connection => "give it as --arm: `armcal run ROUTINE --arm ros2:FILE`, or rosbridge:FILE",
+            Self::Connection => "give it as --arm: `armcal drive ROUTINE --arm FILE`",
         }
     }
 }
@@ -135,7 +135,10 @@ pub(super) fn expect_kind(path: &Path, wanted: &[FileKind]) -> Result<()> {
 }
 
 /// The same for a routine.
-pub(super) fn expect_routine(path: &Path) -> Result<()> {
+///
+/// # Errors
+/// What the file is instead, and which command takes it.
+pub fn expect_routine(path: &Path) -> Result<()> {
     expect_kind(path, &[FileKind::Routine, FileKind::RoutineWithoutVehicle])
 }
 

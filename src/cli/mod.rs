@@ -4,31 +4,35 @@
 mod batch;
 mod belief_text;
 mod calibrate;
-mod calibrate_online;
 mod calibration_inputs;
 #[cfg(feature = "sim")]
 mod campaign;
 mod check;
+#[cfg(feature = "closed-loop")]
+mod closed_loop;
 mod closing;
 mod command_line;
 mod completions;
-#[cfg(feature = "sim")]
+#[cfg(feature = "closed-loop")]
 mod confirm;
+#[cfg(feature = "closed-loop")]
+mod discover;
+#[cfg(feature = "closed-loop")]
+mod drive;
 mod examples;
 mod exit;
 mod explain;
 mod export;
 mod file_kind;
+mod groups;
 mod inspect;
 mod interrupt;
-#[cfg(feature = "sim")]
-mod live;
 mod live_view;
 mod losses;
 mod new_robot;
 mod overrides;
 mod plan;
-#[cfg(feature = "sim")]
+#[cfg(feature = "closed-loop")]
 mod progress;
 #[cfg(feature = "sim")]
 mod regress;
@@ -37,25 +41,16 @@ mod replay;
 #[cfg(feature = "sim")]
 mod run;
 #[cfg(feature = "sim")]
-mod sensitivity;
-#[cfg(feature = "sim")]
 mod serve;
 mod stdout;
-#[cfg(feature = "sim")]
-mod study;
-#[cfg(feature = "sim")]
-mod study_dive;
-#[cfg(feature = "sim")]
-mod study_dive_faults;
-#[cfg(feature = "sim")]
-mod study_falsified;
-#[cfg(feature = "sim")]
-mod study_plan;
-#[cfg(feature = "sim")]
-mod study_worlds;
 mod tagmap;
 mod waiting;
 mod watch;
 
-pub use command_line::{command, main};
-pub use exit::Exit;
+pub use command_line::{Loudness, carry_out, command, main, parsed};
+pub use examples::with_examples;
+pub use exit::{Exit, UsageError};
+pub use file_kind::expect_routine;
+pub use overrides::OverrideArgs;
+pub use stdout::{note, say};
+pub use waiting::Waiting;

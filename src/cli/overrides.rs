@@ -3,24 +3,31 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use toml::Value;
 
 use armcal_core::routine::{Override, Overrides};
 
 #[derive(Clone, Debug, Default, Args)]
-pub(super) struct OverrideArgs {
-    /// Replace a key of the routine, such as world.camera.corner_noise_px=0.45; repeatable
+pub struct OverrideArgs {
+    /// Replace a key of the routine, such as world.camera.corner_noise_px=0.45 or vehicle=FILE; repeatable
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<Override>,
     /// Robot folder instead of the routine's
     #[arg(long, value_name = "DIR")]
     robot: Option<PathBuf>,
-    /// Vehicle file instead of the routine's
-    #[arg(long, value_name = "FILE")]
-    vehicle: Option<PathBuf>,
 }
 
 impl OverrideArgs {
+    /// As a routine is read with. A vehicle that is set is a file in the working directory's terms, as the robot is.
+    #[must_use]
     pub fn overrides(&self) -> Overrides {
-        Overrides { set: self.set.clone(), robot: self.robot.clone(), vehicle: self.vehicle.clone() }
+        let mut overrides = Overrides { robot: self.robot.clone(), ..Overrides::default() };
+        for one in &self.set {
+            match (&one.key[..], &one.value) {
+                ("vehicle", Value::String(file)) => overrides.vehicle = Some(file.into()),
+                _ => overrides.set.push(one.clone()),
+            }
+        }
+        overrides
     }
 }

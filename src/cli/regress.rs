@@ -53,17 +53,32 @@ pub(super) struct RegressArgs {
     /// Print the comparison as JSON instead of the table
     #[arg(long, conflicts_with = "write_baseline")]
     json: bool,
-    /// Also write JUnit XML with one test case per check
+    /// Also write JUnit XML with one test case per check (.xml), a page (.html) or Markdown (.md); repeatable
     #[arg(long, value_name = "FILE", conflicts_with = "write_baseline")]
-    junit: Option<PathBuf>,
-    /// Also write a page (.html)
-    #[arg(long, value_name = "FILE", conflicts_with = "write_baseline")]
-    html: Option<PathBuf>,
-    /// Also write Markdown
-    #[arg(long, value_name = "FILE", conflicts_with = "write_baseline")]
-    markdown: Option<PathBuf>,
+    report: Vec<PathBuf>,
     #[command(flatten)]
     overrides: OverrideArgs,
+}
+
+/// What a report's name ends with.
+enum Form {
+    JUnit,
+    Page,
+    Markdown,
+}
+
+impl Form {
+    fn of(path: &Path) -> Result<Self, UsageError> {
+        match path.extension().and_then(|ending| ending.to_str()) {
+            Some("xml") => Ok(Self::JUnit),
+            Some("html") => Ok(Self::Page),
+            Some("md") => Ok(Self::Markdown),
+            _ => {
+                let problem = "its name must end with .xml (JUnit), .html or .md";
+                Err(UsageError::new(Code::UsageInvalid, format!("--report {}: {problem}", path.display())))
+            }
+        }
+    }
 }
 
 pub(super) fn regress(args: &RegressArgs) -> Result<Exit> {
@@ -71,7 +86,8 @@ pub(super) fn regress(args: &RegressArgs) -> Result<Exit> {
     if let Some(out) = args.write_baseline.as_ref().or(args.out.as_ref()) {
         check_name(out)?;
     }
-    for path in args.junit.iter().chain(&args.markdown).chain(&args.html) {
+    for path in &args.report {
+        Form::of(path)?;
         output::check_writable(path)?;
     }
     let prepared = Prepared::load(Request { routine: args.routine.clone(), overrides: args.overrides.overrides() })?;
@@ -110,16 +126,16 @@ fn compared(args: &RegressArgs, prepared: &Prepared, baseline: &Table, now: &Tab
     }
     let comparison = compare(baseline, now, &prepared.routine.regress);
     let name = &prepared.routine.name;
-    if let Some(path) = &args.markdown {
-        output::write_whole(path, regress_markdown(&comparison, name).as_bytes())?;
-    }
-    if let Some(path) = &args.html {
-        output::write_whole(path, regress_page(&comparison, name).as_bytes())?;
-    }
-    if let Some(path) = &args.junit {
-        let undecided = if args.allow_inconclusive { Undecided::Passes } else { Undecided::Fails };
-        let xml = regress_junit(&comparison, name, undecided).context("the comparison has no XML form")?;
-        output::write_whole(path, xml.as_bytes())?;
+    for path in &args.report {
+        let text = match Form::of(path)? {
+            Form::Markdown => regress_markdown(&comparison, name),
+            Form::Page => regress_page(&comparison, name),
+            Form::JUnit => {
+                let undecided = if args.allow_inconclusive { Undecided::Passes } else { Undecided::Fails };
+                regress_junit(&comparison, name, undecided).context("the comparison has no XML form")?
+            }
+        };
+        output::write_whole(path, text.as_bytes())?;
     }
     if args.json {
         say(&json(&comparison, args)?)?;

@@ -46,5 +46,5 @@ pub(super) fn serve(args: &ServeArgs) -> Result<Exit> {
 
 #[cfg(not(feature = "live"))]
 pub(super) fn serve(_: &ServeArgs) -> Result<Exit> {
-    Err(crate::cli::live::not_built("serve"))
+    Err(crate::cli::exit::not_built("serve"))
 }

@@ -13,7 +13,7 @@ use armcal_core::codes::Code;
 use armcal_core::text::printable;
 
 /// Writes `text`, printable, to stdout and ends the line.
-pub(super) fn say(text: &str) -> Result<()> {
+pub fn say(text: &str) -> Result<()> {
     say_as_it_is(&printable(text))
 }
 
@@ -45,19 +45,19 @@ pub(super) fn is_quiet() -> bool {
 }
 
 /// Writes a line of what goes on or is doubtful to stderr, unless `--quiet` was given.
-pub(super) fn note(text: impl Display) {
+pub fn note(text: impl Display) {
     if !is_quiet() {
         complain(text);
     }
 }
 
 /// Writes a warning with its code to stderr, unless `--quiet` was given.
-pub(super) fn warn(code: Code, text: impl Display) {
+pub fn warn(code: Code, text: impl Display) {
     note(format_args!("warning: {text} [{code}]"));
 }
 
 /// Writes a line that must be read, printable, to stderr: errors and questions. Where that cannot be written nobody can
 /// be told, and the work goes on.
-pub(super) fn complain(text: impl Display) {
+pub fn complain(text: impl Display) {
     let _ = writeln!(std::io::stderr().lock(), "{}", printable(&text.to_string()));
 }

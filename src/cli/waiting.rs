@@ -9,7 +9,7 @@ use crate::cli::stdout::is_quiet;
 
 /// A line that says what is done, for how long already and, where the amount is known, for how long still. It goes away
 /// with this.
-pub(super) struct Waiting {
+pub struct Waiting {
     bar: ProgressBar,
 }
 
@@ -35,7 +35,6 @@ impl Waiting {
     }
 
     /// For `total` pieces.
-    #[cfg(feature = "sim")]
     pub fn for_each_of(total: u64, what: &str) -> Self {
         let bar = if is_quiet() { ProgressBar::hidden() } else { ProgressBar::new(total) };
         Self::with(bar, "{elapsed_precise} {msg} {wide_bar} {pos}/{len}{left}", what)
@@ -51,13 +50,11 @@ impl Waiting {
     }
 
     /// One more is done.
-    #[cfg(feature = "sim")]
     pub fn one_more(&self) {
         self.bar.inc(1);
     }
 
     /// Whether anybody sees it.
-    #[cfg(feature = "sim")]
     pub fn is_seen(&self) -> bool {
         !self.bar.is_hidden()
     }

@@ -111,7 +111,7 @@ impl Refiner {
 }
 
 /// Factor on the fit's covariances. Marine snow, shadows and model errors correlate the residuals of neighbouring
-/// pixels, which the normal matrix assumes to be independent. Measured by `study detection`.
+/// pixels, which the normal matrix assumes to be independent. Measured by `armcal-lab detection`.
 const CORRELATION: f64 = 1.5;
 /// Smallest variance of a corner, px2: errors of the pattern model.
 const FLOOR_PX2: f64 = 0.01 * 0.01;

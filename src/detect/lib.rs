@@ -3,7 +3,7 @@
 //! `decoder` finds and decodes quadrilaterals with the AprilTag project's C library, which assumes straight sides.
 //! `fit` fits each tag again with the lens model, because a fisheye bends the sides. The fit gives corners and a
 //! covariance of each. `gates` rejects doubtful tags with a reason. `detector` joins these steps.
-//! `armcal study detection` measures the detector on images with known truth.
+//! `armcal-lab detection` measures the detector on images with known truth.
 #![warn(missing_docs)]
 
 mod bearings;

@@ -4,7 +4,7 @@ use armcal_core::optics::TagFamily;
 
 use crate::decoder::corrected_bits;
 
-/// Search resolution and gates of a detector. `study detection` measures the defaults.
+/// Search resolution and gates of a detector. `armcal-lab detection` measures the defaults.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DetectorSettings {
     /// What is printed on the tags.

@@ -26,7 +26,7 @@ pub struct Connection {
     /// Addresses of this machine's interfaces that DDS may use; all of them where none are named. The sockets stay
     /// open to every interface.
     pub networks: Vec<Ipv4Addr>,
-    /// The bridge, where there is one; needed by a connection over it, and by nothing else.
+    /// The bridge that the arm is reached over; over DDS where there is none.
     pub rosbridge: Option<Rosbridge>,
     /// `sensor_msgs/msg/JointState` with raw counts in `position`.
     pub joint_sensors: String,
@@ -258,17 +258,6 @@ impl Connection {
             return Err(FileIssue::new(Code::KeyMissing, file, "stop", problem).into());
         }
         Ok(())
-    }
-
-    /// The bridge of a connection map that was read from `file`.
-    ///
-    /// # Errors
-    /// [`LiveError::File`] where it names none.
-    pub fn require_rosbridge(&self, file: &Path) -> Result<&Rosbridge, LiveError> {
-        let problem = "the table is missing: write [rosbridge] and url = \"ws://HOST:PORT\"";
-        self.rosbridge
-            .as_ref()
-            .ok_or_else(|| LiveError::File(FileIssue::new(Code::KeyMissing, file, "rosbridge", problem).into()))
     }
 
     /// Every topic and service by its key.

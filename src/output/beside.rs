@@ -99,7 +99,7 @@ pub(crate) fn check_writable(path: &Path) -> Result<(), OutputError> {
 
 /// That a folder takes files, before the work that fills it. One that is made for this goes again: what comes to
 /// nothing leaves nothing.
-pub(crate) fn check_takes_files(folder: &Path) -> Result<(), OutputError> {
+pub fn check_takes_files(folder: &Path) -> Result<(), OutputError> {
     let is_new = !folder.exists();
     check_writable(&folder.join("file"))?;
     if is_new {

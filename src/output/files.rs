@@ -65,13 +65,13 @@ pub(crate) fn parent(path: &Path) -> &Path {
 }
 
 /// `path` with `.partial` added: where a stream grows until it is whole.
-#[cfg(feature = "sim")]
+#[cfg(feature = "closed-loop")]
 pub(crate) fn partial(path: &Path) -> PathBuf {
     with_suffix(path, ".partial")
 }
 
 /// `path` with text added to its name.
-#[cfg(feature = "sim")]
+#[cfg(feature = "closed-loop")]
 pub(crate) fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(suffix);
@@ -79,15 +79,15 @@ pub(crate) fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
 }
 
 /// Puts the finished file `from` in the place `path`.
-#[cfg(feature = "sim")]
+#[cfg(feature = "closed-loop")]
 pub(crate) fn complete(from: &Path, path: &Path) -> Result<(), OutputError> {
     check_replaceable(path)?;
     std::fs::rename(from, path).map_err(OutputError::of(path, "cannot be put in place"))
 }
 
 /// That nothing is at `path`: a file that is there goes.
-#[cfg(any(feature = "sim", feature = "viewer"))]
-pub(crate) fn remove(path: &Path) -> Result<(), OutputError> {
+#[cfg(any(feature = "closed-loop", feature = "viewer"))]
+pub fn remove(path: &Path) -> Result<(), OutputError> {
     match std::fs::remove_file(path) {
         Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
             Err(OutputError::of(path, "cannot be removed")(error))
@@ -97,7 +97,7 @@ pub(crate) fn remove(path: &Path) -> Result<(), OutputError> {
 }
 
 /// Makes the output folder.
-pub(crate) fn make_folder(folder: &Path) -> Result<(), OutputError> {
+pub fn make_folder(folder: &Path) -> Result<(), OutputError> {
     std::fs::create_dir_all(folder).map_err(OutputError::of(folder, "cannot be made"))
 }
 

@@ -3,24 +3,28 @@
 mod accepted;
 mod beside;
 mod files;
-#[cfg(feature = "sim")]
+#[cfg(feature = "closed-loop")]
 mod folder;
 mod lock;
 
-#[cfg(feature = "sim")]
+#[cfg(feature = "closed-loop")]
 pub use accepted::AcceptedKept;
 pub(crate) use accepted::accepted_kept;
 #[cfg(feature = "viewer")]
 pub(crate) use beside::Beside;
+pub use beside::check_takes_files;
 #[cfg(feature = "sim")]
 pub(crate) use beside::write_whole;
-pub(crate) use beside::{check_takes_files, check_writable, write_together};
+pub(crate) use beside::{check_writable, write_together};
 pub use files::OutputError;
-#[cfg(any(feature = "sim", feature = "viewer"))]
-pub(crate) use files::remove;
-pub(crate) use files::{as_written, check_replaceable, make_folder, parent, refuse_link};
+pub use files::make_folder;
+#[cfg(any(feature = "closed-loop", feature = "viewer"))]
+pub use files::remove;
 #[cfg(feature = "sim")]
-pub(crate) use files::{complete, partial, with_suffix};
-#[cfg(feature = "sim")]
+pub(crate) use files::with_suffix;
+pub(crate) use files::{as_written, check_replaceable, parent, refuse_link};
+#[cfg(feature = "closed-loop")]
+pub(crate) use files::{complete, partial};
+#[cfg(feature = "closed-loop")]
 pub use folder::OutputFolder;
 pub(crate) use lock::FolderLock;

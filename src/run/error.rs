@@ -8,6 +8,7 @@ use armcal_belief::session::SessionError;
 use armcal_core::log::LogError;
 use armcal_core::robot::RobotError;
 use armcal_core::routine::RoutineError;
+#[cfg(feature = "sim")]
 use armcal_sim::SimError;
 
 /// How far a run came.
@@ -46,6 +47,7 @@ pub enum RunError {
     Routine(#[from] RoutineError),
     #[error("{0}")]
     Robot(#[from] RobotError),
+    #[cfg(feature = "sim")]
     #[error("{0}")]
     Sim(#[from] SimError),
     #[error("{0}")]
@@ -85,6 +87,7 @@ impl Failure {
     }
 
     /// A folder for the run that could not be made.
+    #[cfg(feature = "sim")]
     #[must_use]
     pub fn of_output(error: OutputError) -> Self {
         Self { stage: Stage::World, error: Box::new(error.into()), kept: None }
@@ -106,6 +109,7 @@ impl Coded for RunError {
         match self {
             Self::Routine(error) => error.code(),
             Self::Robot(error) => error.code(),
+            #[cfg(feature = "sim")]
             Self::Sim(error) => error.code(),
             Self::Log(error) => error.code(),
             Self::Session(error) => error.code(),

@@ -6,12 +6,9 @@ use std::path::PathBuf;
 use crate::output::{AcceptedKept, OutputError, OutputFolder, accepted_kept};
 #[cfg(feature = "viewer")]
 use crate::report::markdown;
-use crate::report::{
-    About, AssertSummary, HeldJointSummary, OnlineSummary, RenewalSummary, Report, RunSummary, WorldSummary, html,
-};
+use crate::report::{About, AssertSummary, HeldJointSummary, OnlineSummary, RenewalSummary, Report, RunSummary, html};
 use crate::run::describe::describe;
 use crate::run::{Failure, RunError, RunInputs, Stage, corner_scatter_px};
-use crate::score::{ScoreInput, score};
 use armcal_belief::calib::Calibration;
 use armcal_belief::session::{
     self, AssertResult, BelievedFrames, EstimateUpdate, HeldJoint, MessageListener, Outcome, Progress, Recorder,
@@ -22,8 +19,6 @@ use armcal_core::log::{Recording, RecordingHeader, RecordingWriter, read_recordi
 use armcal_core::robot::FrameTree;
 use armcal_core::streams::Arm;
 use armcal_core::time::Stamp;
-use armcal_sim::truth::TruthRecorder;
-use armcal_sim::{World, WorldInput};
 
 /// What a run leaves in its folder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,26 +50,12 @@ pub struct Finished {
     pub kept: Option<AcceptedKept>,
 }
 
-/// Runs the closed loop with `seed` and scores it. The watcher's clock is taken to have started with the command: its
-/// reading at the end is the summary's `wall_s`. Results come into place all at once at the end, if they are kept.
+/// Runs the closed loop on an arm of which nobody knows the truth: there is no score. The watcher's clock is
+/// taken to have started with the command: its reading at the end is the summary's `wall_s`. Results come into place all
+/// at once at the end, if they are kept.
 ///
 /// # Errors
 /// [`Failure`] with the stage, and where the recording is now. It stays readable if the loop breaks off.
-pub fn execute(
-    inputs: &RunInputs,
-    seed: u64,
-    output: RunOutput<'_>,
-    progress: &mut dyn Progress,
-) -> Result<Finished, Failure> {
-    let RunOutput { folder, keep, listener } = output;
-    let run = Run { inputs, seed, output: folder, keep, source: Source::World };
-    run.simulated(listener, progress).map_err(|failure| run.broken_off(failure))
-}
-
-/// Runs the closed loop on an arm of which nobody knows the truth: there is no score. All else is as with [`execute`].
-///
-/// # Errors
-/// As [`execute`].
 pub fn execute_on(
     arm: &mut dyn Arm,
     inputs: &RunInputs,
@@ -87,32 +68,25 @@ pub fn execute_on(
     run.real(arm, listener, progress).map_err(|failure| run.broken_off(failure))
 }
 
-struct Run<'a> {
-    inputs: &'a RunInputs,
-    seed: u64,
-    output: &'a OutputFolder,
-    keep: Keep,
-    source: Source,
+pub(super) struct Run<'a> {
+    pub(super) inputs: &'a RunInputs,
+    pub(super) seed: u64,
+    pub(super) output: &'a OutputFolder,
+    pub(super) keep: Keep,
+    #[cfg_attr(not(any(feature = "sim", feature = "viewer")), expect(dead_code, reason = "there is no truth"))]
+    pub(super) source: Source,
 }
 
 /// Where the streams come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Source {
+pub(super) enum Source {
     /// Simulated: the truth is known.
+    #[cfg(feature = "sim")]
     World,
     Arm,
 }
 
 impl Run<'_> {
-    fn simulated(&self, listener: Option<MessageListener>, progress: &mut dyn Progress) -> Result<Finished, Failure> {
-        let mut world = self.world().map_err(Failure::at(Stage::World))?;
-        let driven = self.drive(&mut world, listener, progress);
-        let finished = world.finish_truth();
-        let (outcome, recorder) = driven?;
-        finished.map_err(Failure::at(Stage::Motion))?;
-        self.keep_all(outcome, recorder, progress)
-    }
-
     fn real(
         &self,
         arm: &mut dyn Arm,
@@ -123,7 +97,12 @@ impl Run<'_> {
         self.keep_all(outcome, recorder, progress)
     }
 
-    fn keep_all(&self, outcome: Outcome, recorder: Recorder, progress: &mut dyn Progress) -> Result<Finished, Failure> {
+    pub(super) fn keep_all(
+        &self,
+        outcome: Outcome,
+        recorder: Recorder,
+        progress: &mut dyn Progress,
+    ) -> Result<Finished, Failure> {
         self.finish_recording(recorder).map_err(Failure::at(Stage::Results))?;
         let finished = self.write_results(outcome, progress).map_err(Failure::at(Stage::Results))?;
         if self.keep == Keep::Everything {
@@ -135,12 +114,22 @@ impl Run<'_> {
         Ok(finished)
     }
 
+    /// The truth of a simulated run.
+    #[cfg(feature = "viewer")]
+    fn truth(&self) -> Option<PathBuf> {
+        match self.source {
+            #[cfg(feature = "sim")]
+            Source::World => Some(self.partial("truth.mcap")),
+            Source::Arm => None,
+        }
+    }
+
     /// Where the result `name` grows.
-    fn partial(&self, name: &str) -> PathBuf {
+    pub(super) fn partial(&self, name: &str) -> PathBuf {
         self.output.partial(name)
     }
 
-    fn drive(
+    pub(super) fn drive(
         &self,
         arm: &mut dyn Arm,
         listener: Option<MessageListener>,
@@ -162,20 +151,6 @@ impl Run<'_> {
         }
     }
 
-    fn world(&self) -> Result<World, RunError> {
-        let inputs = self.inputs;
-        let mut world = World::new(WorldInput {
-            robot: &inputs.robot,
-            vehicle: &inputs.vehicle,
-            scene: &inputs.routine.scene,
-            spec: inputs.spec.clone(),
-            seed: self.seed,
-        })?;
-        let truth = TruthRecorder::create(self.partial("truth.mcap"))?;
-        world.set_truth_sink(Box::new(truth))?;
-        Ok(world)
-    }
-
     fn recorder(&self, now: Stamp) -> Result<Recorder, RunError> {
         let robot = &self.inputs.robot;
         let header = RecordingHeader::new(robot.joint_names()).with_tags_of(robot.tag_family);
@@ -187,7 +162,7 @@ impl Run<'_> {
     }
 
     /// Keeps and names the recording that a broken run leaves; one in which nothing moved yet is removed.
-    fn broken_off(&self, failure: Failure) -> Failure {
+    pub(super) fn broken_off(&self, failure: Failure) -> Failure {
         if let Some(error) = self.output.is_gone() {
             return Failure { stage: failure.stage, error: Box::new(error.into()), kept: None };
         }
@@ -216,7 +191,12 @@ impl Run<'_> {
 
     fn write_results(&self, outcome: Outcome, progress: &mut dyn Progress) -> Result<Finished, RunError> {
         let recording = read_recording(self.partial("run.mcap"))?;
-        let mut summary = self.summary(&outcome, &recording)?;
+        let mut summary = self.summary(&outcome);
+        #[cfg(feature = "sim")]
+        if self.source == Source::World {
+            self.add_score(&mut summary, &outcome, &recording)?;
+        }
+        summary = summary.judged();
         let mut replay_failure = None;
         if self.keep == Keep::Everything {
             // The calibration is worth more than its picture; a full disk has room again for the small files.
@@ -232,7 +212,7 @@ impl Run<'_> {
         Ok(Finished { summary, calibration: outcome.calibration, corner_scatter_px, replay_failure, kept: None })
     }
 
-    fn summary(&self, outcome: &Outcome, recording: &Recording) -> Result<RunSummary, RunError> {
+    fn summary(&self, outcome: &Outcome) -> RunSummary {
         let mut summary = RunSummary::of_calibration(&outcome.calibration, outcome.calibration_wall_s);
         summary.routine = Some(self.inputs.routine.name.clone());
         summary.seed = Some(self.seed);
@@ -256,29 +236,7 @@ impl Run<'_> {
         summary.capture.renewals = outcome.renewals.iter().map(renewal_summary).collect();
         summary.capture.stop_reason.clone_from(&outcome.capture_ended);
         summary.online = outcome.online.as_ref().and_then(OnlineSummary::of);
-        if self.source == Source::World {
-            self.add_score(&mut summary, outcome, recording)?;
-        }
-        Ok(summary.judged())
-    }
-
-    /// What only the truth knows.
-    fn add_score(&self, summary: &mut RunSummary, outcome: &Outcome, recording: &Recording) -> Result<(), RunError> {
-        let truth = self.partial("truth.mcap");
-        let scored = score(&ScoreInput {
-            recording,
-            truth: &truth,
-            robot: &self.inputs.robot,
-            outcome,
-            tolerance_m: self.inputs.routine.task.tolerance_m,
-        })?;
-        summary.world = Some(WorldSummary { engine: self.inputs.spec.engine().name().to_owned() });
-        summary.asserts = scored.asserts.iter().map(assert_summary).collect();
-        summary.capture.collisions = Some(scored.collisions);
-        summary.capture.min_clearance_m = scored.min_clearance_m;
-        summary.capture.margins = scored.margins;
-        summary.score = Some(scored.score);
-        Ok(())
+        summary
     }
 
     fn write_texts(&self, outcome: &Outcome, summary: &RunSummary) -> Result<(), RunError> {
@@ -323,7 +281,7 @@ impl Run<'_> {
             outcome.epochs.iter().map(|epoch| (epoch.from, epoch.tool_belief(&self.inputs.robot))).collect();
         let residuals: Vec<_> =
             outcome.calibrations().into_iter().map(|(since, found)| (since, &found.details.views[..])).collect();
-        let truth = (self.source == Source::World).then(|| self.partial("truth.mcap"));
+        let truth = self.truth();
         armcal_replay::write_rrd(
             &armcal_replay::ReplayInput {
                 recording,
@@ -349,7 +307,7 @@ fn renewal_summary(renewal: &EstimateUpdate) -> RenewalSummary {
 }
 
 /// A limit without a figure does not hold: nobody saw that it does.
-fn assert_summary(limit: &AssertResult) -> AssertSummary {
+pub(super) fn assert_summary(limit: &AssertResult) -> AssertSummary {
     let holds = limit.holds().unwrap_or(false);
     AssertSummary { step: limit.step, key: limit.figure, limit: limit.limit, value: limit.value, holds }
 }

@@ -5,6 +5,7 @@ use std::path::Path;
 use crate::run::RunError;
 use armcal_core::robot::{Robot, Vehicle};
 use armcal_core::routine::{self, Overrides, Routine};
+#[cfg(feature = "sim")]
 use armcal_sim::WorldSpec;
 
 /// Everything read and checked before anything moves.
@@ -13,6 +14,7 @@ pub struct RunInputs {
     pub routine: Routine,
     pub robot: Robot,
     pub vehicle: Vehicle,
+    #[cfg(feature = "sim")]
     pub spec: WorldSpec,
 }
 
@@ -24,7 +26,14 @@ impl RunInputs {
     pub fn load(file: &Path, overrides: &Overrides) -> Result<Self, RunError> {
         let routine = routine::load_with(file, overrides)?;
         let (robot, vehicle) = routine.load_arm()?;
+        #[cfg(feature = "sim")]
         let spec = WorldSpec::from_routine(&routine, &robot)?;
-        Ok(Self { routine, robot, vehicle, spec })
+        Ok(Self {
+            routine,
+            robot,
+            vehicle,
+            #[cfg(feature = "sim")]
+            spec,
+        })
     }
 }

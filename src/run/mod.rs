@@ -10,8 +10,12 @@ mod execution;
 mod inputs;
 mod scatter;
 mod scene;
+#[cfg(feature = "sim")]
+mod simulated;
 
 pub use error::{Failure, RunError, Stage};
-pub use execution::{Finished, Keep, RunOutput, execute, execute_on};
+pub use execution::{Finished, Keep, RunOutput, execute_on};
 pub use inputs::RunInputs;
 pub use scatter::corner_scatter_px;
+#[cfg(feature = "sim")]
+pub use simulated::execute;

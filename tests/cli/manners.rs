@@ -52,15 +52,18 @@ fn a_belief_that_is_followed_has_a_json_form() {
     let _texts = Texts::of("a_belief_that_is_followed_has_a_json_form");
     let folder = temp();
     let file = folder.path().join("belief.jsonl");
-    let told = calibrated(&["--online", "--json"], folder.path());
+    let watched = |more: &[&str]| {
+        let mut command = program();
+        command.arg("watch").arg(shared_run().file("run.mcap")).arg("--robot").arg(robot_folder());
+        answer(command.arg("--json").arg("--out").arg(folder.path()).args(more))
+    };
+    let told = watched(&[]);
     assert!(told.stdout.lines().count() > 1 && told.stdout == crate::support::read(&file), "{told:#?}");
-    let told = calibrated(&["--online", "--stationary", "--json"], folder.path());
+    let told = watched(&["--stationary"]);
     let last = told.stdout.strip_prefix(&crate::support::read(&file)).expect("the file's lines come first");
     let last: serde_json::Value = serde_json::from_str(last).expect("one line of JSON");
     assert_eq!((last["batch"]["status"].as_str(), last["batch"]["refusal"].is_null()), (Some("accepted"), true));
     assert!(last["batch"]["largest_difference_sigmas"].as_f64().is_some_and(|sigmas| sigmas < 0.1), "{last}");
-    let words = ["calibrate", "x.mcap", "--robot", "x", "--online", "--details"];
-    answer(program().args(words)).expect("tables of a belief", 2, &[]);
 }
 
 #[test]
@@ -113,7 +116,7 @@ fn a_wrong_kind_of_file_is_named_with_the_command_that_takes_it() {
     };
     calibrate("--input", &routine, &[]);
     calibrate("--tag-map", &calibration, &[]);
-    calibrate("--task", &vehicle_file(), &["--vehicle"]);
+    calibrate("--task", &vehicle_file(), &["--set vehicle"]);
     calibrate("--prior", &run.file("summary.json"), &["summary.json"]);
     let mut command = program();
     command.arg("calibrate").arg(&recording).arg("--robot").arg(&robot_file).arg("--out").arg(&out);

@@ -41,7 +41,7 @@ fn every_subcommand(folder: &Path) -> Vec<Case> {
     let (shared, robot) = (shared_run(), robot_folder());
     let (recording, baseline) = (root().join("fuzz/corpus/recording/views.mcap"), folder.join("new.csv"));
     let out = |name: &str| folder.join(name);
-    let mut cases = vec![
+    vec![
         Case::new(&["--help"]),
         Case::new(&["--version"]),
         Case { code: 2, ..Case::new(&["check"]).with(&routine).with("nothing.toml").with(&robot) },
@@ -51,27 +51,13 @@ fn every_subcommand(folder: &Path) -> Vec<Case> {
         Case::new(&["campaign", "--seeds", "1"]).with(&routine).leaves("--out", out("campaign.csv"), ""),
         Case::new(&["regress", "--seeds", "1"]).with(&routine).leaves("--write-baseline", baseline.clone(), ""),
         Case::new(&["regress", "--baseline"]).with(&baseline).with(&routine).leaves("--out", out("now.csv"), ""),
-        Case::new(&["sensitivity", "--poses=3"]).with(&routine).leaves("--out", out("sensitivity"), "statement.md"),
         Case::new(&["plan"]).with(&routine).leaves("--out", out("plan"), "plan.toml"),
         Case::new(&["calibrate", "--robot"]).with(&robot).with(&recording).leaves("--out", out("c"), "summary.json"),
         Case::new(&["watch", "--robot"]).with(&robot).with(&recording).leaves("--out", out("w"), "belief.jsonl"),
         Case::new(&["tagmap", "--robot"]).with(&robot).with(&recording).leaves("--out", out("map.toml"), ""),
         Case::new(&["replay", "--robot"]).with(&robot).with(&recording).leaves("--save", out("replay.rrd"), ""),
-        Case::new(&["study", "edges", "--n=5"]).leaves("--out", out("edges"), "edges.csv"),
-        Case::new(&["study", "paths", "--n=2"]).leaves("--out", out("paths"), "paths.csv"),
-        Case::new(&["study", "self-collision", "--n=2000"]).with(robot_copy(folder)),
-        Case::new(&["study", "tracking-error"]).with(&recording),
-    ];
-    // A minute each way, and they end in the same words as the others.
-    if std::env::var_os("ARMCAL_ALL_STUDIES").is_some() {
-        cases.extend([
-            Case::new(&["study", "detection", "--repeats=1"]).leaves("--out", out("detection"), "report.txt"),
-            Case::new(&["study", "paper", "--quick"]).leaves("--out", out("paper"), "report.md"),
-            Case::new(&["study", "poses", "--seeds=1"]).leaves("--out", out("poses"), "report.md"),
-            Case::new(&["study", "falsified", "--quick", "--seeds=1"]).leaves("--out", out("falsified"), "report.md"),
-        ]);
-    }
-    cases
+        Case::new(&["new-robot", "--self-collision"]).with(robot_copy(folder)),
+    ]
 }
 
 /// A pipe that nobody reads.
@@ -105,7 +91,7 @@ fn expect_work_without_readers(is_wanted: fn(&Case) -> bool) {
 /// Commands that simulate or plan; with a full stdout they are of the first tier.
 fn is_long(case: &Case) -> bool {
     let first = case.command.get_args().next().and_then(|word| word.to_str()).expect("a subcommand");
-    ["run", "campaign", "regress", "sensitivity", "plan", "study"].contains(&first)
+    ["run", "campaign", "regress", "plan", "new-robot"].contains(&first)
 }
 
 #[test]

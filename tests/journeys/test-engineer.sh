@@ -17,7 +17,7 @@ finds "$BASELINE" '# armcal baseline'
 
 step 'compare the unchanged program with it: green'
 expect 0 "$ARMCAL" regress routines/regression.toml --baseline "$BASELINE" --out "$FOLDER/new.csv" \
-    --junit "$FOLDER/green.xml" --markdown "$FOLDER/green.md"
+    --report "$FOLDER/green.xml" --report "$FOLDER/green.md"
 sees 'every figure of every run is the same as in the baseline'
 finds "$FOLDER/green.xml" 'failures="0"'
 finds "$FOLDER/green.md" 'not worse than the baseline'
@@ -25,7 +25,7 @@ finds "$FOLDER/new.csv"
 
 step 'make the camera worse on purpose: red, exit code 4'
 expect 4 "$ARMCAL" regress routines/regression.toml --baseline "$BASELINE" --set world.camera.corner_noise_px=0.9 \
-    --junit "$FOLDER/red.xml"
+    --report "$FOLDER/red.xml"
 sees 'regress      WORSE than the baseline'
 sees 'armcal run routines/regression.toml --seed 1 --set world.camera.corner_noise_px=0.9'
 finds "$FOLDER/red.xml" '<failure message='

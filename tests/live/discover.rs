@@ -1,11 +1,11 @@
-//! `armcal live discover` proposes maps that connect, against our own middleware and another one.
+//! `armcal discover` proposes maps that connect, against our own middleware and another one.
 
 use super::in_namespace;
 use crate::support::{ShortRoutine, read, robot_folder, temp, titan, write};
 
 /// Looks around and listens to the arm by the map that was proposed.
-const LOOK: &str = "$ARMCAL live discover --network 127.0.0.1 --for 4 --robot $ROBOT --out arm.toml && \
-                    $ARMCAL run $ROUTINE --arm ros2:arm.toml --no-motion; CODE=$?;";
+const LOOK: &str = "$ARMCAL discover --network 127.0.0.1 --for 4 --robot $ROBOT --out arm.toml && \
+                    $ARMCAL drive $ROUTINE --arm arm.toml --no-motion; CODE=$?;";
 
 /// Topics and joints with names of its own, and the type of set-points that is not the first choice.
 #[test]
@@ -26,7 +26,7 @@ fn a_served_arm_is_discovered_and_heard() {
         robot_folder()
     );
     let said = in_namespace(out.path(), &routine, &script);
-    said.expect("discover and run --no-motion", 0, &["shoulder_yaw", "1 service"]);
+    said.expect("discover and drive --no-motion", 0, &["shoulder_yaw", "1 service"]);
     let map = read(&out.path().join("arm.toml"));
     assert!(!map.contains("FILL IN"), "{map}");
     for line in [
@@ -56,7 +56,7 @@ fn an_arm_of_another_make_is_discovered_and_heard() {
         robot_folder()
     );
     let said = in_namespace(out.path(), &routine, &script);
-    said.expect("discover and run --no-motion", 0, &["shoulder_yaw", ": detections"]);
+    said.expect("discover and drive --no-motion", 0, &["shoulder_yaw", ": detections"]);
     let map = read(&out.path().join("arm.toml"));
     for line in ["joint_sensors = \"/joint_sensors\"", "topic = \"/joint_commands\"", "topic = \"/stop\"", "FILL IN"] {
         assert!(map.contains(line), "{line}: {map}");
@@ -67,7 +67,7 @@ fn an_arm_of_another_make_is_discovered_and_heard() {
 #[ignore = "needs user namespaces"]
 fn nobody_is_an_error_that_says_what_to_look_at() {
     let out = temp();
-    let script = "$ARMCAL live discover --network 127.0.0.1 --domain 7 --for 1";
+    let script = "$ARMCAL discover --network 127.0.0.1 --domain 7 --for 1";
     let said = in_namespace(out.path(), out.path(), script);
-    said.expect("live discover", 1, &["[arm_connection]", "--network"]);
+    said.expect("discover", 1, &["[arm_connection]", "--network"]);
 }

@@ -113,7 +113,7 @@ fn relayed(folder: &Path, fault: &str, steps: &str, ends: &str) -> (Answer, Seen
     let script = format!(
         "python3 $RELAY relay.jsonl {fault} & RELAY=$!; \
          $ARMCAL serve $ROUTINE --arm served.toml --factor {FACTOR} --truth truth.mcap 2>serve.log & SERVER=$!; \
-         $ARMCAL run $ROUTINE --arm ros2:arm.toml --unattended --details --out out & RUN=$!; \
+         $ARMCAL drive $ROUTINE --arm arm.toml --unattended --details --out out & RUN=$!; \
          {ends} wait $RUN; CODE=$?; sleep 0.5; kill $RELAY; kill -INT $SERVER; wait $SERVER; exit $CODE"
     );
     let said = in_namespace(folder, &routine, &script);
@@ -266,7 +266,7 @@ const NOTICED_S: f64 = 1.0;
 fn an_obstacle_is_felt_over_the_wire_and_left_alone() {
     let out = temp();
     let (said, seen) = relayed(out.path(), "none", ROCK, "");
-    said.expect("run --arm", 0, &["ACCEPTED", "skipped"]);
+    said.expect("drive", 0, &["ACCEPTED", "skipped"]);
     seen.assert_safe("an obstacle");
     let messages = read_recording(out.path().join("out/run.mcap")).expect("it reads").messages;
     let truth = read_truth(out.path().join("truth.mcap")).expect("the truth reads");

@@ -83,10 +83,10 @@ fn a_served_arm_is_calibrated_and_reaches_its_targets() {
     let routine = ShortRoutine::default().write(out.path());
     connection(out.path(), "");
     let script = "$ARMCAL serve $ROUTINE --arm arm.toml --factor 8 --truth truth.mcap 2>serve.log & SERVER=$!; \
-                  $ARMCAL run $ROUTINE --arm ros2:arm.toml --unattended --details --out out; CODE=$?; \
+                  $ARMCAL drive $ROUTINE --arm arm.toml --unattended --details --out out; CODE=$?; \
                   kill -INT $SERVER; wait $SERVER; exit $CODE";
     let said = in_namespace(out.path(), &routine, script);
-    said.expect("run --arm", 0, &["ACCEPTED", "time  "]);
+    said.expect("drive", 0, &["ACCEPTED", "time  "]);
     assert!(said.stderr.contains(" ms, 99 % "), "{}", said.stderr);
     let recording = out.path().join("out/run.mcap");
     let truth = read_truth(out.path().join("truth.mcap")).expect("the truth reads");
@@ -136,12 +136,12 @@ fn a_run_whose_arm_dies_stops_and_keeps_its_recording() {
     let routine = ShortRoutine::default().write(out.path());
     connection(out.path(), "");
     let script = "serve() { exec $ARMCAL serve $ROUTINE --arm arm.toml --factor 5 2>serve.log; }; serve & SERVER=$!; \
-                  $ARMCAL run $ROUTINE --arm ros2:arm.toml --unattended --out out & RUN=$!; \
+                  $ARMCAL drive $ROUTINE --arm arm.toml --unattended --out out & RUN=$!; \
                   sleep 10; kill -9 $SERVER; date +%s.%N >killed; wait $RUN; CODE=$?; date +%s.%N >ended; \
-                  serve & SERVER=$!; $ARMCAL run $ROUTINE --arm ros2:arm.toml --no-motion; \
+                  serve & SERVER=$!; $ARMCAL drive $ROUTINE --arm arm.toml --no-motion; \
                   kill -INT $SERVER; wait $SERVER; exit $CODE";
     let said = in_namespace(out.path(), &routine, script);
-    said.expect("run --arm", 1, &[]);
+    said.expect("drive", 1, &[]);
     assert!(said.stderr.contains("[readings_stale]") && said.stderr.contains("run-cut-1.mcap"), "{}", said.stderr);
     let heard = said.stderr.lines().filter(|line| line.starts_with("  shoulder_yaw ")).count();
     assert_eq!(heard, 2, "it is not heard again: {}", said.stderr);
@@ -161,7 +161,7 @@ fn a_served_arm_follows_one_degree_at_a_time() {
     let routine = ShortRoutine::default().write(out.path());
     connection(out.path(), "");
     let script = "$ARMCAL serve $ROUTINE --arm arm.toml --factor 8 2>serve.log & SERVER=$!; \
-                  (yes | head -n 12; echo a) | $ARMCAL run $ROUTINE --arm ros2:arm.toml --nudge --out out; CODE=$?; \
+                  (yes | head -n 12; echo a) | $ARMCAL drive $ROUTINE --arm arm.toml --nudge --out out; CODE=$?; \
                   kill -INT $SERVER; wait $SERVER; exit $CODE";
     let said = in_namespace(out.path(), &routine, script);
     said.expect("run --nudge", 1, &["[interrupted]"]);
@@ -179,7 +179,7 @@ fn images_of_a_served_camera_are_searched_for_tags() {
     // Rendering on a busy machine holds up the readings.
     connection(out.path(), "detections = \"\"\n[guard]\nready_s = 10.0\nstale_s = 5.0\n");
     let script = "$ARMCAL serve $ROUTINE --arm arm.toml 2>serve.log & SERVER=$!; \
-                  $ARMCAL run $ROUTINE --arm ros2:arm.toml --no-motion; CODE=$?; \
+                  $ARMCAL drive $ROUTINE --arm arm.toml --no-motion; CODE=$?; \
                   kill -INT $SERVER; wait $SERVER; exit $CODE";
     let said = in_namespace(out.path(), &routine, script);
     said.expect("run --no-motion", 0, &[]);
@@ -216,10 +216,10 @@ fn an_arm_of_another_make_is_read_moved_and_stopped() {
     let wraps: Vec<f64> = robot.sensors.iter().map(|s| s.wrap_counts).collect();
     let way = |joint: usize, by: f64| (by + wraps[joint] / 2.0).rem_euclid(wraps[joint]) - wraps[joint] / 2.0;
     let script = "python3 $PEER peer.jsonl start.json & PEER=$!; \
-                  $ARMCAL run $ROUTINE --arm ros2:arm.toml --unattended --out out & RUN=$!; \
+                  $ARMCAL drive $ROUTINE --arm arm.toml --unattended --out out & RUN=$!; \
                   sleep 12; kill -INT $RUN; wait $RUN; CODE=$?; sleep 1; kill $PEER; exit $CODE";
     let said = in_namespace(out.path(), &routine, script);
-    said.expect("run --arm", 1, &[]);
+    said.expect("drive", 1, &[]);
     assert!(said.stderr.contains("[interrupted]"), "{}", said.stderr);
     let log: Vec<Value> =
         read(&out.path().join("peer.jsonl")).lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();

@@ -56,9 +56,9 @@ fn an_arm_behind_a_rosbridge_is_calibrated_and_reaches_its_targets() {
     let out = temp();
     let routine = ShortRoutine::default().write(out.path());
     write_map(out.path());
-    let run = "$ARMCAL run $ROUTINE --arm rosbridge:arm.toml --unattended --details --out out;";
+    let run = "$ARMCAL drive $ROUTINE --arm arm.toml --unattended --details --out out;";
     let said = in_namespace(out.path(), &routine, &with_bridge(&format!("{run} {END}")));
-    said.expect("run --arm", 0, &["ACCEPTED", " ms, 99 % "]);
+    said.expect("drive", 0, &["ACCEPTED", " ms, 99 % "]);
     assert!(!said.stderr.contains("[messages_rejected]"), "{}", said.stderr);
     let told = told(out.path());
     assert!(
@@ -96,7 +96,7 @@ fn a_bridge_that_dies_or_hangs_stops_the_run_and_a_stop_goes_over_it() {
         let routine = ShortRoutine::default().write(out.path());
         write_map(out.path());
         let run = format!(
-            "$ARMCAL run $ROUTINE --arm rosbridge:arm.toml --unattended --out out & RUN=$!; \
+            "$ARMCAL drive $ROUTINE --arm arm.toml --unattended --out out & RUN=$!; \
              until [ $(grep -cs set_point bridge.jsonl) -gt 500 ] || ! kill -0 $RUN; do sleep 0.05; done; \
              date +%s.%N >signal; kill -{signal}; wait $RUN; CODE=$?; date +%s.%N >ended; \
              kill -CONT $BRIDGE; sleep 0.5; (exit $CODE); {END}"

@@ -19,7 +19,7 @@ fn a_viewer_that_is_killed_does_not_disturb_the_arm() {
     connection(out.path(), "");
     let script = format!(
         "{VIEWER} $ARMCAL serve $ROUTINE --arm arm.toml --factor 8 2>serve.log & SERVER=$!; \
-         $ARMCAL run $ROUTINE --arm ros2:arm.toml --unattended --live --out out & RUN=$!; \
+         $ARMCAL drive $ROUTINE --arm arm.toml --unattended --live --out out & RUN=$!; \
          sleep 12; kill -9 $VIEWER && kill -0 $RUN && echo killed; wait $RUN; CODE=$?; \
          kill -INT $SERVER; wait $SERVER; exit $CODE"
     );

@@ -1,6 +1,6 @@
 """Other AprilTag detectors on the images of the detection study.
 
-    armcal study detection --images DIR
+    armcal-lab detection --images DIR
     python tests/oracle/compare_detectors.py DIR [KORNIA] [--out FILE]
 
 DIR holds truth.csv and the images. KORNIA is the program of tests/oracle/kornia, built; without it that detector is left out.

@@ -1,4 +1,4 @@
-"""OMPL's RRT-Connect and sampled edge check beside ours, on the scenes and queries of `armcal study edges` and `study paths`.
+"""OMPL's RRT-Connect and sampled edge check beside ours, on the scenes and queries of `armcal-lab edges` and `armcal-lab paths`.
 
 Collisions and distances are Pinocchio's (coal, in C++), built from the same shapes with the margins as security margins and a dynamic
 AABB tree as broad phase. Its times are of the processor; the checker is called from Python, which is a few us a state.
@@ -180,8 +180,8 @@ def compare_paths(file, resolution):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--edges", required=True, help="edges-ARM.json of `armcal study edges`")
-    parser.add_argument("--paths", nargs="*", default=[], help="paths-SITE.json of `armcal study paths`")
+    parser.add_argument("--edges", required=True, help="edges-ARM.json of `armcal-lab edges`")
+    parser.add_argument("--paths", nargs="*", default=[], help="paths-SITE.json of `armcal-lab paths`")
     parser.add_argument("--resolution", type=float, help="share of the extent, instead of the coarsest that misses no edge")
     args = parser.parse_args()
     ou.setLogLevel(ou.LogLevel.LOG_ERROR)

@@ -1,6 +1,6 @@
 """Draws docs/results/checks/detection-rate.png and detection-error.png.
 
-From tests/golden/detection.csv (conditions.csv of `armcal study detection`) and tests/golden/detectors.csv (compare_detectors.py).
+From tests/golden/detection.csv (conditions.csv of `armcal-lab detection`) and tests/golden/detectors.csv (compare_detectors.py).
 """
 
 import csv

@@ -5,9 +5,9 @@ use armcal_core::codes::Code;
 
 use super::DiscoverArgs;
 use crate::cli::calibration_inputs::load_robot;
+use crate::cli::drive::watch_memory;
 use crate::cli::exit::{Exit, UsageError};
 use crate::cli::interrupt::Interrupt;
-use crate::cli::live::watch_memory;
 use crate::cli::stdout::{note, say};
 use crate::output;
 use armcal_core::text::counted;

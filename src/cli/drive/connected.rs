@@ -6,16 +6,21 @@ use std::path::Path;
 use anyhow::Result;
 
 use super::nudging::nudge_one;
-use super::{Way, watch_memory};
+use super::watch_memory;
+#[cfg(not(feature = "images"))]
+use crate::cli::exit::UsageError;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::stdout::note;
+#[cfg(feature = "images")]
 use crate::recorded_images::LiveTagFinder;
 use crate::run::{Failure, Finished, RunInputs, RunOutput, execute_on};
 use armcal_belief::session::Progress;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::ArmSensors;
 use armcal_core::stats::quantile;
-use armcal_live::{Connection, ImageSearch, LiveArm, RosbridgeWire, Survey, TagCheck, WatchedWire, Wire};
+#[cfg(feature = "images")]
+use armcal_live::ImageSearch;
+use armcal_live::{Connection, LiveArm, RosbridgeWire, Survey, TagCheck, WatchedWire, Wire};
 
 /// An arm that was found ready.
 pub struct ConnectedArm(LiveArm<Box<dyn Wire>>);
@@ -48,27 +53,33 @@ fn describe(survey: &Survey, robot: &Robot) -> String {
     text
 }
 
+/// Tags are looked for in the images of the arm's camera.
+#[cfg(feature = "images")]
+fn with_images(wire: Box<dyn Wire>, robot: &Robot) -> Result<Box<dyn Wire>> {
+    robot.require_lens()?;
+    let (lens, family) = (robot.camera.lens, robot.tag_family);
+    Ok(Box::new(ImageSearch::new(wire, move || LiveTagFinder::new(&lens, family))?))
+}
+
+#[cfg(not(feature = "images"))]
+fn with_images(_: Box<dyn Wire>, _: &Robot) -> Result<Box<dyn Wire>> {
+    let problem =
+        "`images` without `detections`: this build of armcal reads no images; build it with `--features images`";
+    Err(UsageError::new(Code::BuildFeatureMissing, problem).into())
+}
+
 impl ConnectedArm {
     /// Waits until the arm is ready, and says what was heard of it.
-    pub fn open(way: Way, file: &Path, inputs: &RunInputs) -> Result<Self> {
+    pub fn open(file: &Path, inputs: &RunInputs) -> Result<Self> {
         let connection = Connection::load(file)?;
-        let wire: Box<dyn Wire> = match way {
-            Way::Dds => {
+        let wire: Box<dyn Wire> = match &connection.rosbridge {
+            None => {
                 let memory = watch_memory(Some(&inputs.robot.camera.lens))?;
                 Box::new(WatchedWire::open(&connection, &inputs.robot, memory)?)
             }
-            Way::Rosbridge => {
-                let bridge = connection.require_rosbridge(file)?;
-                Box::new(RosbridgeWire::open(&connection, bridge, &inputs.robot)?)
-            }
+            Some(bridge) => Box::new(RosbridgeWire::open(&connection, bridge, &inputs.robot)?),
         };
-        let wire: Box<dyn Wire> = if connection.searches_images() {
-            inputs.robot.require_lens()?;
-            let (lens, family) = (inputs.robot.camera.lens, inputs.robot.tag_family);
-            Box::new(ImageSearch::new(wire, move || LiveTagFinder::new(&lens, family))?)
-        } else {
-            wire
-        };
+        let wire = if connection.searches_images() { with_images(wire, &inputs.robot)? } else { wire };
         let (arm, survey) = LiveArm::connect(wire, &inputs.robot, &connection)?;
         note(describe(&survey, &inputs.robot));
         Ok(Self(arm))
@@ -89,11 +100,10 @@ impl ConnectedArm {
     pub fn execute(
         mut self,
         inputs: &RunInputs,
-        seed: u64,
         output: RunOutput<'_>,
         progress: &mut dyn Progress,
     ) -> Result<Finished, Failure> {
-        let result = execute_on(&mut self.0, inputs, seed, output, progress);
+        let result = execute_on(&mut self.0, inputs, inputs.routine.seed, output, progress);
         if result.is_err() {
             self.0.stop("the run broke off");
         }

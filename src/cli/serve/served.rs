@@ -3,9 +3,9 @@
 use anyhow::{Context, Result};
 
 use super::ServeArgs;
+use crate::cli::drive::watch_memory;
 use crate::cli::exit::Exit;
 use crate::cli::interrupt::Interrupt;
-use crate::cli::live::watch_memory;
 use crate::cli::stdout::note;
 use crate::run::RunInputs;
 use armcal_live::{Connection, Pace};

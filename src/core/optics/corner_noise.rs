@@ -11,7 +11,7 @@
 use nalgebra::{Matrix2, Vector2};
 
 /// Corner covariances and chance of detection in one kind of water. The constants are fitted by
-/// `armcal study detection --repeats 2` to tags of 0.15 m under the lamps that it says, with a camera of 1224 x 1024
+/// `armcal-lab detection --repeats 2` to tags of 0.15 m under the lamps that it says, with a camera of 1224 x 1024
 /// pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CornerNoise {

@@ -33,7 +33,7 @@ pub struct MotionSpec {
 }
 
 /// Values of a loop with rate feed-forward through valves of 20 to 80 ms: assumed, except the overshoot, which was
-/// measured on simulated arms (`armcal study tracking-error`).
+/// measured on simulated arms (`armcal inspect --robot`).
 impl Default for MotionSpec {
     fn default() -> Self {
         Self { lag_spread_s: 0.05, overshoot_rad: 0.06, droop_rad: 0.005 }

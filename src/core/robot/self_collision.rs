@@ -1,6 +1,6 @@
 //! The file self_collision.toml of a robot folder: pairs of links that can come near each other.
 //!
-//! `plan::sample_self_pairs` (`armcal study self-collision`) finds them by sampling; planning skips all other pairs.
+//! `plan::sample_self_pairs` (`armcal new-robot --self-collision`) finds them by sampling; planning skips all other pairs.
 //! The file holds the hash of the URDF and is valid for that URDF only.
 
 use crate::codes::Code;
@@ -61,7 +61,7 @@ impl SelfPairs {
             "# Links of this arm that can come nearer to each other than near_m, among n random configurations \
              within the joint\n\
              # limits and the datasheet's errors beyond them. Neighbours along the chain are left out. Made by\n\
-             # `armcal study self-collision {}`; make it anew when the URDF changes.\n{text}",
+             # `armcal new-robot --self-collision {}`; make it anew when the URDF changes.\n{text}",
             robot.folder.display()
         ))
     }
@@ -86,7 +86,7 @@ pub(super) fn read(folder: &Path, urdf_text: &str, bodies: &[LinkBody]) -> Resul
     FileIssue::check_range(&file, "near_m", raw.near_m, 0.0..=10.0)?;
     if raw.urdf_blake3 != hash(urdf_text) {
         let problem = format!(
-            "is of another URDF; make the file again with `armcal study self-collision {}`, or remove it",
+            "is of another URDF; make the file again with `armcal new-robot --self-collision {}`, or remove it",
             folder.display()
         );
         return Ok(Stored::Stale(FileIssue::new(Code::RobotMismatch, &file, SELF_COLLISION_FILE, problem)));
