@@ -89,7 +89,7 @@ fn what_is_no_bag_is_refused_by_name() {
     let bytes = std::fs::read(&arm).expect("it reads");
     std::fs::write(&arm, &bytes[..60]).expect("written");
     both.answer("bag", "inspect arm").expect("cut", 2, &["arm", "not a ROS 2 bag", "header"]);
-    both.answer("bag", "watch arm --idle-s 1").expect("only finished", 2, &["arm", ".db3", "finished"]);
+    both.answer("bag", "watch arm --idle-s 1").expect("not without a map", 2, &["arm", "--write-input"]);
 }
 
 /// A cut bag counts as any cut recording.

@@ -54,7 +54,9 @@ fn a_stationary_belief_ends_at_the_batch() {
 fn what_cannot_be_followed_is_refused() {
     let folder = temp();
     let absent = folder.path().join("absent.mcap");
-    follow(&absent, folder.path()).expect("absent", 2, &["absent.mcap"]);
+    let mut waiting = program();
+    waiting.arg("watch").arg(&absent).args(["--idle-s", "1", "--robot"]).arg(robot_folder());
+    answer(&mut waiting).expect("absent", 2, &["absent.mcap"]);
     let robot = robot_copy(folder.path());
     edit(&robot.join("robot.toml"), "joint = \"wrist_yaw\"", "joint = \"wrist_sway\"");
     edit(&robot.join("titan4.urdf"), "joint name=\"wrist_yaw\"", "joint name=\"wrist_sway\"");

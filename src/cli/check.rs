@@ -37,7 +37,10 @@ pub(super) struct CheckArgs {
 }
 
 pub(super) fn check(args: &CheckArgs) -> Result<Exit> {
-    let context = Context { overrides: Overrides { set: args.set.clone(), ..Overrides::default() }, robot: only_robot(&args.files) };
+    let context = Context {
+        overrides: Overrides { set: args.set.clone(), ..Overrides::default() },
+        robot: only_robot(&args.files),
+    };
     let checked = args.files.iter().map(|file| Checked::of(file, &context));
     let checked: Vec<Checked> = if args.json {
         let checked: Vec<Checked> = checked.collect();

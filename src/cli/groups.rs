@@ -53,7 +53,9 @@ mod tests {
         let command = crate::cli::command();
         let flags = |command: &Command| {
             let named = command.get_arguments().filter(|argument| !argument.is_hide_set());
-            named.filter(|argument| argument.get_long().is_some_and(|name| !["help", "version"].contains(&name))).count()
+            named
+                .filter(|argument| argument.get_long().is_some_and(|name| !["help", "version"].contains(&name)))
+                .count()
         };
         let n_commands = visible(&command).count();
         let n_flags = flags(&command) + visible(&command).map(flags).sum::<usize>();

@@ -16,6 +16,8 @@ use armcal_core::time::Stamp;
 const ON_LINE_RAD: f64 = 1e-3;
 /// Shorter edges are left out, rad.
 const SHORTEST_RAD: f64 = 0.05;
+/// Set-points farther apart belong to no one edge: what is between them was not recorded, s.
+const LONGEST_GAP_S: f64 = 1.0;
 /// Readings are looked at for so long after the last set-point of an edge, s.
 const AFTER_S: f64 = 0.5;
 /// Readings this far along an edge are at its end.
@@ -120,13 +122,15 @@ fn edges(commands: &[(Stamp, JointAngles)]) -> Vec<Edge> {
     let mut edges = Vec::new();
     let mut first = 0;
     while first + 1 < commands.len() {
-        // Rest before the edge is no part of it.
-        if commands[first].1.max_abs_difference(&commands[first + 1].1) < 1e-9 {
+        // Rest before the edge is no part of it, nor a gap of the recording.
+        let is_gap = commands[first + 1].0.since_s(commands[first].0) > LONGEST_GAP_S;
+        if is_gap || commands[first].1.max_abs_difference(&commands[first + 1].1) < 1e-9 {
             first += 1;
             continue;
         }
         let mut last = first + 1;
         while last + 1 < commands.len()
+            && commands[last + 1].0.since_s(commands[last].0) <= LONGEST_GAP_S
             && commands[last].1.max_abs_difference(&commands[last + 1].1) >= 1e-9
             && is_line(&commands[first..=last + 1])
         {
