@@ -60,6 +60,7 @@ mod streams;
 mod support;
 mod tagmap;
 mod touch;
+mod two_tables;
 mod uncalibrated;
 mod urdf;
 mod vehicles;

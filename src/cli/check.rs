@@ -253,7 +253,8 @@ fn describe_input(map: &InputMap) -> String {
                 SeenColumns::Pixel(pixel) | SeenColumns::TagCorner { pixel, .. } => pixel.join(", "),
                 SeenColumns::TagCorners { columns, .. } => columns.join(", "),
             };
-            format!("input map: a table, {what} in {columns}")
+            let of = table.tags.as_ref().map_or(String::new(), |tags| format!(" of {}", tags.file.display()));
+            format!("input map: a table, {what} in {columns}{of}")
         }
     }
 }

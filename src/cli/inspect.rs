@@ -13,9 +13,9 @@ use crate::cli::file_kind::expect_recording;
 use crate::cli::stdout::{note, say};
 use crate::output;
 use crate::report::inspection::{State, inspect as look, to_text};
-use crate::report::pose_table::{inspect_table, propose_table_map};
+use crate::report::pose_table::{LookedAt, TableInspection, inspect_table, neighbours, propose_table_map};
 use crate::report::proposed_map::propose_input_map;
-use armcal_core::input::{TableContents, read_table_contents};
+use armcal_core::input::read_table_contents;
 use armcal_core::log::{LogError, read_attachments};
 use armcal_core::robot::{self, Robot};
 
@@ -24,6 +24,8 @@ use armcal_core::robot::{self, Robot};
 pub(super) struct InspectArgs {
     /// Recording (.mcap, .db3) of armcal or of any other program, or a table of poses (.csv, .yaml, .json)
     recording: PathBuf,
+    /// The other table, where joints and tags are in two; default: the one next to the first that fits
+    other: Option<PathBuf>,
     /// Robot folder, to print which parameters the recording determines; default: the files attached to the recording
     #[arg(long, value_name = "DIR")]
     robot: Option<PathBuf>,
@@ -36,9 +38,10 @@ pub(super) struct InspectArgs {
 }
 
 pub(super) fn inspect(args: &InspectArgs) -> Result<Exit> {
-    let table = read_table_contents(&args.recording);
+    let table = looked_at(&args.recording)?;
     if table.is_none() {
         expect_recording(&args.recording)?;
+        expect_no_other(args)?;
     }
     let robot = match &args.robot {
         Some(folder) => Some(load_robot(folder, &[])?),
@@ -53,7 +56,7 @@ pub(super) fn inspect(args: &InspectArgs) -> Result<Exit> {
         .into());
     }
     if let Some(table) = table {
-        return inspect_columns(args, &table?, robot.as_ref());
+        return inspect_columns(args, &table, robot.as_ref());
     }
     let inspection = look(&args.recording, robot.as_ref())?;
     if args.json {
@@ -72,20 +75,70 @@ pub(super) fn inspect(args: &InspectArgs) -> Result<Exit> {
     })
 }
 
-/// Looks at a table of poses.
-fn inspect_columns(args: &InspectArgs, table: &TableContents, robot: Option<&Robot>) -> Result<Exit> {
-    let inspection = inspect_table(&args.recording, table, robot);
+/// A table by the ending of its name; `None` for another file.
+fn looked_at(path: &Path) -> Result<Option<LookedAt>> {
+    let contents = read_table_contents(path).transpose()?;
+    Ok(contents.map(|contents| LookedAt { path: path.to_owned(), contents }))
+}
+
+fn expect_no_other(args: &InspectArgs) -> Result<()> {
+    let Some(other) = &args.other else { return Ok(()) };
+    let (file, other) = (args.recording.display(), other.display());
+    let problem = format!("{file}: is no table, so that {other} cannot be joined with it; inspect them one by one");
+    Err(UsageError::new(Code::UsageInvalid, problem).into())
+}
+
+/// Looks at a table of poses, or at two of which one has the joints and the other the tags.
+fn inspect_columns(args: &InspectArgs, table: &LookedAt, robot: Option<&Robot>) -> Result<Exit> {
+    let given = match &args.other {
+        Some(path) => Some(looked_at(path)?.with_context(|| format!("{}: is no table", path.display()))?),
+        None => None,
+    };
+    let inspected: Vec<TableInspection> =
+        std::iter::once(table).chain(&given).map(|of| inspect_table(&of.path, &of.contents, robot)).collect();
     if args.json {
-        say(&serde_json::to_string_pretty(&inspection).context("the inspection has no JSON form")?)?;
+        let json = match &inspected[..] {
+            [one] => serde_json::to_string_pretty(one),
+            both => serde_json::to_string_pretty(both),
+        };
+        say(&json.context("the inspection has no JSON form")?)?;
     } else {
-        say_wrapped(&inspection.to_text())?;
+        let texts: Vec<String> = inspected.iter().map(TableInspection::to_text).collect();
+        say_wrapped(&texts.join("\n\n"))?;
     }
+    let other = match given {
+        Some(given) => Some(given),
+        None => the_neighbour(table, robot, args)?,
+    };
     if let Some(file) = &args.write_input {
-        let text = propose_table_map(&args.recording, table, robot)?;
-        output::write_together(&[(file.as_path(), text.as_bytes())])?;
-        note(format_args!("written: {}; look at what it says was chosen", file.display()));
+        let map = propose_table_map((table, other.as_ref()), robot, file)?;
+        output::write_together(&[(file.as_path(), map.text.as_bytes())])?;
+        let recording = other.map_or(String::new(), |_| format!("; give `calibrate` {}", map.recording.display()));
+        note(format_args!("written: {}; look at what it says was chosen{recording}", file.display()));
     }
     Ok(Exit::Ok)
+}
+
+/// The one table next to `table` that has what this lacks.
+fn the_neighbour(table: &LookedAt, robot: Option<&Robot>, args: &InspectArgs) -> Result<Option<LookedAt>> {
+    let mut found = neighbours(table, robot);
+    let names: Vec<String> = found.iter().map(|other| other.path.display().to_string()).collect();
+    match found.len() {
+        0 => Ok(None),
+        1 => {
+            note(format_args!("{} next to it has what it lacks; an input map can join both", names[0]));
+            Ok(found.pop())
+        }
+        _ if args.write_input.is_none() => {
+            note(format_args!("next to it, {} each have what it lacks: name one after it", names.join(", ")));
+            Ok(None)
+        }
+        _ => {
+            let file = args.recording.display();
+            let problem = format!("{file}: {} each have what it lacks: name one after it", names.join(", "));
+            Err(UsageError::new(Code::UsageInvalid, problem).into())
+        }
+    }
 }
 
 /// The robot as attached to the recording; `None` where that is missing or cannot be used, for it is a help, no more.

@@ -46,9 +46,12 @@ pub(super) struct NewRobotArgs {
     /// Link poses for the URDF: kinematics.yaml of Universal Robots (calibration.yaml) or of Franka
     #[arg(long, value_name = "FILE")]
     kinematics: Option<PathBuf>,
-    /// Lens of the camera: camchain.yaml of Kalibr or cameras.yaml of TagSLAM, its first camera
+    /// Lens of the camera: camchain.yaml of Kalibr or cameras.yaml of TagSLAM
     #[arg(long, value_name = "FILE")]
     lens: Option<PathBuf>,
+    /// Camera of that file, such as cam1; needed where it has several
+    #[arg(long, value_name = "NAME", requires = "lens")]
+    lens_camera: Option<String>,
 }
 
 pub(super) fn new_robot(args: &NewRobotArgs) -> Result<Exit> {
@@ -82,7 +85,7 @@ fn new_folder(args: &NewRobotArgs, urdf: &Path, out: &Path) -> Result<Exit> {
     expect_kind(urdf, &[FileKind::Urdf])?;
     refuse_full(out)?;
     let text = args.kinematics.as_deref().map(|file| with_link_poses(urdf, file)).transpose()?;
-    let lens = args.lens.as_deref().map(first_lens).transpose()?;
+    let lens = args.lens.as_deref().map(|file| lens(file, args.lens_camera.as_deref())).transpose()?;
     let wanted = NewRobot {
         urdf,
         text: text.as_deref(),
@@ -111,13 +114,23 @@ fn new_folder(args: &NewRobotArgs, urdf: &Path, out: &Path) -> Result<Exit> {
     Ok(Exit::Ok)
 }
 
-/// The first camera of a file, and where it is from, in words.
-fn first_lens(file: &Path) -> Result<(String, CameraModel)> {
+/// The named camera of a file, or its only one, and where it is from, in words.
+fn lens(file: &Path, wanted: Option<&str>) -> Result<(String, CameraModel)> {
     let cameras = read_cameras(file)?;
-    let name = file.file_name().unwrap_or_default().to_string_lossy();
-    let n = cameras.len();
-    let first = cameras.into_iter().next().context("a file without cameras is refused")?;
-    Ok((format!("{} of {name}, the first of {}", first.name, counted(n, "camera")), first.model))
+    let names: Vec<&str> = cameras.iter().map(|camera| camera.name.as_str()).collect();
+    let problem = match wanted {
+        Some(wanted) if !names.contains(&wanted) => format!("no camera is called `{wanted}`"),
+        None if names.len() > 1 => format!("it has {}", counted(names.len(), "camera")),
+        _ => {
+            let camera = cameras.iter().find(|camera| wanted.is_none_or(|wanted| camera.name == wanted));
+            let camera = camera.context("a file without cameras is refused")?;
+            let name = file.file_name().unwrap_or_default().to_string_lossy();
+            return Ok((format!("{} of {name}", camera.name), camera.model));
+        }
+    };
+    let file = file.display();
+    let text = format!("{file}: {problem}; name one with --lens-camera: {}", names.join(", "));
+    Err(UsageError::new(Code::NameUnknown, text).into())
 }
 
 /// The URDF's text with the link poses of a manufacturer's file.

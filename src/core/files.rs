@@ -55,8 +55,22 @@ pub fn read_bytes(file: &Path, kind: FileKind) -> Result<Vec<u8>> {
 /// # Errors
 /// As [`read_bytes`], or that it is not UTF-8.
 pub fn read_text(file: &Path, kind: FileKind) -> Result<String> {
-    let text = String::from_utf8(read_bytes(file, kind)?);
-    text.map_err(|error| Error::new(ErrorKind::InvalidData, format!("it is not a text: {}", error.utf8_error())))
+    into_text(read_bytes(file, kind)?)
+}
+
+/// The text that a file's bytes are.
+///
+/// # Errors
+/// That they are not UTF-8, and which encoding their beginning states.
+pub fn into_text(bytes: Vec<u8>) -> Result<String> {
+    let is_utf16 = bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]);
+    String::from_utf8(bytes).map_err(|error| {
+        let what = match is_utf16 {
+            true => "it is a text in UTF-16; save it in UTF-8".to_owned(),
+            false => format!("it is not a text in UTF-8: {}", error.utf8_error()),
+        };
+        Error::new(ErrorKind::InvalidData, what)
+    })
 }
 
 /// All of `source`, such as stdin, as a file of this kind.

@@ -27,8 +27,8 @@ const TAG_TYPES: &str = "tags (tf2_msgs/msg/TFMessage, AprilTagDetectionArray of
 pub enum ProposalError {
     #[error(transparent)]
     Log(#[from] LogError),
-    #[error("{file}: no topic with {what}: the recording has {topics:?}")]
-    Missing { file: String, what: &'static str, topics: Vec<String> },
+    #[error("{file}: no topic with {what}: the recording has {topics:?}{remedy}")]
+    Missing { file: String, what: &'static str, topics: Vec<String>, remedy: &'static str },
     #[error("{file}: {problem}")]
     Joints { file: String, problem: String },
     #[error("the proposed input map does not read; rename what the message says: {0}")]
@@ -46,7 +46,11 @@ pub fn propose_input_map(recording: &Path, robot: Option<&Robot>) -> Result<Stri
     let missing = |what| {
         let typed = |(name, topic): (&String, &contents::Topic)| format!("{name} ({})", topic.schema);
         let topics = contents.topics.iter().map(typed).collect();
-        ProposalError::Missing { file: file.clone(), what, topics }
+        let remedy = match contents.topics.values().all(|topic| topic.is_cdr) {
+            true => "",
+            false => "; record them as ROS 2 messages (cdr), or write their numbers into a table (CSV)",
+        };
+        ProposalError::Missing { file: file.clone(), what, topics, remedy }
     };
     let (joint_topic, joints) = choose_joints(&contents, robot).map_err(|problem| match problem {
         None => missing("joint readings (sensor_msgs/msg/JointState)"),

@@ -155,6 +155,39 @@ fn the_camchain_is_the_robots_camera_at_its_calibrated_place() {
     assert!((x + 0.124).abs() < 1e-12, "the drawing's, where the calibration has none");
 }
 
+/// Of several cameras in a file the user names one; each arm has another.
+#[test]
+fn a_camera_of_a_camchain_is_chosen_by_its_name() {
+    let folder = temp();
+    let camera = |name: &str, focal_px: f64, model: &str| {
+        format!(
+            "{name}:\n  camera_model: pinhole\n  intrinsics: [{focal_px}, {focal_px}, 320.5, 240.5]\n  \
+             distortion_model: {model}\n  distortion_coeffs: [0.01, 0.0, 0.0, 0.0]\n  resolution: [640, 480]\n"
+        )
+    };
+    let cameras = [("cam0", 610.0, "radtan"), ("cam1", 450.5, "equidistant"), ("cam2", 820.25, "radtan")];
+    let text: String = cameras.iter().map(|(name, focal_px, model)| camera(name, *focal_px, model)).collect();
+    write(&folder.path().join("chain.yaml"), &text);
+    write(&folder.path().join("one.yaml"), &camera("left", 500.0, "radtan"));
+    let new_robot = |urdf: &str, out: &str, options: &[&str]| {
+        let mut command = program();
+        command.current_dir(folder.path()).arg("new-robot").arg(root().join("robots").join(urdf));
+        answer(command.args(["--out", out]).args(options))
+    };
+    let urdfs = ["titan4/titan4.urdf", "kraft-predator/kraft-predator.urdf", "../tests/golden/bench/arm.urdf"];
+    for (urdf, (name, focal_px, _)) in urdfs.into_iter().zip(cameras) {
+        let refused = new_robot(urdf, name, &["--lens", "chain.yaml"]);
+        refused.expect("none named", 2, &["chain.yaml", "--lens-camera", "cam0", "cam1", "cam2", "[name_unknown]"]);
+        assert!(!folder.path().join(name).exists());
+        new_robot(urdf, name, &["--lens", "chain.yaml", "--lens-camera", name]).expect(name, 0, &[]);
+        assert_eq!(arm_in(&folder.path().join(name)).camera.lens.focal_px(), [focal_px; 2]);
+    }
+    let absent = new_robot(urdfs[0], "absent", &["--lens", "chain.yaml", "--lens-camera", "cam3"]);
+    absent.expect("absent", 2, &["`cam3`", "cam0", "[name_unknown]"]);
+    new_robot(urdfs[0], "alone", &["--lens", "one.yaml"]).expect("its only one", 0, &[]);
+    new_robot(urdfs[0], "no-file", &["--lens-camera", "cam0"]).expect("no file", 2, &["--lens"]);
+}
+
 #[test]
 fn cameras_of_one_link_have_kalibrs_pose_between_them() {
     let mut robot = titan();

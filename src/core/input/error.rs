@@ -58,7 +58,10 @@ pub enum InputError {
          messages of the other"
     )]
     JointTwice { file: String, topic: String, joint: String, first: f64, second: f64, message: u64, n: u64, of: u64 },
-    #[error("{file}: {place}: {field} of `{of}` is {value}, not a finite number")]
+    #[error(
+        "{file}: {place}: {field} of `{of}` is {value}, not a finite number; set not_finite = \"leave_out\" in the \
+         input map to leave such values out"
+    )]
     NotFinite { file: String, place: BadPlace, field: &'static str, of: String, value: f64 },
     #[error("{file}: topic {topic}: {disorder}")]
     Disorder { file: String, topic: String, disorder: StampRegression },
@@ -114,7 +117,7 @@ pub enum InputError {
 fn encoding_remedy(found: &str) -> String {
     match found {
         "ros1" => format!("start from the ROS 1 bag (.bag) that it was made from: {}", crate::log::ROS1_ADVICE),
-        _ => "record the topic as ROS 2 messages".to_owned(),
+        _ => "record the topic as ROS 2 messages, or write the numbers into a table (CSV)".to_owned(),
     }
 }
 

@@ -44,10 +44,10 @@ use nalgebra::{Quaternion, UnitQuaternion};
 use serde::Deserialize;
 
 pub use self::table::{
-    CornerOrder, Direction, PoseColumns, RotationColumns, RotationForm, SeenColumns, TableFormat, TableLayout,
-    TimeColumn,
+    CornerOrder, Direction, PoseColumns, RotationColumns, RotationForm, SeenColumns, TableFormat, TableJoin,
+    TableLayout, TagTable, TimeColumn,
 };
-use self::table::{TableToml, TagColumnsToml};
+use self::table::{TableToml, TagColumnsToml, TagTableToml, TagsOfTable};
 pub use self::units::{JointUnit, SlideUnit};
 use super::lerobot::{LerobotCalibration, LerobotToml};
 use crate::optics::TagFamily;
@@ -386,6 +386,7 @@ struct JointsToml {
 #[serde(deny_unknown_fields)]
 struct TagsToml {
     topic: Option<String>,
+    table: Option<TagTableToml>,
     camera_frame: Option<String>,
     child_frame: Option<String>,
     #[serde(rename = "use")]
@@ -473,7 +474,9 @@ fn checked(file: &Path, raw: MapToml) -> Result<InputMap, RobotError> {
     let tag_noise = raw.tags.noise(file)?;
     let source = match raw.table {
         Some(table) => {
-            let tags = (raw.tags.tag_use, child_frame.as_ref());
+            let clock_offset_s = clock_offset(file, &raw.tags)?;
+            let (tag_use, child_frame) = (raw.tags.tag_use, child_frame.as_ref());
+            let tags = TagsOfTable { tag_use, child_frame, table: raw.tags.table, clock_offset_s };
             Source::Table(Box::new(table::layout(file, table, raw.tags.columns, tags)?))
         }
         None => {
@@ -564,6 +567,10 @@ fn further(file: &Path, first: &TagsToml, raw: Vec<FurtherTagsToml>) -> Result<V
     Ok(found)
 }
 
+fn clock_offset(file: &Path, tags: &TagsToml) -> Result<f64, FileIssue> {
+    FileIssue::check_range(file, "tags.clock_offset_s", tags.clock_offset_s, CLOCK_OFFSETS_S)
+}
+
 fn topics(file: &Path, joints: &JointsToml, tags: &TagsToml, conditions: ConditionTopics) -> Result<Topics, FileIssue> {
     let issue = |key: &str, problem: &str| Err(FileIssue::new(Code::ValueInvalid, file, key, problem));
     let topic = |key: &str, topic: &Option<String>| match topic.as_deref() {
@@ -577,7 +584,7 @@ fn topics(file: &Path, joints: &JointsToml, tags: &TagsToml, conditions: Conditi
         tags: topic("tags.topic", &tags.topic)?,
         camera_frame,
         camera_info: tags.camera_info.clone(),
-        clock_offset_s: FileIssue::check_range(file, "tags.clock_offset_s", tags.clock_offset_s, CLOCK_OFFSETS_S)?,
+        clock_offset_s: clock_offset(file, tags)?,
         image_period_s: FileIssue::check_range(file, "tags.image_period_s", tags.image_period_s, 0.0..=3600.0)?,
         base_from_attitude: base_from_attitude(file, &conditions)?,
         further: Vec::new(),
@@ -592,8 +599,8 @@ fn topics(file: &Path, joints: &JointsToml, tags: &TagsToml, conditions: Conditi
     if named[0].is_empty() || named.windows(2).any(|two| two[0] == two[1]) {
         issue("conditions", "has an empty topic, or one that is named twice")?;
     }
-    if tags.columns.is_some() {
-        issue("tags.columns", "is for a [table], which the input map lacks")?;
+    if let Some(key) = tags.columns.as_ref().map(|_| "columns").or(tags.table.as_ref().map(|_| "table")) {
+        issue(&format!("tags.{key}"), "is for a [table], which the input map lacks")?;
     }
     if found.camera_frame.as_deref() == Some("") {
         issue("tags.camera_frame", "is empty; name a frame")?;

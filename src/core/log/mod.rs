@@ -40,8 +40,8 @@ pub use message_codec::{Stream, encode_message};
 pub use messages as ros;
 pub use order::{StampOrder, StampRegression};
 pub use raw::{
-    AttachmentInfo, Channel, ChunkOrder, ChunkTotals, Completeness, FileContents, Growth, ROS1_ADVICE, RawMessage,
-    RawSummary, Schema, file_contents, for_each_raw,
+    AttachmentInfo, Channel, ChunkOrder, ChunkTotals, Completeness, FILE_START_BYTES, FileContents, Growth,
+    ROS1_ADVICE, RawMessage, RawSummary, Schema, describe_file, file_contents, for_each_raw,
 };
 pub use reader::{
     Choice, RawRecord, Recording, TopicMap, read_chosen, read_recording, read_recording_with, scan_recording,

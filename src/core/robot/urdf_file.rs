@@ -36,14 +36,10 @@ impl UrdfFile {
     /// # Errors
     /// A sentence with line and column, where the text is no URDF or where a joint names no links.
     pub fn parse(text: &str) -> Result<Self, String> {
+        refuse_no_xml(text)?;
         let tree = XmlTree::parse(text, XML_LIMITS)?;
+        refuse_other_roots(&tree)?;
         let root = tree.element(0);
-        if root.name != "robot" {
-            return Err(format!(
-                "{}: the root element is `{}`, and that of a URDF is `robot`. Convert the file to URDF first",
-                root.place, root.name
-            ));
-        }
         refuse_xacro(&tree)?;
         let mut scan = Scan::new(&tree);
         let colors = link::named_colors(&mut scan);
@@ -82,6 +78,39 @@ impl UrdfFile {
         }
         self.links.push(link::read_link(scan, at, name, colors));
     }
+}
+
+/// Refuses what is no XML at all.
+fn refuse_no_xml(text: &str) -> Result<(), String> {
+    let start = text.trim_start_matches(|c: char| c.is_whitespace() || c == '\u{feff}');
+    if start.starts_with("version https://git-lfs") {
+        return Err("it is a pointer of Git LFS, not the URDF itself. Fetch it with `git lfs pull`".to_owned());
+    }
+    if start.starts_with('<') {
+        return Ok(());
+    }
+    Err("it is not XML, as every URDF is. Name the arm's URDF; a table of link lengths or DH parameters must be \
+         written as one"
+        .to_owned())
+}
+
+/// Refuses XML of other kinds.
+fn refuse_other_roots(tree: &XmlTree) -> Result<(), String> {
+    let root = tree.element(0);
+    let has = |name: &str| tree.children(0).any(|at| tree.element(at).name == name);
+    if root.name.eq_ignore_ascii_case("html") {
+        return Err("it is a web page, not the URDF itself. Download the raw file".to_owned());
+    }
+    if root.name != "robot" {
+        return Err(format!(
+            "{}: the root element is `{}`, and that of a URDF is `robot`. Convert the file to URDF first",
+            root.place, root.name
+        ));
+    }
+    if has("group") && !has("link") {
+        return Err("it is an SRDF, which names groups of joints. Name the URDF that has these joints".to_owned());
+    }
+    Ok(())
 }
 
 /// Refuses a file that only xacro can expand. What an expanded file has left over, such as unused definitions and calls
@@ -139,6 +168,19 @@ mod tests {
         assert_eq!(told(quiet), Vec::<String>::new());
         let [wheel] = &told("<wheel/>")[..] else { panic!("one note") };
         assert!(wheel.contains("`wheel`"), "{wheel}");
+    }
+
+    #[test]
+    fn files_of_other_kinds_are_named() {
+        let texts = [
+            "joint,a,alpha,d,theta\n1,0,1.57,0.3,0\n",
+            "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n",
+            "<!DOCTYPE html>\n<html><body>Not found</body></html>",
+            "<robot name=\"a\"><group name=\"arm\"><chain base_link=\"b\" tip_link=\"t\"/></group></robot>",
+            "<sdf version=\"1.7\"><model name=\"arm\"/></sdf>",
+        ];
+        let told = texts.map(|text| UrdfFile::parse(text).expect_err("no URDF"));
+        insta::assert_snapshot!("other_kinds", told.join("\n"));
     }
 
     #[test]

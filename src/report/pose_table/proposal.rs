@@ -1,9 +1,11 @@
 //! A proposed input map for a table.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use super::roles::{Columns, Roles};
-use super::text::missing;
+use super::pair::{LookedAt, ProposedJoin, TablePair, apart_s, pair};
+use super::roles::{Columns, Roles, unit_of_time};
+use super::text::{gaps, missing_joints, missing_seen};
+use super::winding::Windings;
 use crate::report::proposed_map::{ProposalError, comment, quoted};
 use armcal_core::input::{TableColumn, TableContents, TableFormat, parse_input_map};
 use armcal_core::robot::Robot;
@@ -17,60 +19,147 @@ const MAX_DISTANCE_M: f64 = 20.0;
 /// Rotation vectors and angles in radians are smaller.
 const MAX_TURN_RAD: f64 = 7.0;
 
-/// The text of an input map for a table; with `robot`, joints are matched to columns.
+/// The text of an input map for a table, or for two that hold joints and tags; with `robot`, joints are matched to
+/// columns. `map` is the file that it goes to.
 ///
 /// # Errors
-/// [`ProposalError`] where the table lacks columns that an input map needs.
-pub fn propose_table_map(path: &Path, table: &TableContents, robot: Option<&Robot>) -> Result<String, ProposalError> {
-    let roles = Roles::of(table, robot);
-    let file = path.display().to_string();
-    let needs =
-        missing(table, &roles).into_iter().filter(|what| what.starts_with("column") || what.starts_with("a column"));
-    let needs: Vec<String> = needs.collect();
+/// [`ProposalError`] where the tables lack columns that an input map needs.
+pub fn propose_table_map(
+    tables: (&LookedAt, Option<&LookedAt>),
+    robot: Option<&Robot>,
+    map: &Path,
+) -> Result<ProposedTableMap, ProposalError> {
+    let (table, other) = tables;
+    let (text, recording) = match other {
+        None => (of_one(table, robot)?, &table.path),
+        Some(other) => {
+            let pair = pair([table, other], robot)?;
+            (of_two(&pair, robot, map)?, &pair.joints.path)
+        }
+    };
+    parse_input_map(Path::new("proposed input map"), &text)?;
+    Ok(ProposedTableMap { text, recording: recording.clone() })
+}
+
+/// A proposed input map.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ProposedTableMap {
+    /// Its TOML.
+    pub text: String,
+    /// The table that `calibrate` takes.
+    pub recording: PathBuf,
+}
+
+fn of_one(table: &LookedAt, robot: Option<&Robot>) -> Result<String, ProposalError> {
+    let (file, contents) = (table.path.display().to_string(), &table.contents);
+    let roles = Roles::of(contents, robot);
+    let needs: Vec<String> = [missing_joints(&roles), missing_seen(&roles)].into_iter().flatten().collect();
     if !needs.is_empty() {
-        let columns: Vec<&String> = table.columns.iter().take(30).map(|column| &column.name).collect();
-        let problem =
-            format!("no input map can be proposed: it lacks {}; its columns are {columns:?}", needs.join("; "));
+        let columns: Vec<&String> = contents.columns.iter().take(30).map(|column| &column.name).collect();
+        let lists = contents.columns.iter().filter_map(|column| column.first_other.as_deref());
+        let remedy = match lists.into_iter().any(|cell| cell.starts_with(['[', '('])) {
+            true => "give each number of a list in a cell its column",
+            false => "where joints and tags are in two tables, name both: `armcal inspect ONE OTHER`",
+        };
+        let problem = format!(
+            "no input map can be proposed: it lacks {}; its columns are {columns:?}; {remedy}",
+            needs.join("; ")
+        );
         return Err(ProposalError::Joints { file, problem });
     }
-    let mut text = format!(
-        "# Proposed by `armcal inspect --write-input` for {}.\n# Look at each choice; docs/reference/real-arms.md says \
-         what the keys mean.\nversion = 1\n\n[table]\nformat = {}   # {} rows\n",
-        comment(&file),
-        if table.format == TableFormat::Csv { "\"csv\"" } else { "\"yaml\"" },
-        table.n_rows
+    let mut text = head(&comment(&file), &[(contents, &roles)]);
+    text += &table_of(contents, &roles);
+    text += &joints(contents, &roles, robot);
+    text += "\n[tags]\n";
+    Ok(text + &tags(contents, &roles))
+}
+
+fn of_two(pair: &TablePair<'_>, robot: Option<&Robot>, map: &Path) -> Result<String, ProposalError> {
+    let [of_joints, of_tags] = &pair.roles;
+    let files = [pair.joints, pair.tags].map(|table| comment(&table.path.display().to_string()));
+    let sides = [(&pair.joints.contents, of_joints), (&pair.tags.contents, of_tags)];
+    let mut text = head(
+        &format!("{} (joints, the recording that `calibrate` takes)\n# and {} (tags)", files[0], files[1]),
+        &sides,
     );
+    text += &table_of(&pair.joints.contents, of_joints);
+    text += &joints(&pair.joints.contents, of_joints, robot);
+    let file = quoted(&beside(&pair.tags.path, map));
+    let rows_at = match pair.tags.contents.rows_at.join(".") {
+        rows if rows.is_empty() => String::new(),
+        rows => format!(", rows = {}", quoted(&rows)),
+    };
+    let (join, why) = match &pair.join {
+        ProposedJoin::Time(column) => {
+            let unit = column_of(&pair.tags.contents, column).map_or("s", |column| unit_of_time(column).0);
+            let join = format!("time = {{ column = {}, unit = \"{unit}\" }}", quoted(column));
+            (join, "the joints' row nearest in time, within max_gap_s".to_owned())
+        }
+        ProposedJoin::Key([of_joints, of_tags]) if of_joints == of_tags => {
+            (format!("key = {}", quoted(of_tags)), "rows with the same text in this column".to_owned())
+        }
+        ProposedJoin::Key([of_joints, of_tags]) => {
+            let join = format!("key = {}, joints_key = {}", quoted(of_tags), quoted(of_joints));
+            (join, "rows with the same text in these columns".to_owned())
+        }
+    };
+    text += &format!("\n[tags]\ntable = {{ file = {file}{rows_at}, {join} }}   # {why}\n");
+    if let (ProposedJoin::Time(_), Some(apart_s)) = (&pair.join, apart_s(pair)) {
+        text += &format!(
+            "clock_offset_s = {apart_s}   # the times of the tables do not overlap: as if both began together\n"
+        );
+    }
+    Ok(text + &tags(&pair.tags.contents, of_tags))
+}
+
+/// The path of `table` as a map at `map` names it.
+fn beside(table: &Path, map: &Path) -> String {
+    let folder = |path: &Path| std::path::absolute(path).ok().and_then(|path| Some(path.parent()?.to_owned()));
+    let is_beside = folder(table).is_some_and(|of_table| Some(of_table) == folder(map));
+    let name = if is_beside { table.file_name().map(PathBuf::from) } else { std::path::absolute(table).ok() };
+    name.unwrap_or_else(|| table.to_owned()).display().to_string()
+}
+
+fn head(files: &str, sides: &[(&TableContents, &Roles)]) -> String {
+    let mut text = format!(
+        "# Proposed by `armcal inspect --write-input` for {files}.\n# Look at each choice; docs/reference/real-arms.md \
+         says what the keys mean.\nversion = 1\n"
+    );
+    let gaps: Vec<String> = sides
+        .iter()
+        .flat_map(|(table, roles)| gaps(table, roles))
+        .map(|column| format!("{} in {}", column.n_empty + column.n_others, comment(&column.name)))
+        .collect();
+    if !gaps.is_empty() {
+        text += &format!("not_finite = \"leave_out\"   # rows that lack a number: {}\n", gaps.join(", "));
+    }
+    text
+}
+
+fn table_of(table: &TableContents, roles: &Roles) -> String {
+    let format = if table.format == TableFormat::Csv { "csv" } else { "yaml" };
+    let mut text = format!("\n[table]\nformat = \"{format}\"   # {} rows\n", table.n_rows);
     if !table.rows_at.is_empty() {
         text += &format!("rows = {}\n", quoted(&table.rows_at.join(".")));
     }
-    text += &time(table, &roles);
-    text += &joints(table, &roles, robot);
-    text += &tags(table, &roles);
-    parse_input_map(Path::new("proposed input map"), &text)?;
-    Ok(text)
+    text + &time(table, roles)
 }
 
-fn column<'a>(table: &'a TableContents, name: &String) -> Option<&'a TableColumn> {
+fn column_of<'a>(table: &'a TableContents, name: &String) -> Option<&'a TableColumn> {
     table.columns.iter().find(|column| column.name == *name)
 }
 
 /// The largest number in the columns, without its sign.
 fn largest<'a>(table: &TableContents, names: impl IntoIterator<Item = &'a String>) -> f64 {
-    let ranges = names.into_iter().filter_map(|name| column(table, name)?.range);
+    let ranges = names.into_iter().filter_map(|name| column_of(table, name)?.range);
     ranges.flatten().map(f64::abs).fold(0.0, f64::max)
 }
 
-/// Times in s since 1970 are about 2e9; in other units they are so much larger.
 fn time(table: &TableContents, roles: &Roles) -> String {
     let Some(name) = &roles.time else { return "# time: no column of times; rows count as 1 s apart\n".to_owned() };
-    let Some(found) = column(table, name) else { return String::new() };
+    let Some(found) = column_of(table, name) else { return String::new() };
     let largest = found.range.map_or(0.0, |[_, high]| high);
-    let unit = match largest {
-        high if high > 1e17 => "ns",
-        high if high > 1e14 => "us",
-        high if high > 1e11 => "ms",
-        _ => "s",
-    };
+    let unit = unit_of_time(found).0;
     let line = format!("time = {{ column = {}, unit = \"{unit}\" }}   # up to {largest}\n", quoted(name));
     if found.is_rising && found.n_empty + found.n_others == 0 {
         return line;
@@ -93,7 +182,12 @@ fn joints(table: &TableContents, roles: &Roles, robot: Option<&Robot>) -> String
     let largest = largest(table, roles.joints.iter().map(|(_, column)| column));
     let in_rad =
         robot.map(|robot| robot.sensors.iter().all(|s| (s.counts_per_rad.abs() - 1.0).abs() <= RADIANS_WITHIN));
+    let says = |words: &[&str]| {
+        let names = roles.joints.iter().map(|(_, column)| column.to_lowercase());
+        !roles.joints.is_empty() && names.into_iter().all(|name| words.iter().any(|word| name.contains(word)))
+    };
     let unit = match (largest <= MAX_RAD, in_rad) {
+        _ if says(&["deg", "\u{b0}"]) => "unit = \"deg\"",
         (true, Some(false)) => "unit = \"rad\"",
         (false, Some(true)) => "unit = \"deg\"",
         _ => "# unit: as the robot's sensors count; or \"rad\", \"deg\"",
@@ -106,27 +200,27 @@ fn list(names: &[String]) -> String {
 }
 
 /// Corners of tags where a column has the tag's number, otherwise of a board.
-fn corners(roles: &Roles) -> String {
+fn corners(table: &TableContents, roles: &Roles) -> String {
     let pixel = roles.pixel.as_ref().map_or(String::new(), |pixel| list(pixel));
     let id = roles.id.as_ref().map_or(String::new(), |id| quoted(id));
-    let order =
-        "corner_order = \"apriltag\"   # bottom left first, counter-clockwise; or \"opencv\": top left, clockwise\n";
     let of_tag = match (&roles.corners, &roles.corner) {
-        (Some(columns), _) => format!("corners = [{}]\n{order}", list(columns)),
-        (None, Some(corner)) => format!("corner = {}\npixel = [{pixel}]\n{order}", quoted(corner)),
+        (Some(columns), _) => format!("corners = [{}]\n", list(columns)),
+        (None, Some(corner)) => format!("corner = {}\npixel = [{pixel}]\n", quoted(corner)),
         (None, None) => {
             return format!(
-                "\n[tags]\nchild_frame = \"board\"   # as the tag map calls it, with its squares and square_m\n\
+                "child_frame = \"board\"   # as the tag map calls it, with its squares and square_m\n\
                  use = \"board_corners\"\n\n[tags.columns]\nid = {id}\npixel = [{pixel}]\n"
             );
         }
     };
-    format!("\n[tags]\nuse = \"corners\"\n\n[tags.columns]\nid = {id}   # the tag's number\n{of_tag}")
+    let order = Windings::of(table, roles).corner_order();
+    format!("use = \"corners\"\n\n[tags.columns]\nid = {id}   # the tag's number\n{of_tag}{order}")
 }
 
+/// The keys of `[tags]`.
 fn tags(table: &TableContents, roles: &Roles) -> String {
-    let mut text = "\n[tags]\n".to_owned();
-    let Some(position) = &roles.position else { return corners(roles) };
+    let Some(position) = &roles.position else { return corners(table, roles) };
+    let mut text = String::new();
     if roles.id.is_none() {
         text += "child_frame = \"board\"   # as the tag map calls the landmark\n";
     }

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use armcal_core::input::{TableColumn, TableContents};
+use armcal_core::input::{TableColumn, TableContents, tag_number};
 use armcal_core::robot::{Robot, likely_name};
 
 /// Three columns of one place, or three or four of one rotation.
@@ -37,7 +37,7 @@ pub(super) struct Roles {
 
 /// Names of a column of times, of ids, and words for what the camera sees and for the arm itself.
 const TIMES: [&str; 8] = ["t", "time", "stamp", "timestamp", "secs", "seconds", "nanos", "time_s"];
-const IDS: [&str; 6] = ["id", "tag", "tag_id", "marker", "marker_id", "landmark"];
+const IDS: [&str; 9] = ["id", "tag", "tag_id", "tagid", "tag_number", "marker", "marker_id", "aruco_id", "landmark"];
 const CORNERS: [&str; 5] = ["corner", "corner_id", "corner_index", "corner_idx", "point"];
 /// Names of a corner's two columns, u and v.
 const PIXELS: [[&str; 2]; 4] = [["u", "v"], ["x", "y"], ["px", "py"], ["u_px", "v_px"]];
@@ -60,7 +60,9 @@ impl Roles {
         roles.time = names.iter().find(is_time).cloned();
         let called = |words: &[&str]| names.iter().find(|name| words.contains(&last_part(name).as_str())).cloned();
         roles.corner = called(&CORNERS);
-        roles.id = called(&IDS).or_else(|| roles.corner.take());
+        let is_id = |column: &&TableColumn| is_of_tags(column) && IDS.contains(&last_part(&column.name).as_str());
+        let of_names = table.columns.iter().find(is_id).map(|column| column.name.clone());
+        roles.id = called(&IDS).or(of_names).or_else(|| roles.corner.take());
         roles.corners = four_corners(&names);
         let mut places = triples(&names);
         let rotations: Vec<Columns> = extracted(&mut places, is_rotation);
@@ -145,8 +147,36 @@ impl Roles {
     }
 }
 
+/// Cells such as `tag36h11:3` instead of numbers.
+pub(super) fn is_of_tags(column: &TableColumn) -> bool {
+    column.n_numbers == 0 && column.first_other.as_deref().and_then(tag_number).is_some()
+}
+
+/// The last word of a path, as it is compared: `Tag ID` and `tag.id [-]` are `tag_id` and `id`.
 fn last_part(name: &str) -> String {
-    name.rsplit('.').next().unwrap_or(name).to_lowercase()
+    let without_unit = name.split(['[', '(']).next().map_or("", str::trim);
+    let last = without_unit.rsplit('.').next().unwrap_or(name);
+    last.to_lowercase().replace([' ', '-'], "_")
+}
+
+/// The unit of a column of times, and its seconds. Times since 1970 are about 2e9 s; others are a few minutes apart at
+/// most.
+pub(super) fn unit_of_time(column: &TableColumn) -> (&'static str, f64) {
+    const UNITS: [(&str, f64); 4] = [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)];
+    const NAMES: [(&str, usize); 8] =
+        [("nano", 3), ("nsec", 3), ("micro", 2), ("usec", 2), ("milli", 1), ("msec", 1), ("_ns", 3), ("_ms", 1)];
+    const SINCE_1970_S: f64 = 1e9;
+    const APART_S: f64 = 600.0;
+    let name = column.name.to_lowercase();
+    if let Some((_, unit)) = NAMES.iter().find(|(word, _)| name.contains(word)) {
+        return UNITS[*unit];
+    }
+    let [first, last] = column.range.unwrap_or_default();
+    let apart = (last - first) / column.n_steps.max(2).saturating_sub(1) as f64;
+    let by_steps = UNITS.iter().find(|(_, unit_s)| apart * unit_s <= APART_S);
+    let is_date = |time: f64, unit_s: f64| (SINCE_1970_S..10.0 * SINCE_1970_S).contains(&(time * unit_s));
+    let by_date = UNITS.iter().find(|(_, unit_s)| is_date(first, *unit_s) && apart * unit_s <= APART_S);
+    *by_date.or(by_steps).unwrap_or(&UNITS[3])
 }
 
 /// `q1`, `j_2`, `joint3.position`, or a number alone.

@@ -6,8 +6,8 @@ use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
 use serde::Serialize;
 
-use super::roles::Roles;
-use armcal_core::input::{TableContents, TableFormat};
+use super::roles::{Roles, is_of_tags};
+use armcal_core::input::{TableColumn, TableContents, TableFormat};
 use armcal_core::robot::Robot;
 use armcal_core::text::printable;
 
@@ -46,7 +46,7 @@ const MOST_COLUMNS: usize = 60;
 #[must_use]
 pub fn inspect_table(path: &Path, table: &TableContents, robot: Option<&Robot>) -> TableInspection {
     let roles = Roles::of(table, robot);
-    let column = |column: &armcal_core::input::TableColumn| ColumnInspection {
+    let column = |column: &TableColumn| ColumnInspection {
         name: column.name.clone(),
         numbers: column.n_numbers,
         empty: column.n_empty,
@@ -67,31 +67,45 @@ pub fn inspect_table(path: &Path, table: &TableContents, robot: Option<&Robot>) 
 }
 
 /// Reasons for which `calibrate` cannot read the table.
-pub(super) fn missing(table: &TableContents, roles: &Roles) -> Vec<String> {
-    let mut missing = Vec::new();
-    if !roles.missing_joints.is_empty() {
-        missing.push(format!("columns of the robot's joints {:?}", roles.missing_joints));
-    } else if roles.joints.is_empty() {
-        missing.push("columns of joint readings (--robot DIR matches their names)".to_owned());
-    }
-    match (&roles.position, &roles.pixel, &roles.corners) {
-        (None, None, None) => {
-            let text = "columns of what the camera saw: x, y, z of a tag or board, a corner's id and u, v, or a tag's \
-                        id and u, v of its corners";
-            missing.push(text.to_owned());
-        }
-        (None, _, Some(_)) if roles.id.is_none() => missing.push("a column of the tag's number".to_owned()),
-        (None, Some(_), _) if roles.id.is_none() => missing.push("a column of the corner's number".to_owned()),
-        _ => {}
-    }
-    for column in table.columns.iter().filter(|column| !roles.of_column(&column.name).is_empty()) {
+fn missing(table: &TableContents, roles: &Roles) -> Vec<String> {
+    let mut missing: Vec<String> = [missing_joints(roles), missing_seen(roles)].into_iter().flatten().collect();
+    for column in gaps(table, roles) {
         let n = column.n_empty + column.n_others;
-        if n > 0 {
-            let other = column.first_other.as_ref().map_or(String::new(), |other| format!("; the first is {other:?}"));
-            missing.push(format!("numbers in {n} of {} rows of the column `{}`{other}", table.n_rows, column.name));
-        }
+        let other = column.first_other.as_ref().map_or(String::new(), |other| format!("; the first is {other:?}"));
+        missing.push(format!("numbers in {n} of {} rows of the column `{}`{other}", table.n_rows, column.name));
     }
     missing
+}
+
+/// Columns of joints that a map would need.
+pub(super) fn missing_joints(roles: &Roles) -> Option<String> {
+    match (roles.missing_joints.is_empty(), roles.joints.is_empty()) {
+        (false, _) => Some(format!("columns of the robot's joints {:?}", roles.missing_joints)),
+        (true, true) => Some("columns of joint readings (--robot DIR matches their names)".to_owned()),
+        (true, false) => None,
+    }
+}
+
+/// Columns of what the camera saw that a map would need.
+pub(super) fn missing_seen(roles: &Roles) -> Option<String> {
+    let missing = match (&roles.position, &roles.pixel, &roles.corners) {
+        (None, None, None) => {
+            "columns of what the camera saw: x, y, z of a tag or board, a corner's id and u, v, or a tag's id and u, v \
+             of its corners"
+        }
+        (None, _, Some(_)) if roles.id.is_none() => "a column of the tag's number",
+        (None, Some(_), _) if roles.id.is_none() => "a column of the corner's number",
+        _ => return None,
+    };
+    Some(missing.to_owned())
+}
+
+/// Columns with a role in which rows lack a number.
+pub(super) fn gaps<'a>(table: &'a TableContents, roles: &Roles) -> Vec<&'a TableColumn> {
+    let has_gaps = |column: &&TableColumn| {
+        column.n_empty + column.n_others > 0 && !roles.of_column(&column.name).is_empty() && !is_of_tags(column)
+    };
+    table.columns.iter().filter(has_gaps).collect()
 }
 
 impl TableInspection {

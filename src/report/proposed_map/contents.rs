@@ -57,7 +57,9 @@ impl Kind {
 pub(super) struct Topic {
     pub kind: Kind,
     /// Name of the messages' type.
+    /// Its type, with the encoding where that is not read.
     pub schema: String,
+    pub is_cdr: bool,
     pub messages: u64,
     /// Names of joints.
     pub joints: BTreeSet<String>,
@@ -91,9 +93,12 @@ impl Contents {
             if self.topics.len() >= MAX_NAMES {
                 return;
             }
-            let is_cdr = raw.channel.message_encoding == "cdr";
-            let kind = if is_cdr { Kind::of(raw.schema_name()) } else { Kind::Other };
-            let topic = Topic { kind, schema: raw.schema_name().to_owned(), ..Topic::default() };
+            let encoding = raw.channel.message_encoding.as_str();
+            let (kind, schema) = match encoding {
+                "cdr" => (Kind::of(raw.schema_name()), raw.schema_name().to_owned()),
+                _ => (Kind::Other, format!("{} as {encoding}", raw.schema_name())),
+            };
+            let topic = Topic { kind, schema, is_cdr: encoding == "cdr", ..Topic::default() };
             self.topics.insert(raw.topic().to_owned(), topic);
         }
         let Some(topic) = self.topics.get_mut(raw.topic()) else { return };

@@ -1,11 +1,19 @@
+use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 use std::sync::LazyLock;
 
+use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
+
+use super::lens::{of_other_model, scaled};
+use super::map::{UNITS, other_axes};
+use super::recording::reordered_back;
 use super::*;
 use crate::calib::fixture::titan;
+use crate::calib::views::view::TagMeasurement;
 use crate::calib::views::{associate, surveyed};
 use armcal_core::log::read_recording;
-use armcal_core::optics::solve_square;
+use armcal_core::optics::{LensModel, TagFamily, solve_square};
+use armcal_core::spatial::Pose;
 
 /// The sample's views, and the arm with the tags that were around it.
 fn sample() -> (CaptureData, Robot) {

@@ -1,4 +1,4 @@
-//! cameras.yaml of TagSLAM and camchain.yaml of Kalibr.
+//! cameras.yaml of TagSLAM, camchain.yaml of Kalibr, and the camera's file of ROS (camera_calibration).
 
 use armcal_core::codes::Code;
 use std::collections::BTreeMap;
@@ -8,6 +8,8 @@ use std::path::Path;
 use serde::Deserialize;
 
 use crate::tagmap::files::yaml;
+use armcal_core::input::lens_of_camera_info;
+use armcal_core::log::ros::CameraInfo;
 use armcal_core::optics::{CameraModel, Fisheye, LensModel, Radtan, check_image_size};
 use armcal_core::robot::{FileIssue, RobotError, read_text};
 
@@ -36,6 +38,23 @@ struct CameraYaml {
     tagtopic: Option<String>,
 }
 
+/// Camera file of ROS, as `camera_calibration` and `camera_info_manager` write it.
+#[derive(Debug, Deserialize)]
+struct RosCameraYaml {
+    image_width: u32,
+    image_height: u32,
+    #[serde(default)]
+    camera_name: String,
+    camera_matrix: RosMatrix,
+    distortion_model: String,
+    distortion_coefficients: RosMatrix,
+}
+
+#[derive(Debug, Deserialize)]
+struct RosMatrix {
+    data: Vec<f64>,
+}
+
 const SUPPORTED: &str = "equidistant (fisheye), radtan (plumb_bob), none";
 
 /// Reads all cameras of a file, in the order of their names.
@@ -51,6 +70,9 @@ pub fn read_cameras(file: &Path) -> Result<Vec<NamedCamera>, RobotError> {
 /// # Errors
 /// As [`read_cameras`].
 pub fn parse_cameras(file: &Path, text: &str) -> Result<Vec<NamedCamera>, RobotError> {
+    if text.lines().any(|line| line.starts_with("camera_matrix:")) {
+        return Ok(vec![ros_camera(file, yaml::parse(file, text)?)?]);
+    }
     let raw: BTreeMap<String, CameraYaml> = yaml::parse(file, text)?;
     if raw.is_empty() {
         return Err(FileIssue::new(Code::KeyMissing, file, "cam0", "the file names no camera").into());
@@ -60,6 +82,25 @@ pub fn parse_cameras(file: &Path, text: &str) -> Result<Vec<NamedCamera>, RobotE
     // cam10 after cam9.
     cameras.sort_by_key(|camera| (camera.name.len(), camera.name.clone()));
     Ok(cameras)
+}
+
+/// As the same lens in a message.
+fn ros_camera(file: &Path, raw: RosCameraYaml) -> Result<NamedCamera, RobotError> {
+    let issue = |key: &str, problem: String| FileIssue::new(Code::ValueInvalid, file, key, problem);
+    let n = raw.camera_matrix.data.len();
+    let k = raw.camera_matrix.data.try_into();
+    let k = k.map_err(|_| issue("camera_matrix.data", format!("has {n} numbers, needs 9: row by row")))?;
+    let info = CameraInfo {
+        width: raw.image_width,
+        height: raw.image_height,
+        distortion_model: raw.distortion_model,
+        d: raw.distortion_coefficients.data,
+        k,
+        ..CameraInfo::default()
+    };
+    let model = lens_of_camera_info(&info).map_err(|problem| issue("camera_matrix", problem))?;
+    let name = if raw.camera_name.is_empty() { "camera".to_owned() } else { raw.camera_name };
+    Ok(NamedCamera { name, model, image_topic: None, tag_topic: None })
 }
 
 fn camera(file: &Path, name: &str, raw: &CameraYaml) -> Result<NamedCamera, RobotError> {

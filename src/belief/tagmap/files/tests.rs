@@ -224,6 +224,25 @@ fn cameras_of_tagslam_and_kalibr_are_read_and_written() {
 }
 
 #[test]
+fn the_camera_file_of_ros_is_read_as_its_message_would_be() {
+    let text = "image_width: 800\nimage_height: 600\ncamera_name: wrist\ncamera_matrix:\n  rows: 3\n  cols: 3\n  \
+        data: [410.5, 0, 400.25, 0, 411, 299, 0, 0, 1]\ndistortion_model: plumb_bob\ndistortion_coefficients:\n  \
+        rows: 1\n  cols: 5\n  data: [-0.2, 0.05, 0.001, -0.002, 0]\nrectification_matrix:\n  rows: 3\n  cols: 3\n  \
+        data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n";
+    let cameras = parse_cameras(Path::new("ost.yaml"), text).expect("it reads");
+    let [camera] = &cameras[..] else { panic!("one camera") };
+    assert_eq!((camera.name.as_str(), camera.model.resolution_px()), ("wrist", [800, 600]));
+    assert_eq!((camera.model.focal_px(), camera.model.center_px()), ([410.5, 411.0], [400.25, 299.0]));
+    assert_eq!(camera.model.distortion(), [-0.2, 0.05, 0.001, -0.002, 0.0]);
+    let changes = [("410.5, 0, 400.25, ", "410.5, "), ("plumb_bob", "thin_prism"), ("410.5", "0.5")];
+    let told = changes.map(|(from, to)| {
+        assert!(text.contains(from), "{from}");
+        parse_cameras(Path::new("ost.yaml"), &text.replace(from, to)).expect_err(to).to_string()
+    });
+    insta::assert_snapshot!("ros_camera_files", told.join("\n"));
+}
+
+#[test]
 fn what_is_wrong_with_a_camera_is_said_with_file_key_and_what_is_supported() {
     let with = |from: &str, to: &str| {
         assert!(CAMERAS.contains(from));

@@ -1,7 +1,7 @@
 //! The part of an input map that describes a table: which columns of a CSV or YAML file are what.
 
 use crate::codes::Code;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
@@ -150,6 +150,14 @@ pub struct TimeColumn {
 /// # corners = ["u0", "v0", "u1", "v1", "u2", "v2", "u3", "v3"]   # instead of corner and pixel
 /// corner_order = "apriltag"                # optional: "apriltag" | "opencv"
 /// ```
+///
+/// Where the tags are in a table of their own, `[table]` is that of the joints:
+///
+/// ```toml
+/// [tags]
+/// table = { file = "corners.csv", key = "image" }   # rows with the same text in this column of both tables
+/// # table = { file = "corners.csv", time = { column = "t", unit = "s" } }   # or the nearest time, within max_gap_s
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct TableLayout {
     /// `None`: by the end of the file's name.
@@ -162,6 +170,40 @@ pub struct TableLayout {
     pub seen: SeenColumns,
     /// Column of the tag's number, or of the board's corner.
     pub id: Option<String>,
+    /// The tags' own table; `None` where one table has joints and tags.
+    pub tags: Option<TagTable>,
+}
+
+/// The table of the tags where that of the joints is another file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TagTable {
+    /// Next to the input map, unless its path says otherwise.
+    pub file: PathBuf,
+    /// As [`TableLayout::format`].
+    pub format: Option<TableFormat>,
+    /// As [`TableLayout::rows`].
+    pub rows: Vec<String>,
+    /// Rows of both that belong together.
+    pub join: TableJoin,
+}
+
+/// Columns by which rows of two tables belong together.
+#[derive(Clone, Debug, PartialEq)]
+pub enum TableJoin {
+    /// The joints' row nearest in time, within `max_gap_s`.
+    Time {
+        /// Time in the table of the tags.
+        time: TimeColumn,
+        /// Joints' clock less the camera's, s.
+        clock_offset_s: f64,
+    },
+    /// Rows with the same text.
+    Key {
+        /// Column of the tags' table.
+        tags: String,
+        /// Column of the joints' table.
+        joints: String,
+    },
 }
 
 /// What the columns of a row hold of the landmark.
@@ -245,6 +287,25 @@ pub(super) struct TableToml {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
+pub(super) struct TagTableToml {
+    file: String,
+    format: Option<TableFormat>,
+    rows: Option<String>,
+    time: Option<TimeToml>,
+    key: Option<String>,
+    joints_key: Option<String>,
+}
+
+/// The keys of `[tags]` that a table has.
+pub(super) struct TagsOfTable<'a> {
+    pub tag_use: TagUse,
+    pub child_frame: Option<&'a ChildFrame>,
+    pub table: Option<TagTableToml>,
+    pub clock_offset_s: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(super) struct TagColumnsToml {
     direction: Option<Direction>,
     position: Option<[String; 3]>,
@@ -265,13 +326,13 @@ pub(super) fn layout(
     file: &Path,
     table: TableToml,
     columns: Option<TagColumnsToml>,
-    tags: (TagUse, Option<&ChildFrame>),
+    tags: TagsOfTable<'_>,
 ) -> Result<TableLayout, FileIssue> {
     let issue = |key: &str, problem: &str| FileIssue::new(Code::KeyMissing, file, key, problem);
     let Some(columns) = columns else {
         return Err(issue("tags.columns", "is missing; a [table] needs it: direction, position, rotation"));
     };
-    let (tag_use, child_frame) = tags;
+    let TagsOfTable { tag_use, child_frame, table: other, clock_offset_s } = tags;
     if tag_use == TagUse::Corners && child_frame.is_some() {
         let problem = "is for the one landmark of a table; corners have the tags' numbers: leave it out";
         return Err(FileIssue::new(Code::KeysConflict, file, "tags.child_frame", problem));
@@ -280,8 +341,17 @@ pub(super) fn layout(
         return Err(issue("tags.columns.id", "is missing; name the column of the tag's number"));
     }
     let time = table.time.map(time_column);
-    let rows = table.rows.map(|rows| rows.split('.').map(str::to_owned).collect()).unwrap_or_default();
-    let of = |seen, id| Ok(TableLayout { format: table.format, rows, time, seen, id });
+    if other.is_none() && clock_offset_s != 0.0 {
+        let problem = "is for tags with a clock of their own: a recording's, or those of tags.table; leave it out";
+        return Err(FileIssue::new(Code::KeysConflict, file, "tags.clock_offset_s", problem));
+    }
+    let other = other.map(|other| tag_table(file, other, clock_offset_s)).transpose()?;
+    let is_by_time = |other: &TagTable| matches!(other.join, TableJoin::Time { .. });
+    if time.is_none() && other.as_ref().is_some_and(is_by_time) {
+        return Err(issue("table.time", "is missing; tags.table.time needs the column of the joints' times"));
+    }
+    let rows = path_of_rows(table.rows);
+    let of = |seen, id| Ok(TableLayout { format: table.format, rows, time, seen, id, tags: other });
     if tag_use == TagUse::BoardCorners {
         return of(SeenColumns::Pixel(pixel(file, &columns)?), columns.id);
     }
@@ -294,6 +364,25 @@ pub(super) fn layout(
         _ => SeenColumns::Pose(pose(file, &columns, tag_use)?),
     };
     of(seen, columns.id)
+}
+
+fn path_of_rows(rows: Option<String>) -> Vec<String> {
+    rows.map(|rows| rows.split('.').map(str::to_owned).collect()).unwrap_or_default()
+}
+
+fn tag_table(map: &Path, raw: TagTableToml, clock_offset_s: f64) -> Result<TagTable, FileIssue> {
+    let issue = |code, problem: &str| Err(FileIssue::new(code, map, "tags.table", problem));
+    let join = match (raw.time, raw.key) {
+        (Some(time), None) if raw.joints_key.is_none() => TableJoin::Time { time: time_column(time), clock_offset_s },
+        (None, Some(tags)) => TableJoin::Key { joints: raw.joints_key.unwrap_or_else(|| tags.clone()), tags },
+        (None, None) => {
+            let problem = "needs `key`, the column that both tables have, or `time`, the column of the tags' times";
+            return issue(Code::KeyMissing, problem);
+        }
+        _ => return issue(Code::KeysConflict, "has `time` and `key` or `joints_key`; rows are joined by one of them"),
+    };
+    let file = map.parent().unwrap_or(Path::new("")).join(&raw.file);
+    Ok(TagTable { file, format: raw.format, rows: path_of_rows(raw.rows), join })
 }
 
 fn time_column(time: TimeToml) -> TimeColumn {
@@ -398,7 +487,7 @@ fn rotation(file: &Path, raw: &TagColumnsToml) -> Result<Option<RotationColumns>
 #[cfg(test)]
 mod tests {
     use crate::input::map::tests::{parse, told};
-    use crate::input::map::{CornerOrder, SeenColumns, Source};
+    use crate::input::map::{CornerOrder, SeenColumns, Source, TableJoin};
 
     const GOOD: &str = "version = 1\n[table]\n[joint_sensors]\n[tags]\nchild_frame = \"board\"\nuse = \"pose\"\n\
         [tags.columns]\ndirection = \"tag_from_camera\"\nposition = [\"x\", \"y\", \"z\"]\n\
@@ -462,5 +551,30 @@ mod tests {
             ("use = \"corners\"", "use = \"corners\"\nchild_frame = \"board\""),
         ];
         insta::assert_snapshot!("tag_corner_columns", told(TAGS, &faults));
+    }
+
+    #[test]
+    fn tags_may_be_in_a_table_of_their_own() {
+        const TWO: &str = "version = 1\n[table]\ntime = { column = \"t\" }\n[joint_sensors]\n[tags]\n\
+            table = { file = \"corners.csv\", time = { column = \"s\", unit = \"ns\" } }\nclock_offset_s = 2.5\n\
+            use = \"corners\"\n[tags.columns]\nid = \"tag\"\ncorner = \"k\"\npixel = [\"u\", \"v\"]\n";
+        let Source::Table(layout) = parse(TWO).expect("good").source else { panic!("a table") };
+        let tags = layout.tags.expect("a table of its own");
+        let TableJoin::Time { time, clock_offset_s } = tags.join else { panic!("by time") };
+        assert_eq!((time.unit_nanos, clock_offset_s), (1.0, 2.5));
+        let by_key = TWO.replace("time = { column = \"s\", unit = \"ns\" }", "key = \"image\"");
+        let Source::Table(layout) = parse(&by_key).expect("good").source else { panic!("a table") };
+        let join = TableJoin::Key { tags: "image".to_owned(), joints: "image".to_owned() };
+        assert_eq!(layout.tags.expect("a table of its own").join, join);
+        let faults = [
+            ("time = { column = \"t\" }\n", ""),
+            (", time = { column = \"s\", unit = \"ns\" }", ""),
+            ("unit = \"ns\" } }", "unit = \"ns\" }, key = \"image\" }"),
+            ("unit = \"ns\" } }", "unit = \"ns\" }, joints_key = \"image\" }"),
+            ("file = \"corners.csv\", ", ""),
+            ("table = { file = \"corners.csv\", time = { column = \"s\", unit = \"ns\" } }\n", ""),
+            ("[table]\ntime = { column = \"t\" }\n", ""),
+        ];
+        insta::assert_snapshot!("tag_table", told(TWO, &faults));
     }
 }

@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use super::rows::Rows;
+use super::rows::{Rows, Wanted};
 use crate::input::error::InputError;
-use crate::input::map::{InputMap, SeenColumns, TableLayout};
+use crate::input::map::{InputMap, SeenColumns, TableJoin, TableLayout};
 use crate::robot::Robot;
 
 /// Names of columns that an error lists.
@@ -17,48 +17,105 @@ pub(super) struct Columns {
     pub place: Range<usize>,
     /// As many as the form has; none without a rotation.
     pub rotation: Range<usize>,
-    pub time: Option<usize>,
+    /// With the nanoseconds of its unit.
+    pub time: Option<(usize, f64)>,
     pub id: Option<usize>,
     /// Number of a tag's corner.
     pub corner: Option<usize>,
+    /// Not of numbers: the column that joins two tables.
+    pub key: Option<String>,
+    pub part: Part,
+}
+
+/// The parts of a pose that a table has.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Part {
+    /// Joints and tags.
+    Both,
+    /// The joints' own table.
+    Joints,
+    /// The tags' own table.
+    Tags,
 }
 
 impl Columns {
-    pub fn of(map: &InputMap, layout: &TableLayout, robot: &Robot) -> Self {
-        let mut names: Vec<String> = robot.sensors.iter().map(|spec| map.recorded_name(&spec.joint).clone()).collect();
+    pub fn of(map: &InputMap, layout: &TableLayout, robot: &Robot, part: Part) -> Self {
+        let joints = robot.sensors.iter().filter(|_| part != Part::Tags);
+        let mut names: Vec<String> = joints.map(|spec| map.recorded_name(&spec.joint).clone()).collect();
         let mut add = |columns: &[String]| {
             let start = names.len();
             names.extend_from_slice(columns);
             start..names.len()
         };
         let (of_place, of_rotation): (&[String], &[String]) = match &layout.seen {
+            _ if part == Part::Joints => (&[], &[]),
             SeenColumns::Pose(pose) => (&pose.position, pose.rotation.as_ref().map_or(&[], |turn| &turn.columns)),
             SeenColumns::Pixel(pixel) | SeenColumns::TagCorner { pixel, .. } => (pixel, &[]),
             SeenColumns::TagCorners { columns, .. } => (columns, &[]),
         };
         let (place, rotation) = (add(of_place), add(of_rotation));
-        let time = layout.time.as_ref().map(|time| add(std::slice::from_ref(&time.column)).start);
-        let id = layout.id.as_ref().map(|id| add(std::slice::from_ref(id)).start);
-        let corner = match &layout.seen {
-            SeenColumns::TagCorner { corner, .. } => Some(add(std::slice::from_ref(corner)).start),
+        let time = match (part, layout.tags.as_ref().map(|tags| &tags.join)) {
+            (Part::Tags, Some(TableJoin::Time { time, .. })) => Some(time),
+            (Part::Tags, _) => None,
+            _ => layout.time.as_ref(),
+        };
+        let time = time.map(|time| (add(std::slice::from_ref(&time.column)).start, time.unit_nanos));
+        let seen = (part != Part::Joints).then_some(layout);
+        let id = seen.and_then(|layout| layout.id.as_ref()).map(|id| add(std::slice::from_ref(id)).start);
+        let corner = match seen.map(|layout| &layout.seen) {
+            Some(SeenColumns::TagCorner { corner, .. }) => Some(add(std::slice::from_ref(corner)).start),
             _ => None,
         };
-        Self { names, place, rotation, time, id, corner }
+        let key = match (part, layout.tags.as_ref().map(|tags| &tags.join)) {
+            (Part::Joints, Some(TableJoin::Key { joints, .. })) => Some(joints.clone()),
+            (Part::Tags, Some(TableJoin::Key { tags, .. })) => Some(tags.clone()),
+            _ => None,
+        };
+        Self { names, place, rotation, time, id, corner, key, part }
+    }
+
+    pub fn wanted(&self) -> Wanted<'_> {
+        Wanted { names: &self.names, id: self.id, key: self.key.as_ref() }
+    }
+
+    /// Columns of joints come first.
+    pub fn n_joints(&self) -> usize {
+        self.place.start
+    }
+
+    /// Joints, by index, that the table has no column for.
+    pub fn absent_joints(&self, found: &Rows) -> Vec<usize> {
+        (0..self.n_joints()).filter(|&joint| !found.columns.contains(&self.names[joint])).collect()
     }
 
     /// Checks that the table has all columns but those of joints that may be absent.
     pub fn check_present(&self, file: &str, found: &Rows, n_needed: usize) -> Result<(), InputError> {
-        let n_joints = self.place.start;
-        let missing =
+        let n_joints = self.n_joints();
+        let is_missing =
             |(k, name): &(usize, &String)| !(n_needed..n_joints).contains(k) && !found.columns.contains(*name);
-        let missing: Vec<&String> = self.names.iter().enumerate().filter(missing).map(|(_, name)| name).collect();
+        let missing = self.names.iter().chain(&self.key).enumerate().filter(is_missing);
+        let missing: Vec<&String> = missing.map(|(_, name)| name).collect();
         if missing.is_empty() {
             return Ok(());
         }
+        let joints = missing.iter().filter(|name| self.names[..n_joints].contains(**name)).count();
+        let two = match self.part {
+            Part::Both
+                if joints >= n_needed.max(1)
+                    || self.names[self.place.clone()].iter().all(|name| missing.contains(&name)) =>
+            {
+                ". Where joints and tags are in two tables, `armcal inspect ONE OTHER --write-input MAP.toml` proposes \
+                 a map that joins them"
+            }
+            Part::Joints if joints >= n_needed.max(1) => {
+                ". With `tags.table` in the input map, give the table of the joints as the recording"
+            }
+            _ => "",
+        };
         let there: Vec<&String> = found.columns.iter().take(MAX_LISTED).collect();
         let problem = format!(
             "no column {missing:?}; it has {there:?}. Joints' columns go into `joint_sensors.names` of the input map, \
-             the others into `tags.columns` and `table`"
+             the others into `tags.columns` and `table`{two}"
         );
         Err(InputError::Table { file: file.to_owned(), problem })
     }

@@ -1,4 +1,6 @@
-//! What the cells of each column are, added row by row: a table's cells are never kept.
+//! What the cells of each column are, added row by row; those of the first rows are kept.
+
+use super::rows::is_missing;
 
 /// One column.
 #[derive(Clone, Debug, PartialEq)]
@@ -7,7 +9,7 @@ pub struct TableColumn {
     pub name: String,
     /// Cells with a finite number.
     pub n_numbers: usize,
-    /// Cells that are empty.
+    /// Cells that are empty, or say that they have nothing.
     pub n_empty: usize,
     /// Cells with something else; the first of them.
     pub n_others: usize,
@@ -17,6 +19,8 @@ pub struct TableColumn {
     pub range: Option<[f64; 2]>,
     /// All numbers are whole.
     pub is_whole: bool,
+    /// Numbers that differ from the one before.
+    pub n_steps: usize,
     /// No number is smaller than the one before.
     pub is_rising: bool,
 }
@@ -27,7 +31,14 @@ pub(super) struct ColumnsSeen {
     /// The last number of each.
     last: Vec<f64>,
     pub n_rows: usize,
+    /// The cells of the first rows.
+    pub first_rows: Vec<Vec<String>>,
 }
+
+/// Rows whose cells are kept.
+const N_KEPT: usize = 200;
+/// Kept characters of a cell.
+const MAX_CELL: usize = 80;
 
 impl ColumnsSeen {
     pub fn of_names<'a>(names: impl IntoIterator<Item = &'a str>) -> Self {
@@ -38,19 +49,25 @@ impl ColumnsSeen {
             n_others: 0,
             first_other: None,
             range: None,
+            n_steps: 0,
             is_whole: true,
             is_rising: true,
         };
         let columns: Vec<TableColumn> = names.into_iter().map(empty).collect();
-        Self { last: vec![f64::NEG_INFINITY; columns.len()], columns, n_rows: 0 }
+        Self { last: vec![f64::NEG_INFINITY; columns.len()], columns, n_rows: 0, first_rows: Vec::new() }
     }
 
     /// Adds the cells of a row, in the order of the columns.
     pub fn add_row<'a>(&mut self, cells: impl IntoIterator<Item = &'a str>) {
         self.n_rows += 1;
+        let mut kept = (self.n_rows <= N_KEPT).then(Vec::new);
         for ((column, last), cell) in self.columns.iter_mut().zip(&mut self.last).zip(cells) {
             column.add(cell.trim(), last);
+            if let Some(kept) = &mut kept {
+                kept.push(cell.trim().chars().take(MAX_CELL).collect());
+            }
         }
+        self.first_rows.extend(kept);
     }
 }
 
@@ -62,10 +79,11 @@ impl TableColumn {
                 let [low, high] = self.range.unwrap_or([value; 2]);
                 self.range = Some([low.min(value), high.max(value)]);
                 self.is_whole &= value.fract() == 0.0;
+                self.n_steps += usize::from(value != *last);
                 self.is_rising &= value >= *last;
                 *last = value;
             }
-            _ if cell.is_empty() => self.n_empty += 1,
+            _ if is_missing(cell) => self.n_empty += 1,
             _ => {
                 self.n_others += 1;
                 self.first_other.get_or_insert_with(|| cell.chars().take(40).collect());

@@ -23,6 +23,16 @@ pub struct TableContents {
     pub columns: Vec<TableColumn>,
     /// Names that another list of the file gives to numbered columns.
     pub other_names: BTreeMap<String, String>,
+    /// The cells of the first rows, in the order of the columns.
+    pub first_rows: Vec<Vec<String>>,
+}
+
+impl TableContents {
+    /// The cells of the first rows in this column.
+    pub fn first_cells<'a>(&'a self, name: &str) -> impl Iterator<Item = &'a str> + use<'a> {
+        let at = self.columns.iter().position(|column| column.name == name);
+        self.first_rows.iter().filter_map(move |row| row.get(at?).map(String::as_str))
+    }
 }
 
 /// Looks at a table, whose format is that of its name's ending; `None` where the ending is not a table's.
@@ -44,7 +54,7 @@ fn contents(path: &Path, format: TableFormat) -> Result<TableContents, InputErro
             (seen, rows_at, other_names)
         }
     };
-    let ColumnsSeen { columns, n_rows, .. } = seen;
+    let ColumnsSeen { columns, n_rows, first_rows, .. } = seen;
     if n_rows == 0 || columns.iter().all(|column| column.n_numbers == 0) {
         let problem = format!(
             "it is no table of poses: {} rows, none with a number in its columns {:?}; armcal reads tables (CSV, YAML, \
@@ -54,7 +64,7 @@ fn contents(path: &Path, format: TableFormat) -> Result<TableContents, InputErro
         );
         return Err(InputError::Table { file, problem });
     }
-    Ok(TableContents { format, rows_at, n_rows, columns, other_names })
+    Ok(TableContents { format, rows_at, n_rows, columns, other_names, first_rows })
 }
 
 #[cfg(test)]

@@ -201,7 +201,7 @@ fn what_is_wrong_with_a_table_is_named() {
     let matrix = map.replace("quaternion_wxyz", "matrix").replace("\"r3\"]", "\"r3\",\"x\",\"y\",\"z\",\"r0\",\"r1\"]");
     let many = format!("{text}{}", "1,2,3,4,5,6,0,0,1,1,0,0,0\n".repeat(super::rows::MAX_ROWS));
     let told = told.into_iter().chain([
-        problem(&map, "a.dat", &text),
+        problem(&map, "a.xyz", &text),
         problem(&map, "a.csv", text.lines().next().expect("a line")),
         problem(&matrix, "a.csv", &text),
         problem(&map, "a.csv", &many),
@@ -275,4 +275,127 @@ fn many_corners_of_one_pose_are_read_at_once() {
     }
     let found = read_with(&map, "a.csv", &text).expect("it reads");
     assert_eq!((found.frames.len(), found.frames[0].tags.len()), (1, super::rows::MAX_ROWS / 4));
+}
+
+const PLACES: &str = "version = 1\n[table]\n[joint_sensors]\n[tags]\nuse = \"position\"\n[tags.columns]\n\
+    id = \"tag\"\ndirection = \"camera_from_tag\"\nposition = [\"x\", \"y\", \"z\"]\n";
+
+/// Two poses with a tag each, with a point or a comma in the decimals.
+fn two_poses(mark: char, point: &str) -> String {
+    let text = format!("{JOINTS},tag,x,y,z\n1.5,2,3,4,5,6,3,0,0.25,1\n2.5,2,3,4,5,6,7,0,0.5,2\n");
+    text.replace('.', "\0").replace(',', &mark.to_string()).replace('\0', point)
+}
+
+#[test]
+fn csv_is_read_as_programs_write_it() {
+    let plain = two_poses(',', ".");
+    let (names, rows) = plain.split_once('\n').expect("a line of names");
+    let second = rows.lines().nth(1).expect("a row");
+    let spaced = |text: &str| text.replace(',', "  ");
+    let texts = [
+        plain.clone(),
+        two_poses(';', ","),
+        two_poses('\t', ","),
+        format!("\u{feff}{}", plain.replace('\n', "\r\n")),
+        plain.replace('\n', "\r"),
+        spaced(&plain),
+        format!("sep=;\n{}", two_poses(';', ".")),
+        format!("% bench 3\n// of May\n{plain}# end\n"),
+        format!("Rig 7; all poses\nby us\n\n{plain}"),
+        format!("# saved by a script\n# {names}\n{rows}"),
+        format!("# {}\n{}", spaced(names), spaced(rows)),
+        plain.replace(second, &format!("{names}\n{second}")),
+        format!("{names}\nrad,rad,rad,rad,rad,rad,-,m,m,m\n{rows}"),
+        plain.lines().map(|line| format!("{line},,\n")).collect(),
+        format!("{names}\n{}", rows.replace('\n', ",\n")),
+        plain.replace(",3,0,", ",tag36h11:3,0,").replace(",7,0,", ",tag_0007,0,"),
+        plain
+            .split(&[',', '\n'][..])
+            .collect::<Vec<_>>()
+            .chunks(10)
+            .filter(|row| row.len() > 1)
+            .fold(String::new(), |text, row| {
+                text + &row.iter().map(|cell| format!("\"{cell}\"")).collect::<Vec<_>>().join(",") + "\n"
+            }),
+    ];
+    let expected = read_with(PLACES, "a.csv", &plain).expect("plain");
+    assert_eq!(expected.readings[1].counts[..2], [2.5, 2.0]);
+    for text in texts {
+        let found = read_with(PLACES, "a.csv", &text).unwrap_or_else(|error| panic!("{error}: {text}"));
+        assert_eq!((found.readings, found.frames), (expected.readings.clone(), expected.frames.clone()), "{text}");
+    }
+    // A row whose cells say that there is nothing.
+    let lenient = PLACES.replace("[table]", "not_finite = \"leave_out\"\n[table]");
+    for word in ["N/A", "", "null", "-", "nan"] {
+        let found = read_with(&lenient, "a.csv", &plain.replace("0.25", word)).expect(word);
+        assert_eq!((found.frames.len(), found.left_out.values().sum::<u64>()), (1, 1), "{word}");
+    }
+}
+
+#[test]
+fn csv_that_is_of_no_use_is_refused_with_the_remedy() {
+    let plain = two_poses(',', ".");
+    let told = [
+        problem(PLACES, "a.csv", plain.split_once('\n').expect("names").1),
+        problem(PLACES, "a.csv", &plain.replace("0.25", "N/A")),
+        problem(PLACES, "a.csv", &plain.replace("0.25", "\"[0.1, 0.25]\"")),
+        problem(PLACES, "a.csv", &plain.replace("0.25", "left")),
+        problem(PLACES, "a.csv", &plain.replace(",3,0,", ",tag36h11,0,")),
+        problem(PLACES, "a.csv", &plain.replace("0.25,", "0.25,9,")),
+        problem(PLACES, "a.csv", &plain.replace(",x,y,z", "").replace(",0,0.25,1", "").replace(",0,0.5,2", "")),
+    ];
+    insta::assert_snapshot!("csv_of_no_use", told.concat());
+    let folder = tempfile::tempdir().expect("a folder");
+    let bytes: [(&str, Vec<u8>); 5] = [
+        ("excel.xlsx", b"PK\x03\x04\x14\0\x06\0\x08\0[Content_Types].xml".to_vec()),
+        ("run.mcap", b"\x89MCAP0\r\n".to_vec()),
+        (
+            "utf16.csv",
+            plain.encode_utf16().flat_map(u16::to_le_bytes).fold(vec![0xff, 0xfe], |mut all, byte| {
+                all.push(byte);
+                all
+            }),
+        ),
+        ("excel.csv", b"PK\x03\x04\x14\0\x06\0\x08\0[Content_Types].xml".to_vec()),
+        (
+            "latin.csv",
+            plain.replace("tag", "mark").into_bytes().into_iter().map(|b| if b == b'k' { 0xe4 } else { b }).collect(),
+        ),
+    ];
+    let map = parse_input_map(Path::new("map.toml"), PLACES).expect("a map");
+    let told = bytes.map(|(name, bytes)| {
+        let file = folder.path().join(name);
+        std::fs::write(&file, bytes).expect("written");
+        let told = read_external(&file, &map, &titan()).expect_err("refused").to_string();
+        told[told.find(name).expect("the file's name")..].to_owned()
+    });
+    insta::assert_snapshot!("no_utf8", told.join("\n"));
+}
+
+/// A pose an entry, with what the camera saw of each tag in a list; the same with an entry in each line.
+#[test]
+fn lists_of_tags_make_a_row_each() {
+    let map = "version = 1\n[table]\n[joint_sensors]\n[tags]\nuse = \"position\"\n[tags.columns]\n\
+        id = \"seen.*.id\"\ndirection = \"camera_from_tag\"\n\
+        position = [\"seen.*.at.0\", \"seen.*.at.1\", \"seen.*.at.2\"]\n";
+    let joints = |k: usize| {
+        let named = JOINTS.split(',').map(|name| format!("\"{name}\": {k}.5"));
+        named.collect::<Vec<_>>().join(", ")
+    };
+    let entries = [
+        format!("{{{}, \"seen\": [{{\"id\": 4, \"at\": [0, 0, 1]}}, {{\"id\": 9, \"at\": [0, 1, 1]}}]}}", joints(1)),
+        format!("{{{}, \"seen\": []}}", joints(2)),
+        format!("{{{}, \"seen\": [{{\"id\": 9, \"at\": [1, 1, 1]}}]}}", joints(3)),
+    ];
+    for (name, text) in [("a.json", format!("[{}]", entries.join(", "))), ("a.jsonl", entries.join("\n"))] {
+        let found = read_with(map, name, &text).expect(name);
+        let ids: Vec<Vec<Option<u32>>> =
+            found.frames.iter().map(|frame| frame.tags.iter().map(|tag| tag.id).collect()).collect();
+        assert_eq!(ids, [vec![Some(4), Some(9)], vec![Some(9)]], "{name}");
+        assert_eq!(found.readings[1].counts[0], 3.5);
+    }
+    let shared = format!("common: &all {{{}}}\nposes:\n", joints(5));
+    let rows = "- {<<: *all, seen: [{id: 1, at: [0, 0, 1]}]}\n".repeat(150);
+    let at = map.replace("[table]\n", "[table]\nrows = \"poses\"\n");
+    assert_eq!(read_with(&at, "a.yaml", &(shared + &rows)).expect("anchors").frames.len(), 150);
 }

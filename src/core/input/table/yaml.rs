@@ -1,17 +1,28 @@
 //! Rows from YAML, of which JSON is a part: a list or a map with one entry per row.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
 
 use super::columns_seen::ColumnsSeen;
-use super::rows::{MAX_COLUMNS, Row, Rows, check_count, number};
+use super::rows::{MAX_COLUMNS, MAX_ROWS, Rows, Wanted, check_count};
 use crate::input::error::InputError;
-use crate::input::map::TableLayout;
 
 /// Maps and lists within each other.
 const MAX_DEPTH: usize = 32;
+
+/// In the path of a column: each place of a list, of which each makes a row.
+const STAR: &str = "*";
+
+/// Names that paths have for the places of a list of maps.
+#[derive(Clone, Copy, PartialEq)]
+enum Lists {
+    /// All by one star.
+    Starred,
+    Numbered,
+}
 
 /// A part of the file.
 #[derive(Debug)]
@@ -37,24 +48,36 @@ impl Node {
         path.into_iter().try_fold(self, |node, key| node.get(key))
     }
 
-    /// The scalar at the path of a column; empty without one.
-    fn cell(&self, column: &str) -> &str {
-        match self.at(column.split('.')) {
+    /// The scalar at the path of a column, with this place for its star; empty without one.
+    fn cell(&self, column: &str, place: usize) -> &str {
+        let place = place.to_string();
+        match self.at(column.split('.').map(|key| if key == STAR { place.as_str() } else { key })) {
             Some(Self::Scalar(cell)) => cell,
             _ => "",
         }
     }
 
-    /// The paths of all scalars, in the order of the file.
-    fn leaves(&self) -> Vec<String> {
+    /// The length of the list that has a star in the path of `column`.
+    fn n_starred(&self, column: &str) -> usize {
+        match self.at(column.split('.').take_while(|key| *key != STAR)) {
+            Some(Self::List(list)) => list.len(),
+            _ => 0,
+        }
+    }
+
+    /// The paths of all scalars, in the order of the file; a list of maps counts once, with a star for the place.
+    fn leaves(&self, lists: Lists) -> Vec<String> {
         let join = |key: &str, below: String| if below.is_empty() { key.to_owned() } else { format!("{key}.{below}") };
-        let of = |key: String, node: &Self| {
-            node.leaves().into_iter().map(move |below| join(&key, below)).collect::<Vec<_>>()
+        let of = |key: String, node: &Self, lists: Lists| {
+            node.leaves(lists).into_iter().map(move |below| join(&key, below)).collect::<Vec<_>>()
         };
         match self {
             Self::Scalar(_) => vec![String::new()],
-            Self::List(list) => list.iter().enumerate().flat_map(|(k, node)| of(k.to_string(), node)).collect(),
-            Self::Map(map) => map.iter().flat_map(|(key, node)| of(key.clone(), node)).collect(),
+            Self::List(list) => match list.first() {
+                Some(first @ Self::Map(_)) if lists == Lists::Starred => of(STAR.to_owned(), first, Lists::Numbered),
+                _ => list.iter().enumerate().flat_map(|(k, node)| of(k.to_string(), node, lists)).collect(),
+            },
+            Self::Map(map) => map.iter().flat_map(|(key, node)| of(key.clone(), node, lists)).collect(),
         }
     }
 
@@ -136,11 +159,27 @@ impl<'de> Visitor<'de> for NodeVisitor {
 }
 
 fn parse(file: &str, text: &str) -> Result<Node, InputError> {
-    let options = serde_saphyr::options! { budget: serde_saphyr::budget! { max_depth: MAX_DEPTH } };
-    serde_saphyr::from_str_with_options(text, options).map_err(|error| {
-        let problem = format!("is no YAML of this kind: {error}");
+    // What aliases make is limited by itself.
+    let budget = serde_saphyr::budget! { max_depth: MAX_DEPTH, alias_anchor_min_aliases: MAX_ROWS };
+    let options = serde_saphyr::options! { budget: budget };
+    serde_saphyr::from_str_with_options(&as_one_list(text), options).map_err(|error| {
+        let error = error.to_string();
+        let problem = match error.contains("budget breached") {
+            true => format!("has more than armcal reads as YAML or JSON; write the table as CSV. {error}"),
+            false => format!("is no YAML of this kind: {error}"),
+        };
         InputError::Table { file: file.to_owned(), problem }
     })
+}
+
+/// JSON with an entry in each line as a list of them.
+fn as_one_list(text: &str) -> Cow<'_, str> {
+    let lines = || text.lines().map(str::trim).filter(|line| !line.is_empty());
+    let is_entry = |line: &str| line.starts_with('{') && line.ends_with('}');
+    if lines().count() > 1 && lines().all(is_entry) {
+        return format!("[{}]", lines().collect::<Vec<_>>().join(",\n")).into();
+    }
+    text.into()
 }
 
 /// The entries of a list or a map that are lists or maps themselves; none where one is a scalar.
@@ -151,6 +190,21 @@ fn entries(node: &Node) -> Vec<&Node> {
         Node::Scalar(_) => Vec::new(),
     };
     if all.iter().any(|entry| matches!(entry, Node::Scalar(_))) { Vec::new() } else { all }
+}
+
+/// Numbers in an entry beyond those of joints and a pose: a column of a table.
+const MANY: usize = 24;
+
+/// The columns of the entry that has most of them.
+fn columns_of(rows: &[&Node]) -> Vec<String> {
+    let most = rows.iter().map(|row| row.leaves(Lists::Starred)).reduce(|a, b| if b.len() > a.len() { b } else { a });
+    most.unwrap_or_default().into_iter().take(MAX_COLUMNS).collect()
+}
+
+/// Rows that an entry makes: one, or one for each place of the list that a column has a star for.
+fn n_rows_of(entry: &Node, columns: &[String]) -> usize {
+    let starred = columns.iter().find(|column| column.split('.').any(|key| key == STAR));
+    starred.map_or(1, |column| entry.n_starred(column))
 }
 
 /// Columns of the rows that a file holds.
@@ -171,7 +225,7 @@ pub(super) fn yaml_columns(file: &str, text: &str) -> Result<YamlColumns, InputE
     };
     let candidates = std::iter::once((Vec::new(), &all)).chain(below);
     let found = candidates.map(|(path, node)| (path, entries(node))).max_by_key(|(path, rows)| {
-        let is_uniform = rows.windows(2).all(|two| two[0].leaves() == two[1].leaves());
+        let is_uniform = rows.windows(2).all(|two| two[0].leaves(Lists::Starred) == two[1].leaves(Lists::Starred));
         // The whole file before its parts; a map of one list is that list.
         (is_uniform, rows.len() > 1, rows.len(), path.is_empty())
     });
@@ -187,11 +241,22 @@ pub(super) fn yaml_columns(file: &str, text: &str) -> Result<YamlColumns, InputE
         return Err(InputError::Table { file: file.to_owned(), problem });
     };
     check_count(file, rows.len())?;
-    let mut names = Vec::new();
-    let first = rows.first().map(|row| row.leaves()).unwrap_or_default();
-    names.extend(first.into_iter().take(MAX_COLUMNS));
+    let names = columns_of(&rows);
     let mut seen = ColumnsSeen::of_names(names.iter().map(String::as_str));
-    rows.iter().for_each(|row| seen.add_row(names.iter().map(|name| row.cell(name))));
+    for row in &rows {
+        (0..n_rows_of(row, &names)).for_each(|place| seen.add_row(names.iter().map(|name| row.cell(name, place))));
+        check_count(file, seen.n_rows)?;
+    }
+    if let Node::Map(map) = all.at(rows_at.iter().map(String::as_str)).unwrap_or(&all)
+        && names.iter().enumerate().all(|(k, name)| *name == k.to_string() && names.len() > MANY)
+    {
+        let keys: Vec<&String> = map.iter().take(12).map(|(key, _)| key).collect();
+        let problem = format!(
+            "its entries {keys:?} are columns and not rows; write one entry for each row (pandas: \
+             `to_json(orient=\"records\")`), or CSV"
+        );
+        return Err(InputError::Table { file: file.to_owned(), problem });
+    }
     Ok(YamlColumns { seen, rows_at, other_names: names_beside(&all, &names) })
 }
 
@@ -216,27 +281,30 @@ fn text_of(node: &Node) -> Option<String> {
 }
 
 /// Reads the paths `wanted` of each entry.
-pub(super) fn yaml_rows(file: &str, text: &str, layout: &TableLayout, wanted: &[String]) -> Result<Rows, InputError> {
+pub(super) fn yaml_rows(file: &str, text: &str, rows_at: &[String], wanted: Wanted<'_>) -> Result<Rows, InputError> {
     let bad = |problem: String| InputError::Table { file: file.to_owned(), problem };
     let all = parse(file, text)?;
-    let path = layout.rows.join(".");
-    let entries: Vec<&Node> = match all.at(layout.rows.iter().map(String::as_str)) {
+    let path = rows_at.join(".");
+    let entries: Vec<&Node> = match all.at(rows_at.iter().map(String::as_str)) {
         Some(Node::List(list)) => list.iter().collect(),
         Some(Node::Map(map)) => map.iter().map(|(_, node)| node).collect(),
         Some(Node::Scalar(_)) | None => {
             return Err(bad(format!("there is no list or map of rows at `table.rows` = {path:?} of the input map")));
         }
     };
-    check_count(file, entries.len())?;
-    let mut columns = BTreeSet::new();
+    let mut columns: BTreeSet<String> = columns_of(&entries).into_iter().collect();
     entries.iter().take(1).for_each(|first| first.columns("", &mut columns));
+    let stars: BTreeSet<&str> = wanted.names.iter().filter_map(|name| Some(name.split_once(STAR)?.0)).collect();
+    if stars.len() > 1 {
+        return Err(bad(format!("the columns have a star for different lists, {stars:?}; name columns of one list")));
+    }
     let mut rows = Vec::new();
-    for (entry, row) in entries.into_iter().zip(1..) {
-        let value = |column: &String| match entry.at(column.split('.')) {
-            Some(Node::Scalar(cell)) => number(file, row, (column, cell)),
-            _ => Ok(None),
-        };
-        rows.push(Row { number: row, values: wanted.iter().map(value).collect::<Result<_, _>>()? });
+    for entry in entries {
+        for place in 0..n_rows_of(entry, wanted.names) {
+            let cell = |column: &String| Some(entry.cell(column, place));
+            rows.push(wanted.row((file, rows.len() as u64 + 1), cell)?);
+        }
+        check_count(file, rows.len())?;
     }
     Ok(Rows { rows, columns })
 }

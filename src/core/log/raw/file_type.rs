@@ -24,7 +24,7 @@ const SPREADSHEET: &str = "export it as CSV with one row per pose; `armcal inspe
     then proposes an input map";
 
 /// First bytes, type and advice.
-const KINDS: [(&[u8], &str, &str); 23] = [
+const KINDS: [(&[u8], &str, &str); 25] = [
     (b"#ROSBAG V", "a ROS 1 bag", ROS1_ADVICE),
     (SQLITE, "an SQLite database, as ROS 2 bags in .db3 files are", "only finished ones are read"),
     (b"RRF", "a file for the Rerun viewer (.rrd)", "name the recording that it was made from"),
@@ -36,6 +36,8 @@ const KINDS: [(&[u8], &str, &str); 23] = [
     (b"\xfd7zXZ\0", "compressed with xz", UNPACK),
     (b"\x93NUMPY", "a NumPy array", SPREADSHEET),
     (b"MATLAB 5.0", "a MATLAB file", SPREADSHEET),
+    (b"\x80\x04\x95", "a Python pickle", SPREADSHEET),
+    (b"\x80\x05\x95", "a Python pickle", SPREADSHEET),
     (b"\xd0\xcf\x11\xe0", "an old Excel workbook or another Office file", SPREADSHEET),
     (b"PK\x03\x04", "a zip archive", UNPACK),
     (b"7z\xbc\xaf\x27\x1c", "a 7z archive", UNPACK),
@@ -129,13 +131,14 @@ mod tests {
 
     #[test]
     fn tables_of_other_programs_are_named_with_the_way_to_a_readable_one() {
-        let cases: [&[u8]; 10] = [
+        let cases: [&[u8]; 11] = [
             b"PK\x03\x04\x14\0\x06\0\x08\0[Content_Types].xml",
             b"PK\x03\x04mimetypeapplication/vnd.oasis.opendocument.spreadsheet",
             b"PK\x03\x04\x14\0angles.npy",
             b"PK\x03\x04\x14\0arm.mcap",
             b"PAR1\x15\x04",
             b"\x93NUMPY\x01\0v\0",
+            b"\x80\x04\x95\x1a\0",
             b"samples:\n  - x: 1.0\n",
             b"---\n# poses\njoint_names: [j1, j2]\n",
             b"- x: 1\n- x: 2\n",

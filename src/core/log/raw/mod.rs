@@ -25,7 +25,7 @@ mod tests;
 pub use completeness::{Completeness, RawSummary};
 pub use contents::{AttachmentInfo, ChunkTotals, FileContents};
 pub use file::{FileIdentity, begin_growing, file_contents, for_each_raw, for_each_raw_twice, identity, of_scan};
-pub use file_type::ROS1_ADVICE;
+pub use file_type::{ROS1_ADVICE, START_BYTES as FILE_START_BYTES, describe as describe_file};
 pub use message::{Channel, RawMessage, Schema};
 pub use order::ChunkOrder;
 pub use scan::{GrowingScan, Growth};
