@@ -35,7 +35,7 @@ pub fn propose_table_map(path: &Path, table: &TableContents, robot: Option<&Robo
     }
     let mut text = format!(
         "# Proposed by `armcal inspect --write-input` for {}.\n# Look at each choice; docs/reference/real-arms.md says \
-         what the keys mean.\nversion = 1\n\n[table]\nformat = {}   # {} rows\n",
+         what the keys mean.\nversion = 1\nkind = \"input\"\n\n[table]\nformat = {}   # {} rows\n",
         comment(&file),
         if table.format == TableFormat::Csv { "\"csv\"" } else { "\"yaml\"" },
         table.n_rows
