@@ -55,10 +55,9 @@ pub fn stated_kind(file: &Path, table: &Table, expected: Option<Kind>) -> Result
     let all = || Kind::ALL.map(Kind::name).join(", ");
     match table.get("kind") {
         Some(Value::String(name)) => Kind::named(name).ok_or_else(|| {
-            let name = nearest(name, Kind::ALL.map(Kind::name)).or(expected.map(Kind::name));
-            let remedy =
-                name.map_or_else(|| format!("write one of {}", all()), |name| format!("write kind = \"{name}\""));
-            issue(format!("names no kind of file; {remedy}"))
+            let likely = nearest(name, Kind::ALL.map(Kind::name)).or(expected.map(Kind::name));
+            let remedy = likely.map_or_else(|| format!("one of {}", all()), |likely| format!("kind = \"{likely}\""));
+            issue(format!("{name:?} names no kind of file; write {remedy}"))
         }),
         Some(_) => Err(issue(format!("must be a text, one of {}", all()))),
         None => {
