@@ -19,7 +19,7 @@ use armcal::time::Stamp;
 use armcal::verify::{Belief, reaches};
 use rand::RngExt;
 
-const MAP: &str = "version = 1\n[joint_sensors]\ntopic = \"/joint_sensors\"\n[tags]\n\
+const MAP: &str = "version = 1\nkind = \"input\"\n[joint_sensors]\ntopic = \"/joint_sensors\"\n[tags]\n\
     topic = \"/camera/wrist/image/compressed\"\nuse = \"corners\"\n[conditions]\n\
     oil_temperature = \"/temperature/oil\"\npressure = \"/depth_pressure\"\n";
 

@@ -233,7 +233,8 @@ fn link_poses(scratch: &Scratch, bytes: &[u8]) -> bool {
 
 /// As the JSON that an input map names.
 fn lerobot(scratch: &Scratch, bytes: &[u8]) -> bool {
-    const MAP: &[u8] = b"version = 1\n[joint_sensors]\ntopic = \"/j\"\nlerobot = { file = \"arm.json\", motors = \
+    const MAP: &[u8] =
+        b"version = 1\nkind = \"input\"\n[joint_sensors]\ntopic = \"/j\"\nlerobot = { file = \"arm.json\", motors = \
         \"feetech\", values = \"degrees\" }\n[tags]\ntopic = \"/t\"\nuse = \"corners\"\n";
     scratch.write("arm.json", bytes);
     let map = armcal::input::read_input_map(&scratch.write("input.toml", MAP));
@@ -258,7 +259,8 @@ fn input_map(_: &Scratch, bytes: &[u8]) -> bool {
 
 /// As poses of numbered tags at their times.
 fn table_csv(scratch: &Scratch, bytes: &[u8]) -> bool {
-    const MAP: &str = "version = 1\n[table]\ntime = { column = \"t\" }\n[joint_sensors]\n[tags]\nuse = \"pose\"\n\
+    const MAP: &str = "version = 1\nkind = \"input\"\n\
+        [table]\ntime = { column = \"t\" }\n[joint_sensors]\n[tags]\nuse = \"pose\"\n\
         [tags.columns]\ndirection = \"tag_from_camera\"\nposition = [\"x\", \"y\", \"z\"]\nid = \"tag\"\n\
         rotation = [\"rx\", \"ry\", \"rz\"]\nrotation_form = \"fixed_xyz\"\n";
     table(scratch, "rows.csv", (MAP, bytes))
@@ -266,7 +268,7 @@ fn table_csv(scratch: &Scratch, bytes: &[u8]) -> bool {
 
 /// As poses of one landmark.
 fn table_yaml(scratch: &Scratch, bytes: &[u8]) -> bool {
-    const MAP: &str = "version = 1\n[table]\nrows = \"views\"\n[joint_sensors]\n\
+    const MAP: &str = "version = 1\nkind = \"input\"\n[table]\nrows = \"views\"\n[joint_sensors]\n\
         names = { shoulder_yaw = \"joints.0\", shoulder_pitch = \"joints.1\", forearm_pitch = \"joints.2\", \
         wrist_pitch = \"joints.3\", wrist_yaw = \"joints.4\", wrist_rotate = \"joints.5\" }\n\
         [tags]\nchild_frame = \"board\"\nuse = \"pose\"\n[tags.columns]\ndirection = \"camera_from_tag\"\n\
@@ -277,9 +279,10 @@ fn table_yaml(scratch: &Scratch, bytes: &[u8]) -> bool {
 
 /// As corners of a board, up to the views; the corpus shows it near the middle of the image, face on.
 fn table_board(scratch: &Scratch, bytes: &[u8]) -> bool {
-    const MAP: &str = "version = 1\n[table]\n[joint_sensors]\n[tags]\nchild_frame = \"board\"\n\
+    const MAP: &str = "version = 1\nkind = \"input\"\n[table]\n[joint_sensors]\n[tags]\nchild_frame = \"board\"\n\
         use = \"board_corners\"\n[tags.columns]\nid = \"corner\"\npixel = [\"u\", \"v\"]\n";
-    const BOARD: &[u8] = b"version = 1\nframe = \"base_link\"\n[[tag]]\nname = \"board\"\nsquares = [4, 4]\n\
+    const BOARD: &[u8] =
+        b"version = 1\nkind = \"tag_map\"\nframe = \"base_link\"\n[[tag]]\nname = \"board\"\nsquares = [4, 4]\n\
         square_m = 0.05\nposition_m = [1.4, 0.5, 0.0]\nquaternion_wxyz = [0.5, -0.5, 0.5, -0.5]\n";
     let map = armcal::input::parse_input_map(Path::new("input.toml"), MAP).expect("a map");
     let tags = scratch.write("board.toml", BOARD);
@@ -334,7 +337,8 @@ fn obj(scratch: &Scratch, bytes: &[u8]) -> bool {
 /// As one hull. What a decomposition takes, seconds, is for `tests/mutations.rs` alone.
 fn mesh(scratch: &Scratch, file: &Path, scale_m: f64) -> bool {
     let scene = format!(
-        "[[obstacle]]\nname = \"a\"\nshape = \"mesh\"\nfile = {file:?}\nscale_m = {scale_m}\nposition_m = [0.0, 0.0, 0.0]\n"
+        "version = 1\nkind = \"scene\"\n[[obstacle]]\nname = \"a\"\nshape = \"mesh\"\n\
+         file = {file:?}\nscale_m = {scale_m}\nposition_m = [0.0, 0.0, 0.0]\n"
     );
     armcal::routine::load_scene(&scratch.write("scene.toml", scene.as_bytes())).is_ok()
 }

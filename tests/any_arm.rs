@@ -353,13 +353,13 @@ fn all_that_robot_toml_lacks_is_named_at_once() {
         }
     }
     assert!(n_named > 15, "{n_named}");
-    let short = "name = \"a\"\nurdf = \"titan4.urdf\"\nbase_link = \"base_link\"\n[tool]\nlink = \"manipulator_link\"\n\
+    let short = "version = 1\nkind = \"robot\"\nname = \"a\"\nurdf = \"titan4.urdf\"\nbase_link = \"base_link\"\n\
+                 [tool]\nlink = \"manipulator_link\"\n\
                  [camera]\nlink = \"fisheye\"\n[[joint_sensor]]\njoint = \"forearm_pitch\"\nkind = \"encoder\"\n\
                  gain_std = 0.1\n[[tag]]\nid = 7\n";
     write(&file, short);
     let words = [
-        "missing: version",
-        "[tool] point_m",
+        "missing: [tool] point_m",
         "mount_std_rad",
         "`forearm_pitch`: offset_counts",
         "[[tag]] 7: family",

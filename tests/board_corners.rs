@@ -29,12 +29,14 @@ const BOARD_STD: [f64; 2] = [0.002, 0.003];
 /// Corners in view that make a pose.
 const MIN_CORNERS: usize = 12;
 
-const CSV_MAP: &str = "version = 1\n[table]\n[joint_sensors]\n[tags]\nchild_frame = \"board\"\n\
+const CSV_MAP: &str = "version = 1\nkind = \"input\"\n[table]\n[joint_sensors]\n[tags]\nchild_frame = \"board\"\n\
     use = \"board_corners\"\n[tags.columns]\nid = \"corner\"\npixel = [\"u\", \"v\"]\n";
-const POSES_MAP: &str = "version = 1\n[table]\n[joint_sensors]\n[tags]\nchild_frame = \"board\"\nuse = \"pose\"\n\
+const POSES_MAP: &str = "version = 1\nkind = \"input\"\n\
+    [table]\n[joint_sensors]\n[tags]\nchild_frame = \"board\"\nuse = \"pose\"\n\
     [tags.columns]\ndirection = \"camera_from_tag\"\nposition = [\"x\", \"y\", \"z\"]\n\
     rotation = [\"qw\", \"qx\", \"qy\", \"qz\"]\nrotation_form = \"quaternion_wxyz\"\n";
-const MCAP_MAP: &str = "version = 1\n[joint_sensors]\ntopic = \"/joint_states\"\n[tags]\ntopic = \"/corners\"\n\
+const MCAP_MAP: &str = "version = 1\nkind = \"input\"\n\
+    [joint_sensors]\ntopic = \"/joint_states\"\n[tags]\ntopic = \"/corners\"\n\
     child_frame = \"board\"\nuse = \"board_corners\"\n";
 
 /// Numbers of corners and where they were seen, px.
@@ -149,7 +151,8 @@ fn corners(robot: &Robot, camera_from_board: &Isometry3<f64>, rng: &mut ChaCha8R
 fn tag_map(squares: &str) -> String {
     let (place, q) = (drawn_board().translation.vector, drawn_board().rotation);
     format!(
-        "version = 1\nframe = \"base_link\"\n[[tag]]\nname = \"board\"\n{squares}position_m = {:?}\n\
+        "version = 1\nkind = \"tag_map\"\n\
+         frame = \"base_link\"\n[[tag]]\nname = \"board\"\n{squares}position_m = {:?}\n\
          quaternion_wxyz = {:?}\nposition_std_m = {:?}\nrotation_std_rad = {:?}\n",
         [place.x, place.y, place.z],
         [q.w, q.i, q.j, q.k],

@@ -19,7 +19,8 @@ use crate::support::synthetic::{TrueArm, normal, small_motion};
 use crate::support::texts::Texts;
 use crate::support::{answer, program, read, robot_copy, temp, write};
 
-const ONE: &str = "version = 1\n[joint_sensors]\ntopic = \"/joint_states\"\n[tags]\ntopic = \"/wrist/tags\"\n\
+const ONE: &str = "version = 1\nkind = \"input\"\n\
+    [joint_sensors]\ntopic = \"/joint_states\"\n[tags]\ntopic = \"/wrist/tags\"\n\
     use = \"corners\"\n";
 const FURTHER: &str = "[[further_tags]]\ncamera = \"elbow\"\ntopic = \"/elbow/tags\"\n";
 const N_POSES: usize = 25;

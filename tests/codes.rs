@@ -124,7 +124,12 @@ const CASES: &[Case] = &[
         code: Code::VersionUnsupported,
         exit: 2,
         call: |f| {
-            text(f, "tags.toml", "version = 9\nframe = \"base_link\"\n[[tag]]\nid = 1\nposition_m = [0.0, 0.0, 1.0]\n")
+            text(
+                f,
+                "tags.toml",
+                "version = 9\nkind = \"tag_map\"\nframe = \"base_link\"\n[[tag]]\nid = 1\n\
+                 position_m = [0.0, 0.0, 1.0]\n",
+            )
         },
     },
     Case { code: Code::FileUnreadable, exit: 2, call: |f| check(&f.join("none.toml")) },

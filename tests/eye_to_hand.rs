@@ -43,7 +43,10 @@ impl Given {
             &INPUT_MAP.replace("tag36h11:{id}", "board").replace("\"position\"", "\"pose\""),
         );
         write(&folder.path().join("board.toml"), &board("manipulator_link"));
-        write(&folder.path().join("task.toml"), "version = 1\ntolerance_m = 0.02\ntargets_m = [[0.5, 1.4, 0.3]]\n");
+        write(
+            &folder.path().join("task.toml"),
+            "version = 1\nkind = \"task\"\ntolerance_m = 0.02\ntargets_m = [[0.5, 1.4, 0.3]]\n",
+        );
         Self { folder, robot }
     }
 
@@ -97,7 +100,7 @@ impl Given {
 
 fn board(frame: &str) -> String {
     format!(
-        "version = 1\nframe = \"{frame}\"\n[[tag]]\nname = \"board\"\nposition_m = {BOARD_M:?}\n\
+        "version = 1\nkind = \"tag_map\"\nframe = \"{frame}\"\n[[tag]]\nname = \"board\"\nposition_m = {BOARD_M:?}\n\
          quaternion_wxyz = [1.0, 0.0, 0.0, 0.0]\nposition_std_m = [{BOARD_STD_M}, {BOARD_STD_M}, {BOARD_STD_M}]\n\
          rotation_std_rad = [{BOARD_STD_RAD}, {BOARD_STD_RAD}, {BOARD_STD_RAD}]\n"
     )

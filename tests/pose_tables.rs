@@ -15,7 +15,8 @@ use crate::support::texts::Texts;
 use crate::support::{Answer, answer, program, read, root, temp, write};
 
 /// A board before an arm.
-const BOARD: &str = "version = 1\nframe = \"base_link\"\n[[tag]]\nname = \"board\"\nposition_m = [1.0, 0.2, -0.1]\n\
+const BOARD: &str = "version = 1\nkind = \"tag_map\"\n\
+    frame = \"base_link\"\n[[tag]]\nname = \"board\"\nposition_m = [1.0, 0.2, -0.1]\n\
     quaternion_wxyz = [1.0, 0.0, 0.0, 0.0]\nposition_std_m = [0.002, 0.002, 0.002]\n\
     rotation_std_rad = [0.01, 0.01, 0.01]\n";
 

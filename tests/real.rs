@@ -293,7 +293,7 @@ fn the_same_poses_as_a_table_give_the_same_sensors() {
         }
     }
     write(&given.file("poses.csv"), &csv);
-    let map = "version = 1\n[table]\n[joint_sensors]\n[tags]\nuse = \"position\"\n[tags.columns]\n\
+    let map = "version = 1\nkind = \"input\"\n[table]\n[joint_sensors]\n[tags]\nuse = \"position\"\n[tags.columns]\n\
         direction = \"camera_from_tag\"\nposition = [\"x\", \"y\", \"z\"]\nposition_unit = \"mm\"\nid = \"tag\"\n";
     let map = map.replace("[tags.columns]", &format!("{TAG_NOISE}[tags.columns]"));
     write(&given.file("map.toml"), &map);
@@ -457,7 +457,7 @@ fn corners_of_an_external_detector_are_used_as_our_own_are() {
         writer.write_ros("/tags", &ros::AprilTagDetectionArray::SCHEMA, now, &array).expect("written");
     }
     writer.finish().expect("finished");
-    let map = "version = 1\n[joint_sensors]\ntopic = \"/words\"\n[tags]\ntopic = \"/tags\"\n\
+    let map = "version = 1\nkind = \"input\"\n[joint_sensors]\ntopic = \"/words\"\n[tags]\ntopic = \"/tags\"\n\
         camera_frame = \"wrist_optical\"\nuse = \"corners\"\n";
     write(&given.file("map.toml"), map);
     let mut command = program();
@@ -528,7 +528,7 @@ fn noise_accepted(n_poses: usize, seeds: std::ops::Range<u64>, tag_use: &str, is
         let given = Given::new(&titan);
         write(
             &given.file("task.toml"),
-            "version = 1\ntolerance_m = 0.02\ntargets_m = [[0.5, 1.6, 0.3], [1.2, -0.9, 0.5]]\n",
+            "version = 1\nkind = \"task\"\ntolerance_m = 0.02\ntargets_m = [[0.5, 1.6, 0.3], [1.2, -0.9, 0.5]]\n",
         );
         let task = given.file("task.toml");
         let map = INPUT_MAP.replace("\"position\"", &format!("\"{tag_use}\""));
@@ -575,7 +575,10 @@ fn a_worse_result_replaces_no_better_one() {
     given.calibrate(&[]).expect("all views", 0, &["ACCEPTED"]);
     let first = read(&given.file("out/calibration.toml"));
     given.calibrate_again(&["few.mcap"], &[]).expect("fewer views", 0, &["[result_kept]", "out/worse"]);
-    write(&given.file("task.toml"), "version = 1\ntolerance_m = 0.001\ntargets_m = [[0.5, 1.6, 0.3]]\n");
+    write(
+        &given.file("task.toml"),
+        "version = 1\nkind = \"task\"\ntolerance_m = 0.001\ntargets_m = [[0.5, 1.6, 0.3]]\n",
+    );
     let task = given.file("task.toml");
     let again = given.calibrate_again(&["arm.mcap"], &["--task", task.to_str().expect("a path")]);
     again.expect("too small a tolerance", 4, &["[beyond_tolerance]", "[result_kept]", "out/refused"]);
@@ -596,7 +599,11 @@ fn targets_out_of_reach_refuse_by_their_numbers() {
     let _texts = Texts::of("targets_out_of_reach_refuse_by_their_numbers");
     let given = Given::new(&RealTitan::new(&titan(), 57, AS_IN_2018, 12));
     let task = given.file("task.toml");
-    write(&task, "version = 1\ntolerance_m = 0.05\ntargets_m = [[0.5, 1.6, 0.3], [5.0, 0.0, 0.0], [1.2, -0.9, 0.5]]\n");
+    write(
+        &task,
+        "version = 1\nkind = \"task\"\n\
+         tolerance_m = 0.05\ntargets_m = [[0.5, 1.6, 0.3], [5.0, 0.0, 0.0], [1.2, -0.9, 0.5]]\n",
+    );
     given.calibrate(&["--task", task.to_str().expect("a path")]).expect(
         "5 m away",
         4,
@@ -614,7 +621,7 @@ fn task_and_prior_are_taken_from_files() {
     let given = Given::new(&titan);
     write(
         &given.file("task.toml"),
-        "version = 1\ntolerance_m = 0.05\ntargets_m = [[0.5, 1.6, 0.3], [1.2, -0.9, 0.5]]\n",
+        "version = 1\nkind = \"task\"\ntolerance_m = 0.05\ntargets_m = [[0.5, 1.6, 0.3], [1.2, -0.9, 0.5]]\n",
     );
     let task = given.file("task.toml");
     let task = ["--task", task.to_str().expect("a path")];
@@ -622,11 +629,11 @@ fn task_and_prior_are_taken_from_files() {
     assert!(given.summary()["calibration"]["predicted_tool_error_m"].is_null());
     given.calibrate(&task).expect("with one", 0, &["U95"]);
     assert_eq!(given.summary()["calibration"]["predicted_tool_error_m"]["n"], 2);
-    write(&given.file("task.toml"), "version = 1\ntolerance_m = 0.001\npose_rad = [[0.0]]\n");
+    write(&given.file("task.toml"), "version = 1\nkind = \"task\"\ntolerance_m = 0.001\npose_rad = [[0.0]]\n");
     given.calibrate(&task).expect("a wrong key", 2, &["task.toml", "pose_rad"]);
     write(
         &given.file("task.toml"),
-        "version = 1\ntolerance_m = 0.0001\nposes_rad = [[-1.3, -0.3, -0.4, 0.3, -0.6, 0.0]]\n",
+        "version = 1\nkind = \"task\"\ntolerance_m = 0.0001\nposes_rad = [[-1.3, -0.3, -0.4, 0.3, -0.6, 0.0]]\n",
     );
     given.calibrate(&task).expect("too small a tolerance", 4, &["[beyond_tolerance]"]);
     let refused = given.file("out/calibration.toml");
@@ -643,14 +650,17 @@ fn task_and_prior_are_taken_from_files() {
     let summary = given.summary();
     let cost = |key: &str| summary["calibration"][key].as_f64().expect("a number");
     assert!(cost("cost_initial") < 1.001 * cost("cost_final"), "it starts from the prior: {summary:#}");
-    assert!(parse_task(&prior, "version = 1\ntolerance_m = 1.0\n").is_err());
+    assert!(parse_task(&prior, "version = 1\nkind = \"task\"\ntolerance_m = 1.0\n").is_err());
 }
 
 #[test]
 fn check_reads_input_maps_tag_maps_and_tasks() {
     let _texts = Texts::of("check_reads_input_maps_tag_maps_and_tasks");
     let given = Given::new(&RealTitan::new(&titan(), 1, AS_IN_2018, 13));
-    write(&given.file("task.toml"), "version = 1\ntolerance_m = 0.02\ntargets_m = [[0.5, 1.6, 0.3]]\n");
+    write(
+        &given.file("task.toml"),
+        "version = 1\nkind = \"task\"\ntolerance_m = 0.02\ntargets_m = [[0.5, 1.6, 0.3]]\n",
+    );
     let check = |names: &[&str]| answer(program().arg("check").args(names.iter().map(|name| given.file(name))));
     let words = ["tag36h11:{id}", " 9 landmarks", " 1 targets"];
     check(&["map.toml", "tags.toml", "task.toml"]).expect("good", 0, &words);

@@ -185,7 +185,8 @@ impl Camera {
 
 fn image_map(topic: &str) -> String {
     format!(
-        "version = 1\n[joint_sensors]\ntopic = \"/joints\"\n[tags]\ntopic = \"{topic}\"\ncamera_frame = \"wrist\"\n\
+        "version = 1\nkind = \"input\"\n\
+         [joint_sensors]\ntopic = \"/joints\"\n[tags]\ntopic = \"{topic}\"\ncamera_frame = \"wrist\"\n\
          use = \"corners\"\ncamera_info = \"/info\"\n"
     )
 }

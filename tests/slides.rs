@@ -33,7 +33,8 @@ fn arm() -> Robot {
 fn input_map(unit: &str) -> String {
     let unit = if unit == "mm" { "rad\"\nslide_unit = \"mm" } else { unit };
     format!(
-        "version = 1\n[joint_sensors]\ntopic = \"/joint_states\"\nunit = \"{unit}\"\n[tags]\ntopic = \"/tags\"\n\
+        "version = 1\nkind = \"input\"\n\
+         [joint_sensors]\ntopic = \"/joint_states\"\nunit = \"{unit}\"\n[tags]\ntopic = \"/tags\"\n\
          camera_frame = \"wrist_optical\"\nuse = \"corners\"\n"
     )
 }

@@ -488,7 +488,7 @@ fn frames_far_from_the_base_lose_no_precision() {
 fn a_pose_of_a_task_in_degrees_is_named_as_such() {
     let check = |robot: &Path, task: &str| {
         let file = robot.with_file_name("task.toml");
-        write(&file, &format!("version = 1\ntolerance_m = 0.01\n{task}\n"));
+        write(&file, &format!("version = 1\nkind = \"task\"\ntolerance_m = 0.01\n{task}\n"));
         answer(program().arg("check").arg(robot).arg(&file))
     };
     let bench = Bench::new(&arm(6, &Parts::default()));

@@ -125,7 +125,7 @@ fn box_and_mesh(folder: &Path, at_m: [f64; 3]) -> [Scene; 2] {
     ["shape = \"box\"\nsize_m = [0.6, 0.4, 0.5]\n", "shape = \"mesh\"\nfile = \"block.obj\"\nscale_m = 0.001\n"].map(
         |shape| {
             let file = folder.join("scene.toml");
-            write(&file, &format!("[[obstacle]]\nname = \"rock\"\n{shape}{place}"));
+            write(&file, &format!("version = 1\nkind = \"scene\"\n[[obstacle]]\nname = \"rock\"\n{shape}{place}"));
             load_scene(&file).expect("the scene reads")
         },
     )

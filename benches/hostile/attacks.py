@@ -58,7 +58,7 @@ def without_lens(folder):
 
 
 def calibrate(folder, recording, map_text, of=None):
-    (folder / "map.toml").write_text("version = 1\n" + map_text)
+    (folder / "map.toml").write_text('version = 1\nkind = "input"\n' + map_text)
     return ["calibrate", recording, "--robot", of or robot(folder), "--input", folder / "map.toml", "--out", folder / "out"]
 
 
@@ -519,7 +519,7 @@ def table(name, content, ending="csv", command="calibrate"):
     def of(folder):
         path = write(folder, f"a.{ending}", content())
         board = 'name = "board"\nposition_m = [1.0, 0.0, 0.0]\nquaternion_wxyz = [1.0, 0.0, 0.0, 0.0]\n'
-        tags = write(folder, "tags.toml", 'version = 1\nframe = "base_link"\n[[tag]]\n' + board)
+        tags = write(folder, "tags.toml", 'version = 1\nkind = "tag_map"\nframe = "base_link"\n[[tag]]\n' + board)
         return ["inspect", path] if command == "inspect" else [*calibrate(folder, path, TABLE_MAP), "--tag-map", tags]
 
     of.__name__ = name
@@ -588,10 +588,10 @@ text_file("toml_deep_keys", "a.toml", lambda: "version = 1\n" + "a." * 2_000_000
 text_file("toml_many_keys", "a.toml", lambda: "version = 1\n" + "".join(f"k{k} = 1\n" for k in range(500_000)))
 text_file("toml_many_deep_keys", "a.toml", lambda: "version = 1\n" + "".join("a." * 70 + f"k{k} = 1\n" for k in range(50_000)))
 text_file("toml_many_tables", "a.toml", lambda: "version = 1\n" + "".join(f"[a{k}]\n" for k in range(700_000)))
-text_file("tag_map_of_60000", "a.toml", lambda: 'version = 1\nframe = "a"\n' + "".join(TAG.format(k) for k in range(60_000)))
-text_file("tag_map_of_100000_short", "a.toml", lambda: 'version = 1\nframe = "a"\n' + "[[tag]]\nid=0\n" * 500_000)
-text_file("tag_map_of_one_name", "a.toml", lambda: 'version = 1\nframe = "a"\n' + TAG.format(7) * 5_000)
-text_file("task_of_targets", "a.toml", lambda: "version = 1\ntolerance_m = 0.02\ntargets_m = [" + "[0,0,0]," * 900_000 + "]")
+text_file("tag_map_of_60000", "a.toml", lambda: 'version = 1\nkind = "tag_map"\nframe = "a"\n' + "".join(TAG.format(k) for k in range(60_000)))
+text_file("tag_map_of_100000_short", "a.toml", lambda: 'version = 1\nkind = "tag_map"\nframe = "a"\n' + "[[tag]]\nid=0\n" * 500_000)
+text_file("tag_map_of_one_name", "a.toml", lambda: 'version = 1\nkind = "tag_map"\nframe = "a"\n' + TAG.format(7) * 5_000)
+text_file("task_of_targets", "a.toml", lambda: "version = 1\nkind = \"task\"\ntolerance_m = 0.02\ntargets_m = [" + "[0,0,0]," * 900_000 + "]")
 text_file(
     "calibration_of_joints",
     "calibration.toml",

@@ -33,7 +33,7 @@ ADDRESS_BYTES = 12 << 30
 # Seconds for which an attack that repeats itself lasts.
 LASTS_S = 4.0
 ROUTINE = ROOT / "routines/titan4-quickstart.toml"
-MAP = 'networks = ["127.0.0.1"]\n[guard]\nconnect_s = 6.0\nready_s = 5.0\nstale_s = 2.0\n'
+MAP = 'version = 1\nkind = "arm"\nnetworks = ["127.0.0.1"]\n[guard]\nconnect_s = 6.0\nready_s = 5.0\nstale_s = 2.0\n'
 COMMAND = {
     "discover": ["discover", "--network", "127.0.0.1", "--for", "6", "--robot", ROOT / "robots/titan4"],
     "listen": ["drive", ROUTINE, "--arm", "arm.toml", "--no-motion"],

@@ -332,7 +332,7 @@ def meet(program, one):
     try:
         with socket.create_server(("127.0.0.1", 0)) as server:
             port = server.getsockname()[1]
-            (folder / "arm.toml").write_text(f'[guard]\nconnect_s = 4.0\n[rosbridge]\nurl = "ws://127.0.0.1:{port}"\n')
+            (folder / "arm.toml").write_text(f'version = 1\nkind = "arm"\n[guard]\nconnect_s = 4.0\n[rosbridge]\nurl = "ws://127.0.0.1:{port}"\n')
             attacker = os.fork()
             if attacker == 0:
                 play(one, server, sent)

@@ -129,7 +129,7 @@ def write_arm(folder, spec, size):
                     '<limit lower="-4" upper="4" effort="1" velocity="1"/></joint>')
     (folder / "arm.urdf").write_text("\n".join(urdf + ["</robot>"]))
     k, camera = spec["intrinsics"], numbers(spec["camera_mount_to_camera_guess"])
-    text = ['version = 1\nname = "flange"\nurdf = "arm.urdf"\nbase_link = "base_link"\n[tool]\nlink = "flange"\npoint_m = [0.0, 0.0, 0.0]']
+    text = ['version = 1\nkind = "robot"\nname = "flange"\nurdf = "arm.urdf"\nbase_link = "base_link"\n[tool]\nlink = "flange"\npoint_m = [0.0, 0.0, 0.0]']
     for name, kind, _ in JOINTS:
         slides = kind == "prismatic"
         scale = "scale_counts_per_mm = 0.001" if slides else f"scale_counts_per_deg = {np.pi / 180!r}"
@@ -167,6 +167,7 @@ def write_views(folder, spec, views):
                   ((i, [float(c) for c in uv]) for i, uv in seen.items())]
     (folder / "views.csv").write_text("\n".join(lines) + "\n")
     (folder / "map.toml").write_text("""version = 1
+kind = "input"
 [table]
 time = { column = "t", unit = "s" }
 [joint_sensors]
@@ -181,6 +182,7 @@ pixel = ["u", "v"]
     finder, board = spec["target_finder"], board_guess(spec)
     x, y, z, w = np.array(board[3:]) / np.linalg.norm(board[3:])
     (folder / "board.toml").write_text(f"""version = 1
+kind = "tag_map"
 frame = "flange"
 [[tag]]
 name = "board"

@@ -55,7 +55,7 @@ class Table:
         names = ", ".join(f'{name} = "q{k}"' for k, name in enumerate(self.names))
         quoted = ", ".join(f'"{head}"' for head in heads)
         (folder / "map.toml").write_text(
-            f'version = 1\n[table]\ntime = {{ column = "t", unit = "s" }}\n[joint_sensors]\nnames = {{ {names} }}\nunit = "{self.unit}"\n'
+            f'version = 1\nkind = "input"\n[table]\ntime = {{ column = "t", unit = "s" }}\n[joint_sensors]\nnames = {{ {names} }}\nunit = "{self.unit}"\n'
             f'[tags]\nchild_frame = "board"\nuse = "{board_use}"\n[tags.columns]\ndirection = "{self.direction}"\n'
             f'position = ["x", "y", "z"]\nposition_unit = "{self.position_unit}"\nrotation = [{quoted}]\nrotation_form = "{self.form}"\n')
 
@@ -249,7 +249,7 @@ def main(armcal, data, out=None):
         folder = Path(folder)
         for name, reach_m, table in tables(armcal, data, folder):
             poses = [[float(angle) for angle in row] for row in table.angles[:: max(1, len(table.angles) // 4)][:4]]
-            (folder / "task.toml").write_text(f"version = 1\ntolerance_m = {TOLERANCE_M}\nposes_rad = {poses}\n")
+            (folder / "task.toml").write_text(f"version = 1\nkind = \"task\"\ntolerance_m = {TOLERANCE_M}\nposes_rad = {poses}\n")
             for kind, changed in kinds(table):
                 for with_task in (False, True):
                     limit_m = TOLERANCE_M if with_task else 0.01 * reach_m

@@ -65,11 +65,12 @@ class Recording:
             rows.writerow(["t", *[f"j{k + 1}" for k in range(6)], "id", "u0", "v0", "u1", "v1", "u2", "v2", "u3", "v3"])
             rows.writerows([20 * view, *self.readings[view], self.ids[tag], *pixels.ravel()] for view, tag, pixels in self.seen)
         (folder / "map.toml").write_text(
-            'version = 1\n[table]\ntime = { column = "t", unit = "s" }\n[joint_sensors]\nunit = "rad"\n[tags]\nuse = "corners"\n[tags.columns]\n'
+            'version = 1\nkind = "input"\n'
+            '[table]\ntime = { column = "t", unit = "s" }\n[joint_sensors]\nunit = "rad"\n[tags]\nuse = "corners"\n[tags.columns]\n'
             f'id = "id"\ncorners = ["u0", "v0", "u1", "v1", "u2", "v2", "u3", "v3"]\ncorner_order = "{self.order}"\n')
         tags = [f"[[tag]]\nid = {k}\nsize_m = {size}\nposition_m = {at.tolist()}\nposition_std_m = {[0.002] * 3}\n"
                 f"quaternion_wxyz = {self.flip}\nrotation_std_rad = {[0.01] * 3}\n" for k, (size, at) in enumerate(zip(self.sizes_m, self.tags_m))]
-        (folder / "tags.toml").write_text('version = 1\nframe = "l0"\n' + "".join(tags))
+        (folder / "tags.toml").write_text('version = 1\nkind = "tag_map"\nframe = "l0"\n' + "".join(tags))
 
 
 def kinds(seed):
@@ -167,7 +168,7 @@ def main(armcal, out=None):
     with tempfile.TemporaryDirectory() as folder:
         folder = Path(folder)
         write_urdf(folder)
-        (folder / "task.toml").write_text(f"version = 1\ntolerance_m = {TOLERANCE_M}\nposes_rad = {TASK.tolist()}\n")
+        (folder / "task.toml").write_text(f"version = 1\nkind = \"task\"\ntolerance_m = {TOLERANCE_M}\nposes_rad = {TASK.tolist()}\n")
         for seed in (1, 2):
             for name, recording in kinds(seed):
                 recording.write(armcal, folder)

@@ -24,6 +24,7 @@ LENS = 'model = "pinhole"\nresolution_px = [1280, 960]\nfocal_px = [900.0, 900.0
 SIZE_M = 0.15
 PIXELS = [f"{axis}{k}" for k in range(4) for axis in "uv"]
 INPUT = """version = 1
+kind = "input"
 [table]
 time = { column = "t", unit = "s" }
 [joint_sensors]
@@ -65,8 +66,9 @@ def write_noise(folder, use, n_views, seed):
     (folder / "input.toml").write_text(INPUT[:INPUT.index("[tags]")] + CORNERS if use == "corners" else text)
     tags = [f"[[tag]]\nid = {k}\nsize_m = {SIZE_M}\nposition_m = [{1.0 + 0.1 * k}, {0.2 * k - 0.4}, -0.4]\nposition_std_m = {[0.01] * 3}\n"
             f"quaternion_wxyz = [0.0, 1.0, 0.0, 0.0]\nrotation_std_rad = {[0.03] * 3}\n" for k in (1, 2, 3)]
-    (folder / "tags.toml").write_text("version = 1\nframe = \"l0\"\n" + "".join(tags))
-    (folder / "task.toml").write_text("version = 1\ntolerance_m = 0.02\nposes_rad = [[0.0, 0.6, 0.4, 0.0, 0.5, 0.0], [0.3, 0.3, 0.6, 0.2, 0.3, 0.5]]\n")
+    (folder / "tags.toml").write_text("version = 1\nkind = \"tag_map\"\nframe = \"l0\"\n" + "".join(tags))
+    head = "version = 1\nkind = \"task\"\ntolerance_m = 0.02\n"
+    (folder / "task.toml").write_text(head + "poses_rad = [[0.0, 0.6, 0.4, 0.0, 0.5, 0.0], [0.3, 0.3, 0.6, 0.2, 0.3, 0.5]]\n")
 
 
 def main(armcal, seeds="3", out=None):

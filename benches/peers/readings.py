@@ -110,7 +110,7 @@ def calibrate(armcal, folder, change=None, task=None):
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(CASE, folder)
     poses = [[0.3, 0.4, 0.4, 0.2, 0.5, 0.1], [-0.3, 0.6, 0.3, -0.4, 0.4, -0.5]]
-    (folder / "task.toml").write_text(task or f"version = 1\ntolerance_m = {TOLERANCE_M}\nposes_rad = {poses}\n")
+    (folder / "task.toml").write_text(task or f"version = 1\nkind = \"task\"\ntolerance_m = {TOLERANCE_M}\nposes_rad = {poses}\n")
     if callable(change):
         rewrite(folder / "run.mcap", "/joint_states", lambda data: with_readings(data, change))
     words = [armcal, "calibrate", "run.mcap", "--robot", "robot", "--input", "input.toml", "--tag-map", "tags.toml", "--task", "task.toml",
@@ -184,7 +184,7 @@ def main(armcal, out=None):
             rewrite(folder / "run.mcap", "/camera_info", lambda data, k=k: with_focal_length(data, k))
             row(kind, run(), None, {"lens_contradicted", "input_image_size", "lens"})
         for kind, xyz, names in [("a target 5 m away", [5.0, 0.0, 0.5], {"targets_not_judged"}), ("a target in reach", [0.7, 0.1, 0.8], set())]:
-            row(kind, calibrate(armcal, folder, task=f"version = 1\ntolerance_m = {TOLERANCE_M}\ntargets_m = [{xyz}]\n")(), None, names)
+            row(kind, calibrate(armcal, folder, task=f"version = 1\nkind = \"task\"\ntolerance_m = {TOLERANCE_M}\ntargets_m = [{xyz}]\n")(), None, names)
     print(f"\n{len(rows)} calibrations; accepted while off by more than 3 U95: {wrong}; refused for another cause: {unnamed}")
     if out:
         with open(out, "w", newline="") as file:

@@ -23,6 +23,7 @@ POSITIONER = """<robot name="positioner"><link name="base_link"/><link name="l1"
 <joint name="t" type="fixed"><parent link="l2"/><child link="target"/>
 <origin xyz="0.17 -0.65 0.5" rpy="1.5707963267948966 -0.20000119387833815 -1.5707963267948966"/></joint></robot>"""
 POSITIONER_MAP = """version = 1
+kind = "input"
 [table]
 format = "yaml"
 [joint_sensors]
@@ -38,6 +39,7 @@ rotation = ["pose.qw", "pose.qx", "pose.qy", "pose.qz"]
 rotation_form = "quaternion_wxyz"
 """
 TARGET = """version = 1
+kind = "tag_map"
 frame = "target"
 [[tag]]
 name = "target"

@@ -1,6 +1,7 @@
 //! What `armcal calibrate` is given: recordings, and the files beside them, as the estimator takes them.
 
 use armcal_core::codes::Code;
+use armcal_core::kind::Kind;
 #[cfg(feature = "images")]
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -76,10 +77,10 @@ impl CalibrationInputs<'_> {
             )
             .into());
         }
-        expect_option(self.input, FileKind::InputMap)?;
-        expect_option(self.tag_map, FileKind::TagMap)?;
-        expect_option(self.prior, FileKind::Calibration)?;
-        expect_option(self.task, FileKind::Task)
+        expect_option(self.input, Kind::Input)?;
+        expect_option(self.tag_map, Kind::TagMap)?;
+        expect_option(self.prior, Kind::Calibration)?;
+        expect_option(self.task, Kind::Task)
     }
 
     pub fn calibrate(&self) -> Result<Calibrated> {

@@ -16,7 +16,9 @@ use crate::cli::stdout::say;
 use armcal_belief::calib::{Calibration, CalibrationFileError, Status};
 use armcal_belief::plan::{ClearanceModel, PlanFile, SceneCheck, SceneIssues, grips_at_first};
 use armcal_belief::tagmap::files::read_landmarks;
+use armcal_core::document::stated_kind;
 use armcal_core::input::{InputMap, SeenColumns, Source, TagUse, Topics, read_input_map, read_task};
+use armcal_core::kind::Kind;
 use armcal_core::robot::{self, Robot, Vehicle};
 use armcal_core::routine::{self, Override, Overrides, Routine, Step};
 use armcal_core::stats::stream_rng;
@@ -136,16 +138,36 @@ fn check_one(file: &Path, context: &Context) -> Result<Found> {
     if file.is_dir() {
         return check_robot(file);
     }
-    if file.file_name().is_some_and(|name| name == "robot.toml") {
-        return check_robot(file.parent().unwrap_or(Path::new(".")));
-    }
     expect_toml(file)?;
     let text = robot::read_text(file)?;
     let table: toml::Table = robot::parse_toml(file, &text)?;
-    match FileKind::of_table(&table) {
-        Some(FileKind::Routine) => check_routine(file, &context.overrides),
-        Some(FileKind::Calibration) => describe_calibration(file, &text),
-        Some(FileKind::Task) => describe_task(file, context.robot.as_ref()),
+    let kind = stated_kind(file, &table, is_robot_toml(file).then_some(Kind::Robot))?;
+    let mut found = check_kind(file, kind, &text, context)?;
+    if !table.contains_key("kind") {
+        let problem = format!("its kind is missing; add the line kind = \"{}\" at its start", kind.name());
+        found.warnings.push(Warning::new(Code::FileKind, problem));
+    }
+    Ok(found)
+}
+
+fn is_robot_toml(file: &Path) -> bool {
+    file.file_name().is_some_and(|name| name == "robot.toml")
+}
+
+fn check_kind(file: &Path, kind: Kind, text: &str, context: &Context) -> Result<Found> {
+    let folder = file.parent().unwrap_or(Path::new("."));
+    match kind {
+        Kind::Routine => check_routine(file, &context.overrides),
+        Kind::Calibration => describe_calibration(file, text),
+        Kind::Task => describe_task(file, context.robot.as_ref()),
+        Kind::Robot if !is_robot_toml(file) => {
+            let problem = format!(
+                "{}: is a robot.toml under another name; call it robot.toml, in a folder with its URDF",
+                file.display()
+            );
+            Err(UsageError::new(Code::FileKind, problem).into())
+        }
+        Kind::Robot | Kind::SelfCollision => check_robot(folder),
         kind => Ok(Found::whole(describe(file, kind)?)),
     }
 }
@@ -162,43 +184,40 @@ fn expect_toml(file: &Path) -> Result<()> {
     Err(UsageError::new(Code::FileKind, format!("{name}: is {kind}, which `check` does not read; {advice}")).into())
 }
 
-/// What a file that is neither robot nor routine holds.
-fn describe(file: &Path, kind: Option<FileKind>) -> Result<String> {
+/// Describes a file that is read alone.
+fn describe(file: &Path, kind: Kind) -> Result<String> {
     match kind {
-        Some(FileKind::Plan) => {
+        Kind::Plan => {
             let plan = PlanFile::read(file)?;
             let (poses, least_m) = (plan.pose.len(), plan.totals.least_clearance_m);
             let arm_min = plan.totals.arm_time_s / 60.0;
             Ok(format!("plan for `{}`, {poses} poses in {arm_min:.1} min, at least {least_m:.3} m clear", plan.robot))
         }
-        Some(FileKind::Vehicle) => {
+        Kind::Vehicle => {
             let vehicle = robot::load_vehicle(file)?;
             let n_tags = vehicle.survey.as_ref().map(|survey| survey.tags.len());
             let tags = n_tags.map_or_else(String::new, |n| format!(", {}", counted(n, "tag")));
             Ok(format!("vehicle `{}`, {} parts{tags}", vehicle.name, vehicle.parts.len()))
         }
-        Some(FileKind::InputMap) => Ok(describe_input(&read_input_map(file)?)),
-        Some(FileKind::TagMap) => {
+        Kind::Input => Ok(describe_input(&read_input_map(file)?)),
+        Kind::TagMap => {
             let map = read_landmarks(file)?;
             Ok(format!("tag map in the frame `{}`, {}", map.frame, counted(map.landmarks.len(), "landmark")))
         }
-        Some(FileKind::RoutineWithoutVehicle) => Err(UsageError::new(
-            Code::KeyMissing,
-            format!(
-                "{}: vehicle: is missing; a routine names the vehicle that carries the arm: \
-             robots/vehicles/fixed-base.toml is an arm bolted to the ground",
-                file.display()
-            ),
-        )
-        .into()),
-        _ => Err(UsageError::new(
-            Code::FileKind,
-            format!(
-                "{}: is none of robot, routine, vehicle, calibration, input map, tag map, task, plan",
-                file.display()
-            ),
-        )
-        .into()),
+        Kind::Scene => Ok(format!("scene, {}", counted(routine::load_scene(file)?.obstacles.len(), "obstacle"))),
+        #[cfg(feature = "live")]
+        Kind::Arm => {
+            let connection = armcal_live::Connection::load(file)?;
+            Ok(format!("connection map: set-points on {}", connection.commands.topic))
+        }
+        kind => {
+            let (file, in_words, takers) = (file.display(), kind.in_words(), kind.takers());
+            Err(UsageError::new(
+                Code::FileKind,
+                format!("{file}: is {in_words}, which `check` does not read; {takers}"),
+            )
+            .into())
+        }
     }
 }
 

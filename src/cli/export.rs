@@ -1,6 +1,7 @@
 //! `armcal export`: a calibration in another form, on stdout.
 
 use armcal_core::codes::Code;
+use armcal_core::kind::Kind;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
@@ -115,7 +116,7 @@ pub(super) fn export(args: &ExportArgs) -> Result<Exit> {
         )
         .into());
     }
-    expect_kind(&args.file, &[FileKind::Calibration])?;
+    expect_kind(&args.file, &[FileKind::Toml(Kind::Calibration)])?;
     let robot = args.robot.as_deref().map(|folder| load_robot(folder, &[])).transpose()?;
     let input = read_input(&args.file)?;
     if !args.refused

@@ -1,4 +1,4 @@
-//! What a file is, by its content, and which command takes it: for those who name the wrong one.
+//! Kinds of files by their first bytes or their key `kind`. Errors name the command that takes a file.
 
 use armcal_core::codes::Code;
 use std::io::Read;
@@ -7,28 +7,21 @@ use std::path::Path;
 use anyhow::Result;
 
 use crate::cli::exit::UsageError;
+use armcal_core::document::stated_kind;
 use armcal_core::files::{self, FileKind as Size};
+use armcal_core::kind::Kind;
 use armcal_core::robot::parse_toml;
 
-/// What armcal reads and writes.
+/// Kind of a file or folder that armcal reads or writes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum FileKind {
     Recording,
     Bag,
     Rerun,
     RobotFolder,
-    RobotFile,
     Urdf,
-    Routine,
-    Vehicle,
-    Calibration,
-    InputMap,
-    TagMap,
-    Task,
-    Plan,
-    Connection,
-    /// A routine without a vehicle, as people write it at first.
-    RoutineWithoutVehicle,
+    /// TOML that states its kind.
+    Toml(Kind),
 }
 
 /// So much of a file's start tells a recording.
@@ -60,25 +53,8 @@ impl FileKind {
         if start.trim_ascii_start().starts_with(b"<") {
             return text.contains("<robot").then_some(Self::Urdf);
         }
-        Self::of_table(&parse_toml(path, &text).ok()?)
-    }
-
-    /// By the keys of a TOML file.
-    pub fn of_table(table: &toml::Table) -> Option<Self> {
-        let has = |key: &str| table.contains_key(key);
-        let by_keys = [
-            (has("inputs_hash"), Self::Plan),
-            (has("robot") && has("vehicle"), Self::Routine),
-            (has("urdf") && has("joint_sensor"), Self::RobotFile),
-            (has("part"), Self::Vehicle),
-            (has("joint_sensors") && has("tags"), Self::InputMap),
-            (has("frame") && has("tag"), Self::TagMap),
-            (has("tolerance_m"), Self::Task),
-            (has("messages_hash"), Self::Calibration),
-            (has("robot") && has("task"), Self::RoutineWithoutVehicle),
-            (has("joint_sensors") && has("commands"), Self::Connection),
-        ];
-        by_keys.into_iter().find(|(is, _)| *is).map(|(_, kind)| kind)
+        let table: toml::Table = parse_toml(path, &text).ok()?;
+        stated_kind(path, &table, None).ok().map(Self::Toml)
     }
 
     /// With its article.
@@ -88,16 +64,8 @@ impl FileKind {
             Self::Bag => "a ROS bag",
             Self::Rerun => "a file for the Rerun viewer (.rrd)",
             Self::RobotFolder => "a robot folder",
-            Self::RobotFile => "a robot.toml",
             Self::Urdf => "a URDF",
-            Self::Routine | Self::RoutineWithoutVehicle => "a routine",
-            Self::Vehicle => "a vehicle",
-            Self::Calibration => "a calibration",
-            Self::InputMap => "an input map",
-            Self::TagMap => "a tag map",
-            Self::Task => "a task",
-            Self::Plan => "a plan",
-            Self::Connection => "a connection map",
+            Self::Toml(kind) => kind.in_words(),
         }
     }
 
@@ -108,16 +76,8 @@ impl FileKind {
             Self::Bag => "`armcal inspect`, and `armcal calibrate` with --input, take it",
             Self::Rerun => "open it with `rerun FILE`; other commands take the recording that it was made from",
             Self::RobotFolder => "give it as --robot",
-            Self::RobotFile => "give its folder as --robot",
             Self::Urdf => "`armcal new-robot` makes a robot folder of it",
-            Self::Routine | Self::RoutineWithoutVehicle => "`armcal run`, `plan`, `campaign` and `regress` take it",
-            Self::Vehicle => "name it in a routine, or give it as --set vehicle=FILE",
-            Self::Calibration => "`armcal export` takes it, and --prior",
-            Self::InputMap => "give it as --input to `armcal calibrate`",
-            Self::TagMap => "give it as --tag-map to `armcal calibrate`, or as --tags to `armcal tagmap`",
-            Self::Task => "give it as --task to `armcal calibrate` or `watch`",
-            Self::Plan => "`armcal check` reads it",
-            Self::Connection => "give it as --arm: `armcal drive ROUTINE --arm FILE`",
+            Self::Toml(kind) => kind.takers(),
         }
     }
 }
@@ -139,7 +99,7 @@ pub(super) fn expect_kind(path: &Path, wanted: &[FileKind]) -> Result<()> {
 /// # Errors
 /// What the file is instead, and which command takes it.
 pub fn expect_routine(path: &Path) -> Result<()> {
-    expect_kind(path, &[FileKind::Routine, FileKind::RoutineWithoutVehicle])
+    expect_kind(path, &[FileKind::Toml(Kind::Routine)])
 }
 
 /// The same for recordings, of armcal or of others.
@@ -148,6 +108,6 @@ pub(super) fn expect_recording(path: &Path) -> Result<()> {
 }
 
 /// The same for a file that an option names, if it is given.
-pub(super) fn expect_option(path: Option<&Path>, wanted: FileKind) -> Result<()> {
-    path.map_or(Ok(()), |path| expect_kind(path, &[wanted]))
+pub(super) fn expect_option(path: Option<&Path>, wanted: Kind) -> Result<()> {
+    path.map_or(Ok(()), |path| expect_kind(path, &[FileKind::Toml(wanted)]))
 }

@@ -1,6 +1,7 @@
 //! `armcal plan`: poses and paths of a routine's first capture, without moving.
 
 use armcal_core::codes::Code;
+use armcal_core::kind::Kind;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
@@ -11,7 +12,7 @@ use comfy_table::{CellAlignment, Table};
 use crate::cli::calibration_inputs::read_prior;
 use crate::cli::closing::{say_closing, terminal_width};
 use crate::cli::exit::Exit;
-use crate::cli::file_kind::{FileKind, expect_option, expect_routine};
+use crate::cli::file_kind::{expect_option, expect_routine};
 use crate::cli::overrides::OverrideArgs;
 use crate::cli::stdout::{is_quiet, note, say, warn};
 use crate::output;
@@ -52,7 +53,7 @@ const DOMAIN: &[u8] = b"armcal plan 1";
 
 pub(super) fn plan(args: &PlanArgs) -> Result<Exit> {
     expect_routine(&args.routine)?;
-    expect_option(args.prior.as_deref(), FileKind::Calibration)?;
+    expect_option(args.prior.as_deref(), Kind::Calibration)?;
     let overrides = args.overrides.overrides();
     let routine = routine::load_with(&args.routine, &overrides)?;
     let (robot, vehicle) = routine.load_arm()?;

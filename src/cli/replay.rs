@@ -168,22 +168,24 @@ impl Drawings {
             }
         }
         let has = |name: &str| names.iter().any(|n| n == name);
+        let file = args.recording.display();
+        let attached = || format!("{file}: an attached file does not read; replay it with the armcal that recorded it");
         let robot = match &args.robot {
             Some(robot) => robot::load(robot)?,
-            None if has("robot.toml") => robot::load_attached(folder.path())?,
+            None if has("robot.toml") => robot::load_attached(folder.path()).with_context(attached)?,
             None => {
-                let recording = args.recording.display();
                 let problem = "carries no drawings of its robot (attachment robot.toml); name its folder with --robot";
-                return Err(UsageError::new(Code::UsageInvalid, format!("{recording}: {problem}")).into());
+                return Err(UsageError::new(Code::UsageInvalid, format!("{file}: {problem}")).into());
             }
         };
-        let vehicle =
-            has("vehicle.toml").then(|| robot::load_vehicle(&folder.path().join("vehicle.toml"))).transpose()?;
+        let vehicle = has("vehicle.toml").then(|| robot::load_vehicle(&folder.path().join("vehicle.toml")));
+        let vehicle = vehicle.transpose().with_context(attached)?;
         let robot = match &vehicle {
             Some(vehicle) => robot.mounted_on(vehicle)?,
             None => surveyed(recording, &robot).into_owned(),
         };
-        let scene = has("scene.toml").then(|| routine::load_scene(&folder.path().join("scene.toml"))).transpose()?;
+        let scene = has("scene.toml").then(|| routine::load_scene(&folder.path().join("scene.toml")));
+        let scene = scene.transpose().with_context(attached)?;
         Ok(Self { robot, vehicle, scene })
     }
 }

@@ -1,6 +1,7 @@
 //! `armcal tagmap`: where the tags are, from camera views alone.
 
 use armcal_core::codes::{Code, Warning};
+use armcal_core::kind::Kind;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
@@ -12,7 +13,7 @@ use serde_json::{Value, json};
 use crate::cli::calibration_inputs::load_robot;
 use crate::cli::closing::say_wrapped;
 use crate::cli::exit::Exit;
-use crate::cli::file_kind::{FileKind, expect_option, expect_recording};
+use crate::cli::file_kind::{expect_option, expect_recording};
 use crate::cli::stdout::{note, say};
 use crate::output;
 use crate::report::{TAG_COLUMNS, TagMapPage, fit_lines, group_title, tag_map_html, tag_rows};
@@ -87,7 +88,7 @@ const NOISY: f64 = 2.0;
 
 pub(super) fn tagmap(args: &TagmapArgs) -> Result<Exit> {
     expect_recording(&args.recording)?;
-    expect_option(args.tags.as_deref(), FileKind::TagMap)?;
+    expect_option(args.tags.as_deref(), Kind::TagMap)?;
     args.out.iter().chain(&args.html).try_for_each(|path| output::check_writable(path))?;
     let (cameras, tags, settings) = match (&args.robot, &args.camera, &args.tags) {
         (Some(folder), ..) => of_robot(&args.recording, &load_robot(folder, &[])?)?,

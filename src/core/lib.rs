@@ -6,9 +6,11 @@
 use armcal_libm as _;
 
 pub mod codes;
+pub mod document;
 pub mod files;
 pub mod input;
 pub mod joints;
+pub mod kind;
 pub mod kinematics;
 pub mod log;
 pub mod numeric;

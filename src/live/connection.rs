@@ -12,8 +12,10 @@ use serde::Deserialize;
 pub use bridge::Rosbridge;
 
 use crate::LiveError;
+use armcal_core::document::{VERSION, parse_file};
+use armcal_core::kind::Kind;
 use armcal_core::log::topics;
-use armcal_core::robot::{FileIssue, RobotError, parse_toml, read_text};
+use armcal_core::robot::{FileIssue, RobotError, read_text};
 
 /// The connection map of an arm.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -21,6 +23,8 @@ use armcal_core::robot::{FileIssue, RobotError, parse_toml, read_text};
 pub struct Connection {
     /// Of this file's layout: 1.
     pub version: u32,
+    /// [`Kind::Arm`].
+    pub kind: Kind,
     /// ROS_DOMAIN_ID.
     pub domain: u16,
     /// Addresses of this machine's interfaces that DDS may use; all of them where none are named. The sockets stay
@@ -58,7 +62,8 @@ impl Default for Connection {
     fn default() -> Self {
         let topic = str::to_owned;
         Self {
-            version: 1,
+            version: VERSION,
+            kind: Kind::Arm,
             domain: 0,
             networks: Vec::new(),
             rosbridge: None,
@@ -210,21 +215,12 @@ impl Connection {
     /// # Errors
     /// [`RobotError`] with file, key and allowed range.
     pub fn parse(file: &Path, text: &str) -> Result<Self, RobotError> {
-        let connection: Self = parse_toml(file, text)?;
+        let connection: Self = parse_file(Kind::Arm, file, text)?;
         connection.check(file)?;
         Ok(connection)
     }
 
     fn check(&self, file: &Path) -> Result<(), RobotError> {
-        if self.version != 1 {
-            return Err(FileIssue::new(
-                Code::VersionUnsupported,
-                file,
-                "version",
-                format!("{} is not 1", self.version),
-            )
-            .into());
-        }
         FileIssue::check_range(file, "domain", f64::from(self.domain), 0.0..=232.0)?;
         FileIssue::check_range(file, "commands.rate_hz", self.commands.rate_hz, 5.0..=1000.0)?;
         let guard = &self.guard;
@@ -301,12 +297,12 @@ mod tests {
     use super::*;
 
     fn checked(text: &str) -> Result<Connection, String> {
-        Connection::parse(Path::new("arm.toml"), text).map_err(|error| error.to_string())
+        Connection::parse(Path::new("arm.toml"), &format!("kind = \"arm\"\n{text}")).map_err(|error| error.to_string())
     }
 
     #[test]
     fn an_empty_map_has_the_topics_of_our_own_recordings() {
-        let connection = checked("").unwrap();
+        let connection = checked("version = 1").unwrap();
         assert_eq!(connection.joint_sensors, "/joint_sensors");
         assert_eq!(connection, Connection::default());
     }
@@ -328,7 +324,10 @@ mod tests {
             "[rosbridge]\nros = 3",
             "joint_sensor = \"/a\"",
         ];
-        let told = texts.map(|text| format!("{text:?}\n  {}\n", checked(text).expect_err(text)));
+        let told = texts.map(|text| {
+            let version = if text.contains("version") { "" } else { "version = 1\n" };
+            format!("{text:?}\n  {}\n", checked(&format!("{version}{text}")).expect_err(text))
+        });
         insta::assert_snapshot!("connections", told.concat());
     }
 }

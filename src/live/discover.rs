@@ -140,7 +140,7 @@ impl<'a> Proposal<'a> {
             "# Proposed by `armcal live discover`. Look at each choice; docs/guide/live-arm.md says what the keys",
         );
         self.line("# mean. What is called by the name of a thing was taken for it.");
-        self.line(&format!("version = 1\ndomain = {number}\nnetworks = [{}]\n", networks.join(", ")));
+        self.line(&format!("version = 1\nkind = \"arm\"\ndomain = {number}\nnetworks = [{}]\n", networks.join(", ")));
     }
 
     /// Everything that the arm publishes; readings a second.

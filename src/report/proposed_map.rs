@@ -59,7 +59,7 @@ pub fn propose_input_map(recording: &Path, robot: Option<&Robot>) -> Result<Stri
     let (tag_topic, tags) = choose_tags(&contents).ok_or_else(|| missing(TAG_TYPES))?;
     let mut text = format!(
         "# Proposed by `armcal inspect --write-input` for {}.\n# Look at each choice; docs/reference/real-arms.md says \
-         what the keys mean.\nversion = 1\n",
+         what the keys mean.\nversion = 1\nkind = \"input\"\n",
         comment(&file)
     );
     text += "# max_gap_s = 0.5   # a tag message farther than this from any joint reading is left out\n";

@@ -150,13 +150,13 @@ fn missing_keys_are_told_at_once_and_unknown_ones_with_the_nearest() {
     let _texts = Texts::of("missing_keys_are_told_at_once_and_unknown_ones_with_the_nearest");
     let folder = temp();
     let map = folder.path().join("map.toml");
-    write(&map, "version = 1\n[joint_sensors]\ntopic = \"/j\"\n[tags]\ntopics = \"/t\"\n");
+    write(&map, "version = 1\nkind = \"input\"\n[joint_sensors]\ntopic = \"/j\"\n[tags]\ntopics = \"/t\"\n");
     let check = |file: &Path| answer(program().arg("check").arg(file));
-    check(&map).expect("unknown", 2, &["map.toml", "line 5", "`topics`"]);
-    write(&map, "[joint_sensors]\ntopic = \"/j\"\n[tags]\n");
+    check(&map).expect("unknown", 2, &["map.toml", "line 6", "`topics`"]);
+    write(&map, "version = 1\nkind = \"input\"\n[joint_sensors]\ntopic = \"/j\"\n[tags]\n");
     check(&map).expect("missing", 2, &[]);
     let routine = folder.path().join("r.toml");
-    write(&routine, "version = 1\nrobot = \"a\"\nvehicle = \"b\"\n[task]\n");
+    write(&routine, "version = 1\nkind = \"routine\"\nrobot = \"a\"\nvehicle = \"b\"\n[task]\n");
     check(&routine).expect("routine", 2, &[]);
     let robot = robot_copy(folder.path());
     edit(&robot.join("robot.toml"), "mount_std_m", "mount_std");

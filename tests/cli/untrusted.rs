@@ -138,7 +138,8 @@ fn long_files_and_many_entries_are_refused() {
             "[[tag]]\nid = {k}\nsize_m = 0.1\nposition_m = [0.0, 0.0, 1.0]\nquaternion_wxyz = [1.0, 0.0, 0.0, 0.0]\n"
         )
     };
-    let map = |n: usize| format!("version = 1\nframe = \"a\"\n{}", (0..n).map(tag).collect::<String>());
+    let map =
+        |n: usize| format!("version = 1\nkind = \"tag_map\"\nframe = \"a\"\n{}", (0..n).map(tag).collect::<String>());
     write(&file, &map(5_000));
     check(&file).expect("5,000 tags", 0, &["5000 landmarks"]);
     write(&file, &map(5_001));
@@ -180,7 +181,11 @@ fn control_characters_never_reach_the_terminal() {
     let failed = run(&broken, &folder.path().join("out"));
     failed.expect("broken TOML", 2, &["\\u001b]0;owned\\u0007"]);
     let map = folder.path().join("map.toml");
-    write(&map, "version = 1\nframe = \"a\\u001b[31m\"\n[[tag]]\nid = 1\nsize_m = 0.1\nposition_m = [0.0, 0.0, 1.0]\n");
+    write(
+        &map,
+        "version = 1\nkind = \"tag_map\"\n\
+         frame = \"a\\u001b[31m\"\n[[tag]]\nid = 1\nsize_m = 0.1\nposition_m = [0.0, 0.0, 1.0]\n",
+    );
     let frame = check(&map);
     frame.expect("a frame", 0, &["a\\u001b[31m"]);
     for told in [good, spoilt, failed, frame] {

@@ -36,7 +36,8 @@ fn files(folder: &Path, robot: &Robot, motors: &str, values: &str) -> PathBuf {
     let names: Vec<String> = robot.joint_names().iter().map(|name| format!("{name} = \"{name}.pos\"")).collect();
     let map = folder.join("map.toml");
     let text = format!(
-        "version = 1\n[table]\n[joint_sensors]\nnames = {{ {} }}\nlerobot = {{ file = \"arm.json\", motors = \
+        "version = 1\nkind = \"input\"\n\
+         [table]\n[joint_sensors]\nnames = {{ {} }}\nlerobot = {{ file = \"arm.json\", motors = \
          \"{motors}\", values = \"{values}\" }}\n[tags]\nchild_frame = \"board\"\nuse = \"position\"\n\
          [tags.columns]\ndirection = \"camera_from_tag\"\nposition = [\"x\", \"y\", \"z\"]\n",
         names.join(", ")

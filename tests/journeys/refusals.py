@@ -52,7 +52,7 @@ def with_map(change):
     """The survey, changed, as a tag map."""
     tags = copy.deepcopy(TAGS)
     change(tags)
-    lines = ['version = 1\nframe = "base_link"\n']
+    lines = ['version = 1\nkind = "tag_map"\nframe = "base_link"\n']
     keys = ("id", "size_m", "position_m", "quaternion_wxyz", "position_std_m", "rotation_std_rad")
     for tag in tags:
         three = {key: [tag.get(key, 0.0)] * 3 for key in keys[4:]}

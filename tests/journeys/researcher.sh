@@ -100,6 +100,7 @@ tag() { # ID PLACE QUATERNION
 cp "$REPOSITORY/robots/vehicles/fixed-base.toml" .
 cat >my-arm.toml <<'END'
 version = 1
+kind = "routine"
 name = "my-arm"
 robot = "my-arm"
 vehicle = "fixed-base.toml"

@@ -15,7 +15,8 @@ fn a_served_arm_is_discovered_and_heard() {
     let routine = ShortRoutine::default().write(out.path());
     let names: String = titan().joint_names().iter().map(|name| format!("{name} = \"titan_{name}\"\n")).collect();
     let served = format!(
-        "networks = [\"127.0.0.1\"]\njoint_sensors = \"/titan/raw\"\noil_temperature = \"/hpu/oil\"\n[names]\n{names}\
+        "version = 1\nkind = \"arm\"\n\
+         networks = [\"127.0.0.1\"]\njoint_sensors = \"/titan/raw\"\noil_temperature = \"/hpu/oil\"\n[names]\n{names}\
          [commands]\ntopic = \"/titan/set_points\"\ntype = \"std_msgs/msg/Float64MultiArray\"\n\
          [stop]\ntopic = \"/titan/stop\"\nservice = \"/titan/halt\"\n"
     );

@@ -106,9 +106,9 @@ fn way_rad(sensor: &JointSensorSpec, from: f64, to: f64) -> f64 {
 /// A run through the relay; the script goes on with `ends` while it runs as $RUN, and $SERVER serves.
 fn relayed(folder: &Path, fault: &str, steps: &str, ends: &str) -> (Answer, Seen) {
     let routine = ShortRoutine { tail: steps.to_owned(), ..ShortRoutine::default() }.write(folder);
-    write(&folder.join("served.toml"), "domain = 1\nnetworks = [\"127.0.0.1\"]\n");
+    write(&folder.join("served.toml"), "version = 1\nkind = \"arm\"\ndomain = 1\nnetworks = [\"127.0.0.1\"]\n");
     // A busy machine holds readings up for longer than the default allows.
-    let arm = format!("networks = [\"127.0.0.1\"]\n[guard]\nstale_s = {STALE_S}\n");
+    let arm = format!("version = 1\nkind = \"arm\"\nnetworks = [\"127.0.0.1\"]\n[guard]\nstale_s = {STALE_S}\n");
     write(&folder.join("arm.toml"), &arm);
     let script = format!(
         "python3 $RELAY relay.jsonl {fault} & RELAY=$!; \

@@ -47,7 +47,7 @@ fn in_namespace(out: &Path, routine: &Path, script: &str) -> Answer {
 
 fn connection(out: &Path, more: &str) -> PathBuf {
     let file = out.join("arm.toml");
-    write(&file, &format!("networks = [\"127.0.0.1\"]\n{more}"));
+    write(&file, &format!("version = 1\nkind = \"arm\"\nnetworks = [\"127.0.0.1\"]\n{more}"));
     file
 }
 

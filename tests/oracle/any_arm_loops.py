@@ -160,6 +160,7 @@ rotation_std_rad = 0.0035
 def routine(name, targets):
     rows = "\n".join(f"  [{', '.join(f'{v:.3f}' for v in target)}]," for target in targets)
     return f"""version = 1
+kind = "routine"
 name = "{name}"
 robot = "{name}"
 vehicle = "{VEHICLE}"

@@ -34,7 +34,7 @@ sys.exit(code)
 def run_pair(args, seed):
     folder = args.out.resolve() / str(seed)
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "arm.toml").write_text('networks = ["127.0.0.1"]\n')
+    (folder / "arm.toml").write_text('version = 1\nkind = "arm"\nnetworks = ["127.0.0.1"]\n')
     (folder / "timed.py").write_text(TIMED)
     values = {"ARMCAL": args.armcal.resolve(), "ROUTINE": args.routine.resolve(), "SEED": seed, "FACTOR": args.factor,
               "TIMED": "python3 timed.py", "MORE": args.run_more}

@@ -94,6 +94,7 @@ fn write_rod(folder: &Path, stowed_rad: f64) -> (PathBuf, PathBuf) {
     </robot>"#;
     let toml = format!(
         r#"version = 1
+kind = "robot"
 name = "rod"
 urdf = "rod.urdf"
 base_link = "base_link"
@@ -129,7 +130,7 @@ mount_std_m = 0.002
 mount_std_rad = 0.0035
 "#
     );
-    let vehicle = "version = 1\nname = \"crate\"\nmass_kg = 4000.0\npart = []\n[mount]\n\
+    let vehicle = "version = 1\nkind = \"vehicle\"\nname = \"crate\"\nmass_kg = 4000.0\npart = []\n[mount]\n\
                    position_m = [0.0, 0.0, 0.0]\nquaternion_wxyz = [1.0, 0.0, 0.0, 0.0]\n";
     write(&folder.join("rod.urdf"), urdf);
     write(&folder.join("robot.toml"), &toml);

@@ -87,7 +87,7 @@ impl RealTitan {
 
     /// The landmarks as a tag map.
     pub fn tag_map(&self) -> String {
-        let mut text = "version = 1\nframe = \"base_link\"\n".to_owned();
+        let mut text = "version = 1\nkind = \"tag_map\"\nframe = \"base_link\"\n".to_owned();
         for (id, at) in self.landmarks_m.iter().enumerate() {
             let place: [f64; 3] = (*at).into();
             text += &format!("[[tag]]\nid = {id}\nposition_m = {place:?}\nposition_std_m = [0.001, 0.001, 0.001]\n");
@@ -98,7 +98,8 @@ impl RealTitan {
 
 /// The lines of [`INPUT_MAP`] that state the noise of [`AS_IN_2018`].
 pub const TAG_NOISE: &str = "position_std_m = 0.009\nrotation_std_rad = 0.018\n";
-pub const INPUT_MAP: &str = "version = 1\n[joint_sensors]\ntopic = \"/joint_states\"\n[tags]\ntopic = \"/tf\"\n\
+pub const INPUT_MAP: &str = "version = 1\nkind = \"input\"\n\
+    [joint_sensors]\ntopic = \"/joint_states\"\n[tags]\ntopic = \"/tf\"\n\
     camera_frame = \"fisheye\"\nchild_frame = \"tag36h11:{id}\"\nuse = \"position\"\n\
     position_std_m = 0.009\nrotation_std_rad = 0.018\n";
 

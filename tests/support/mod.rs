@@ -106,7 +106,7 @@ impl Default for ShortRoutine {
 impl ShortRoutine {
     pub fn text(&self) -> String {
         let mut text = format!(
-            "version = 1\nname = \"short\"\nrobot = {:?}\nvehicle = {:?}\nseed = {}\n\
+            "version = 1\nkind = \"routine\"\nname = \"short\"\nrobot = {:?}\nvehicle = {:?}\nseed = {}\n\
              [capture]\nposes = {}\nheld_out = {}\nmin_tags = {}\ndwell_s = 0.6\n[task]\ntolerance_m = 0.03\n",
             self.robot, self.vehicle, self.seed, self.poses, self.held_out, self.min_tags
         );

@@ -181,7 +181,8 @@ impl Scene {
         let [joints, tags, lens] = &self.topics;
         let path = self.folder.path().join("map.toml");
         let text = format!(
-            "version = 1\n{above}[joint_sensors]\ntopic = \"{joints}\"\n[tags]\ntopic = \"{tags}\"\nuse = \"corners\"\n\
+            "version = 1\nkind = \"input\"\n\
+             {above}[joint_sensors]\ntopic = \"{joints}\"\n[tags]\ntopic = \"{tags}\"\nuse = \"corners\"\n\
              camera_info = \"{lens}\"\n{in_tags}"
         );
         write(&path, &text);

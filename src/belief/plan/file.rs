@@ -10,7 +10,9 @@ use crate::plan::capture_plan::{ArmBelief, CapturePlan, LeastClearance, PlannedV
 use crate::plan::clearance::ClosestPair;
 use crate::plan::motion::timing::Timing;
 use crate::plan::view_planning::StopReason;
-use armcal_core::robot::{FileIssue, Robot, RobotError, parse_toml, read_text};
+use armcal_core::document::{VERSION, parse_file};
+use armcal_core::kind::Kind;
+use armcal_core::robot::{FileIssue, Robot, RobotError, read_text};
 use armcal_core::streams::{CaptureSet, JointAngles, MAX_JOINTS};
 
 /// One plan, as its file has it. Angles are believed ones, in rad; counts are what the arm's controller is sent for
@@ -20,6 +22,8 @@ use armcal_core::streams::{CaptureSet, JointAngles, MAX_JOINTS};
 pub struct PlanFile {
     /// Of the format: 1.
     pub version: u32,
+    /// [`Kind::Plan`].
+    pub kind: Kind,
     /// Name of the routine.
     pub routine: String,
     /// Name of the robot.
@@ -178,7 +182,8 @@ impl PlanFile {
         let visits = &itinerary.visits;
         let least_m = visits.iter().map(|visit| visit.path_clearance.proven_m).fold(f64::INFINITY, f64::min);
         Self {
-            version: 1,
+            version: VERSION,
+            kind: Kind::Plan,
             routine: header.routine,
             robot: robot.name.clone(),
             vehicle: header.vehicle,
@@ -224,14 +229,13 @@ impl PlanFile {
     /// # Errors
     /// [`RobotError`] naming file, key and allowed range.
     pub fn read(file: &FilePath) -> Result<Self, RobotError> {
-        let plan: Self = parse_toml(file, &read_text(file)?)?;
+        let plan: Self = parse_file(Kind::Plan, file, &read_text(file)?)?;
         plan.check(file)?;
         Ok(plan)
     }
 
     fn check(&self, file: &FilePath) -> Result<(), FileIssue> {
         let range = |key: &str, value: f64, range| FileIssue::check_range(file, key, value, range).map(|_| ());
-        range("version", f64::from(self.version), 1.0..=1.0)?;
         range("joints (number)", self.joints.len() as f64, 1.0..=MAX_JOINTS as f64)?;
         range("margin_m", self.margin_m, 0.0..=1.0)?;
         let numbers = |key: String, list: &[f64]| {

@@ -181,7 +181,8 @@ mod tests {
     fn told(unit: &str, factor: f64) -> Result<Option<String>, String> {
         let robot = crate::robot::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/titan4")).unwrap();
         let text = format!(
-            "version = 1\n[joint_sensors]\ntopic = \"/j\"\nunit = \"{unit}\"\n[tags]\ntopic = \"/t\"\nuse = \
+            "version = 1\nkind = \"input\"\n\
+             [joint_sensors]\ntopic = \"/j\"\nunit = \"{unit}\"\n[tags]\ntopic = \"/t\"\nuse = \
              \"corners\"\n"
         );
         let map = parse_input_map(Path::new("map.toml"), &text).unwrap();

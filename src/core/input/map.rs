@@ -2,6 +2,7 @@
 //!
 //! ```toml
 //! version = 1
+//! kind = "input"
 //! max_gap_s = 0.5                    # optional: a tag message farther from any reading is left out
 //! while_moving = "leave_out"         # optional: or "use": what the camera saw while the arm was on its way
 //! not_finite = "refuse"              # optional: or "leave_out": NaN and infinities
@@ -50,8 +51,10 @@ pub use self::table::{
 use self::table::{TableToml, TagColumnsToml, TagTableToml, TagsOfTable};
 pub use self::units::{JointUnit, SlideUnit};
 use super::lerobot::{LerobotCalibration, LerobotToml};
+use crate::document::parse_file;
+use crate::kind::Kind;
 use crate::optics::TagFamily;
-use crate::robot::{FileIssue, JointSensorSpec, Robot, RobotError, parse_toml, read_text};
+use crate::robot::{FileIssue, JointSensorSpec, Robot, RobotError, read_text};
 
 mod table;
 mod units;
@@ -343,7 +346,10 @@ pub(super) fn without_slash(frame: &str) -> &str {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct MapToml {
-    version: u32,
+    #[serde(rename = "version")]
+    _version: u32,
+    #[serde(rename = "kind")]
+    _kind: Kind,
     #[serde(default = "usual_gap_s")]
     max_gap_s: f64,
     #[serde(default)]
@@ -438,7 +444,7 @@ fn usual_gap_s() -> f64 {
 /// # Errors
 /// [`RobotError`] with file, key and allowed range.
 pub fn read_input_map(file: &Path) -> Result<InputMap, RobotError> {
-    let raw: MapToml = parse_toml(file, &read_text(file)?)?;
+    let raw: MapToml = parse_file(Kind::Input, file, &read_text(file)?)?;
     let lerobot = raw.joint_sensors.lerobot.clone();
     let map = checked(file, raw)?;
     let lerobot = lerobot.map(|lerobot| LerobotCalibration::read(file, &lerobot)).transpose()?;
@@ -450,11 +456,10 @@ pub fn read_input_map(file: &Path) -> Result<InputMap, RobotError> {
 /// # Errors
 /// As [`read_input_map`].
 pub fn parse_input_map(file: &Path, text: &str) -> Result<InputMap, RobotError> {
-    checked(file, parse_toml(file, text)?)
+    checked(file, parse_file(Kind::Input, file, text)?)
 }
 
 fn checked(file: &Path, raw: MapToml) -> Result<InputMap, RobotError> {
-    FileIssue::check_range(file, "version", f64::from(raw.version), 1.0..=1.0)?;
     let child_frame = raw.tags.child_frame.as_deref().map(|frame| child_frame(file, frame)).transpose()?;
     let family = |text: &String| {
         text.parse().map_err(|problem: String| FileIssue::new(Code::NameUnknown, file, "tags.family", problem))

@@ -2,6 +2,7 @@
 //!
 //! ```toml
 //! version = 1
+//! kind = "task"
 //! tolerance_m = 0.02
 //! targets_m = [[0.5, 1.6, 0.3]]           # tool positions in the frame of the arm's base
 //! # or the arm's joint angles there, base first, instead:
@@ -13,9 +14,11 @@ use std::path::Path;
 
 use serde::Deserialize;
 
+use crate::document::parse_file;
 use crate::joints::JointAngles;
+use crate::kind::Kind;
 use crate::kinematics::{ChainJoint, JointKind};
-use crate::robot::{FileIssue, Robot, RobotError, parse_toml, read_text};
+use crate::robot::{FileIssue, Robot, RobotError, read_text};
 use crate::streams::ReachTask;
 use crate::time::Stamp;
 
@@ -33,7 +36,10 @@ pub struct TaskFile {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct TaskToml {
-    version: u32,
+    #[serde(rename = "version")]
+    _version: u32,
+    #[serde(rename = "kind")]
+    _kind: Kind,
     tolerance_m: f64,
     #[serde(default)]
     targets_m: Vec<[f64; 3]>,
@@ -57,8 +63,7 @@ pub fn read_task(file: &Path) -> Result<TaskFile, RobotError> {
 /// # Errors
 /// As [`read_task`].
 pub fn parse_task(file: &Path, text: &str) -> Result<TaskFile, RobotError> {
-    let raw: TaskToml = parse_toml(file, text)?;
-    FileIssue::check_range(file, "version", f64::from(raw.version), 1.0..=1.0)?;
+    let raw: TaskToml = parse_file(Kind::Task, file, text)?;
     FileIssue::check_range(file, "tolerance_m", raw.tolerance_m, 1e-6..=10.0)?;
     for (k, target) in raw.targets_m.iter().enumerate() {
         for value in target {
@@ -136,7 +141,7 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_named_with_file_and_key() {
-        let good = "version = 1\ntolerance_m = 0.02\ntargets_m = [[0.5, 1.6, 0.3]]\n";
+        let good = "version = 1\nkind = \"task\"\ntolerance_m = 0.02\ntargets_m = [[0.5, 1.6, 0.3]]\n";
         let parse = |text: &str| parse_task(Path::new("task.toml"), text).map_err(|error| error.to_string());
         assert_eq!(parse(good).expect("good").targets_m, [[0.5, 1.6, 0.3]]);
         let faults = [

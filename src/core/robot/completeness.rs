@@ -9,7 +9,7 @@ use toml::{Table, Value};
 use super::error::FileIssue;
 use crate::kinematics::JointKind;
 
-const ROBOT_KEYS: [&str; 7] = ["version", "name", "urdf", "base_link", "tool", "joint_sensor", "camera"];
+const ROBOT_KEYS: [&str; 6] = ["name", "urdf", "base_link", "tool", "joint_sensor", "camera"];
 const TOOL_KEYS: [&str; 2] = ["link", "point_m"];
 const CAMERA_KEYS: [&str; 4] = ["name", "link", "mount_std_m", "mount_std_rad"];
 const SENSOR_KEYS: [&str; 12] = [

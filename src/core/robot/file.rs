@@ -23,8 +23,10 @@ use super::shape::{PlacedShape, Shape};
 use super::survey::{SurveyedTag, TagFile, check_tags};
 use super::urdf::{UrdfChain, UrdfModel, notes as urdf_notes};
 use super::urdf_mesh::{CollisionMeshes, MeshFolders};
+use crate::document::check_head;
 
 use crate::joints::JointAngles;
+use crate::kind::Kind;
 use crate::kinematics::{ArmLoads, Attachment, JointKind};
 use crate::optics::TagFamily;
 use crate::spatial::{Base, Pose};
@@ -32,7 +34,10 @@ use crate::spatial::{Base, Pose};
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RobotFile {
-    version: u32,
+    #[serde(rename = "version")]
+    _version: u32,
+    #[serde(rename = "kind")]
+    _kind: Kind,
     name: String,
     serial: Option<String>,
     urdf: PathBuf,
@@ -131,9 +136,9 @@ fn read_files(folder: &Path) -> Result<(RobotFile, UrdfModel), RobotError> {
     let file = folder.join("robot.toml");
     let text = read_in(folder, &file)?;
     let table: toml::Table = parse_toml(&file, &text)?;
+    check_head(Kind::Robot, &file, &table)?;
     check_complete(&file, &table, || chain_joints(folder, &table))?;
     let raw: RobotFile = parse_toml(&file, &text)?;
-    FileIssue::check_range(&file, "version", f64::from(raw.version), 1.0..=1.0)?;
     let urdf = read_urdf(folder, &raw.urdf)?;
     Ok((raw, urdf))
 }

@@ -181,7 +181,7 @@ impl Draft<'_> {
             out,
             "# Written by `armcal new-robot` from {}. \"Read\" is what the URDF says, \"assumed\" is not: look at it.\n\
              # Angles in rad, lengths and the ways of slides in m. Keys that begin with # are left to fill in.\n\
-             version = 1\nname = {}\nurdf = {urdf}\n\
+             version = 1\nkind = \"robot\"\nname = {}\nurdf = {urdf}\n\
              # Read: the chain of {n} moving joints from here. Tags and targets are in this link's frame.\n\
              base_link = {}\n\
              # Assumed: the arm is in air. Under water: the displaced water's weight over the arm's.\n\

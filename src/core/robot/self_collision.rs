@@ -4,14 +4,16 @@
 //! The file holds the hash of the URDF and is valid for that URDF only.
 
 use crate::codes::Code;
+use crate::kind::Kind;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
 use super::body::LinkBody;
-use super::error::{FileIssue, RobotError, parse_toml, read_in};
+use super::error::{FileIssue, RobotError, read_in};
 use super::nominal::Robot;
 use super::self_pairs::{SelfPair, SelfPairs};
+use crate::document::{VERSION, parse_file};
 
 /// Its name in a robot folder.
 pub const SELF_COLLISION_FILE: &str = "self_collision.toml";
@@ -20,6 +22,7 @@ pub const SELF_COLLISION_FILE: &str = "self_collision.toml";
 #[serde(deny_unknown_fields)]
 struct SelfCollisionFile {
     version: u32,
+    kind: Kind,
     /// BLAKE3 of the URDF's text.
     urdf_blake3: String,
     seed: u64,
@@ -44,7 +47,8 @@ impl SelfPairs {
     pub fn to_toml(&self, file: &Path, robot: &Robot) -> Result<String, FileIssue> {
         let name = |body: usize| robot.bodies[body].name.clone();
         let raw = SelfCollisionFile {
-            version: 1,
+            version: VERSION,
+            kind: Kind::SelfCollision,
             urdf_blake3: hash(&robot.urdf_text),
             seed: self.seed,
             n: self.n,
@@ -81,8 +85,7 @@ pub(super) fn read(folder: &Path, urdf_text: &str, bodies: &[LinkBody]) -> Resul
     if !file.exists() {
         return Ok(Stored::None);
     }
-    let raw: SelfCollisionFile = parse_toml(&file, &read_in(folder, &file)?)?;
-    FileIssue::check_range(&file, "version", f64::from(raw.version), 1.0..=1.0)?;
+    let raw: SelfCollisionFile = parse_file(Kind::SelfCollision, &file, &read_in(folder, &file)?)?;
     FileIssue::check_range(&file, "near_m", raw.near_m, 0.0..=10.0)?;
     if raw.urdf_blake3 != hash(urdf_text) {
         let problem = format!(

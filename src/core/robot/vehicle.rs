@@ -6,10 +6,12 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::error::{FileIssue, RobotError, parse_toml, read_text};
+use super::error::{FileIssue, RobotError, read_text};
 use super::light::{LightFile, VehicleLight};
 use super::part::{Part, PartFile, check_parts, check_place};
 use super::survey::{TagFile, TagSurvey, check_tags};
+use crate::document::parse_file;
+use crate::kind::Kind;
 use crate::kinematics::Attachment;
 use crate::spatial::{Base, Pose, Vehicle as VehicleFrame};
 
@@ -110,6 +112,7 @@ impl VehicleDynamics {
 #[serde(deny_unknown_fields)]
 struct VehicleFile {
     version: u32,
+    kind: Kind,
     name: String,
     mass_kg: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -141,8 +144,7 @@ struct PlaceFile {
 /// [`RobotError`] naming file and key.
 pub fn load_vehicle(file: &Path) -> Result<Vehicle, RobotError> {
     let mut text = read_text(file)?;
-    let mut raw: VehicleFile = parse_toml(file, &text)?;
-    FileIssue::check_range(file, "version", f64::from(raw.version), 1.0..=1.0)?;
+    let mut raw: VehicleFile = parse_file(Kind::Vehicle, file, &text)?;
     FileIssue::check_range(file, "mass_kg", raw.mass_kg, 1.0..=1e7)?;
     check_place(file, "mount.position_m", &raw.mount.position_m)?;
     let mount =

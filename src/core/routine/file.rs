@@ -16,16 +16,20 @@ use super::script::{self, Script};
 use super::settings::{CaptureSettings, TaskSettings};
 use super::site::SiteFile;
 use super::step::Step;
+use crate::kind::Kind;
 use crate::robot::{FileIssue, PartFile, read_text};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RoutineFile {
-    version: u32,
+    #[serde(rename = "version")]
+    _version: u32,
+    #[serde(rename = "kind")]
+    _kind: Kind,
     name: String,
     operator: Option<String>,
     robot: PathBuf,
-    vehicle: PathBuf,
+    vehicle: Option<PathBuf>,
     #[serde(default = "first_seed")]
     seed: u64,
     #[serde(default)]
@@ -82,7 +86,11 @@ pub fn load(file: &Path) -> Result<Routine, RoutineError> {
 pub fn load_with(file: &Path, overrides: &Overrides) -> Result<Routine, RoutineError> {
     let raw: RoutineFile = read_with(file, &overrides.set)?;
     let check = |key: &str, value: f64, range| FileIssue::check_range(file, key, value, range);
-    check("version", f64::from(raw.version), 1.0..=1.0)?;
+    let vehicle = raw.vehicle.ok_or_else(|| {
+        let problem = "is missing; a routine names the vehicle that carries the arm: \
+                       robots/vehicles/fixed-base.toml is an arm bolted to the ground";
+        FileIssue::new(Code::KeyMissing, file, "vehicle", problem)
+    })?;
     raw.capture.check(file, "capture.")?;
     check("task.tolerance_m", raw.task.tolerance_m, 1e-4..=1.0)?;
     if raw.task.targets_m.is_empty() {
@@ -102,7 +110,7 @@ pub fn load_with(file: &Path, overrides: &Overrides) -> Result<Routine, RoutineE
     let folder = file.parent().unwrap_or(Path::new("."));
     let tags = raw.site.tags.clone();
     let (map, base_tag_std) = (raw.site.map(file)?, raw.site.base_tag_std(file)?);
-    let (scene, scene_file) = SceneFile { site: raw.site, obstacle: raw.obstacle }.check(file)?;
+    let (scene, scene_file) = SceneFile::new(raw.site, raw.obstacle).check(file)?;
     let scene_toml = toml::to_string(&scene_file)
         .map_err(|error| FileIssue::new(Code::Internal, file, "obstacle", format!("has no TOML form: {error}")))?;
     let script = if raw.step.is_empty() {
@@ -117,7 +125,7 @@ pub fn load_with(file: &Path, overrides: &Overrides) -> Result<Routine, RoutineE
         name: raw.name,
         operator: raw.operator,
         robot_folder: overrides.robot.clone().unwrap_or_else(|| folder.join(raw.robot)),
-        vehicle_file: overrides.vehicle.clone().unwrap_or_else(|| folder.join(raw.vehicle)),
+        vehicle_file: overrides.vehicle.clone().unwrap_or_else(|| folder.join(vehicle)),
         seed: raw.seed,
         method: raw.method,
         scene,

@@ -11,6 +11,8 @@ use serde::de::DeserializeOwned;
 use toml::{Table, Value};
 
 use super::error::RoutineError;
+use crate::document::{check_head, parse_file};
+use crate::kind::Kind;
 use crate::robot::{FileIssue, parse_toml, read_text};
 use crate::text::with_nearest;
 
@@ -118,6 +120,7 @@ impl fmt::Display for Override {
 /// [`RoutineError`] where the file is no TOML or an override has no place in it.
 pub fn effective_table(file: &Path, set: &[Override]) -> Result<Table, RoutineError> {
     let mut table: Table = parse_toml(file, &read_text(file)?)?;
+    check_head(Kind::Routine, file, &table)?;
     for one in set {
         one.apply(&mut table)
             .map_err(|problem| FileIssue::new(Code::ValueInvalid, file, format!("--set {one}"), problem))?;
@@ -127,7 +130,7 @@ pub fn effective_table(file: &Path, set: &[Override]) -> Result<Table, RoutineEr
 
 /// Reads a routine file as `T`, with overrides in place.
 pub(super) fn read_with<T: DeserializeOwned>(file: &Path, set: &[Override]) -> Result<T, RoutineError> {
-    let read_alone = || -> Result<T, RoutineError> { Ok(parse_toml(file, &read_text(file)?)?) };
+    let read_alone = || -> Result<T, RoutineError> { Ok(parse_file(Kind::Routine, file, &read_text(file)?)?) };
     if set.is_empty() {
         return read_alone();
     }

@@ -6,7 +6,9 @@ use serde::{Deserialize, Serialize};
 
 use super::error::RoutineError;
 use super::site::SiteFile;
-use crate::robot::{FileIssue, Part, PartFile, check_parts, parse_toml, read_text};
+use crate::document::{VERSION, parse_file};
+use crate::kind::Kind;
+use crate::robot::{FileIssue, Part, PartFile, check_parts, read_text};
 
 /// The site: a flat seafloor and obstacles, placed in the world frame (z up, origin at the vehicle's station).
 #[derive(Clone, Debug, Default)]
@@ -17,10 +19,12 @@ pub struct Scene {
     pub obstacles: Vec<Part>,
 }
 
-/// The tables `[site]` and `[[obstacle]]` of a routine.
+/// The tables `[site]` and `[[obstacle]]` of a routine, as a file that travels with a recording.
 #[derive(Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SceneFile {
+    version: u32,
+    kind: Kind,
     #[serde(default)]
     pub(super) site: SiteFile,
     #[serde(default)]
@@ -28,6 +32,10 @@ pub(super) struct SceneFile {
 }
 
 impl SceneFile {
+    pub(super) fn new(site: SiteFile, obstacle: Vec<PartFile>) -> Self {
+        Self { version: VERSION, kind: Kind::Scene, site, obstacle }
+    }
+
     /// The scene, and itself without the files of meshes.
     pub(super) fn check(self, file: &Path) -> Result<(Scene, Self), RoutineError> {
         if let Some(z) = self.site.seafloor_z_m {
@@ -43,5 +51,5 @@ impl SceneFile {
 /// # Errors
 /// [`RoutineError`] naming file, key and allowed range.
 pub fn load_scene(file: &Path) -> Result<Scene, RoutineError> {
-    Ok(parse_toml::<SceneFile>(file, &read_text(file)?)?.check(file)?.0)
+    Ok(parse_file::<SceneFile>(Kind::Scene, file, &read_text(file)?)?.check(file)?.0)
 }

@@ -123,7 +123,7 @@ fn beside(table: &Path, map: &Path) -> String {
 fn head(files: &str, sides: &[(&TableContents, &Roles)]) -> String {
     let mut text = format!(
         "# Proposed by `armcal inspect --write-input` for {files}.\n# Look at each choice; docs/reference/real-arms.md \
-         says what the keys mean.\nversion = 1\n"
+         says what the keys mean.\nversion = 1\nkind = \"input\"\n"
     );
     let gaps: Vec<String> = sides
         .iter()

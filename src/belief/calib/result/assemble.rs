@@ -18,7 +18,9 @@ use crate::calib::views::scale_identification::IdentifiedScale;
 use crate::calib::views::view::{CaptureData, EndStopReading, TagMeasurement, View};
 use crate::judge::{TargetError, TargetU95, U95Table};
 use armcal_core::codes::Code;
+use armcal_core::document::VERSION;
 use armcal_core::input::TagNoise;
+use armcal_core::kind::Kind;
 use armcal_core::robot::Robot;
 use armcal_core::routine::Method;
 use armcal_core::sensor::{ConditionChange, SensorModel};
@@ -79,8 +81,10 @@ pub(crate) fn assemble(source: &Provenance<'_>, fit: &Fit<'_>, evidence: Evidenc
         held_out_limit: held_out_limit(source, fit, tolerance_m, held_out.views),
     });
     let refusals: Vec<Refusal> = by_conditions.or_else(|| refusal_by_risk(&u95)).into_iter().collect();
+    let names = fit.covariance.parameters.iter().map(|p| p.name(source.robot)).collect();
     let mut calibration = Calibration {
-        version: 1,
+        version: VERSION,
+        kind: Kind::Calibration,
         robot: source.robot.name.clone(),
         method: source.method,
         status: Status::Accepted,
@@ -110,10 +114,7 @@ pub(crate) fn assemble(source: &Provenance<'_>, fit: &Fit<'_>, evidence: Evidenc
         failed_joint: Vec::new(),
         prior: None,
         covariance_hash: None,
-        covariance: CovarianceTable::new(
-            fit.covariance.parameters.iter().map(|p| p.name(source.robot)).collect(),
-            &fit.covariance.matrix,
-        ),
+        covariance: CovarianceTable::new(names, &fit.covariance.matrix),
         details,
     };
     calibration.refuse_for(refusals);

@@ -5,13 +5,16 @@ use crate::calib::result::covariance_file::CovarianceTable;
 use crate::calib::result::details::FitDetails;
 use crate::calib::result::metrics::{FitMetrics, HeldOutMetrics};
 use crate::calib::result::valid_range::ValidRange;
+use armcal_core::document::VERSION;
+use armcal_core::kind::Kind;
 use armcal_core::numeric::Outcome;
 use armcal_core::routine::Method;
 
 /// Accepted, without joints or covariance.
 pub(in crate::calib) fn bare(robot: &str, method: Method) -> Calibration {
     Calibration {
-        version: 1,
+        version: VERSION,
+        kind: Kind::Calibration,
         robot: robot.to_owned(),
         method,
         status: Status::Accepted,

@@ -1,5 +1,6 @@
 //! calibration.toml: the answer, how sure it is, what it rests on and where it holds.
 
+use armcal_core::kind::Kind;
 use armcal_core::kinematics::JointKind;
 use armcal_core::routine::Method;
 use armcal_core::stats::Summary;
@@ -41,6 +42,8 @@ pub enum Status {
 pub struct Calibration {
     /// Of the format: 1.
     pub version: u32,
+    /// [`Kind::Calibration`].
+    pub kind: Kind,
     /// Name of the robot.
     pub robot: String,
     /// Method that made it.

@@ -10,7 +10,9 @@ use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 use crate::calib::result::file_error::CalibrationFileError;
-use armcal_core::robot::{FileIssue, RobotError, parse_toml, read_text};
+use armcal_core::document::{VERSION, parse_file};
+use armcal_core::kind::Kind;
+use armcal_core::robot::{FileIssue, RobotError, read_text};
 use armcal_core::text::printable;
 
 /// Above so many rows, a covariance is written with seven significant digits.
@@ -39,6 +41,8 @@ pub struct CovarianceTable {
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CovarianceFile {
+    version: u32,
+    kind: Kind,
     calibration_hash: String,
     parameters: Vec<String>,
     lower_triangle: Vec<Vec<f64>>,
@@ -67,23 +71,23 @@ impl CovarianceTable {
         self.parameters.iter().position(|name| name == parameter)
     }
 
-    /// The table as a file's body, without the other file's hash.
-    fn body(&self) -> String {
+    /// Returns the text of the file with the hash of its counterpart.
+    fn text(&self, calibration_hash: String) -> String {
         let lower_triangle = self.rows.iter().enumerate().map(|(i, row)| row[..=i].to_vec()).collect();
-        let file =
-            CovarianceFile { calibration_hash: String::new(), parameters: self.parameters.clone(), lower_triangle };
-        let text = toml::to_string(&file).expect("names and numbers have a TOML form");
-        text.lines().filter(|line| !line.starts_with(CALIBRATION_HASH)).map(|line| format!("{line}\n")).collect()
+        let (version, kind, parameters) = (VERSION, Kind::Covariance, self.parameters.clone());
+        let file = CovarianceFile { version, kind, calibration_hash, parameters, lower_triangle };
+        let body = toml::to_string(&file).expect("names and numbers have a TOML form");
+        format!("{HEAD}{body}")
     }
 
     /// What `covariance_hash` in calibration.toml is.
     pub(crate) fn hash(&self) -> String {
-        content_hash(&self.body())
+        content_hash(&self.text(String::new()))
     }
 
     /// The file that goes beside the calibration with this text.
     pub(crate) fn to_file(&self, calibration: &str) -> String {
-        format!("{HEAD}{CALIBRATION_HASH} = \"{}\"\n{}", content_hash(calibration), self.body())
+        self.text(content_hash(calibration))
     }
 
     /// Reads the covariance of `calibration`, whose text and `covariance_hash` these are.
@@ -96,7 +100,7 @@ impl CovarianceTable {
             return Err(CalibrationFileError::NoCovariance { file, calibration: calibration.to_owned() });
         }
         let covariance = read_text(&file)?;
-        let read: CovarianceFile = parse_toml(&file, &covariance)?;
+        let read: CovarianceFile = parse_file(Kind::Covariance, &file, &covariance)?;
         let (n, lower) = (read.parameters.len(), &read.lower_triangle);
         if lower.len() != n || lower.iter().enumerate().any(|(i, row)| row.len() != i + 1) {
             let problem = format!("needs {n} rows, one for each of `parameters`, of 1 .. {n} numbers");

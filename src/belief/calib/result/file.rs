@@ -14,11 +14,11 @@ use crate::calib::result::link_table::LinkResult;
 use crate::calib::result::slide_keys::{SLIDE_HEAD, in_metres, named_as_angles};
 use crate::calib::result::terms_table::TermsTable;
 use crate::calib::views::View;
+use armcal_core::document::parse_file;
 use armcal_core::joints::JointAngles;
+use armcal_core::kind::Kind;
 use armcal_core::kinematics::LinkCorrections;
-use armcal_core::robot::{
-    FileIssue, JointSensorSpec, Robot, RobotError, from_table, parse_toml, read_text, syntax_code,
-};
+use armcal_core::robot::{FileIssue, JointSensorSpec, Robot, RobotError, from_table, read_text, syntax_code};
 use armcal_core::sensor::{ArmSensors, Correction};
 
 /// The texts of a calibration's two files, which hold each other's hashes: to be put in place together.
@@ -247,21 +247,20 @@ impl Calibration {
     /// [`CalibrationFileError`] naming file, key and allowed range.
     pub fn parse(file: &Path, text: &str) -> Result<Self, CalibrationFileError> {
         let calibration: Self = if text.contains("prismatic") {
-            let table = named_as_angles(file, parse_toml(file, text)?).map_err(RobotError::from)?;
+            let table = named_as_angles(file, parse_file(Kind::Calibration, file, text)?).map_err(RobotError::from)?;
             from_table(&table).map_err(|message| RobotError::Syntax {
                 code: syntax_code(&message),
                 file: file.to_owned(),
                 message,
             })?
         } else {
-            parse_toml(file, text)?
+            parse_file(Kind::Calibration, file, text)?
         };
         calibration.check(file).map_err(RobotError::from)?;
         Ok(calibration)
     }
 
     fn check(&self, file: &Path) -> Result<(), FileIssue> {
-        FileIssue::check_range(file, "version", f64::from(self.version), 1.0..=1.0)?;
         for joint in &self.joint {
             let check = |key: &str, value: f64, range| {
                 FileIssue::check_range(file, &format!("joint `{}`: {key}", joint.name), value, range)

@@ -2,6 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use armcal_core::document::VERSION;
+use armcal_core::kind::Kind;
+
 /// The map that a calibration used in place of a survey.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -58,6 +61,7 @@ pub struct MapTag {
 #[derive(Serialize)]
 struct MapFile<'a> {
     version: u32,
+    kind: Kind,
     frame: &'a str,
     base_tag: u32,
     tag: Vec<MapFileTag>,
@@ -88,7 +92,13 @@ impl MapResult {
             position_std_m: tag.position_std_m,
             rotation_std_rad: tag.rotation_std_rad,
         });
-        let file = MapFile { version: 1, frame: &self.frame, base_tag: self.base_tag, tag: tag.collect() };
+        let file = MapFile {
+            version: VERSION,
+            kind: Kind::TagMap,
+            frame: &self.frame,
+            base_tag: self.base_tag,
+            tag: tag.collect(),
+        };
         toml::to_string(&file).expect("plain tables and finite numbers have a TOML form")
     }
 }

@@ -82,7 +82,8 @@ fn drawn_arm(number: usize, rng: &mut ChaCha8Rng) -> Robot {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("drawn.urdf"), urdf).expect("written");
     let text = format!(
-        "version = 1\nname = \"drawn\"\nurdf = \"drawn.urdf\"\nbase_link = \"l0\"\nbase_tag = 0\nstowed_rad = {:?}\n\
+        "version = 1\nkind = \"robot\"\n\
+         name = \"drawn\"\nurdf = \"drawn.urdf\"\nbase_link = \"l0\"\nbase_tag = 0\nstowed_rad = {:?}\n\
          [tool]\nlink = \"l{n}\"\npoint_m = [{length_m}, 0.0, 0.0]\n{sensors}\
          [camera]\nname = \"wrist\"\nlink = \"l{n}\"\nmodel = \"equidistant\"\nresolution_px = [1224, 1024]\n\
          focal_px = [387.0, 387.0]\ncenter_px = [612.0, 512.0]\ndistortion = [0.0, 0.0, 0.0, 0.0]\n\

@@ -65,7 +65,8 @@ mod tests {
     use crate::tagmap::files::landmark::{FIRST_NAMED_ID, NamedSurvey, UNKNOWN_ROTATION_STD_RAD, spoken_name};
     use armcal_core::input::TagUse;
 
-    const TWO: &str = "version = 1\nframe = \"base_link\"\n[[tag]]\nid = 2\nsize_m = 0.16\nposition_m = [0.0, 0.0, \
+    const TWO: &str = "version = 1\nkind = \"tag_map\"\n\
+        frame = \"base_link\"\n[[tag]]\nid = 2\nsize_m = 0.16\nposition_m = [0.0, 0.0, \
         1.0]\n\
         quaternion_wxyz = [1.0, 0.0, 0.0, 0.0]\nposition_std_m = [0.001, 0.002, 0.003]\n\
         [[tag]]\nname = \"board\"\nposition_m = [0.1, 0.2, 0.3]\n";
@@ -112,7 +113,7 @@ mod tests {
 
     #[test]
     fn a_tag_without_place_is_mapped_by_its_corners() {
-        let text = "version = 1\nframe = \"base_link\"\n[[tag]]\nid = 5\nsize_m = 0.1\n";
+        let text = "version = 1\nkind = \"tag_map\"\nframe = \"base_link\"\n[[tag]]\nid = 5\nsize_m = 0.1\n";
         let named = survey(text, TagUse::Corners).expect("good");
         assert!(!named.survey.tags[0].is_known());
     }

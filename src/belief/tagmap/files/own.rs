@@ -1,11 +1,11 @@
 //! Our tag map file.
 //!
-//! `version = 1`, `frame`, and one `[[tag]]` each with `id` (or `name`, for a landmark that is not an AprilTag),
-//! `size_m`, `position_m`, `quaternion_wxyz` and `position_std_m`; all but the first may be absent. Further optional
-//! keys: `base_tag` and `default_size_m` (of tags without an entry) at the top; `rotation_std_rad` and `frame` of a tag
-//! in another frame than the file's, such as a separate group; `squares` and `square_m` of a chessboard or ChArUco
-//! board with a name, whose origin is an outer corner; `[[body]]` with `name` and `moving`, for frames that
-//! move.
+//! `version = 1`, `kind = "tag_map"`, `frame`, and one `[[tag]]` each with `id` (or `name`, for a landmark that is not
+//! an AprilTag), `size_m`, `position_m`, `quaternion_wxyz` and `position_std_m`; all but the first may be absent.
+//! Further optional keys: `base_tag` and `default_size_m` (of tags without an entry) at the top; `rotation_std_rad` and
+//! `frame` of a tag in another frame than the file's, such as a separate group; `squares` and `square_m` of a
+//! chessboard or ChArUco board with a name, whose origin is an outer corner; `[[body]]` with `name` and `moving`, for
+//! frames that move.
 
 use armcal_core::codes::Code;
 use std::fmt::Write as _;
@@ -19,8 +19,10 @@ use crate::tagmap::files::landmark::{FIRST_NAMED_ID, Landmark, LandmarkFile};
 use crate::tagmap::files::tag_file::TagFile;
 use crate::tagmap::files::written::WrittenGroup;
 use crate::tagmap::types::{Body, TagPrior};
+use armcal_core::document::{VERSION, parse_file};
+use armcal_core::kind::Kind;
 use armcal_core::optics::Chessboard;
-use armcal_core::robot::{FileIssue, RobotError, parse_toml};
+use armcal_core::robot::{FileIssue, RobotError};
 use armcal_core::spatial::{Base, Pose, Tag};
 
 /// Squares of a board along one side.
@@ -29,7 +31,10 @@ const MAX_SQUARES: f64 = 100.0;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct MapToml {
-    version: u32,
+    #[serde(rename = "version")]
+    _version: u32,
+    #[serde(rename = "kind")]
+    _kind: Kind,
     frame: String,
     base_tag: Option<u32>,
     default_size_m: Option<f64>,
@@ -61,23 +66,9 @@ struct TagToml {
     square_m: Option<f64>,
 }
 
-fn raw(file: &Path, text: &str) -> Result<MapToml, RobotError> {
-    let raw: MapToml = parse_toml(file, text)?;
-    if raw.version != 1 {
-        return Err(FileIssue::new(
-            Code::VersionUnsupported,
-            file,
-            "version",
-            format!("{} is not supported; use 1", raw.version),
-        )
-        .into());
-    }
-    Ok(raw)
-}
-
 /// The landmarks in the file's frame; those of other frames are left out.
 pub(super) fn parse_landmarks(file: &Path, text: &str) -> Result<LandmarkFile, RobotError> {
-    let raw = raw(file, text)?;
+    let raw: MapToml = parse_file(Kind::TagMap, file, text)?;
     let mut landmarks = Vec::new();
     for (k, tag) in raw.tag.iter().enumerate() {
         let label = match (tag.id, &tag.name) {
@@ -149,7 +140,7 @@ fn board(file: &Path, tag: &TagToml, key: &impl Fn(&str) -> String) -> Result<Op
 }
 
 pub(super) fn parse(file: &Path, text: &str) -> Result<TagFile, RobotError> {
-    let raw = raw(file, text)?;
+    let raw: MapToml = parse_file(Kind::TagMap, file, text)?;
     let mut out = TagFile { frame: raw.frame.clone(), base_tag: raw.base_tag, ..TagFile::default() };
     body_of(&mut out, &raw.body, &raw.frame);
     for tag in &raw.tag {
@@ -215,7 +206,8 @@ fn body_of(out: &mut TagFile, bodies: &[BodyToml], frame: &str) -> usize {
 
 pub(super) fn to_text(groups: &[WrittenGroup]) -> String {
     let main = groups.first().map_or("base_link", |group| group.frame.as_str());
-    let mut out = format!("version = 1\nframe = {}\n", quoted(main));
+    let kind = Kind::TagMap.name();
+    let mut out = format!("version = {VERSION}\nkind = \"{kind}\"\nframe = {}\n", quoted(main));
     for group in groups.iter().filter(|group| !group.is_static) {
         let _ = writeln!(out, "\n[[body]]\nname = {}\nmoving = true", quoted(&group.frame));
     }

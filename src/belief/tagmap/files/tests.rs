@@ -140,7 +140,7 @@ fn what_is_wrong_with_a_tag_file_is_said_with_file_key_and_range() {
         ("1533224423.510462496", "noon"),
     ];
     let mut words = changes.map(|(from, to)| with(from, to)).to_vec();
-    let own = "version = 1\nframe = \"base\"\n[[tag]]\nid = 2\nsize_m = 0.0\n";
+    let own = "version = 1\nkind = \"tag_map\"\nframe = \"base\"\n[[tag]]\nid = 2\nsize_m = 0.0\n";
     words.extend([
         refusal("tagslam.yaml", "bodies: 3"),
         refusal("tags.json", "{}"),

@@ -112,6 +112,7 @@ pub struct TimeColumn {
 ///
 /// ```toml
 /// version = 1
+/// kind = "input"
 /// [table]
 /// format = "csv"                           # optional: "csv" or "yaml"; absent: by the end of the file's name
 /// rows = "poses"                           # optional, YAML alone: where the rows are, keys joined by dots
@@ -489,7 +490,8 @@ mod tests {
     use crate::input::map::tests::{parse, told};
     use crate::input::map::{CornerOrder, SeenColumns, Source, TableJoin};
 
-    const GOOD: &str = "version = 1\n[table]\n[joint_sensors]\n[tags]\nchild_frame = \"board\"\nuse = \"pose\"\n\
+    const GOOD: &str = "version = 1\nkind = \"input\"\n\
+        [table]\n[joint_sensors]\n[tags]\nchild_frame = \"board\"\nuse = \"pose\"\n\
         [tags.columns]\ndirection = \"tag_from_camera\"\nposition = [\"x\", \"y\", \"z\"]\n\
         rotation = [\"a\", \"b\", \"c\"]\nrotation_form = \"fixed_xyz\"\nrotation_unit = \"deg\"\n";
 
@@ -518,7 +520,7 @@ mod tests {
 
     #[test]
     fn a_row_may_be_a_corner_of_a_board() {
-        const BOARD: &str = "version = 1\n[table]\n[joint_sensors]\n[tags]\nchild_frame = \"board\"\n\
+        const BOARD: &str = "version = 1\nkind = \"input\"\n[table]\n[joint_sensors]\n[tags]\nchild_frame = \"board\"\n\
             use = \"board_corners\"\n[tags.columns]\nid = \"corner\"\npixel = [\"u\", \"v\"]\n";
         let Source::Table(layout) = parse(BOARD).expect("good").source else { panic!("a table") };
         assert_eq!(layout.seen, SeenColumns::Pixel(["u".to_owned(), "v".to_owned()]));
@@ -533,7 +535,7 @@ mod tests {
     }
     #[test]
     fn a_row_may_be_a_corner_of_a_tag_or_all_four() {
-        const TAGS: &str = "version = 1\n[table]\n[joint_sensors]\n[tags]\nuse = \"corners\"\n\
+        const TAGS: &str = "version = 1\nkind = \"input\"\n[table]\n[joint_sensors]\n[tags]\nuse = \"corners\"\n\
             [tags.columns]\nid = \"tag\"\ncorner = \"k\"\npixel = [\"u\", \"v\"]\n";
         let Source::Table(layout) = parse(TAGS).expect("good").source else { panic!("a table") };
         assert!(matches!(layout.seen, SeenColumns::TagCorner { order: CornerOrder::Apriltag, .. }));

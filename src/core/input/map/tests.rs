@@ -2,7 +2,8 @@
 
 use super::*;
 
-const GOOD: &str = "version = 1\n[joint_sensors]\ntopic = \"/joint_states\"\n[tags]\ntopic = \"/tf\"\n\
+const GOOD: &str = "version = 1\nkind = \"input\"\n\
+    [joint_sensors]\ntopic = \"/joint_states\"\n[tags]\ntopic = \"/tf\"\n\
     camera_frame = \"/fisheye\"\nchild_frame = \"tag36h11:{id}\"\nuse = \"position\"\n";
 
 pub(super) fn parse(text: &str) -> Result<InputMap, String> {
@@ -60,7 +61,7 @@ fn what_is_wrong_is_named_with_file_and_key() {
 
 #[test]
 fn corners_need_no_frames() {
-    let text = "version = 1\nmax_gap_s = 0.1\nwhile_moving = \"use\"\nnot_finite = \"leave_out\"\n\
+    let text = "version = 1\nkind = \"input\"\nmax_gap_s = 0.1\nwhile_moving = \"use\"\nnot_finite = \"leave_out\"\n\
         [joint_sensors]\ntopic = \"/a\"\nnames = { elbow = \"j3\" }\n[tags]\ntopic = \"/b\"\nuse = \"corners\"\n";
     let map = parse(text).expect("good");
     let Source::Topics(topics) = &map.source else { panic!("topics") };

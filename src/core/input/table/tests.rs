@@ -6,7 +6,8 @@ use crate::input::{ExternalRecording, InputError, RawMeasurement, parse_input_ma
 use crate::robot::Robot;
 
 const JOINTS: &str = "shoulder_yaw,shoulder_pitch,forearm_pitch,wrist_pitch,wrist_yaw,wrist_rotate";
-const MAP: &str = "version = 1\n[table]\n[joint_sensors]\n[tags]\nchild_frame = \"board\"\nuse = \"pose\"\n\
+const MAP: &str = "version = 1\nkind = \"input\"\n\
+    [table]\n[joint_sensors]\n[tags]\nchild_frame = \"board\"\nuse = \"pose\"\n\
     [tags.columns]\ndirection = \"camera_from_tag\"\nposition = [\"x\", \"y\", \"z\"]\n";
 /// Angles about the fixed axes x, y and z, rad.
 const ANGLES: [f64; 3] = [0.4, -1.1, 2.3];
@@ -209,7 +210,8 @@ fn what_is_wrong_with_a_table_is_named() {
     insta::assert_snapshot!("table", told.collect::<String>());
 }
 
-const CORNERS: &str = "version = 1\n[table]\n[joint_sensors]\n[tags]\nuse = \"corners\"\n[tags.columns]\n\
+const CORNERS: &str = "version = 1\nkind = \"input\"\n\
+    [table]\n[joint_sensors]\n[tags]\nuse = \"corners\"\n[tags.columns]\n\
     id = \"tag\"\n";
 /// Bottom left, bottom right, top right, top left of two tags.
 const SQUARES: [[[f64; 2]; 4]; 2] =
