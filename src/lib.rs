@@ -14,7 +14,7 @@
 //! |---|---|---|
 //! | belief | [`calib`], [`tagmap`], [`plan`], [`verify`], [`session`] | estimates, plans, acts |
 //! | meeting place | [`streams`], [`log`], [`routine`], [`input`] | messages, recordings, routines |
-//! | arm | [`robot`], [`sensor`], [`kinematics`], [`optics`]; `detect` (feature `images`) | nominal arm; tags in images |
+//! | arm | [`robot`], [`sensor`], [`kinematics`], [`optics`]; `detect` (`images`) | nominal arm; tags in images |
 //! | base | [`joints`], [`spatial`], [`stats`], [`time`] | units and frames as types; random streams; stamps |
 //!
 //! Without the default features `images`, `sim` and `viewer`, the library is the estimator and the planner alone.

@@ -4,7 +4,6 @@ mod growing;
 mod stationary;
 mod told;
 
-use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -24,6 +23,7 @@ use crate::cli::losses::warn_of_losses;
 use crate::output;
 use armcal_belief::calib::check_joints;
 use armcal_belief::calib::online::OnlineSettings;
+use armcal_core::files;
 use armcal_core::log::TopicMap;
 use armcal_core::robot::Robot;
 use armcal_core::routine::Method;
@@ -108,7 +108,7 @@ pub(super) fn watch(args: &WatchArgs) -> Result<Exit> {
 /// Whether its writer ended it.
 fn is_whole(recording: &Path) -> bool {
     let last_bytes = || {
-        let mut file = File::open(recording)?;
+        let mut file = files::open(recording)?;
         file.seek(SeekFrom::End(-(MCAP_MAGIC.len() as i64)))?;
         let mut end = [0; MCAP_MAGIC.len()];
         file.read_exact(&mut end).map(|()| end)

@@ -74,6 +74,42 @@ impl Kind {
         Self::ALL.into_iter().find(|kind| kind.name() == name)
     }
 
+    /// Defaults of files that state no kind.
+    #[must_use]
+    pub fn plan() -> Self {
+        Self::Plan
+    }
+
+    /// As [`Kind::plan`].
+    #[must_use]
+    pub fn calibration() -> Self {
+        Self::Calibration
+    }
+
+    /// As [`Kind::plan`].
+    #[must_use]
+    pub fn covariance() -> Self {
+        Self::Covariance
+    }
+
+    /// As [`Kind::plan`].
+    #[must_use]
+    pub fn vehicle() -> Self {
+        Self::Vehicle
+    }
+
+    /// As [`Kind::plan`].
+    #[must_use]
+    pub fn self_collision() -> Self {
+        Self::SelfCollision
+    }
+
+    /// As [`Kind::plan`].
+    #[must_use]
+    pub fn scene() -> Self {
+        Self::Scene
+    }
+
     /// Returns the words for a file of this kind, with an article.
     #[must_use]
     pub fn in_words(self) -> &'static str {

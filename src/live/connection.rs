@@ -30,7 +30,7 @@ pub struct Connection {
     /// Addresses of this machine's interfaces that DDS may use; all of them where none are named. The sockets stay
     /// open to every interface.
     pub networks: Vec<Ipv4Addr>,
-    /// The bridge that the arm is reached over; over DDS where there is none.
+    /// The bridge that the arm is reached over, in place of DDS.
     pub rosbridge: Option<Rosbridge>,
     /// `sensor_msgs/msg/JointState` with raw counts in `position`.
     pub joint_sensors: String,

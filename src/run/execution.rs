@@ -51,8 +51,8 @@ pub struct Finished {
 }
 
 /// Runs the closed loop on an arm of which nobody knows the truth: there is no score. The watcher's clock is
-/// taken to have started with the command: its reading at the end is the summary's `wall_s`. Results come into place all
-/// at once at the end, if they are kept.
+/// taken to have started with the command: its reading at the end is the summary's `wall_s`. Results come into place
+/// all at once at the end, if they are kept.
 ///
 /// # Errors
 /// [`Failure`] with the stage, and where the recording is now. It stays readable if the loop breaks off.

@@ -116,7 +116,7 @@ fn a_wrong_kind_of_file_is_named_with_the_command_that_takes_it() {
     };
     calibrate("--input", &routine, &[]);
     calibrate("--tag-map", &calibration, &[]);
-    calibrate("--task", &vehicle_file(), &["--set vehicle"]);
+    calibrate("--task", &vehicle_file(), &["vehicle="]);
     calibrate("--prior", &run.file("summary.json"), &["summary.json"]);
     let mut command = program();
     command.arg("calibrate").arg(&recording).arg("--robot").arg(&robot_file).arg("--out").arg(&out);

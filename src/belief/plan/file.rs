@@ -23,6 +23,7 @@ pub struct PlanFile {
     /// Of the format: 1.
     pub version: u32,
     /// [`Kind::Plan`].
+    #[serde(default = "Kind::plan")]
     pub kind: Kind,
     /// Name of the routine.
     pub routine: String,

@@ -349,7 +349,7 @@ struct MapToml {
     #[serde(rename = "version")]
     _version: u32,
     #[serde(rename = "kind")]
-    _kind: Kind,
+    _kind: Option<Kind>,
     #[serde(default = "usual_gap_s")]
     max_gap_s: f64,
     #[serde(default)]

@@ -39,7 +39,7 @@ struct TaskToml {
     #[serde(rename = "version")]
     _version: u32,
     #[serde(rename = "kind")]
-    _kind: Kind,
+    _kind: Option<Kind>,
     tolerance_m: f64,
     #[serde(default)]
     targets_m: Vec<[f64; 3]>,

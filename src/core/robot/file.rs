@@ -37,7 +37,7 @@ struct RobotFile {
     #[serde(rename = "version")]
     _version: u32,
     #[serde(rename = "kind")]
-    _kind: Kind,
+    _kind: Option<Kind>,
     name: String,
     serial: Option<String>,
     urdf: PathBuf,

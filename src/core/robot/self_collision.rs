@@ -1,7 +1,7 @@
 //! The file self_collision.toml of a robot folder: pairs of links that can come near each other.
 //!
-//! `plan::sample_self_pairs` (`armcal new-robot --self-collision`) finds them by sampling; planning skips all other pairs.
-//! The file holds the hash of the URDF and is valid for that URDF only.
+//! `plan::sample_self_pairs` (`new-robot --self-collision`) finds them by sampling; planning skips all other pairs. The
+//! file holds the hash of the URDF and is valid for that URDF only.
 
 use crate::codes::Code;
 use crate::kind::Kind;
@@ -22,6 +22,7 @@ pub const SELF_COLLISION_FILE: &str = "self_collision.toml";
 #[serde(deny_unknown_fields)]
 struct SelfCollisionFile {
     version: u32,
+    #[serde(default = "Kind::self_collision")]
     kind: Kind,
     /// BLAKE3 of the URDF's text.
     urdf_blake3: String,

@@ -112,6 +112,7 @@ impl VehicleDynamics {
 #[serde(deny_unknown_fields)]
 struct VehicleFile {
     version: u32,
+    #[serde(default = "Kind::vehicle")]
     kind: Kind,
     name: String,
     mass_kg: f64,

@@ -25,7 +25,7 @@ struct RoutineFile {
     #[serde(rename = "version")]
     _version: u32,
     #[serde(rename = "kind")]
-    _kind: Kind,
+    _kind: Option<Kind>,
     name: String,
     operator: Option<String>,
     robot: PathBuf,

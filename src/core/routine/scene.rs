@@ -24,6 +24,7 @@ pub struct Scene {
 #[serde(deny_unknown_fields)]
 pub(super) struct SceneFile {
     version: u32,
+    #[serde(default = "Kind::scene")]
     kind: Kind,
     #[serde(default)]
     pub(super) site: SiteFile,

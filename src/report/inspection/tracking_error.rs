@@ -213,7 +213,8 @@ impl TrackingError {
     pub(super) fn to_text(&self) -> String {
         let [moving, at_end] = self.n_beyond;
         let mut text = format!(
-            "tracking     {} edges, {} readings, beyond the bound of [motion] {moving} on the way and {at_end} at the end\n\
+            "tracking     {} edges, {} readings, beyond the bound of [motion] {moving} on the way and {at_end} at the \
+             end\n\
              {:<18} {:>9} {:>9} {:>11} {:>14} {:>9}\n",
             self.n_edges, self.n_readings, "joint", "most rad", "lag s", "at end rad", "overshoot_rad", "of bound"
         );

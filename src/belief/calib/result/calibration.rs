@@ -43,6 +43,7 @@ pub struct Calibration {
     /// Of the format: 1.
     pub version: u32,
     /// [`Kind::Calibration`].
+    #[serde(default = "Kind::calibration")]
     pub kind: Kind,
     /// Name of the robot.
     pub robot: String,

@@ -42,6 +42,7 @@ pub struct CovarianceTable {
 #[serde(deny_unknown_fields)]
 struct CovarianceFile {
     version: u32,
+    #[serde(default = "Kind::covariance")]
     kind: Kind,
     calibration_hash: String,
     parameters: Vec<String>,

@@ -34,7 +34,7 @@ struct MapToml {
     #[serde(rename = "version")]
     _version: u32,
     #[serde(rename = "kind")]
-    _kind: Kind,
+    _kind: Option<Kind>,
     frame: String,
     base_tag: Option<u32>,
     default_size_m: Option<f64>,
