@@ -242,6 +242,8 @@ fn what_cannot_be_watched_is_refused() {
     answer(&mut watch(&root().join("README.md"), &soon)).expect("a text", 2, &[]);
     answer(&mut watch(folder.path(), &soon)).expect("a folder", 2, &[]);
     answer(&mut watch(&sample(), &["--failed", "forearm=dead"])).expect("no joint", 2, &["--failed forearm=dead"]);
+    let twice = sample();
+    answer(watch(&sample(), &["--live"]).arg(&twice)).expect("two, live", 2, &["--live", "[usage_invalid]"]);
     let mut other = program();
     other.arg("watch").arg(sample()).arg("--robot").arg(root().join("robots/kraft-predator"));
     answer(&mut other).expect("another arm", 2, &["run.mcap", "shoulder"]);

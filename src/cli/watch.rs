@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::Result;
+use armcal_core::codes::Code;
 use clap::Args;
 
 use self::growing::{Patience, follow, opened};
@@ -16,7 +17,7 @@ use self::stationary::stationary;
 use self::told::{Form, Told};
 use crate::cli::belief_text::exit_of;
 use crate::cli::calibration_inputs::{CalibrationInputs, load_robot};
-use crate::cli::exit::Exit;
+use crate::cli::exit::{Exit, UsageError};
 use crate::cli::interrupt::Interrupt;
 use crate::cli::live_view::{LiveViewArgs, OpenView, ViewOf};
 use crate::cli::losses::warn_of_losses;
@@ -90,6 +91,10 @@ pub(super) fn watch(args: &WatchArgs) -> Result<Exit> {
     let form = if args.json { Form::Json } else { Form::Text };
     if args.stationary {
         return stationary(&given, args.out.as_deref(), form);
+    }
+    if args.view.live.is_some() && (args.recordings.len() > 1 || args.input.is_some()) {
+        let problem = "--live shows one recording that armcal made; leave out --input and the others";
+        return Err(UsageError::new(Code::UsageInvalid, problem).into());
     }
     match &args.recordings[..] {
         [one] if args.input.is_none() && (args.view.live.is_some() || !is_whole(one)) => {

@@ -136,9 +136,7 @@ impl<'a> Proposal<'a> {
     fn head(&mut self) {
         let Domain { number, networks } = &self.seen.domain;
         let networks: Vec<String> = networks.iter().map(|address| quoted(&address.to_string())).collect();
-        self.line(
-            "# Proposed by `armcal live discover`. Look at each choice; docs/guide/live-arm.md says what the keys",
-        );
+        self.line("# Proposed by `armcal discover`. Look at each choice; docs/guide/live-arm.md says what the keys");
         self.line("# mean. What is called by the name of a thing was taken for it.");
         self.line(&format!("version = 1\nkind = \"arm\"\ndomain = {number}\nnetworks = [{}]\n", networks.join(", ")));
     }
