@@ -110,7 +110,6 @@ fn new_robot(scratch: &Scratch, bytes: &[u8]) -> bool {
         base: None,
         tip: None,
         camera: None,
-        name: None,
         lens: None,
         touching: &[],
         clear_rad: None,

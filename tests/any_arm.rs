@@ -286,11 +286,10 @@ fn several_arms_in_a_file_are_named_and_one_is_asked_for() {
     bench.new_robot(&[]).expect("two arms", 2, &["left_link6 (6 joints)", "right_link5 (5 joints)", "--tip"]);
     assert!(!bench.file("robot").exists());
     assert_eq!(joints(&made(&text, &["--tip", "right_link5"])).len(), 5);
-    let bench =
-        made(&text, &["--tip", "left_link6", "--base", "left_link1", "--camera-link", "left_link4", "--name", "x"]);
+    let bench = made(&text, &["--tip", "left_link6", "--base", "left_link1", "--camera-link", "left_link4"]);
     let robot = load(&bench.file("robot")).expect("it reads");
     assert_eq!((robot.n_joints(), robot.camera.mount.n_joints), (5, 3));
-    assert_eq!((robot.name.as_str(), robot.base_link.as_str()), ("x", "left_link1"));
+    assert_eq!((robot.name.as_str(), robot.base_link.as_str()), ("bench", "left_link1"));
     bench.new_robot(&["--tip", "none"]).expect("again", 2, &[]);
     let bench = Bench::new(&text);
     bench.new_robot(&["--tip", "none"]).expect("no such link", 2, &["--tip", "`none`"]);
@@ -329,7 +328,7 @@ fn new_robot_reads_limits_rates_and_the_camera() {
 #[test]
 fn names_of_a_urdf_stay_names() {
     let text = urdf(&chain("arm", "base", 3)).replace("arm2", "a&#10;stowed_rad = [9]&#10;&quot;");
-    let bench = made(&text, &["--name", "x\"\ny = 1"]);
+    let bench = made(&text.replacen("<robot name=\"bench\"", "<robot name=\"x&quot;&#10;y = 1\"", 1), &[]);
     let robot = load(&bench.file("robot")).expect("it reads");
     assert_eq!((robot.name.as_str(), robot.joint_names()[1].as_str()), ("x\"\ny = 1", "a\nstowed_rad = [9]\n\""));
 }

@@ -37,7 +37,7 @@ fn the_same_input_gives_the_same_bytes_and_check_reads_them() {
     let outs = ["a", "b", "c"].map(|name| folder.path().join(name));
     planned(&routine, &outs[0], &[]);
     planned(&routine, &outs[1], &[]);
-    let other = planned(&routine, &outs[2], &["--seed", "2"]);
+    let other = planned(&routine, &outs[2], &["--set", "seed=2"]);
     for name in ["plan.toml", "plan.md"] {
         assert_eq!(read(&outs[0].join(name)), read(&outs[1].join(name)), "{name}");
     }

@@ -6,7 +6,9 @@ mod links;
 mod names;
 mod prose;
 mod readers;
+mod schemas;
 mod structure;
+mod tables;
 mod words;
 
 use std::path::PathBuf;

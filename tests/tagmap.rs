@@ -245,7 +245,7 @@ fn size_off_by_ten(hall: &Hall) -> String {
 fn the_page_has_the_figures_of_the_table_and_the_warnings() {
     let hall = Hall::new();
     let page = hall.file("map.html");
-    let said = hall.map(&["--html", page.to_str().expect("text")]);
+    let said = hall.map(&["--out", page.to_str().expect("text")]);
     said.expect("a page", 0, &["2 (held)"]);
     let text = read(&page);
     let row = said.stdout.lines().find(|line| line.starts_with("│4 ")).expect("tag 4");
@@ -259,7 +259,7 @@ fn the_page_has_the_figures_of_the_table_and_the_warnings() {
         assert!(!text.contains(outside), "{outside}");
     }
     edit(&hall.file("tagslam.yaml"), "size: 0.1\n", &size_off_by_ten(&hall));
-    hall.map(&["--html", page.to_str().expect("text")]).expect("off by ten", 3, &[]);
+    hall.map(&["--out", page.to_str().expect("text")]).expect("off by ten", 3, &[]);
     let text = read(&page);
     let [warning, table] = ["size_m", "<table"].map(|word| text.find(word));
     assert!(warning.is_some() && warning < table, "{warning:?} {table:?}");

@@ -10,12 +10,12 @@ use clap::Args;
 use crate::cli::calibration_inputs::{Calibrated, CalibrationInputs, load_robot};
 use crate::cli::closing::ClosingArgs;
 use crate::cli::exit::Exit;
-use crate::cli::stdout::{say, warn};
+use crate::cli::stdout::warn;
 use crate::output::{self, accepted_kept};
 #[cfg(feature = "viewer")]
 use crate::report::markdown;
 use crate::report::{About, Report, RunSummary, html};
-use armcal_belief::calib::{Calibration, CompactCalibration, MapResult, Status, View, covariance_file};
+use armcal_belief::calib::{Calibration, MapResult, Status, View, covariance_file};
 use armcal_core::robot::Robot;
 use armcal_core::routine::Method;
 
@@ -49,9 +49,6 @@ pub(super) struct CalibrateArgs {
     /// Folder for calibration.toml, summary.json and report.html
     #[arg(long, value_name = "DIR", default_value = ".")]
     out: PathBuf,
-    /// Print the calibration as one line below 512 bytes instead of the verdict
-    #[arg(long, conflicts_with_all = ["details", "json"])]
-    compact: bool,
     #[command(flatten)]
     closing: ClosingArgs,
 }
@@ -75,8 +72,6 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
     let (views, tags, steps) = (calibration.fit.views, calibration.fit.tags_seen, calibration.fit.evaluations);
     tracing::info!("{views} views with {tags} tag observations fitted in {steps} steps, method {:?}", args.method);
     let summary = RunSummary::of_calibration(&calibration, started.elapsed().as_secs_f64()).judged();
-    // Before anything is written: what has no compact form shall leave no half of the answer.
-    let compact = args.compact.then(|| CompactCalibration::of(&calibration)?.to_text()).transpose()?;
     let kept = accepted_kept(&args.out, &calibration);
     let out = kept.as_ref().map_or_else(|| args.out.clone(), |kept| kept.folder.clone());
     output::make_folder(&out)?;
@@ -88,10 +83,7 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
         }
     }
     let replay = external.map(|_| out.join("replay.rrd")).filter(|file| file.is_file());
-    match &compact {
-        Some(line) => say(line)?,
-        None => args.closing.say(&summary, &next_step(&out, replay.as_deref()))?,
-    }
+    args.closing.say(&summary, &next_step(&out, replay.as_deref()))?;
     if let Some(kept) = kept {
         warn(Code::ResultKept, format_args!("{}: {kept}", args.out.display()));
     }

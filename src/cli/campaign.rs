@@ -24,6 +24,21 @@ use crate::output;
 use crate::run::Keep;
 use armcal_core::routine::SeedRange;
 
+/// Folders of runs that stay.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum KeptRuns {
+    All,
+    Worst(u16),
+}
+
+/// Most folders of worst runs.
+const MAX_WORST: u16 = 1000;
+
+fn kept(text: &str) -> Result<KeptRuns, String> {
+    let worst = text.parse().ok().filter(|n| *n <= MAX_WORST).map(KeptRuns::Worst);
+    if text == "all" { Some(KeptRuns::All) } else { worst }.ok_or_else(|| format!("write all, or 0 to {MAX_WORST}"))
+}
+
 #[derive(Debug, Args)]
 pub(super) struct CampaignArgs {
     /// Routine (.toml); [campaign] in it may give seeds and a matrix of settings
@@ -51,20 +66,16 @@ pub(super) struct CampaignArgs {
     json: bool,
     #[command(flatten)]
     overrides: OverrideArgs,
-    /// Keep the folder of each run in FILE.runs
-    #[arg(long)]
-    keep: bool,
-    /// Run the N worst seeds again and keep their folders with replays in FILE.worst: contacts, failures, refusals,
-    /// missed limits, then the largest tool errors
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    #[arg(value_parser = clap::value_parser!(u16).range(0..=1000))]
-    keep_worst: u16,
+    /// Keep the folders of `all` runs in FILE.runs, or run the N worst seeds again and keep their folders with replays
+    /// in FILE.worst: contacts, failures, refusals, missed limits, then the largest tool errors
+    #[arg(long, value_name = "all|N", default_value = "0", value_parser = kept)]
+    keep: KeptRuns,
     /// Discard existing rows
     #[arg(long)]
     fresh: bool,
     /// Merge the tables of shards into --out
     #[arg(long, value_name = "FILE", num_args = 1.., requires = "out",
-          conflicts_with_all = ["seeds", "shard", "until", "threads", "keep", "keep_worst", "fresh", "set", "robot"])]
+          conflicts_with_all = ["seeds", "shard", "until", "threads", "keep", "fresh", "set", "robot"])]
     merge: Vec<PathBuf>,
     /// Merge even if tables of some shards are missing
     #[arg(long, requires = "merge")]
@@ -101,8 +112,11 @@ fn run(args: &CampaignArgs, routine: &Path) -> Result<Exit> {
     let mut store = opened(args, &prepared, range, &out)?;
     let n_before = store.table().rows.len();
     let jobs = jobs(&prepared, range, args.shard, &store.done());
-    let folder = output::with_suffix(&out, if args.keep { ".runs" } else { ".work" });
-    let keep = if args.keep { Keep::Everything } else { Keep::StreamsAlone };
+    let (suffix, keep) = match args.keep {
+        KeptRuns::All => (".runs", Keep::Everything),
+        KeptRuns::Worst(_) => (".work", Keep::StreamsAlone),
+    };
+    let folder = output::with_suffix(&out, suffix);
     let many = BatchRun { prepared: &prepared, folder: &folder, keep, threads: args.threads, stop: stop.flag() };
     let mut stopping = stopping(args, &prepared, range, &store);
     let jobs = if stopping.is_answered() { Vec::new() } else { jobs };
@@ -160,12 +174,13 @@ fn stopping(args: &CampaignArgs, prepared: &Prepared, range: SeedRange, store: &
 /// Makes the worst runs again, for their folders: none was kept while nobody knew which they would be. Folders that are
 /// whole stay.
 fn keep_worst(args: &CampaignArgs, many: &BatchRun<'_>, rows: &Table) -> Result<()> {
+    let KeptRuns::Worst(n_worst) = args.keep else { return Ok(()) };
     let is_there = |row: &Row| many.folder.join(format!("{}-{}/summary.json", row.setting, row.seed)).exists();
     let job = |row: &&Row| {
         let setting = many.prepared.settings.iter().find(|setting| setting.index == row.setting)?;
         (!is_there(row)).then(|| many.prepared.job(setting, row.seed))
     };
-    let jobs: Vec<_> = worst_rows(rows, usize::from(args.keep_worst)).iter().filter_map(job).collect();
+    let jobs: Vec<_> = worst_rows(rows, usize::from(n_worst)).iter().filter_map(job).collect();
     if jobs.is_empty() {
         return Ok(());
     }

@@ -19,7 +19,9 @@ use crate::cli::groups::grouped;
 #[cfg(feature = "viewer")]
 use crate::cli::replay;
 use crate::cli::stdout::{be_quiet, complain, is_written};
-use crate::cli::{calibrate, check, completions, exit, explain, export, inspect, new_robot, plan, tagmap, watch};
+use crate::cli::{
+    calibrate, check, completions, exit, explain, export, inspect, new_robot, plan, schema, tagmap, watch,
+};
 #[cfg(feature = "sim")]
 use crate::cli::{campaign, regress, run, serve};
 #[cfg(feature = "closed-loop")]
@@ -113,6 +115,8 @@ enum Command {
     /// Serve a routine's simulated arm on the ROS 2 topics of a real arm
     #[cfg(feature = "sim")]
     Serve(serve::ServeArgs),
+    /// Print the JSON Schema of a kind of file, or list all kinds
+    Schema(schema::SchemaArgs),
     /// Print cause, evidence, remedy and page of a code, or list all codes
     Explain(explain::ExplainArgs),
     /// Print the completion script of a shell
@@ -182,6 +186,7 @@ impl Command {
             Self::Regress(args) => regress::regress(args),
             #[cfg(feature = "sim")]
             Self::Serve(args) => serve::serve(args),
+            Self::Schema(args) => schema::schema(args),
             Self::Explain(args) => explain::explain(args),
             Self::Completions(args) => completions::completions(args, command()),
             Self::Man(args) => completions::man(args, command()),

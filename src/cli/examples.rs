@@ -51,6 +51,7 @@ pub(super) const EXAMPLES: &[(&str, &[&str])] = &[
             "armcal calibrate day-1.mcap day-2.mcap --robot robots/titan4 --prior result/calibration.toml --out new",
         ],
     ),
+    ("schema", &["armcal schema robot", "armcal schema"]),
     ("explain", &["armcal explain value_out_of_range", "armcal explain"]),
     (
         "watch",
@@ -62,7 +63,7 @@ pub(super) const EXAMPLES: &[(&str, &[&str])] = &[
     (
         "tagmap",
         &[
-            "armcal tagmap run.mcap --robot robots/titan4 --out tags.toml --html tags.html",
+            "armcal tagmap run.mcap --robot robots/titan4 --out tags.toml --out tags.html",
             "armcal tagmap bag.mcap --camera cameras.yaml --tags tagslam.yaml --mode partly-known",
         ],
     ),

@@ -40,6 +40,7 @@ mod regress;
 mod replay;
 #[cfg(feature = "sim")]
 mod run;
+mod schema;
 #[cfg(feature = "sim")]
 mod serve;
 mod stdout;

@@ -40,9 +40,6 @@ pub(super) struct NewRobotArgs {
     /// Link of the camera's optical frame; default: a link named camera or optical, else that of the tool
     #[arg(long, value_name = "LINK")]
     camera_link: Option<String>,
-    /// Name of the robot; default: the name in the URDF
-    #[arg(long, value_name = "NAME")]
-    name: Option<String>,
     /// Link poses for the URDF: kinematics.yaml of Universal Robots (calibration.yaml) or of Franka
     #[arg(long, value_name = "FILE")]
     kinematics: Option<PathBuf>,
@@ -92,7 +89,6 @@ fn new_folder(args: &NewRobotArgs, urdf: &Path, out: &Path) -> Result<Exit> {
         base: args.base.as_deref(),
         tip: args.tip.as_deref(),
         camera: args.camera_link.as_deref(),
-        name: args.name.as_deref(),
         lens: lens.as_ref().map(|(source, lens)| (source.as_str(), lens)),
         touching: &[],
         clear_rad: None,

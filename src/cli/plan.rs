@@ -32,9 +32,6 @@ pub(super) struct PlanArgs {
     /// Accepted calibration.toml of this arm as prior; default: the datasheet
     #[arg(long, value_name = "CALIBRATION.toml")]
     prior: Option<PathBuf>,
-    /// Seed of the planner; default: the routine's seed
-    #[arg(long, value_name = "N")]
-    seed: Option<u64>,
     /// Output folder for plan.toml, plan.md and plan.rrd; default: recordings/ROUTINE-NAME-plan
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -63,7 +60,7 @@ pub(super) fn plan(args: &PlanArgs) -> Result<Exit> {
         None => ArmBelief::datasheet(&robot),
         Some(file) => ArmBelief::of(&robot, read_prior(file, &robot)?)?,
     };
-    let seed = args.seed.unwrap_or(routine.seed);
+    let seed = routine.seed;
     let header = PlanHeader {
         routine: routine.name.clone(),
         vehicle: vehicle.name.clone(),

@@ -18,9 +18,6 @@ pub(super) struct ServeArgs {
     /// Connection map that the client also uses; default: the topics of armcal's recordings
     #[arg(long, value_name = "ARM.toml")]
     arm: Option<PathBuf>,
-    /// Seed of all random numbers; default: the routine's seed
-    #[arg(long, value_name = "N")]
-    seed: Option<u64>,
     /// Speed of the arm's clock over real time, 0.05 to 50
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = factor)]
     factor: f64,

@@ -47,12 +47,9 @@ pub(super) struct TagmapArgs {
     /// Trust in the given tag poses; default: `unknown` with --robot, `partly-known` with --tags
     #[arg(long, value_enum)]
     mode: Option<Mode>,
-    /// Write the map here: .toml, or .yaml for TagSLAM
+    /// Write the map here: .toml, .yaml for TagSLAM, or .html for a page with a drawing of the tags; repeatable
     #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
-    /// Write a page (.html) with a drawing of the tags
-    #[arg(long, value_name = "FILE")]
-    html: Option<PathBuf>,
+    out: Vec<PathBuf>,
     /// Print JSON instead of tables
     #[arg(long)]
     json: bool,
@@ -89,7 +86,8 @@ const NOISY: f64 = 2.0;
 pub(super) fn tagmap(args: &TagmapArgs) -> Result<Exit> {
     expect_recording(&args.recording)?;
     expect_option(args.tags.as_deref(), Kind::TagMap)?;
-    args.out.iter().chain(&args.html).try_for_each(|path| output::check_writable(path))?;
+    args.out.iter().try_for_each(|path| output::check_writable(path))?;
+    let is_page = |path: &&PathBuf| path.extension().is_some_and(|end| end == "html");
     let (cameras, tags, settings) = match (&args.robot, &args.camera, &args.tags) {
         (Some(folder), ..) => of_robot(&args.recording, &load_robot(folder, &[])?)?,
         (None, Some(camera), Some(tags)) => of_files(camera, tags)?,
@@ -111,14 +109,14 @@ pub(super) fn tagmap(args: &TagmapArgs) -> Result<Exit> {
     let input = MapInput { cameras: &models, views: &read.views, bodies: &tags.bodies, tags: &tags.tags };
     let file = args.recording.display();
     let map = solve(&input, &settings).map_err(|error| anyhow::Error::from(error).context(format!("{file}")))?;
-    if let Some(out) = &args.out {
+    for out in args.out.iter().filter(|path| !is_page(path)) {
         let text = map_to_text(out, &map, &input).map_err(robot::RobotError::from)?;
         output::write_together(&[(out, text.as_bytes())])?;
     }
     let sources: Vec<String> =
         read.topics.iter().map(|(camera, topic)| format!("{topic} of camera {}", cameras[*camera].name)).collect();
     let (warnings, is_sound) = warnings(&file.to_string(), &map, &read, &tags);
-    if let Some(out) = &args.html {
+    for out in args.out.iter().filter(is_page) {
         let page = TagMapPage { map: &map, file: &file.to_string(), sources: &sources, warnings: &warnings, is_sound };
         output::write_together(&[(out, tag_map_html(&page).as_bytes())])?;
     }

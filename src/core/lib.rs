@@ -17,6 +17,7 @@ pub mod numeric;
 pub mod optics;
 pub mod robot;
 pub mod routine;
+pub mod schema;
 pub mod sensor;
 pub mod spatial;
 pub mod stats;

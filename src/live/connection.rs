@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use std::net::Ipv4Addr;
 use std::path::Path;
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 pub use bridge::Rosbridge;
@@ -16,9 +17,10 @@ use armcal_core::document::{VERSION, parse_file};
 use armcal_core::kind::Kind;
 use armcal_core::log::topics;
 use armcal_core::robot::{FileIssue, RobotError, read_text};
+use armcal_core::schema::schema_of;
 
 /// The connection map of an arm.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Connection {
     /// Of this file's layout: 1.
@@ -26,6 +28,7 @@ pub struct Connection {
     /// [`Kind::Arm`].
     pub kind: Kind,
     /// ROS_DOMAIN_ID.
+    #[schemars(range(min = 0, max = 232))]
     pub domain: u16,
     /// Addresses of this machine's interfaces that DDS may use; all of them where none are named. The sockets stay
     /// open to every interface.
@@ -84,7 +87,7 @@ impl Default for Connection {
 }
 
 /// Where set-points go, raw counts.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Commands {
     /// Name of the topic.
@@ -93,6 +96,7 @@ pub struct Commands {
     #[serde(rename = "type")]
     pub message_type: CommandType,
     /// Set-points a second, by the arm's clock.
+    #[schemars(range(min = 5.0, max = 1000.0))]
     pub rate_hz: f64,
 }
 
@@ -104,7 +108,7 @@ impl Default for Commands {
 }
 
 /// Messages that drivers take set-points from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 pub enum CommandType {
     /// One point, to be reached one period later.
     #[serde(rename = "trajectory_msgs/msg/JointTrajectory", alias = "trajectory_msgs/JointTrajectory")]
@@ -130,7 +134,7 @@ impl CommandType {
 }
 
 /// How the arm is told to stop; every way that is named is used.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct StopWays {
     /// `std_msgs/msg/Bool`, true.
@@ -148,7 +152,7 @@ impl Default for StopWays {
 }
 
 /// How services go over DDS.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ServiceMapping {
     /// Fast DDS and others.
@@ -158,32 +162,40 @@ pub enum ServiceMapping {
 }
 
 /// A switch that somebody holds as long as the arm may move.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Deadman {
     /// `std_msgs/msg/Bool`.
     pub topic: String,
     /// The arm stops when the last `true` is older, s.
+    #[schemars(range(min = 0.05, max = 10.0))]
     pub timeout_s: f64,
 }
 
 /// When the guard stops the arm.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct GuardLimits {
     /// The first readings must come within this time, s.
+    #[schemars(range(min = 0.1, max = 600.0))]
     pub connect_s: f64,
     /// Readings must be sound and the arm at rest for so long before anything moves, s.
+    #[schemars(range(min = 0.5, max = 60.0))]
     pub ready_s: f64,
     /// Readings may be missing for so long, s.
+    #[schemars(range(min = 0.02, max = 5.0))]
     pub stale_s: f64,
-    /// A joint may be so far from its set-point, deg,
+    /// A joint may be so far from its set-point, deg.
+    #[schemars(range(min = 0.5, max = 180.0))]
     pub tracking_deg: f64,
-    /// for so long by the arm's clock, s.
+    /// It may be so for this time by the arm's clock, s.
+    #[schemars(range(min = 0.0, max = 10.0))]
     pub tracking_s: f64,
     /// All readings may stay the same to the count for so long while set-points move, s.
+    #[schemars(range(min = 0.1, max = 10.0))]
     pub frozen_s: f64,
     /// The arm's clock may leap by so much between two readings, s.
+    #[schemars(range(min = 0.05, max = 60.0))]
     pub clock_step_s: f64,
 }
 
@@ -199,6 +211,12 @@ impl Default for GuardLimits {
             clock_step_s: 0.5,
         }
     }
+}
+
+/// Returns the schema of a connection map.
+#[must_use]
+pub fn arm_schema() -> serde_json::Value {
+    schema_of::<Connection>(Kind::Arm)
 }
 
 impl Connection {
@@ -298,6 +316,16 @@ mod tests {
 
     fn checked(text: &str) -> Result<Connection, String> {
         Connection::parse(Path::new("arm.toml"), &format!("kind = \"arm\"\n{text}")).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn the_committed_schema_is_that_of_the_type() {
+        let text = format!("{}\n", serde_json::to_string_pretty(&arm_schema()).expect("JSON"));
+        if std::env::var("INSTA_UPDATE").is_ok_and(|update| update == "always") {
+            std::fs::write("../core/schemas/arm.json", text).expect("written");
+        } else {
+            assert!(armcal_core::schema::committed(Kind::Arm) == text, "INSTA_UPDATE=always renews arm.json");
+        }
     }
 
     #[test]

@@ -8,8 +8,10 @@ use std::net::Ipv4Addr;
 
 use crate::connection::is_name;
 use crate::{CommandType, ServiceMapping};
+use armcal_core::kind::Kind;
 use armcal_core::log::{Stream, topics};
 use armcal_core::robot::{Robot, likely_name};
+use armcal_core::schema::first_line;
 use armcal_core::text::printable;
 
 /// A ROS 2 domain and how it is reached.
@@ -136,6 +138,7 @@ impl<'a> Proposal<'a> {
     fn head(&mut self) {
         let Domain { number, networks } = &self.seen.domain;
         let networks: Vec<String> = networks.iter().map(|address| quoted(&address.to_string())).collect();
+        self.line(first_line(Kind::Arm).trim_end());
         self.line("# Proposed by `armcal discover`. Look at each choice; docs/guide/live-arm.md says what the keys");
         self.line("# mean. What is called by the name of a thing was taken for it.");
         self.line(&format!("version = 1\nkind = \"arm\"\ndomain = {number}\nnetworks = [{}]\n", networks.join(", ")));

@@ -30,7 +30,9 @@ mod tests;
 mod topics;
 mod wire;
 
-pub use connection::{CommandType, Commands, Connection, Deadman, GuardLimits, Rosbridge, ServiceMapping, StopWays};
+pub use connection::{
+    CommandType, Commands, Connection, Deadman, GuardLimits, Rosbridge, ServiceMapping, StopWays, arm_schema,
+};
 pub use discover::{Domain, ProposedConnection, Seen, SeenService, SeenTopic, propose_connection};
 pub use error::LiveError;
 pub use guard::StopReason;

@@ -7,6 +7,7 @@ use std::path::Path;
 use armcal_core::input::{ClockDoubt, ClockRemedy, DEFAULT_MAX_GAP_S, compare_clocks, parse_input_map};
 use armcal_core::log::{LogError, for_each_raw};
 use armcal_core::robot::{Robot, RobotError};
+use armcal_core::schema::first_line;
 use armcal_core::text::printable;
 
 mod contents;
@@ -58,8 +59,9 @@ pub fn propose_input_map(recording: &Path, robot: Option<&Robot>) -> Result<Stri
     })?;
     let (tag_topic, tags) = choose_tags(&contents).ok_or_else(|| missing(TAG_TYPES))?;
     let mut text = format!(
-        "# Proposed by `armcal inspect --write-input` for {}.\n# Look at each choice; docs/reference/real-arms.md says \
-         what the keys mean.\nversion = 1\nkind = \"input\"\n",
+        "{}# Proposed by `armcal inspect --write-input` for {}.\n# Look at each choice; \
+         docs/reference/real-arms.md says what the keys mean.\nversion = 1\nkind = \"input\"\n",
+        first_line(armcal_core::kind::Kind::Input),
         comment(&file)
     );
     text += "# max_gap_s = 0.5   # a tag message farther than this from any joint reading is left out\n";

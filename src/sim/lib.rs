@@ -42,6 +42,6 @@ pub use recorded_motion::{RecordedMotion, VehicleKinematics};
 pub use spec::{
     CameraMode, CameraWorldSpec, ClockSpec, EngineKind, Figure, GeometrySpec, GroundSpec, HydraulicsSpec, ImageSpec,
     JointSensorsSpec, MotionKind, PhysicsSpec, Points, PortKind, StructureSpec, TagsSpec, TemperatureSpec,
-    UnmodelledObstacles, VehicleMotionSpec, WaterKind, WaterSpec, WorldSpec,
+    UnmodelledObstacles, VehicleMotionSpec, WaterKind, WaterSpec, WorldSpec, routine_schema,
 };
 pub use world::{World, WorldInput};

@@ -225,7 +225,7 @@ def prepared(program, folder, name, urdf, more):
     description = urdf.parents[len(urdf.relative_to(robots_folder()).parts) - 2]
     copy = folder / "given" / name / "example-robot-data/robots" / description.name
     mended(description, copy)
-    code, text = said(program, "new-robot", copy / urdf.relative_to(description), "--name", name, "--out", robot, *more)
+    code, text = said(program, "new-robot", copy / urdf.relative_to(description), "--out", robot, *more)
     if code:
         raise RuntimeError(text.splitlines()[0])
     chain = Chain(robot)

@@ -17,7 +17,7 @@ from pathlib import Path
 
 NAMESPACE = 'ip link set lo up multicast on && ip route add 239.0.0.0/8 dev lo && exec bash -c "$@"'
 SCRIPT = """
-$ARMCAL serve $ROUTINE --arm arm.toml --seed $SEED --factor $FACTOR --truth truth.mcap 2>serve.log & SERVER=$!
+$ARMCAL serve $ROUTINE --arm arm.toml --set seed=$SEED --factor $FACTOR --truth truth.mcap 2>serve.log & SERVER=$!
 $TIMED $ARMCAL drive $ROUTINE --arm arm.toml --unattended --out served $MORE >served.log 2>&1; CODE=$?
 kill -INT $SERVER; wait $SERVER
 $ARMCAL run $ROUTINE --seed $SEED --out direct >direct.log 2>&1 && exit $CODE

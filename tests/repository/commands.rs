@@ -103,16 +103,16 @@ fn quoted_command_lines_parse() {
 #[test]
 fn command_lines_are_found_and_judged() {
     let page = "```sh\n$ armcal run r.toml # now\n```\nas `armcal explain\nsky` and `armcal_msgs` say\n\n    \
-        armcal plan R [--seed N]\n";
+        armcal run R [--seed N]\n";
     let lines = quoted(page);
     let found: Vec<&str> = lines.iter().map(|(_, line)| line.as_str()).collect();
-    assert_eq!(found, ["run r.toml", "plan R [--seed N]", "explain sky"]);
+    assert_eq!(found, ["run r.toml", "run R [--seed N]", "explain sky"]);
     assert!(lines.iter().all(|(place, line)| problem(*place, line).is_none()));
     for (place, line) in [
         (Place::Block, "run"),
         (Place::Inline, "run r.toml --sed 3"),
         (Place::Inline, "fly"),
-        (Place::Inline, "plan R --seed three"),
+        (Place::Inline, "run R --seed three"),
     ] {
         assert!(problem(place, line).is_some(), "{line}");
     }

@@ -6,6 +6,7 @@
 //! logarithm, for distances differ between views by factors.
 
 use armcal_core::stats::student_t_above;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Level of the test: an improvement that chance makes more often is none.
@@ -15,7 +16,7 @@ pub const SIGNIFICANCE: f64 = 0.01;
 const LEAST_P: f64 = 1e-9;
 
 /// Mount and map alone on the held-out views, and whether the calibration beats it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BaselineComparison {
     /// Tag position error by mount and map alone.

@@ -2,10 +2,11 @@
 
 use armcal_core::codes::{Code, Coded};
 use armcal_core::kinematics::JointKind;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// One finding; a repaired one does not refuse.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Finding {
     /// Cause; its code in files.
@@ -30,7 +31,7 @@ pub struct Finding {
 }
 
 /// What may be other than it was said to be.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FindingKind {
     /// A surveyed tag; the size is its distance from the survey.
@@ -160,7 +161,7 @@ impl FindingUnit {
 }
 
 /// SI, and plain numbers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum FindingUnit {
     /// Lengths.
     #[serde(rename = "m")]

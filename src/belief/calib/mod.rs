@@ -54,7 +54,7 @@ pub use result::{
     HeldOutMetrics, JointCompliance, JointResult, LinkResult, LookupTable, MAX_COMPACT_BYTES, MapResult, MapTag,
     ModelTable, ObservabilityTable, ObservedTag, PredictedToolError, PriorTable, ReferenceTable, SagTable, Status,
     SurveyCoverage, TargetPrediction, TermsTable, ValidRange, VerdictTable, ViewContainment, ViewResidual,
-    covariance_file, metric,
+    calibration_schema, covariance_file, covariance_schema, metric,
 };
 pub(crate) use views::dropouts::replace_dropouts;
 pub use views::{

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::calib::wrong_input::turn_in_words;
@@ -9,7 +10,7 @@ use armcal_core::codes::{Code, Coded};
 use armcal_core::kinematics::JointKind;
 
 /// A joint whose sensor has its zero elsewhere than robot.toml says.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct JointZero {
     /// Name of the joint in the URDF.
     pub joint: String,
@@ -23,7 +24,7 @@ pub struct JointZero {
 }
 
 /// One way in which readings differ from the angles that they are read as.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", tag = "error")]
 pub enum ReadingError {
     /// Two joints have each other's readings.
@@ -80,7 +81,7 @@ pub enum ReadingError {
 }
 
 /// The reading error that explains the views, with those that explain them nearly as well.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MisreadReadings {
     /// The likeliest one.
     pub found: ReadingError,

@@ -7,6 +7,7 @@ use armcal_core::codes::{Code, Coded};
 use armcal_core::kinematics::JointKind;
 use armcal_core::numeric::Outcome;
 use armcal_core::robot::FailedKind;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::calib::finding::FindingUnit;
@@ -19,7 +20,7 @@ mod words;
 pub use words::in_words;
 
 /// One reason to refuse. Angles in rad, lengths in m.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "cause", rename_all = "snake_case")]
 pub enum Refusal {
     /// Fewer fitted views than gains and offsets to estimate.
@@ -334,7 +335,7 @@ pub enum Refusal {
 }
 
 /// Source of the limit of a held-out error.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum HeldOutLimitSource {
     /// The noise that the input map states.
@@ -346,7 +347,7 @@ pub enum HeldOutLimitSource {
 }
 
 /// Which innovations of held-out views are tested.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum InnovationQuantity {
     /// Poses of the cameras, six numbers a view.

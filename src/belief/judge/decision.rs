@@ -3,6 +3,7 @@
 
 use armcal_core::codes::Code;
 use nalgebra::Matrix3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::judge::coverage::{COVERAGE, ErrorDistribution};
@@ -13,7 +14,7 @@ pub const MAX_RISK: f64 = 1.0 - COVERAGE;
 pub const RULE: &str = "P(error > tolerance) <= 5 % at every target";
 
 /// `[u95]` of calibration.toml: how far the tool may be off.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct U95Table {
     /// Largest U95 of the targets, or of the recorded views' configurations where there is no task, m; absent where
@@ -35,7 +36,7 @@ pub struct U95Table {
 }
 
 /// One target of the task.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TargetU95 {
     /// Number in the task, from 0.

@@ -4,6 +4,7 @@ use armcal_core::codes::Code;
 use armcal_core::codes::Warning;
 use std::path::Path as FilePath;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::plan::capture_plan::{ArmBelief, CapturePlan, LeastClearance, PlannedVisit};
@@ -13,11 +14,12 @@ use crate::plan::view_planning::StopReason;
 use armcal_core::document::{VERSION, parse_file};
 use armcal_core::kind::Kind;
 use armcal_core::robot::{FileIssue, Robot, RobotError, read_text};
+use armcal_core::schema::{first_line, schema_of};
 use armcal_core::streams::{CaptureSet, JointAngles, MAX_JOINTS};
 
 /// One plan, as its file has it. Angles are believed ones, in rad; counts are what the arm's controller is sent for
 /// them.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PlanFile {
     /// Of the format: 1.
@@ -60,7 +62,7 @@ pub struct PlanFile {
 }
 
 /// Sums over a plan.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PlanTotals {
     /// Number of planned views.
@@ -81,7 +83,7 @@ pub struct PlanTotals {
 }
 
 /// One planned view.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PoseTable {
     /// From 1, in the order of visits.
@@ -111,7 +113,7 @@ pub struct PoseTable {
 }
 
 /// What a view is for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SetName {
     /// The fit uses it.
@@ -121,7 +123,7 @@ pub enum SetName {
 }
 
 /// A tag that a view is planned for.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TagTable {
     /// Number of the tag.
@@ -131,7 +133,7 @@ pub struct TagTable {
 }
 
 /// The way to one view.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PathTable {
     /// 0 is the start.
@@ -154,13 +156,19 @@ pub struct PathTable {
 }
 
 /// A pose that no path leads to.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LeftOutTable {
     /// Believed angles.
     pub angles_rad: Vec<f64>,
     /// Why there is no path.
     pub reason: String,
+}
+
+/// Returns the schema of a plan.
+#[must_use]
+pub fn plan_schema() -> serde_json::Value {
+    schema_of::<PlanFile>(Kind::Plan)
 }
 
 /// Digits of the file: a millionth of a radian is a few micrometres at the tool.
@@ -222,7 +230,7 @@ impl PlanFile {
     #[must_use]
     pub fn to_toml(&self) -> String {
         let body = toml::to_string(self).expect("plain tables and finite numbers have a TOML form");
-        format!("{HEAD}{body}")
+        format!("{}{HEAD}{body}", first_line(Kind::Plan))
     }
 
     /// Reads a plan.

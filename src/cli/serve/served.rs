@@ -20,7 +20,7 @@ pub(super) fn serve(args: &ServeArgs) -> Result<Exit> {
         vehicle: &inputs.vehicle,
         scene: &inputs.routine.scene,
         spec: inputs.spec.clone(),
-        seed: args.seed.unwrap_or(inputs.routine.seed),
+        seed: inputs.routine.seed,
     })?;
     if let Some(file) = &args.truth {
         world.set_truth_sink(Box::new(TruthRecorder::create(file)?))?;

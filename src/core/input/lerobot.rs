@@ -11,6 +11,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::codes::Code;
@@ -30,7 +31,7 @@ const DYNAMIXEL_HOMING: f64 = 1_044_479.0;
 const MAX_DEG: f64 = 400.0;
 
 /// Make of the motors.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum LerobotMotors {
     /// STS and SMS series.
@@ -50,7 +51,7 @@ impl LerobotMotors {
 }
 
 /// Kind of the recorded numbers, by LeRobot's own names (`MotorNormMode`, motors_bus.py, lines 169 to 172).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum LerobotValues {
     /// Degrees from the middle of the range; the older form's `DEGREE`.
@@ -88,16 +89,19 @@ impl LerobotValues {
 }
 
 /// Part of an input map.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct LerobotToml {
+    /// LeRobot's calibration JSON, from the folder of this file.
     file: PathBuf,
+    /// Make of the motors.
     motors: LerobotMotors,
+    /// Kind of the recorded numbers.
     values: LerobotValues,
 }
 
 /// A motor's entry.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Motor {
     id: u32,
@@ -108,7 +112,7 @@ struct Motor {
 }
 
 /// The older form: lists in the order of `motor_names`.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct OlderFile {
     homing_offset: Vec<i64>,

@@ -42,6 +42,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use nalgebra::{Quaternion, UnitQuaternion};
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 pub use self::table::{
@@ -55,6 +56,7 @@ use crate::document::parse_file;
 use crate::kind::Kind;
 use crate::optics::TagFamily;
 use crate::robot::{FileIssue, JointSensorSpec, Robot, RobotError, read_text};
+use crate::schema::schema_of;
 
 mod table;
 mod units;
@@ -63,7 +65,7 @@ mod units;
 pub(super) const QUATERNION_LENGTH_TOLERANCE: f64 = 0.01;
 
 /// What of a tag's measurement counts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum TagUse {
     /// Its position in the camera frame.
@@ -94,7 +96,7 @@ pub struct TagNoise {
 }
 
 /// What becomes of tags that were seen while the arm moved.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum WhileMoving {
     /// Clocks of arm and camera differ: at 0.1 rad/s some 50 ms are 0.3 deg.
@@ -105,7 +107,7 @@ pub enum WhileMoving {
 }
 
 /// What becomes of NaN and infinities in joint readings and tags.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum NotFinite {
     /// The recording is refused with the place of the first one.
@@ -116,7 +118,7 @@ pub enum NotFinite {
 }
 
 /// Which time of a message counts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum StampSource {
     /// The stamp in its header, by the sender's clock; the log time where that is zero.
@@ -175,7 +177,7 @@ pub enum ConditionKind {
 }
 
 /// Topics of slow sensors.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ConditionTopics {
     /// Temperature of the oil, `sensor_msgs/msg/Temperature`.
@@ -343,69 +345,103 @@ pub(super) fn without_slash(frame: &str) -> &str {
     frame.strip_prefix('/').unwrap_or(frame)
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct MapToml {
     #[serde(rename = "version")]
     _version: u32,
     #[serde(rename = "kind")]
     _kind: Option<Kind>,
+    /// Largest gap between a tag message and the nearest joint reading; tags with a larger gap are left out.
     #[serde(default = "usual_gap_s")]
+    #[schemars(range(min = 1e-6, max = 60.0))]
     max_gap_s: f64,
+    /// Use of tags that were seen while the arm moved.
     #[serde(default)]
     while_moving: WhileMoving,
+    /// Use of readings and tags that are not finite.
     #[serde(default)]
     not_finite: NotFinite,
+    /// Time of a message.
     #[serde(default)]
     stamps: StampSource,
+    /// Table of the joints (and tags), instead of a recording.
     #[serde(default)]
     table: Option<TableToml>,
+    /// Joint readings.
     joint_sensors: JointsToml,
+    /// Tags that the camera saw.
     tags: TagsToml,
+    /// Tags that further cameras saw.
     #[serde(default)]
     further_tags: Vec<FurtherTagsToml>,
+    /// Topics of temperature, pressure and attitude.
     #[serde(default)]
     conditions: ConditionTopics,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct FurtherTagsToml {
+    /// Name of a [[further_camera]] of robot.toml.
     camera: String,
+    /// Topic of its tags.
     topic: String,
+    /// Frame of that camera.
     camera_frame: Option<String>,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct JointsToml {
+    /// Topic of sensor_msgs/msg/JointState.
     topic: Option<String>,
+    /// Recorded name or column of each joint of the robot, where they differ.
     #[serde(default)]
     names: BTreeMap<String, String>,
+    /// Unit of the recorded numbers.
     #[serde(default)]
     unit: JointUnit,
+    /// Unit of slides, where `unit` is "rad" or "deg".
     slide_unit: Option<SlideUnit>,
+    /// Calibration of LeRobot by which the recorded numbers become ticks.
     lerobot: Option<LerobotToml>,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct TagsToml {
+    /// Topic of transforms, detections or images.
     topic: Option<String>,
+    /// Table of the tags, where the joints are in another one.
     table: Option<TagTableToml>,
+    /// Frame of the camera in the transforms.
     camera_frame: Option<String>,
+    /// Frame of a tag, such as `tag36h11:{id}`, or the plain name of one landmark.
     child_frame: Option<String>,
+    /// Part of a tag's measurement that counts.
     #[serde(rename = "use")]
     tag_use: TagUse,
+    /// Columns of a table.
     #[serde(default)]
     columns: Option<TagColumnsToml>,
+    /// Family of the tags in images; absent: that of the robot's tags.
     family: Option<String>,
+    /// Least time between two images that are searched; 0: all.
     #[serde(default)]
+    #[schemars(range(min = 0.0, max = 3600.0))]
     image_period_s: f64,
+    /// Topic of sensor_msgs/msg/CameraInfo, for a robot without a lens.
     camera_info: Option<String>,
+    /// Seconds added to the stamps of the tags: joints' clock less the camera's.
     #[serde(default)]
+    #[schemars(range(min = -4.3e9, max = 4.3e9))]
     clock_offset_s: f64,
+    /// Noise of a tag's position, one sigma per axis.
+    #[schemars(range(min = 1e-7, max = 10.0))]
     position_std_m: Option<f64>,
+    /// Noise of a tag's attitude, one sigma per axis.
+    #[schemars(range(min = 1e-7, max = 3.0))]
     rotation_std_rad: Option<f64>,
 }
 
@@ -437,6 +473,12 @@ pub const DEFAULT_MAX_GAP_S: f64 = 0.5;
 
 fn usual_gap_s() -> f64 {
     DEFAULT_MAX_GAP_S
+}
+
+/// Returns the schema of an input map.
+#[must_use]
+pub fn input_schema() -> serde_json::Value {
+    schema_of::<MapToml>(Kind::Input)
 }
 
 /// Reads an input map.

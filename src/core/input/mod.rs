@@ -35,10 +35,10 @@ pub use lerobot::{LerobotCalibration, LerobotMotors, LerobotValues};
 pub use map::{
     ChildFrame, ConditionKind, ConditionTopics, CornerOrder, DEFAULT_MAX_GAP_S, Direction, FurtherTopic, InputMap,
     JointUnit, NotFinite, PoseColumns, RotationColumns, RotationForm, SeenColumns, SlideUnit, Source, StampSource,
-    TableFormat, TableJoin, TableLayout, TagNoise, TagTable, TagUse, TimeColumn, Topics, WhileMoving, parse_input_map,
-    read_input_map,
+    TableFormat, TableJoin, TableLayout, TagNoise, TagTable, TagUse, TimeColumn, Topics, WhileMoving, input_schema,
+    parse_input_map, read_input_map,
 };
 pub use recording::ExternalRecording;
 pub use table::{TableColumn, TableContents, plain_key, read_table_contents, tag_number};
 pub use tags::{ExternalDetection, RawMeasurement, TagFrame};
-pub use task::{TaskFile, parse_task, read_task};
+pub use task::{TaskFile, parse_task, read_task, task_schema};

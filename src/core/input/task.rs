@@ -12,6 +12,7 @@
 use crate::codes::Code;
 use std::path::Path;
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::document::parse_file;
@@ -19,6 +20,7 @@ use crate::joints::JointAngles;
 use crate::kind::Kind;
 use crate::kinematics::{ChainJoint, JointKind};
 use crate::robot::{FileIssue, Robot, RobotError, read_text};
+use crate::schema::schema_of;
 use crate::streams::ReachTask;
 use crate::time::Stamp;
 
@@ -33,18 +35,30 @@ pub struct TaskFile {
     pub poses_rad: Vec<Vec<f64>>,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct TaskToml {
     #[serde(rename = "version")]
     _version: u32,
     #[serde(rename = "kind")]
     _kind: Option<Kind>,
+    /// Largest distance between tool and target that counts as a hit.
+    #[schemars(range(min = 1e-6, max = 10.0))]
     tolerance_m: f64,
+    /// Tool positions in the base frame.
     #[serde(default)]
+    #[schemars(inner(inner(range(min = -100.0, max = 100.0))))]
     targets_m: Vec<[f64; 3]>,
+    /// Joint angles at which the tool shall be, base first (m for slides).
     #[serde(default)]
+    #[schemars(inner(inner(range(min = -100.0, max = 100.0))))]
     poses_rad: Vec<Vec<f64>>,
+}
+
+/// Returns the schema of a task.
+#[must_use]
+pub fn task_schema() -> serde_json::Value {
+    schema_of::<TaskToml>(Kind::Task)
 }
 
 /// Farther than any arm reaches, m.

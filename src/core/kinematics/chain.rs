@@ -1,6 +1,7 @@
 //! The chain and its forward kinematics.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, UnitVector3, Vector3};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::joints::{JointAngles, MAX_JOINTS};
@@ -10,7 +11,7 @@ use crate::kinematics::link_poses::{Attachment, LinkPoses, Slides};
 use crate::units::Unit;
 
 /// How a joint moves.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum JointKind {
     /// It turns about its axis: its coordinate is an angle, rad.

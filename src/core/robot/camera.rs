@@ -4,6 +4,7 @@ use crate::codes::Code;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::error::FileIssue;
@@ -53,25 +54,54 @@ impl Default for LensPriors {
     }
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct CameraFile {
+    /// Name of the camera.
     pub(super) name: String,
+    /// Link of the URDF that carries the camera; one that no joint moves: the camera stands still.
     pub(super) link: String,
+    /// Position of the camera in the frame of that link; absent: at its origin.
+    #[schemars(inner(range(min = -1e4, max = 1e4)))]
     position_m: Option<[f64; 3]>,
+    /// Attitude of the camera in that link: x right, y down, z along the view; absent: not turned.
     quaternion_wxyz: Option<[f64; 4]>,
+    /// Lens model: fisheye of Kannala and Brandt, or pinhole; with the next keys, all or none.
+    #[schemars(extend("enum" = ["pinhole", "equidistant"]))]
     model: Option<String>,
+    /// Width and height of the image.
     resolution_px: Option<[u32; 2]>,
+    /// Focal lengths along u and v.
+    #[schemars(inner(range(min = 1.0, max = 1e6)))]
     focal_px: Option<[f64; 2]>,
+    /// Principal point; the centre of the first pixel is (0, 0).
+    #[schemars(inner(range(min = -1e6, max = 1e6)))]
     center_px: Option<[f64; 2]>,
+    /// Coefficients: k1 to k4 of `equidistant`; none, k1, k2, p1, p2 or these and k3 of `pinhole` (OpenCV).
+    #[schemars(inner(range(min = -10.0, max = 10.0)))]
     distortion: Option<Vec<f64>>,
+    /// Half of the field of view of `equidistant`; that of a pinhole follows from its image.
+    #[schemars(range(min = 0.1, max = 3.0))]
     max_view_angle_rad: Option<f64>,
+    /// Flat window between lens and water; the lens is then that in air, without it that in its medium.
     port: Option<PortFile>,
+    /// Noise of a tag's corner, one sigma per coordinate; absent: 0.3 px.
+    #[schemars(range(min = 1e-3, max = 100.0))]
     corner_std_px: Option<f64>,
+    /// Relative sigma of the focal length; absent: 0.0025 (assumed).
+    #[schemars(range(min = 0.0, max = 0.1))]
     focal_std: Option<f64>,
+    /// Sigma of the principal point, per axis; absent: 1 px (assumed).
+    #[schemars(range(min = 0.0, max = 100.0))]
     center_std_px: Option<f64>,
+    /// Sigma of each distortion coefficient; absent: 0.001 (assumed).
+    #[schemars(range(min = 0.0, max = 1.0))]
     distortion_std: Option<f64>,
+    /// Sigma of the camera's position in its link, per axis.
+    #[schemars(range(min = 0.0, max = 1.0))]
     mount_std_m: f64,
+    /// Sigma of the camera's attitude in its link, per axis.
+    #[schemars(range(min = 0.0, max = 1.0))]
     mount_std_rad: f64,
 }
 
@@ -143,14 +173,22 @@ impl CameraFile {
 }
 
 /// A flat window before the lens.
-#[derive(Clone, Copy, Deserialize)]
+#[derive(Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct PortFile {
+    /// Distance from the lens's pupil to the window.
+    #[schemars(range(min = 0.0, max = 0.5))]
     distance_m: f64,
+    /// Thickness of the window.
+    #[schemars(range(min = 0.0, max = 0.1))]
     thickness_m: f64,
+    /// Refractive index of the window.
     #[serde(default = "acrylic")]
+    #[schemars(range(min = 1.0, max = 3.0))]
     glass_index: f64,
+    /// Refractive index of the water.
     #[serde(default = "water")]
+    #[schemars(range(min = 1.0, max = 2.0))]
     water_index: f64,
 }
 

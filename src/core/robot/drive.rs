@@ -4,6 +4,7 @@
 
 use std::path::Path;
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::error::FileIssue;
@@ -21,14 +22,17 @@ pub struct DriveSpec {
 }
 
 /// Tracking error of a moving joint: its own sensor against its set-point.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct MotionSpec {
     /// Largest time by which a joint lags or leads its set-points, s.
+    #[schemars(range(min = 0.0, max = 5.0))]
     pub lag_spread_s: f64,
     /// Overshoot at the end of a motion at the joint's full rate, rad; in proportion to the rate.
+    #[schemars(range(min = 0.0, max = 0.5))]
     pub overshoot_rad: f64,
     /// Error under load at the joint's full rate, rad; in proportion to the rate.
+    #[schemars(range(min = 0.0, max = 0.5))]
     pub droop_rad: f64,
 }
 
@@ -40,9 +44,11 @@ impl Default for MotionSpec {
     }
 }
 
-#[derive(Clone, Copy, Debug, Deserialize)]
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct HydraulicsFile {
+    /// Flow of the pump.
+    #[schemars(range(min = 0.01, max = 1e4))]
     pump_l_per_min: f64,
 }
 

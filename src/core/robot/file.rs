@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Isometry3, Vector3};
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::allowed_pairs::AllowedPairs;
@@ -13,7 +14,7 @@ use super::camera::{CameraFile, CameraSpec, CameraTable, check_camera, check_fur
 use super::completeness::check_complete;
 use super::drive::{DriveSpec, HydraulicsFile, MotionSpec, usual_displacement};
 use super::error::{FileIssue, RobotError, parse_toml, read_in};
-use super::geometry::GeometryPriors;
+use super::geometry::{GeometryPriors, GeometryTable};
 use super::gripper::GripperFile;
 use super::gripper_tag::{GripperTag, GripperTagFile};
 use super::joint_sensor::{JointSensorSpec, SensorFile, check_sensors, displacements};
@@ -29,49 +30,78 @@ use crate::joints::JointAngles;
 use crate::kind::Kind;
 use crate::kinematics::{ArmLoads, Attachment, JointKind};
 use crate::optics::TagFamily;
+use crate::schema::schema_of;
 use crate::spatial::{Base, Pose};
 
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct RobotFile {
     #[serde(rename = "version")]
     _version: u32,
     #[serde(rename = "kind")]
     _kind: Option<Kind>,
+    /// Name of the arm, for reports and exports.
     name: String,
+    /// Serial number; the report has it.
     serial: Option<String>,
+    /// Path of the URDF, from the folder of this file.
     urdf: PathBuf,
+    /// Link of the URDF that is the base frame.
     base_link: String,
+    /// Number of the tag next to the base; `run` and `plan` need it, here or from the vehicle.
     base_tag: Option<u32>,
+    /// Link that carries the tags, whose poses are then in its frame: for a camera that stands still.
     tag_link: Option<String>,
+    /// Joint angles from which a run starts, base first; `run` and `plan` need them, here or from the vehicle.
+    #[schemars(inner(range(min = -100.0, max = 100.0)))]
     stowed_rad: Option<Vec<f64>>,
+    /// Collision meshes of the URDF; `run` and `plan` refuse an arm whose meshes are ignored.
     #[serde(default)]
     collision_meshes: CollisionMeshes,
+    /// Pairs of links, or of a link and a part of the vehicle, that touch by design and are not kept apart.
     #[serde(default)]
     allowed_pairs: Vec<[String; 2]>,
+    /// Weight of the displaced sea water over that of the arm.
     #[serde(default = "default_buoyancy_fraction")]
+    #[schemars(range(min = 0.0, max = 0.95))]
     buoyancy_fraction: f64,
+    /// Tool point.
     tool: ToolFile,
+    /// Jaws of the gripper.
     gripper: Option<GripperFile>,
+    /// Tag behind the last joint that the wrist camera sees.
     gripper_tag: Option<GripperTagFile>,
+    /// Joint sensors, one for each moving joint, in the order of the chain.
     joint_sensor: Vec<SensorFile>,
+    /// Oil supply.
     hydraulics: Option<HydraulicsFile>,
+    /// How closely the arm follows its set-points.
     #[serde(default)]
     motion: MotionSpec,
+    /// Sigmas of the geometry and loads.
     #[serde(default)]
+    #[schemars(with = "GeometryTable")]
     geometry: GeometryPriors,
+    /// Camera that calibrates the arm.
     camera: CameraFile,
+    /// Further cameras, at most seven, used by `calibrate` on recordings of real arms.
     #[serde(default)]
     further_camera: Vec<CameraFile>,
+    /// Surveyed tags in the base frame; those of a vehicle replace them all.
     #[serde(default)]
     tag: Vec<TagFile>,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct ToolFile {
+    /// Link of the URDF that carries the tool.
     link: String,
+    /// Tool point in the frame of that link.
+    #[schemars(inner(range(min = -10.0, max = 10.0)))]
     point_m: [f64; 3],
+    /// Radius of the sphere that touches; needed by `touch` steps.
+    #[schemars(range(min = 0.002, max = 0.2))]
     tip_radius_m: Option<f64>,
 }
 
@@ -91,6 +121,12 @@ const TIP_RGB: [u8; 3] = [200, 205, 215];
 /// Of a Titan: 100 kg in air, 78 kg in sea water.
 fn default_buoyancy_fraction() -> f64 {
     0.22
+}
+
+/// Returns the schema of robot.toml.
+#[must_use]
+pub fn robot_schema() -> serde_json::Value {
+    schema_of::<RobotFile>(Kind::Robot)
 }
 
 /// Reads a robot folder: robot.toml, the URDF that it names, the collision meshes that this names, and

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use nalgebra::Vector3;
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::error::FileIssue;
@@ -42,15 +43,28 @@ pub struct StatedGeometry {
 }
 
 /// `[geometry]` as it is written.
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-struct GeometryTable {
+pub(super) struct GeometryTable {
+    /// Sigma of each joint's position in its parent link, per axis; absent: 0.0005, not included in U95.
+    #[schemars(range(min = 0.0, max = 1.0))]
     link_position_std_m: Option<f64>,
+    /// Sigma of each joint's attitude in its parent link, per axis; absent: 0.0005, not included in U95.
+    #[schemars(range(min = 0.0, max = 1.0))]
     link_rotation_std_rad: Option<f64>,
+    /// Sigma of the tool point in its link, per axis; absent: 0.0005, not included in U95.
+    #[schemars(range(min = 0.0, max = 1.0))]
     tool_position_std_m: Option<f64>,
+    /// Sigma of each joint's compliance behind its sensor.
+    #[schemars(range(min = 0.0, max = 1e-2))]
     joint_compliance_std_rad_per_nm: f64,
+    /// Sigma of the mount's compliance, about each axis of the base.
+    #[schemars(range(min = 0.0, max = 1e-2))]
     mount_compliance_std_rad_per_nm: f64,
+    /// Sigma of a load in the gripper, weight less buoyancy.
+    #[schemars(range(min = 0.0, max = 1e5))]
     tool_load_std_n: f64,
+    /// Direction against gravity in the base frame, of any length.
     up: [f64; 3],
 }
 

@@ -7,6 +7,7 @@ use crate::codes::Code;
 use std::path::Path;
 
 use nalgebra::{Isometry3, Unit, Vector3};
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::error::{FileIssue, RobotError};
@@ -55,14 +56,22 @@ impl GripperSpec {
     }
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct GripperFile {
-    /// Links of the URDF.
+    /// Links of the URDF that are the two jaws.
     jaws: [String; 2],
+    /// Direction in which the first jaw opens, in the frame of the tool's link.
+    #[schemars(inner(range(min = -1e3, max = 1e3)))]
     opens_along: [f64; 3],
+    /// Width between the jaws as the arm carries them.
+    #[schemars(range(min = 0.0, max = 2.0))]
     rest_opening_m: f64,
+    /// Largest width between the jaws.
+    #[schemars(range(min = 1e-3, max = 2.0))]
     opening_max_m: f64,
+    /// Time in which the jaws close from the largest width.
+    #[schemars(range(min = 0.05, max = 60.0))]
     closing_time_s: f64,
 }
 

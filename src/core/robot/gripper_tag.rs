@@ -5,6 +5,7 @@
 use crate::codes::Code;
 use std::path::Path;
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::error::{FileIssue, RobotError};
@@ -65,17 +66,28 @@ impl GripperTag {
     }
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct GripperTagFile {
+    /// Number of the tag.
     id: u32,
+    /// Family of the tag, such as `36h11`.
     family: String,
+    /// Edge of the black square.
+    #[schemars(range(min = 1e-3, max = 10.0))]
     size_m: f64,
-    /// A link of the URDF; the tag's pose is in its frame.
+    /// Link of the URDF that carries the tag.
     link: String,
+    /// Position of the tag's centre in that link.
+    #[schemars(inner(range(min = -1e4, max = 1e4)))]
     position_m: [f64; 3],
+    /// Attitude of the tag in that link.
     quaternion_wxyz: [f64; 4],
+    /// Sigma of the position, per axis.
+    #[schemars(range(min = 0.0, max = 1.0))]
     position_std_m: f64,
+    /// Sigma of the attitude, per axis.
+    #[schemars(range(min = 0.0, max = 1.0))]
     rotation_std_rad: f64,
 }
 

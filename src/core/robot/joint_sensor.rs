@@ -4,6 +4,7 @@ use crate::codes::Code;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::error::{FileIssue, RobotError};
@@ -11,7 +12,7 @@ use crate::kinematics::{Chain, ChainJoint, JointKind};
 use crate::units::Unit;
 
 /// Kind of joint sensor; it selects the effects that belief models.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SensorKind {
     /// Resistive track: nonlinear, and sensitive to temperature and pressure.
@@ -85,34 +86,75 @@ impl JointSensorSpec {
     }
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SensorFile {
+    /// Name of the joint in the URDF.
     pub(super) joint: String,
+    /// Kind of the sensor; it selects the effects that the estimate models.
     kind: SensorKind,
+    /// Reading at angle zero.
+    #[schemars(range(min = -1e9, max = 1e9))]
     offset_counts: f64,
+    /// Counts after which the reading repeats, at least the joint's range.
+    #[schemars(range(min = 1.0, max = 1e12))]
     wrap_counts: f64,
+    /// Relative sigma of the gain; 0 holds it fixed.
+    #[schemars(range(min = 0.0, max = 10.0))]
     gain_std: f64,
+    /// Largest relative gain error that planning allows for.
+    #[schemars(range(min = 0.0, max = 0.5))]
     gain_bound: f64,
+    /// Noise of one reading, one sigma; it also distinguishes a still joint from a moving one.
+    #[schemars(range(min = 0.0, max = 1e6))]
     noise_std_counts: f64,
-    /// Counts per degree: datasheets give this round figure.
+    /// Counts per degree of the joint, of size 0.001 at least; negative where the reading falls as the angle grows.
+    #[schemars(range(min = -1e9, max = 1e9))]
     scale_counts_per_deg: Option<f64>,
+    /// Sigma of the offset; 0 holds it fixed.
+    #[schemars(range(min = 0.0, max = 6.3))]
     offset_std_rad: Option<f64>,
+    /// Largest offset that planning allows for.
+    #[schemars(range(min = 0.0, max = 3.2))]
     offset_bound_rad: Option<f64>,
+    /// Sigma of the error left by gain and offset; it enters the predicted tool error.
+    #[schemars(range(min = 0.0, max = 1.0))]
     linearity_std_rad: Option<f64>,
+    /// Sigma of the offset's change with the oil temperature.
+    #[schemars(range(min = 0.0, max = 0.1))]
     temperature_std_rad_per_k: Option<f64>,
+    /// Sigma of the offset's random walk in one hour.
+    #[schemars(range(min = 0.0, max = 0.1))]
     drift_std_rad_per_sqrt_h: Option<f64>,
+    /// Largest rate at which the joint is driven.
+    #[schemars(range(min = 1e-3, max = 20.0))]
     max_rate_rad_s: Option<f64>,
-    /// Computed from the URDF's effort where absent.
+    /// Oil per radian; absent: from the URDF's effort.
+    #[schemars(range(min = 0.0, max = 100.0))]
     displacement_l_per_rad: Option<f64>,
-    /// The same of a slide.
+    /// Counts per millimetre of a slide.
+    #[schemars(range(min = -1e9, max = 1e9))]
     scale_counts_per_mm: Option<f64>,
+    /// Sigma of a slide's offset.
+    #[schemars(range(min = 0.0, max = 10.0))]
     offset_std_m: Option<f64>,
+    /// Largest offset of a slide that planning allows for.
+    #[schemars(range(min = 0.0, max = 10.0))]
     offset_bound_m: Option<f64>,
+    /// Sigma of the error left by gain and offset of a slide.
+    #[schemars(range(min = 0.0, max = 1.0))]
     linearity_std_m: Option<f64>,
+    /// Sigma of a slide's offset change with the oil temperature.
+    #[schemars(range(min = 0.0, max = 0.1))]
     temperature_std_m_per_k: Option<f64>,
+    /// Sigma of a slide's offset walk in one hour.
+    #[schemars(range(min = 0.0, max = 0.1))]
     drift_std_m_per_sqrt_h: Option<f64>,
+    /// Largest rate at which a slide is driven.
+    #[schemars(range(min = 1e-3, max = 20.0))]
     max_rate_m_s: Option<f64>,
+    /// Oil per metre of a slide; absent: from the URDF's effort.
+    #[schemars(range(min = 0.0, max = 1000.0))]
     displacement_l_per_m: Option<f64>,
 }
 

@@ -4,6 +4,7 @@ use crate::codes::Code;
 use std::path::Path;
 
 use nalgebra::{Point3, Unit, Vector3};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::error::FileIssue;
@@ -24,13 +25,22 @@ pub struct VehicleLight {
     pub half_angle_rad: f64,
 }
 
-#[derive(Clone, Debug, Deserialize, Serialize)]
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct LightFile {
+    /// Name of the light.
     name: String,
+    /// Position in the vehicle's frame.
+    #[schemars(inner(range(min = -1e4, max = 1e4)))]
     position_m: [f64; 3],
+    /// Axis of the beam in the vehicle's frame, of any length.
+    #[schemars(inner(range(min = -1e3, max = 1e3)))]
     direction: [f64; 3],
+    /// Luminous flux.
+    #[schemars(range(min = 0.0, max = 1e7))]
     flux_lm: f64,
+    /// Half of the beam's opening angle.
+    #[schemars(range(min = 0.02, max = 3.0))]
     half_angle_rad: f64,
 }
 

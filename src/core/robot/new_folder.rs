@@ -13,8 +13,10 @@ use super::mesh;
 use super::urdf::{MAX_COLLISION_SHAPES, UrdfChain, UrdfModel};
 use super::urdf_mesh::places;
 use crate::files::{self, FileKind};
+use crate::kind::Kind;
 use crate::kinematics::{Chain, ChainJoint, JointKind};
 use crate::optics::{CameraModel, LensModel};
+use crate::schema::first_line;
 
 /// What a robot folder is made from.
 #[derive(Clone, Copy, Debug)]
@@ -29,8 +31,6 @@ pub struct NewRobot<'a> {
     pub tip: Option<&'a str>,
     /// Link whose frame is the camera's, x right, y down, z forward.
     pub camera: Option<&'a str>,
-    /// Name of the robot; that of the URDF.
-    pub name: Option<&'a str>,
     /// The camera's lens, and the words that say where it is from.
     pub lens: Option<(&'a str, &'a CameraModel)>,
     /// Links that overlap or are near each other at nearly every pose.
@@ -81,7 +81,7 @@ pub fn draft_robot(wanted: &NewRobot<'_>, meshes: DraftedMeshes<'_>) -> Result<D
     let urdf_name = wanted.urdf.file_name().map_or_else(|| "arm.urdf".into(), PathBuf::from);
     let mut files = mesh_files(&on_chain, wanted.urdf)?;
     files.push(NewFile { path: urdf_name.clone(), bytes: urdf.text.clone().into_bytes() });
-    let name = wanted.name.unwrap_or(&urdf.robot.name);
+    let name = &urdf.robot.name;
     let draft = Draft { wanted, urdf: &urdf, urdf_name: &urdf_name, name, arm: &arm, chain: &chain, meshes };
     files.push(NewFile { path: "robot.toml".into(), bytes: draft.text().into_bytes() });
     Ok(DraftedRobot { files, left_out: arm.left_out })
@@ -179,13 +179,14 @@ impl Draft<'_> {
         let urdf = quoted(&self.urdf_name.to_string_lossy());
         let _ = write!(
             out,
-            "# Written by `armcal new-robot` from {}. \"Read\" is what the URDF says, \"assumed\" is not: look at it.\n\
-             # Angles in rad, lengths and the ways of slides in m. Keys that begin with # are left to fill in.\n\
+            "{}# Written by `armcal new-robot` from {}. \"Read\" is what the URDF says, \"assumed\" is not: look at\n\
+             # it. Angles in rad, lengths and the ways of slides in m. Keys that begin with # are left to fill in.\n\
              version = 1\nkind = \"robot\"\nname = {}\nurdf = {urdf}\n\
              # Read: the chain of {n} moving joints from here. Tags and targets are in this link's frame.\n\
              base_link = {}\n\
              # Assumed: the arm is in air. Under water: the displaced water's weight over the arm's.\n\
              buoyancy_fraction = 0.0\n",
+            first_line(Kind::Robot),
             on_line(&self.urdf_name.to_string_lossy()),
             quoted(self.name),
             quoted(&arm.base)

@@ -3,6 +3,7 @@
 use crate::codes::Code;
 use std::path::{Path, PathBuf};
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::decomposition::decomposed;
@@ -22,7 +23,7 @@ pub struct Part {
 }
 
 /// Conversion of a mesh to convex parts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Convex {
     /// One hull around the whole mesh.
@@ -33,28 +34,47 @@ pub enum Convex {
 }
 
 /// A part or obstacle in a file.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PartFile {
+    /// Name of the part, for messages and reports.
     name: String,
+    /// Shape: `box`, `cylinder`, `capsule`, `sphere`, `hull` or `mesh`.
+    #[schemars(extend("enum" = ["box", "cylinder", "capsule", "sphere", "hull", "mesh"]))]
     shape: String,
+    /// Edges of a box along x, y, z.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(range(min = 1e-4, max = 1e4)))]
     size_m: Option<[f64; 3]>,
+    /// Radius of a cylinder, capsule or sphere.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1e-4, max = 1e4))]
     radius_m: Option<f64>,
+    /// Length of a cylinder along z, or between the centres of a capsule's caps.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1e-4, max = 1e4))]
     length_m: Option<f64>,
+    /// Points of a hull: the smallest convex body around them, 0.1 mm thick at least.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(inner(range(min = -1e4, max = 1e4))))]
     points_m: Option<Vec<[f64; 3]>>,
+    /// Mesh file (STL, OBJ, DAE), from the folder of this file.
     #[serde(skip_serializing_if = "Option::is_none")]
     file: Option<PathBuf>,
+    /// Metres per unit of the mesh; absent: 1.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1e-6, max = 1e4))]
     scale_m: Option<f64>,
+    /// Conversion of the mesh: one hull, or up to 32 that follow its hollows (V-HACD).
     #[serde(skip_serializing_if = "Option::is_none")]
     convex: Option<Convex>,
+    /// Position of the shape's centre in its owner's frame.
+    #[schemars(inner(range(min = -1e4, max = 1e4)))]
     position_m: [f64; 3],
+    /// Attitude of the shape in its owner's frame.
     #[serde(default = "no_rotation")]
     quaternion_wxyz: [f64; 4],
+    /// Colour in pictures.
     #[serde(default = "grey")]
     color_rgb: [u8; 3],
 }
@@ -210,7 +230,7 @@ mod tests {
         f 1 2 8 7\nf 2 3 9 8\nf 3 4 10 9\nf 4 5 11 10\nf 5 6 12 11\nf 6 1 7 12\n";
 
     fn parts(text: &str) -> Result<(Vec<Part>, Vec<PartFile>), RobotError> {
-        #[derive(Deserialize)]
+        #[derive(Deserialize, JsonSchema)]
         struct List {
             obstacle: Vec<PartFile>,
         }
@@ -279,7 +299,7 @@ mod tests {
         for convex in ["hull", "decomposed"] {
             let keys = format!("file = \"angle.obj\"\nscale_m = 0.001\nconvex = \"{convex}\"\n");
             let (found, plain) = parts(&mesh(&keys)).expect("a mesh");
-            #[derive(Serialize, Deserialize)]
+            #[derive(Serialize, Deserialize, JsonSchema)]
             struct List {
                 obstacle: Vec<PartFile>,
             }

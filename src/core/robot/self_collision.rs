@@ -5,8 +5,10 @@
 
 use crate::codes::Code;
 use crate::kind::Kind;
+use crate::schema::{first_line, schema_of};
 use std::path::Path;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::body::LinkBody;
@@ -18,7 +20,7 @@ use crate::document::{VERSION, parse_file};
 /// Its name in a robot folder.
 pub const SELF_COLLISION_FILE: &str = "self_collision.toml";
 
-#[derive(Deserialize, Serialize)]
+#[derive(Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct SelfCollisionFile {
     version: u32,
@@ -26,18 +28,30 @@ struct SelfCollisionFile {
     kind: Kind,
     /// BLAKE3 of the URDF's text.
     urdf_blake3: String,
+    /// Seed of the random configurations.
     seed: u64,
+    /// Number of random configurations.
     n: u64,
+    /// Distance below which a pair is listed.
     near_m: f64,
+    /// Pairs of links that can come near each other.
     #[serde(default)]
     pair: Vec<PairFile>,
 }
 
-#[derive(Deserialize, Serialize)]
+#[derive(Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct PairFile {
+    /// Names of the two links.
     links: [String; 2],
+    /// Least distance found.
     nearest_m: f64,
+}
+
+/// Returns the schema of self_collision.toml.
+#[must_use]
+pub fn self_collision_schema() -> serde_json::Value {
+    schema_of::<SelfCollisionFile>(Kind::SelfCollision)
 }
 
 impl SelfPairs {
@@ -63,10 +77,11 @@ impl SelfPairs {
         let text = toml::to_string(&raw)
             .map_err(|error| FileIssue::new(Code::Internal, file, "pair", format!("has no TOML form: {error}")))?;
         Ok(format!(
-            "# Links of this arm that can come nearer to each other than near_m, among n random configurations \
+            "{}# Links of this arm that can come nearer to each other than near_m, among n random configurations \
              within the joint\n\
              # limits and the datasheet's errors beyond them. Neighbours along the chain are left out. Made by\n\
              # `armcal new-robot --self-collision {}`; make it anew when the URDF changes.\n{text}",
+            first_line(Kind::SelfCollision),
             robot.folder.display()
         ))
     }

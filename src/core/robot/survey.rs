@@ -4,6 +4,7 @@ use crate::codes::Code;
 use std::collections::BTreeSet;
 use std::path::Path;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::error::{FileIssue, RobotError};
@@ -110,15 +111,26 @@ impl TagSurvey {
 }
 
 /// `[[tag]]` of a file, with its pose in the owner's frame.
-#[derive(Clone, Debug, Deserialize, Serialize)]
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct TagFile {
+    /// Number of the tag.
     id: u32,
+    /// Family of the tag, such as `36h11`; one for all tags of an arm.
     family: String,
+    /// Edge of the black square.
+    #[schemars(range(min = 1e-3, max = 10.0))]
     size_m: f64,
+    /// Position of the tag's centre in its owner's frame.
+    #[schemars(inner(range(min = -1e4, max = 1e4)))]
     position_m: [f64; 3],
+    /// Attitude of the tag in its owner's frame: x right, y up as printed, z out of the tag.
     quaternion_wxyz: [f64; 4],
+    /// Sigma of the surveyed position, per axis.
+    #[schemars(range(min = 0.0, max = 1.0))]
     position_std_m: f64,
+    /// Sigma of the surveyed attitude, per axis.
+    #[schemars(range(min = 0.0, max = 1.0))]
     rotation_std_rad: f64,
 }
 

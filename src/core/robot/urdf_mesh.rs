@@ -3,6 +3,7 @@
 use crate::codes::Code;
 use std::path::{Path, PathBuf};
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::error::FileIssue;
@@ -13,7 +14,7 @@ use super::shape::Shape;
 use crate::files::check_within;
 
 /// What becomes of the collision meshes of a URDF. `collision_meshes` of robot.toml.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum CollisionMeshes {
     /// Each is read as its convex hull.

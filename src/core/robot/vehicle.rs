@@ -4,6 +4,7 @@ use crate::codes::Code;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::error::{FileIssue, RobotError, read_text};
@@ -13,6 +14,7 @@ use super::survey::{TagFile, TagSurvey, check_tags};
 use crate::document::parse_file;
 use crate::kind::Kind;
 use crate::kinematics::Attachment;
+use crate::schema::schema_of;
 use crate::spatial::{Base, Pose, Vehicle as VehicleFrame};
 
 /// The nominal vehicle.
@@ -43,12 +45,14 @@ pub struct Vehicle {
 }
 
 /// Station-keeping errors, one sigma: centre of mass along each axis, and roll, pitch and yaw.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StationKeeping {
     /// Per axis.
+    #[schemars(range(min = 0.0, max = 10.0))]
     pub position_std_m: f64,
     /// Per angle.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub attitude_std_rad: f64,
 }
 
@@ -69,24 +73,32 @@ impl StationKeeping {
 
 /// The vehicle as a body in water, about its origin (the centre of mass) in its own axes. Arrays of six hold x, y, z,
 /// then about x, y, z.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct VehicleDynamics {
     /// Moments of inertia about x, y, z, without the water.
+    #[schemars(inner(range(min = 0.1, max = 1e8)))]
     pub inertia_kg_m2: [f64; 3],
     /// Mass of the water that moves along x, y, z with it.
+    #[schemars(inner(range(min = 0.0, max = 1e7)))]
     pub added_mass_kg: [f64; 3],
     /// Inertia of the water that turns about x, y, z with it.
+    #[schemars(inner(range(min = 0.0, max = 1e8)))]
     pub added_inertia_kg_m2: [f64; 3],
     /// Only its height matters: the vehicle is ballasted so that it floats level with the arm stowed.
+    #[schemars(inner(range(min = -10.0, max = 10.0)))]
     pub center_of_buoyancy_m: [f64; 3],
     /// N s/m and N m s/rad.
+    #[schemars(inner(range(min = 0.0, max = 1e7)))]
     pub drag_linear: [f64; 6],
     /// N s2/m2 and N m s2/rad2.
+    #[schemars(inner(range(min = 0.0, max = 1e7)))]
     pub drag_quadratic: [f64; 6],
     /// Of all thrusters together; 0 on axes without authority.
+    #[schemars(inner(range(min = 0.0, max = 1e6)))]
     pub thrust_max_n: [f64; 3],
     /// Of all thrusters together about x, y, z; 0 on axes without authority.
+    #[schemars(inner(range(min = 0.0, max = 1e6)))]
     pub moment_max_n_m: [f64; 3],
 }
 
@@ -108,35 +120,58 @@ impl VehicleDynamics {
     }
 }
 
-#[derive(Deserialize, Serialize)]
+#[derive(Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct VehicleFile {
     version: u32,
     #[serde(default = "Kind::vehicle")]
     kind: Kind,
+    /// Name of the vehicle.
     name: String,
+    /// Dry mass without the arm.
+    #[schemars(range(min = 1.0, max = 1e7))]
     mass_kg: f64,
+    /// Number of the tag that defines the frame of the tags.
     #[serde(skip_serializing_if = "Option::is_none")]
     base_tag: Option<u32>,
+    /// Stowed joint angles on this vehicle, by the robot's name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[schemars(extend("additionalProperties" = {
+        "type": "array", "items": { "type": "number", "minimum": -100.0, "maximum": 100.0 }
+    }))]
     stowed_rad: BTreeMap<String, Vec<f64>>,
+    /// Mount of the arm: pose of its base link in the vehicle's frame.
     mount: PlaceFile,
+    /// Vehicle as a body in water; needed by a free vehicle.
     #[serde(skip_serializing_if = "Option::is_none")]
     dynamics: Option<VehicleDynamics>,
+    /// Errors of station keeping; absent: 3 cm and 0.5 deg.
     #[serde(skip_serializing_if = "Option::is_none")]
     station_keeping: Option<StationKeeping>,
+    /// Tags on the vehicle, in its frame; they are the survey for any arm on it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     tag: Vec<TagFile>,
+    /// Lamps for rendered images.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     light: Vec<LightFile>,
+    /// Convex parts around the arm, in the vehicle's frame; 256 at most.
     part: Vec<PartFile>,
 }
 
-#[derive(Deserialize, Serialize)]
+#[derive(Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct PlaceFile {
+    /// Position.
+    #[schemars(inner(range(min = -1e4, max = 1e4)))]
     position_m: [f64; 3],
+    /// Attitude.
     quaternion_wxyz: [f64; 4],
+}
+
+/// Returns the schema of a vehicle.
+#[must_use]
+pub fn vehicle_schema() -> serde_json::Value {
+    schema_of::<VehicleFile>(Kind::Vehicle)
 }
 
 /// Reads a vehicle file.
@@ -146,6 +181,11 @@ struct PlaceFile {
 pub fn load_vehicle(file: &Path) -> Result<Vehicle, RobotError> {
     let mut text = read_text(file)?;
     let mut raw: VehicleFile = parse_file(Kind::Vehicle, file, &text)?;
+    for (robot, angles) in &raw.stowed_rad {
+        for angle in angles {
+            FileIssue::check_range(file, &format!("stowed_rad.{robot}"), *angle, -100.0..=100.0)?;
+        }
+    }
     FileIssue::check_range(file, "mass_kg", raw.mass_kg, 1.0..=1e7)?;
     check_place(file, "mount.position_m", &raw.mount.position_m)?;
     let mount =

@@ -1,14 +1,17 @@
 //! The figures that an `assert` step may hold a run against.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt;
 
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value, json};
 
 use crate::units::Unit;
 
 /// A figure of a run, as routines and summary.json name it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 pub enum AssertFigure {
     /// Held-out views of the last calibration, root mean square.
     #[serde(rename = "held_out_rms_m")]
@@ -50,6 +53,9 @@ pub enum AssertFigure {
     #[serde(rename = "poses_skipped")]
     PosesSkipped,
 }
+
+/// Largest limit, in the unit of its figure.
+pub(super) const MAX_LIMIT: f64 = 1e9;
 
 /// What must have happened before there is a figure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -148,6 +154,25 @@ impl AssertLimits {
     #[must_use]
     pub fn need(&self, what: Needs) -> bool {
         self.0.keys().any(|figure| figure.needs() == what)
+    }
+}
+
+/// A table with one key per figure.
+impl JsonSchema for AssertLimits {
+    fn schema_name() -> Cow<'static, str> {
+        "AssertLimits".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let figures = AssertFigure::json_schema(generator);
+        let keys = figures.get("oneOf").and_then(|figures| figures.as_array()).into_iter().flatten();
+        let limit = |figure: &Value| {
+            let key = figure["const"].as_str()?.to_owned();
+            let text = &figure["description"];
+            Some((key, json!({ "type": "number", "minimum": 0.0, "maximum": MAX_LIMIT, "description": text })))
+        };
+        let keys: Map<String, Value> = keys.filter_map(limit).collect();
+        json_schema!({ "type": "object", "properties": keys, "additionalProperties": false })
     }
 }
 

@@ -3,21 +3,25 @@
 use crate::codes::Code;
 use std::path::Path;
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::robot::FileIssue;
 
 /// The table `[camera]` of a routine.
-#[derive(Default, Deserialize)]
+const MODES: [&str; 2] = ["geometric", "rendered"];
+
+#[derive(Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct CameraFile {
+    /// `geometric`: corners are computed; `rendered`: a detector reads rendered images.
+    #[schemars(extend("enum" = MODES))]
     mode: Option<String>,
 }
 
 impl CameraFile {
     /// The table `[world]` with the mode in `[world.camera]`: only the simulator reads it.
     pub(super) fn into_world(self, file: &Path, mut world: toml::Table) -> Result<toml::Table, FileIssue> {
-        const MODES: [&str; 2] = ["geometric", "rendered"];
         let Some(mode) = self.mode else { return Ok(world) };
         if !MODES.contains(&mode.as_str()) {
             return Err(FileIssue::new(

@@ -1,11 +1,13 @@
 //! What a routine says about being run many times: `[campaign]` and `[regress]`.
 
 use crate::codes::Code;
+use std::collections::BTreeMap;
 use std::fmt;
 use std::ops::RangeInclusive;
 use std::path::Path;
 use std::str::FromStr;
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 use toml::{Table, Value};
 
@@ -70,28 +72,38 @@ pub struct CampaignSettings {
 }
 
 /// `[regress]`: how much worse than the baseline is still the same.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RegressSettings {
     /// Limits of new over baseline, typical of the pairs.
+    #[schemars(range(min = 1.0, max = 1000.0))]
     pub tool_error_ratio: f64,
     /// The same of the distance between target and tool.
+    #[schemars(range(min = 1.0, max = 1000.0))]
     pub reach_error_ratio: f64,
     /// The same of the fit's residual in the image.
+    #[schemars(range(min = 1.0, max = 1000.0))]
     pub residual_ratio: f64,
     /// The same of the held-out tags' position error.
+    #[schemars(range(min = 1.0, max = 1000.0))]
     pub held_out_ratio: f64,
     /// The same of the scatter of corners within a capture.
+    #[schemars(range(min = 1.0, max = 1000.0))]
     pub corner_scatter_ratio: f64,
     /// The same of the simulated time.
+    #[schemars(range(min = 1.0, max = 1000.0))]
     pub time_ratio: f64,
     /// Limit of poses captured, baseline over new.
+    #[schemars(range(min = 1.0, max = 1000.0))]
     pub poses_ratio: f64,
     /// How much nearer than the baseline the arm may come to anything, typical of the pairs, m.
+    #[schemars(range(min = 1e-6, max = 10.0))]
     pub clearance_drop_m: f64,
     /// Limits of the new value itself, median over the seeds, m.
+    #[schemars(range(min = 1e-6, max = 10.0))]
     pub tool_error_m: Option<f64>,
     /// The same of the distance between target and tool; `None` sets no limit.
+    #[schemars(range(min = 1e-6, max = 10.0))]
     pub reach_error_m: Option<f64>,
 }
 
@@ -143,13 +155,18 @@ impl RegressSettings {
 /// Of a setting over the others.
 const MIN_WEIGHT: f64 = 1e-9;
 
-#[derive(Clone, Debug, Default, Deserialize)]
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct CampaignFile {
+    /// Seeds `A..B`, both included.
     seeds: Option<String>,
+    /// Keys of the routine with the values that they take; the full product is run.
     #[serde(default)]
+    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
     matrix: Table,
+    /// Frequency of each value of a key of the matrix.
     #[serde(default)]
+    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
     weights: Table,
 }
 

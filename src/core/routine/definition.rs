@@ -3,6 +3,7 @@
 use crate::codes::Code;
 use std::path::PathBuf;
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::campaign::{CampaignSettings, RegressSettings};
@@ -188,11 +189,12 @@ fn touch_problem(settings: &TouchSettings, robot: &Robot, vehicle: &Vehicle) -> 
 }
 
 /// `[[failed_joint]]`.
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FailedJointEntry {
     /// Name of the joint in the URDF.
     pub joint: String,
     /// `locked`, `dead`, `stuck` or `jumps`.
+    #[schemars(extend("enum" = ["locked", "dead", "stuck", "jumps"]))]
     pub kind: String,
 }

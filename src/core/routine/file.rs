@@ -3,6 +3,7 @@
 use crate::codes::Code;
 use std::path::{Path, PathBuf};
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::camera_mode::CameraFile;
@@ -18,39 +19,58 @@ use super::site::SiteFile;
 use super::step::Step;
 use crate::kind::Kind;
 use crate::robot::{FileIssue, PartFile, read_text};
+use crate::schema::schema_of;
 
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct RoutineFile {
     #[serde(rename = "version")]
     _version: u32,
     #[serde(rename = "kind")]
     _kind: Option<Kind>,
+    /// Name of the routine (letters, digits, - and _); it names the output folder.
     name: String,
+    /// Name of the operator; the report has it, no recording.
     operator: Option<String>,
+    /// Robot folder, from the folder of this file.
     robot: PathBuf,
+    /// Vehicle file, from the folder of this file.
     vehicle: Option<PathBuf>,
+    /// Seed of everything random; `run --seed N` replaces it.
     #[serde(default = "first_seed")]
     seed: u64,
+    /// Estimator.
     #[serde(default)]
     method: Method,
+    /// Surroundings: seafloor and tags.
     #[serde(default)]
     site: SiteFile,
+    /// Obstacles fixed in the world.
     #[serde(default)]
     obstacle: Vec<PartFile>,
+    /// Settings of every capture step that does not say otherwise.
     #[serde(default)]
     capture: CaptureSettings,
+    /// Targets and tolerance.
     task: TaskSettings,
+    /// Steps in order; absent: reach, capture, calibrate, reach.
     #[serde(default)]
+    #[schemars(schema_with = "super::step_keys::schema")]
     step: Vec<toml::Table>,
+    /// Joints whose sensor is known to have failed.
     #[serde(default)]
     failed_joint: Vec<FailedJointEntry>,
+    /// Camera of the simulated arm.
     #[serde(default)]
     camera: CameraFile,
+    /// The simulated world as it truly is; the estimator does not read it.
     #[serde(default)]
+    #[schemars(with = "std::collections::BTreeMap<String, serde_json::Value>")]
     world: toml::Table,
+    /// Seeds and settings of `armcal campaign`.
     #[serde(default)]
     campaign: CampaignFile,
+    /// Limits of `armcal regress`.
     #[serde(default)]
     regress: RegressSettings,
 }
@@ -69,6 +89,12 @@ fn check_held_out(file: &Path, method: Method, steps: &[Step]) -> Result<(), Fil
     held_out.min().map_or(Ok(()), |least| {
         FileIssue::check_range(file, "capture.held_out", f64::from(least), 3.0..=1000.0).map(drop)
     })
+}
+
+/// Returns the schema of a routine; `[world]` and the keys of faults, which the simulator reads, are open.
+#[must_use]
+pub fn schema() -> serde_json::Value {
+    schema_of::<RoutineFile>(Kind::Routine)
 }
 
 /// Reads a routine file.

@@ -1,9 +1,10 @@
 //! Calibration methods.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A calibration method by its name in files and on the command line.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
     /// Nominal end stops against the readings there (Williams 1991); needs no camera.

@@ -17,15 +17,16 @@ mod script;
 mod settings;
 mod site;
 mod step;
+mod step_keys;
 
 pub use assert_figure::{AssertFigure, AssertLimits};
 pub use campaign::{CampaignSettings, RegressSettings, SeedRange};
 pub use definition::{FailedJointEntry, Routine};
 pub use error::RoutineError;
-pub use file::{load, load_with};
+pub use file::{load, load_with, schema};
 pub use method::Method;
 pub use overrides::{Override, Overrides, effective_table};
-pub use scene::{Scene, load_scene};
+pub use scene::{Scene, load_scene, scene_schema};
 pub use settings::{CaptureSettings, Margins, PoseCriterion, TaskSettings};
 pub use step::{
     CalibrateSettings, CalibrateViews, IdentifySettings, MoveGoal, OnRefusal, ReachSettings, Step, StopsSettings,

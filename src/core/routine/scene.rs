@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::error::RoutineError;
@@ -9,6 +10,7 @@ use super::site::SiteFile;
 use crate::document::{VERSION, parse_file};
 use crate::kind::Kind;
 use crate::robot::{FileIssue, Part, PartFile, check_parts, read_text};
+use crate::schema::schema_of;
 
 /// The site: a flat seafloor and obstacles, placed in the world frame (z up, origin at the vehicle's station).
 #[derive(Clone, Debug, Default)]
@@ -20,14 +22,16 @@ pub struct Scene {
 }
 
 /// The tables `[site]` and `[[obstacle]]` of a routine, as a file that travels with a recording.
-#[derive(Deserialize, Serialize)]
+#[derive(Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SceneFile {
     version: u32,
     #[serde(default = "Kind::scene")]
     kind: Kind,
+    /// Seafloor and tags.
     #[serde(default)]
     pub(super) site: SiteFile,
+    /// Obstacles fixed in the world.
     #[serde(default)]
     pub(super) obstacle: Vec<PartFile>,
 }
@@ -45,6 +49,12 @@ impl SceneFile {
         let (obstacles, plain) = check_parts(&self.obstacle, file, "obstacle")?;
         Ok((Scene { seafloor_z_m: self.site.seafloor_z_m, obstacles }, Self { obstacle: plain, ..self }))
     }
+}
+
+/// Returns the schema of a recording's scene.
+#[must_use]
+pub fn scene_schema() -> serde_json::Value {
+    schema_of::<SceneFile>(Kind::Scene)
 }
 
 /// Reads the scene that travelled with a recording.

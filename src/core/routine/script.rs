@@ -6,12 +6,15 @@ use std::path::Path;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
-use super::assert_figure::{AssertLimits, Needs};
+use super::assert_figure::{AssertLimits, MAX_LIMIT, Needs};
 use super::error::RoutineError;
-use super::settings::{CaptureSettings, Margins, PoseCriterion, TaskSettings};
+use super::settings::{CaptureSettings, TaskSettings};
 use super::step::{
     CalibrateSettings, CalibrateViews, IdentifySettings, MoveGoal, OnRefusal, ReachSettings, Step, StopsSettings,
-    TouchSettings, WorkBelief, WorkSettings,
+    TouchSettings, WorkSettings,
+};
+use super::step_keys::{
+    CalibrateKeys, CaptureKeys, GripKeys, IdentifyKeys, MoveKeys, ReachKeys, StopsKeys, TouchKeys, WaitKeys, WorkKeys,
 };
 use crate::robot::{FileIssue, from_table, parse_toml};
 use crate::streams::PriorSource;
@@ -129,13 +132,7 @@ impl StepReader<'_> {
     }
 
     fn move_goal(&self) -> Result<Step, FileIssue> {
-        #[derive(Deserialize)]
-        #[serde(deny_unknown_fields)]
-        struct Raw {
-            to: Option<String>,
-            to_rad: Option<Vec<f64>>,
-        }
-        let raw: Raw = self.parse()?;
+        let raw: MoveKeys = self.parse()?;
         match (raw.to.as_deref(), raw.to_rad) {
             (Some("stowed"), None) => Ok(Step::Move(MoveGoal::Stowed)),
             (None, Some(angles)) => {
@@ -154,14 +151,7 @@ impl StepReader<'_> {
     }
 
     fn reach(&self, task: &TaskSettings) -> Result<Step, FileIssue> {
-        #[derive(Deserialize)]
-        #[serde(deny_unknown_fields)]
-        struct Raw {
-            targets: Option<Vec<usize>>,
-            #[serde(default)]
-            touch: bool,
-        }
-        let Raw { targets, touch } = self.parse()?;
+        let ReachKeys { targets, touch } = self.parse()?;
         Ok(Step::Reach(ReachSettings { targets: self.targets(targets, task)?, touch }))
     }
 
@@ -179,41 +169,7 @@ impl StepReader<'_> {
     }
 
     fn work(&self, task: &TaskSettings) -> Result<Step, FileIssue> {
-        #[derive(Deserialize)]
-        #[serde(deny_unknown_fields)]
-        struct Raw {
-            tasks: u32,
-            #[serde(default = "ten_minutes")]
-            every_s: f64,
-            targets: Option<Vec<usize>>,
-            rest_rad: Option<Vec<f64>>,
-            #[serde(default)]
-            looks_rad: Vec<Vec<f64>>,
-            #[serde(default = "three")]
-            look_every: u32,
-            #[serde(default = "one_second")]
-            look_s: f64,
-            #[serde(default)]
-            gaps_s: Vec<[f64; 2]>,
-            rate_rad_s: Option<f64>,
-            #[serde(default)]
-            belief: WorkBelief,
-            #[serde(default = "two")]
-            poses: u32,
-        }
-        fn two() -> u32 {
-            2
-        }
-        fn ten_minutes() -> f64 {
-            600.0
-        }
-        fn three() -> u32 {
-            3
-        }
-        fn one_second() -> f64 {
-            1.0
-        }
-        let raw: Raw = self.parse()?;
+        let raw: WorkKeys = self.parse()?;
         for angle in raw.looks_rad.iter().flatten() {
             self.range("looks_rad", *angle, -100.0..=100.0)?;
         }
@@ -241,74 +197,17 @@ impl StepReader<'_> {
     }
 
     fn grip(&self) -> Result<Step, FileIssue> {
-        #[derive(Deserialize)]
-        #[serde(deny_unknown_fields)]
-        struct Raw {
-            opening: f64,
-        }
-        Ok(Step::Grip { opening: self.range("opening", self.parse::<Raw>()?.opening, 0.0..=1.0)? })
+        Ok(Step::Grip { opening: self.range("opening", self.parse::<GripKeys>()?.opening, 0.0..=1.0)? })
     }
 
     fn capture(&self, general: CaptureSettings) -> Result<Step, FileIssue> {
-        #[derive(Deserialize)]
-        #[serde(deny_unknown_fields)]
-        struct Raw {
-            poses: Option<u32>,
-            held_out: Option<u32>,
-            min_tags: Option<u32>,
-            clearance_m: Option<f64>,
-            dwell_s: Option<f64>,
-            #[serde(alias = "choose")]
-            criterion: Option<PoseCriterion>,
-            replan_every: Option<u32>,
-            stop_at_tool_error_m: Option<f64>,
-            max_time_s: Option<f64>,
-            margins: Option<Margins>,
-        }
-        let raw: Raw = self.parse()?;
-        let settings = CaptureSettings {
-            poses: raw.poses.unwrap_or(general.poses),
-            held_out: raw.held_out.unwrap_or(general.held_out),
-            min_tags: raw.min_tags.unwrap_or(general.min_tags),
-            clearance_m: raw.clearance_m.unwrap_or(general.clearance_m),
-            dwell_s: raw.dwell_s.unwrap_or(general.dwell_s),
-            criterion: raw.criterion.unwrap_or(general.criterion),
-            replan_every: raw.replan_every.unwrap_or(general.replan_every),
-            stop_at_tool_error_m: raw.stop_at_tool_error_m.or(general.stop_at_tool_error_m),
-            max_time_s: raw.max_time_s.or(general.max_time_s),
-            margins: raw.margins.unwrap_or(general.margins),
-        };
+        let settings = self.parse::<CaptureKeys>()?.over(general);
         settings.check(self.file, &self.key(""))?;
         Ok(Step::Capture(settings))
     }
 
     fn identify(&self) -> Result<Step, FileIssue> {
-        #[derive(Deserialize)]
-        #[serde(deny_unknown_fields)]
-        struct Raw {
-            joint: String,
-            #[serde(default = "four")]
-            gain_max: f64,
-            #[serde(default = "sixty")]
-            travel_counts: f64,
-            #[serde(default = "seven_degrees")]
-            swing_rad: f64,
-            #[serde(default = "nine")]
-            views: u32,
-        }
-        fn four() -> f64 {
-            4.0
-        }
-        fn sixty() -> f64 {
-            60.0
-        }
-        fn seven_degrees() -> f64 {
-            0.12
-        }
-        fn nine() -> u32 {
-            9
-        }
-        let raw: Raw = self.parse()?;
+        let raw: IdentifyKeys = self.parse()?;
         Ok(Step::Identify(IdentifySettings {
             joint: raw.joint,
             gain_max: self.range("gain_max", raw.gain_max, 1.0..=20.0)?,
@@ -319,45 +218,12 @@ impl StepReader<'_> {
     }
 
     fn stops(&self) -> Result<Step, FileIssue> {
-        #[derive(Deserialize)]
-        #[serde(deny_unknown_fields)]
-        struct Raw {
-            #[serde(default)]
-            joints: Vec<String>,
-            #[serde(default = "one_second")]
-            dwell_s: f64,
-        }
-        fn one_second() -> f64 {
-            1.0
-        }
-        let Raw { joints, dwell_s } = self.parse()?;
+        let StopsKeys { joints, dwell_s } = self.parse()?;
         Ok(Step::Stops(StopsSettings { joints, dwell_s: self.range("dwell_s", dwell_s, 0.2..=60.0)? }))
     }
 
     fn touch(&self) -> Result<Step, FileIssue> {
-        #[derive(Deserialize)]
-        #[serde(deny_unknown_fields)]
-        struct Raw {
-            part: String,
-            point_m: [f64; 3],
-            normal: [f64; 3],
-            #[serde(default = "one_millimetre")]
-            std_m: f64,
-            #[serde(default = "ten_centimetres")]
-            approach_m: f64,
-            #[serde(default = "one_second")]
-            dwell_s: f64,
-        }
-        fn one_millimetre() -> f64 {
-            1e-3
-        }
-        fn ten_centimetres() -> f64 {
-            0.1
-        }
-        fn one_second() -> f64 {
-            1.0
-        }
-        let raw: Raw = self.parse()?;
+        let raw: TouchKeys = self.parse()?;
         for value in raw.point_m {
             self.range("point_m", value, -10.0..=10.0)?;
         }
@@ -377,25 +243,12 @@ impl StepReader<'_> {
     }
 
     fn calibrate(&self, prior: PriorSource) -> Result<Step, FileIssue> {
-        #[derive(Deserialize)]
-        #[serde(deny_unknown_fields)]
-        struct Raw {
-            #[serde(default)]
-            views: CalibrateViews,
-            #[serde(default)]
-            on_refusal: OnRefusal,
-        }
-        let raw: Raw = self.parse()?;
+        let raw: CalibrateKeys = self.parse()?;
         Ok(Step::Calibrate(CalibrateSettings { prior, views: raw.views, on_refusal: raw.on_refusal }))
     }
 
     fn wait(&self) -> Result<Step, FileIssue> {
-        #[derive(Deserialize)]
-        #[serde(deny_unknown_fields)]
-        struct Raw {
-            seconds: f64,
-        }
-        Ok(Step::Wait { seconds: self.range("seconds", self.parse::<Raw>()?.seconds, 0.01..=1e6)? })
+        Ok(Step::Wait { seconds: self.range("seconds", self.parse::<WaitKeys>()?.seconds, 0.01..=1e6)? })
     }
 
     fn assert(&self) -> Result<Step, FileIssue> {
@@ -409,7 +262,7 @@ impl StepReader<'_> {
             ));
         }
         for (figure, limit) in limits.each() {
-            self.range(figure.key(), limit, 0.0..=1e9)?;
+            self.range(figure.key(), limit, 0.0..=MAX_LIMIT)?;
         }
         Ok(Step::Assert(limits))
     }

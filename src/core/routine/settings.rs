@@ -2,40 +2,49 @@
 
 use std::path::Path;
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::robot::FileIssue;
 
 /// How views are captured.
-#[derive(Clone, Copy, Debug, Deserialize)]
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CaptureSettings {
     /// Views that the fit uses.
     #[serde(default = "CaptureSettings::default_poses")]
+    #[schemars(range(min = 3, max = 1000))]
     pub poses: u32,
     /// Views that only the verdict uses.
     #[serde(default = "CaptureSettings::default_held_out")]
+    #[schemars(range(min = 0, max = 1000))]
     pub held_out: u32,
     /// Tags that a planned view must be expected to see.
     #[serde(default = "CaptureSettings::default_min_tags")]
+    #[schemars(range(min = 1, max = 100))]
     pub min_tags: u32,
     /// Free water kept between the arm and everything else, beyond the sensors' error.
     #[serde(default = "CaptureSettings::default_clearance_m")]
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub clearance_m: f64,
     /// How long the settled arm is watched.
     #[serde(default = "CaptureSettings::default_dwell_s")]
+    #[schemars(range(min = 0.2, max = 60.0))]
     pub dwell_s: f64,
     /// What the views are chosen for.
-    #[serde(default, alias = "choose")]
+    #[serde(default)]
     pub criterion: PoseCriterion,
     /// After so many views, the running estimate renews margins and remaining poses; 0: planned once.
     #[serde(default = "CaptureSettings::default_replan_every")]
+    #[schemars(range(min = 0, max = 1000))]
     pub replan_every: u32,
     /// No more views once the predicted tool error at the task (root mean square) is below this.
     #[serde(default)]
+    #[schemars(range(min = 1e-5, max = 1.0))]
     pub stop_at_tool_error_m: Option<f64>,
     /// No more views after so long, by the arm's clock.
     #[serde(default)]
+    #[schemars(range(min = 1.0, max = 1e6))]
     pub max_time_s: Option<f64>,
     /// What is kept clear beyond `clearance_m`.
     #[serde(default)]
@@ -43,7 +52,7 @@ pub struct CaptureSettings {
 }
 
 /// What makes one view better than another.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PoseCriterion {
     /// Least predicted tool error at the task (the test-pose criterion of Klimchik et al. 2014).
@@ -60,7 +69,7 @@ pub enum PoseCriterion {
 }
 
 /// For which arms the clearance is kept.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Margins {
     /// Every arm that the present belief allows.
@@ -131,11 +140,13 @@ impl Default for CaptureSettings {
 }
 
 /// What the arm is calibrated for.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TaskSettings {
     /// How near the tool must come to count as a hit.
+    #[schemars(range(min = 1e-4, max = 1.0))]
     pub tolerance_m: f64,
     /// Tool positions in the base frame.
+    #[schemars(inner(inner(range(min = -100.0, max = 100.0))))]
     pub targets_m: Vec<[f64; 3]>,
 }

@@ -3,33 +3,45 @@
 use crate::codes::Code;
 use std::path::Path;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::robot::{BaseTagStd, FileIssue, MapKnowledge};
 
-#[derive(Clone, Default, Deserialize, Serialize)]
+#[derive(Clone, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SiteFile {
+    /// Height of the seafloor in the world frame; absent: open water.
+    #[schemars(range(min = -1e4, max = 0.0))]
     pub(super) seafloor_z_m: Option<f64>,
+    /// Numbers of the tags that are there; absent: all of the vehicle's (or robot's).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) tags: Option<Vec<u32>>,
+    /// Tags whose place is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     map: Option<MapFile>,
-    /// With map = "partly".
+    /// Numbers of the tags whose place is known; with map = "partly".
     #[serde(skip_serializing_if = "Option::is_none")]
     known_tags: Option<Vec<u32>>,
+    /// Sigma of the base tag's position, where better known than its file says.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = 1.0))]
     base_tag_position_std_m: Option<f64>,
+    /// Sigma of the base tag's attitude, where better known than its file says.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = 1.0))]
     base_tag_rotation_std_rad: Option<f64>,
 }
 
 /// How much of the tags' places is known, as files write it.
-#[derive(Clone, Copy, Deserialize, Serialize)]
+#[derive(Clone, Copy, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 enum MapFile {
+    /// All tags.
     Known,
+    /// The base tag and `known_tags`.
     Partly,
+    /// The base tag only.
     Unknown,
 }
 

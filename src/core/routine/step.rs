@@ -1,6 +1,7 @@
 //! The steps of a script.
 
 use nalgebra::{Point3, Vector3};
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::assert_figure::AssertLimits;
@@ -113,7 +114,7 @@ pub struct WorkSettings {
 }
 
 /// What sensors a work step believes in.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum WorkBelief {
     /// Those of the last accepted calibration.
@@ -208,7 +209,7 @@ pub struct CalibrateSettings {
 }
 
 /// Which captured views a calibration uses.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CalibrateViews {
     /// Those since the last calibration.
@@ -219,7 +220,7 @@ pub enum CalibrateViews {
 }
 
 /// What happens after a refused calibration; the arm keeps the sensors that it believed in either way.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum OnRefusal {
     /// The script ends there.

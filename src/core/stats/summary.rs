@@ -1,9 +1,10 @@
 //! Summaries of samples.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Count, median, 95th percentile and maximum, the form of every statistic in summary.json.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Summary {
     /// Number of samples, one or more.
     pub n: usize,

@@ -1,14 +1,16 @@
 //! Where a rosbridge listens, and which ROS is behind it.
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 /// The table `[rosbridge]` of a connection map.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Rosbridge {
     /// `ws://HOST:PORT`.
     pub url: String,
     /// 1 or 2: how times and types are spelled.
+    #[schemars(range(min = 1, max = 2))]
     pub ros: u32,
 }
 

@@ -8,7 +8,9 @@ use super::text::{gaps, missing_joints, missing_seen};
 use super::winding::Windings;
 use crate::report::proposed_map::{ProposalError, comment, quoted};
 use armcal_core::input::{TableColumn, TableContents, TableFormat, parse_input_map};
+use armcal_core::kind::Kind;
 use armcal_core::robot::Robot;
+use armcal_core::schema::first_line;
 
 /// No joint of an arm turns more than two turns either way.
 const MAX_RAD: f64 = 4.0 * std::f64::consts::PI;
@@ -122,8 +124,9 @@ fn beside(table: &Path, map: &Path) -> String {
 
 fn head(files: &str, sides: &[(&TableContents, &Roles)]) -> String {
     let mut text = format!(
-        "# Proposed by `armcal inspect --write-input` for {files}.\n# Look at each choice; docs/reference/real-arms.md \
-         says what the keys mean.\nversion = 1\nkind = \"input\"\n"
+        "{}# Proposed by `armcal inspect --write-input` for {files}.\n# Look at each choice; \
+         docs/reference/real-arms.md says what the keys mean.\nversion = 1\nkind = \"input\"\n",
+        first_line(Kind::Input)
     );
     let gaps: Vec<String> = sides
         .iter()

@@ -1,9 +1,10 @@
 //! Kinds of faults, as routines name them.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// One fault; it is permanent unless it has a duration.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Fault {
     /// The sensor slips on its shaft: it reads `by_rad` more from now on.
@@ -11,6 +12,7 @@ pub enum Fault {
         /// Name of the joint in the URDF.
         joint: String,
         /// Positive: it reads a larger angle.
+        #[schemars(range(min = -3.2, max = 3.2))]
         by_rad: f64,
     },
     /// The sensor keeps the word that it reads now.
@@ -33,10 +35,13 @@ pub enum Fault {
         /// Name of the joint in the URDF.
         joint: String,
         /// The middle of the spot, an angle of the joint.
+        #[schemars(range(min = -6.3, max = 6.3))]
         at_rad: f64,
         /// Height of the bump; not beyond its width.
+        #[schemars(range(min = -1.0, max = 1.0))]
         by_rad: f64,
         /// Its standard width.
+        #[schemars(range(min = 1e-3, max = 1.0))]
         width_rad: f64,
     },
     /// The wiper begins to lose contact, so often in a second.
@@ -44,15 +49,18 @@ pub enum Fault {
         /// Name of the joint in the URDF.
         joint: String,
         /// Drop-outs, each as long as `world.joint_sensors.dropout_mean_s` has it.
+        #[schemars(range(min = 0.0, max = 100.0))]
         dropout_per_s: f64,
     },
     /// The camera slips on its mount, by a translation and a rotation vector in its own axes.
     CameraSlipped {
         /// Translation along the camera's axes.
         #[serde(default)]
+        #[schemars(inner(range(min = -0.5, max = 0.5)))]
         by_m: [f64; 3],
         /// Rotation vector along the camera's axes.
         #[serde(default)]
+        #[schemars(inner(range(min = -3.2, max = 3.2)))]
         by_rad: [f64; 3],
     },
     /// The valve jams shut: the oil holds the joint where it is.
@@ -66,6 +74,7 @@ pub enum Fault {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         joint: Option<String>,
         /// 0: none is lost, 1: all of it.
+        #[schemars(range(min = 0.0, max = 1.0))]
         ratio: f64,
     },
     /// The tag falls off.
@@ -79,9 +88,11 @@ pub enum Fault {
         id: u32,
         /// Translation along the tag's axes.
         #[serde(default)]
+        #[schemars(inner(range(min = -2.0, max = 2.0)))]
         by_m: [f64; 3],
         /// Rotation vector along the tag's axes.
         #[serde(default)]
+        #[schemars(inner(range(min = -3.2, max = 3.2)))]
         by_rad: [f64; 3],
     },
     /// The detector takes the tag for another one.
@@ -89,22 +100,27 @@ pub enum Fault {
         /// Number of the tag.
         id: u32,
         /// The number that is read in its place.
+        #[schemars(range(min = 0, max = 2147483647))]
         as_id: u32,
     },
     /// The camera sees nothing for a while.
     Silt {
         /// How long the camera sees nothing.
+        #[schemars(range(min = 0.0, max = 1e6))]
         seconds: f64,
     },
     /// Something strikes the vehicle: a force in vehicle axes for a moment, at a point of it (its origin, if left out).
     #[serde(rename = "vehicle_knocked")]
     VehicleImpulse {
         /// In vehicle axes.
+        #[schemars(inner(range(min = -1e6, max = 1e6)))]
         force_n: [f64; 3],
         /// How long the force acts.
+        #[schemars(range(min = 0.01, max = 10.0))]
         duration_s: f64,
         /// In the vehicle's frame.
         #[serde(default)]
+        #[schemars(inner(range(min = -10.0, max = 10.0)))]
         at_m: [f64; 3],
     },
     /// Something strikes a link at its centre of mass: a force in base axes for a moment.
@@ -113,14 +129,19 @@ pub enum Fault {
         /// Name of the link in the URDF.
         link: String,
         /// In base axes.
+        #[schemars(inner(range(min = -1e5, max = 1e5)))]
         force_n: [f64; 3],
         /// How long the force acts.
+        #[schemars(range(min = 0.01, max = 10.0))]
         duration_s: f64,
     },
 }
 
+/// Latest time of a fault since the start, s.
+pub(crate) const LATEST_FAULT_S: f64 = 1e6;
+
 /// A fault and when it happens.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ScheduledFault {
     /// Seconds after the start; `None`: at its step of the script.
     #[serde(default, skip_serializing_if = "Option::is_none")]

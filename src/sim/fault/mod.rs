@@ -10,6 +10,7 @@ mod robot_check;
 mod timeline;
 
 pub(crate) use impulse::Impulse;
+pub(crate) use kinds::LATEST_FAULT_S;
 pub use kinds::{Fault, ScheduledFault};
 pub(crate) use list::{list_key, read_list, read_one};
 pub(crate) use robot_check::RobotCheck;

@@ -3,6 +3,7 @@
 use std::ops::RangeInclusive;
 use std::path::Path;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::spec::image::CameraMode;
@@ -10,7 +11,7 @@ use crate::spec::table::{CheckedTable, DEG, table};
 use armcal_core::robot::FileIssue;
 
 /// The window between lens and water.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PortKind {
     /// Rays go straight, as through a dome about the lens's pupil.
@@ -23,7 +24,7 @@ pub enum PortKind {
 }
 
 /// What the geometric camera draws corners and misses from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CornerNoiseKind {
     /// `corner_noise_px`, `miss_probability` and the limits of range, incidence and side.
@@ -115,16 +116,20 @@ table!(
     } and {
         /// Of the base tag alone, where it is machined or measured better than the others.
         #[serde(skip_serializing_if = "Option::is_none")]
+        #[schemars(range(min = 0.0, max = 0.2))]
         base_std_m: Option<f64> = None;
         /// The same of its rotation.
         #[serde(skip_serializing_if = "Option::is_none")]
+        #[schemars(range(min = 0.0, max = 0.5))]
         base_std_rad: Option<f64> = None;
         /// Of the tag on the gripper, against its drawing; 0.3 mm and 0.1 deg where left out. Assumed: a measuring arm
         /// on the bench.
         #[serde(skip_serializing_if = "Option::is_none")]
+        #[schemars(range(min = 0.0, max = 0.2))]
         gripper_std_m: Option<f64> = None;
         /// The same of its rotation.
         #[serde(skip_serializing_if = "Option::is_none")]
+        #[schemars(range(min = 0.0, max = 0.5))]
         gripper_std_rad: Option<f64> = None;
     }
 );

@@ -3,13 +3,14 @@
 use std::ops::RangeInclusive;
 use std::path::Path;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::spec::table::{CheckedTable, table};
 use armcal_core::robot::FileIssue;
 
 /// Whether the wrist camera's detections come from pixels.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CameraMode {
     /// Corners are projected and get noise.
@@ -26,7 +27,7 @@ impl CameraMode {
 }
 
 /// Water by its optical class, after Jerlov (1976): absorption and scattering for red, green and blue.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum WaterKind {
     /// Ocean.
@@ -81,10 +82,13 @@ table!(
         /// Class of the water.
         water: WaterKind = WaterKind::Clear;
         /// Attenuation of what comes from a surface, 1/m, red, green, blue; without it, that of the class.
+        #[schemars(inner(range(min = 0.0, max = 100.0)))]
         direct_per_m: Option<[f64; 3]> = None;
         /// Attenuation by which the veil closes in, 1/m; without it, that of the class.
+        #[schemars(inner(range(min = 0.0, max = 100.0)))]
         backscatter_per_m: Option<[f64; 3]> = None;
         /// The veil far away, cd/m2, in place of what lamps and sun make of it.
+        #[schemars(inner(range(min = 0.0, max = 1e6)))]
         veil_cd_m2: Option<[f64; 3]> = None;
     }
 );

@@ -68,13 +68,16 @@ table!(
     } and {
         /// Time constant with which the sensors' own temperature follows the oil's. Assumed.
         #[serde(skip_serializing_if = "is_zero")]
+        #[schemars(range(min = 0.0, max = 36_000.0))]
         sensor_lag_s: f64 = 0.0;
         /// Width of the pressure's hysteresis: its effects on the way down and up are as if the pressure differed by
         /// it. Assumed.
         #[serde(skip_serializing_if = "is_zero")]
+        #[schemars(range(min = 0.0, max = 100.0))]
         pressure_hysteresis_mpa: f64 = 0.0;
         /// Share of the pressure's effect that lags behind. Assumed.
         #[serde(skip_serializing_if = "is_half")]
+        #[schemars(range(min = 0.05, max = 1.0))]
         pressure_hysteresis_share: f64 = 0.5;
         /// Electrical turns of a resolver in one of its shaft, 1 .. 255.
         resolver_pole_pairs: NonZeroU8 = NonZeroU8::MIN;

@@ -4,6 +4,7 @@ use armcal_core::codes::Code;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use armcal_core::robot::FileIssue;
@@ -12,7 +13,7 @@ use armcal_core::robot::FileIssue;
 const MAX_POINTS: usize = 16;
 
 /// A few figures, written as a list.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "Vec<f64>", into = "Vec<f64>")]
 pub struct Points {
     n: usize,

@@ -4,40 +4,52 @@ use armcal_core::codes::Code;
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::spec::table::CheckedTable;
 use armcal_core::robot::FileIssue;
 
 /// What gives and pulls about the arm. Nothing does in the standard world.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct StructureSpec {
     /// By joint: how far the link turns behind its sensor under a torque. 0 for joints that are not named.
+    #[schemars(extend("additionalProperties" = { "type": "number", "minimum": 0.0, "maximum": 1e-2 }))]
     pub joint_compliance_rad_per_nm: BTreeMap<String, f64>,
     /// By joint, of those that give: full width of the play between sensor and link.
+    #[schemars(extend("additionalProperties" = { "type": "number", "minimum": 0.0, "maximum": 0.1 }))]
     pub bearing_play_rad: BTreeMap<String, f64>,
     /// How far the base turns on the vehicle under a moment about each of its axes.
+    #[schemars(inner(range(min = 0.0, max = 1e-2)))]
     pub mount_compliance_rad_per_nm: [f64; 3],
     /// How far it moves under a force along each of its axes.
+    #[schemars(inner(range(min = 0.0, max = 1e-2)))]
     pub mount_compliance_m_per_n: [f64; 3],
     /// Damping of the mount over its stiffness; assumed.
+    #[schemars(range(min = 0.0, max = 10.0))]
     pub mount_damping_s: f64,
     /// Mass of a ball in the gripper; 0 for none.
+    #[schemars(range(min = 0.0, max = 1e4))]
     pub payload_kg: f64,
     /// Steel by default.
+    #[schemars(range(min = 100.0, max = 2e4))]
     pub payload_density_kg_m3: f64,
     /// Its centre from the tool point, axes of the tool's link.
+    #[schemars(inner(range(min = -10.0, max = 10.0)))]
     pub payload_offset_m: [f64; 3],
     /// A hose to a link; none without a stiffness.
     pub hose_link: String,
     /// Where it is tied to the link, in the link's frame.
+    #[schemars(inner(range(min = -10.0, max = 10.0)))]
     pub hose_point_m: [f64; 3],
     /// Where it comes from, base frame.
     pub hose_anchor_m: [f64; 3],
     /// It pulls when its ends are farther apart than this.
+    #[schemars(range(min = 0.0, max = 100.0))]
     pub hose_length_m: f64,
     /// Of its pull; 0 for no hose.
+    #[schemars(range(min = 0.0, max = 1e4))]
     pub hose_stiffness_n_m: f64,
 }
 

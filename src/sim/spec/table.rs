@@ -16,7 +16,7 @@ macro_rules! table {
         $(and { $($(#[$other_doc:meta])* $other:ident: $kind:ty = $other_default:expr;)+ })?
     ) => {
         $(#[$doc])*
-        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
         #[serde(default, deny_unknown_fields)]
         pub struct $name {
             $($(#[$field_doc])* pub $field: f64,)+

@@ -40,8 +40,10 @@ table!(
         thermometer_resolution_k = 0.0, in 0.0..=5.0;
     } and {
         /// Depths of `profile_c`, ascending, 16 at most; none for water that is the same everywhere.
+        #[schemars(with = "Vec<f64>", inner(range(min = 0.0, max = 12_000.0)))]
         profile_depth_m: Points = Points::NONE;
         /// The water's temperature at those depths, linear between them and constant beyond; replaces `water_c`.
+        #[schemars(with = "Vec<f64>", inner(range(min = -2.0, max = 30.0)))]
         profile_c: Points = Points::NONE;
     }
 );

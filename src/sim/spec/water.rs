@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::spec::points::{Points, Polyline};
@@ -9,40 +10,55 @@ use crate::spec::table::CheckedTable;
 use armcal_core::robot::FileIssue;
 
 /// Sea water about the arm.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct WaterSpec {
     /// 0: neither drag nor buoyancy.
+    #[schemars(range(min = 0.0, max = 2000.0))]
     pub density_kg_m3: f64,
     /// Of every link, per axis of its shapes.
+    #[schemars(range(min = 0.0, max = 10.0))]
     pub drag_coefficient: f64,
     /// Weight of the displaced water over the arm's own; the robot's own figure where there is none.
+    #[schemars(range(min = 0.0, max = 0.95))]
     pub buoyancy_fraction: Option<f64>,
     /// Linear friction of each joint, for slow motion.
+    #[schemars(range(min = 0.0, max = 1e4))]
     pub joint_friction_n_m_s_rad: f64,
     /// Standard deviation of the depth gauge's constant error; assumed.
+    #[schemars(range(min = 0.0, max = 1e7))]
     pub pressure_bias_std_pa: f64,
     /// Standard deviation of its relative scale error; assumed.
+    #[schemars(range(min = 0.0, max = 0.1))]
     pub pressure_scale_std: f64,
     /// Of the vehicle's station below the surface.
+    #[schemars(range(min = 0.0, max = 12000.0))]
     pub depth_m: f64,
     /// Times of `dive_depth_m` since the start, ascending, 16 at most; none for a vehicle that stays at its depth.
     #[serde(skip_serializing_if = "Points::is_empty")]
+    #[schemars(with = "Vec<f64>", inner(range(min = 0.0, max = 1e6)))]
     pub dive_time_s: Points,
     /// Depths of the station at those times, linear between them and constant beyond; they replace `depth_m`.
     #[serde(skip_serializing_if = "Points::is_empty")]
+    #[schemars(with = "Vec<f64>", inner(range(min = 0.0, max = 12000.0)))]
     pub dive_depth_m: Points,
     /// Noise of a single reading, one sigma.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub pressure_noise_pa: f64,
     /// Scale of the links' theoretical added mass; 0 for none.
+    #[schemars(range(min = 0.0, max = 10.0))]
     pub added_mass_coefficient: f64,
     /// Steady current in the world's axes, z up.
+    #[schemars(inner(range(min = -5.0, max = 5.0)))]
     pub current_m_s: [f64; 3],
     /// Significant height of the waves at the surface; 0 for none.
+    #[schemars(range(min = 0.0, max = 20.0))]
     pub wave_height_m: f64,
     /// Peak period of the waves.
+    #[schemars(range(min = 1.0, max = 30.0))]
     pub wave_period_s: f64,
     /// Where they run, from the world's x axis about z.
+    #[schemars(range(min = -6.3, max = 6.3))]
     pub wave_direction_rad: f64,
 }
 

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -28,7 +29,8 @@ use armcal_core::robot::{FileIssue, JointSensorSpec, PartFile, Robot, check_part
 use armcal_core::routine::Scene;
 
 /// `[world]`, checked.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields, default)]
 pub struct WorldSpec {
     /// Integrator and rates of the truth's record.
     pub physics: PhysicsSpec,
@@ -62,6 +64,7 @@ pub struct WorldSpec {
     pub geometry: GeometrySpec,
     /// By joint: counts per radian over the datasheet's. Negative: they run the other way. The arm's own controller
     /// knows.
+    #[schemars(extend("additionalProperties" = { "type": "number", "minimum": -100.0, "maximum": 100.0 }))]
     pub gear_ratio: BTreeMap<String, f64>,
     /// The motion that `vehicle.motion_file` names, read with the routine.
     #[serde(skip)]

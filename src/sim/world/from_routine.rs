@@ -4,7 +4,7 @@ use armcal_core::codes::Code;
 use std::path::Path;
 
 use crate::error::SimError;
-use crate::fault::{Fault, RobotCheck, ScheduledFault, list_key, read_one};
+use crate::fault::{Fault, LATEST_FAULT_S, RobotCheck, ScheduledFault, list_key, read_one};
 use crate::hydraulics::{Hydraulics, actuator_inputs};
 use crate::spec::WorldSpec;
 use armcal_core::robot::{FileIssue, Robot};
@@ -40,7 +40,7 @@ impl WorldSpec {
                                [[step]] do = \"fault\"";
                 return Err(FileIssue::new(Code::KeyMissing, &routine.file, key, problem).into());
             };
-            check.check_range(&key, "at_s", at_s, 0.0..=1e6)?;
+            check.check_range(&key, "at_s", at_s, 0.0..=LATEST_FAULT_S)?;
             check.check_fault(&key, &scheduled.fault)?;
         }
         let steps = routine.steps.iter().enumerate().filter(|(_, step)| matches!(step, Step::Fault { .. }));

@@ -3,8 +3,11 @@
 use armcal_core::kind::Kind;
 use armcal_core::kinematics::JointKind;
 use armcal_core::routine::Method;
+use armcal_core::schema::schema_of;
 use armcal_core::stats::Summary;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use crate::calib::finding::Finding;
 use crate::calib::refusal::{Refusal, in_words};
@@ -18,13 +21,14 @@ use crate::calib::result::map_table::MapResult;
 use crate::calib::result::metrics::{FitMetrics, HeldOutMetrics};
 use crate::calib::result::model_table::ModelTable;
 use crate::calib::result::sag_table::SagTable;
+use crate::calib::result::slide_keys::metric;
 use crate::calib::result::terms_table::{ReferenceTable, TermsTable};
 use crate::calib::result::valid_range::ValidRange;
 use crate::calib::result::verdict_tables::{ObservabilityTable, VerdictTable};
 use crate::judge::U95Table;
 
 /// Whether the answer may be used.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Status {
     /// No reason to refuse was found.
@@ -37,7 +41,7 @@ pub enum Status {
 ///
 /// `angle_rad = center_rad + offset_rad + gain_rad_per_count * travel_counts`, where `travel_counts` is the reading
 /// less the datasheet's reading at `center_rad`, wrapped to half a word either way.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Calibration {
     /// Of the format: 1.
@@ -117,6 +121,7 @@ pub struct Calibration {
     pub prior: Option<PriorTable>,
     /// The reasons to refuse as data, the most telling first.
     #[serde(default, skip_serializing_if = "Vec::is_empty", with = "crate::calib::refusal::in_files")]
+    #[schemars(with = "Vec<Refusal>")]
     pub refusals: Vec<Refusal>,
     /// What rests on priors alone, the largest at the tool first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -130,6 +135,30 @@ pub struct Calibration {
     /// Residuals and predictions one by one, for reports; in no file.
     #[serde(skip)]
     pub details: FitDetails,
+}
+
+/// Returns the schema of a calibration.
+#[must_use]
+pub fn calibration_schema() -> serde_json::Value {
+    with_slides(schema_of::<Calibration>(Kind::Calibration))
+}
+
+/// Tables of a joint in a calibration.
+const JOINT_TABLES: [&str; 2] = ["JointResult", "TermsTable"];
+
+/// Returns the schema of a calibration whose joints may slide: their keys end in `_m` instead of `_rad`.
+fn with_slides(mut schema: Value) -> Value {
+    let definitions = schema.get_mut("definitions").and_then(Value::as_object_mut);
+    for (_, definition) in definitions.into_iter().flatten().filter(|(name, _)| JOINT_TABLES.contains(&name.as_str())) {
+        let Some(keys) = definition.get_mut("properties").and_then(Value::as_object_mut) else { continue };
+        let renamed: Vec<(String, Value)> = keys.iter().map(|(key, value)| (metric(key), value.clone())).collect();
+        let angles: Vec<String> = keys.keys().filter(|key| metric(key) != **key).cloned().collect();
+        keys.extend(renamed);
+        if let Some(needed) = definition.get_mut("required").and_then(Value::as_array_mut) {
+            needed.retain(|key| angles.iter().all(|angle| key != angle));
+        }
+    }
+    schema
 }
 
 impl Calibration {
@@ -179,7 +208,7 @@ impl Calibration {
 }
 
 /// The sensor of one joint.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct JointResult {
     /// Name of the joint in the URDF.

@@ -1,6 +1,7 @@
 //! `[camera_mount]` and `[[further_camera]]` of calibration.toml.
 
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::calib::methods::gripper_tag::MountEstimate;
@@ -8,7 +9,7 @@ use armcal_core::robot::Robot;
 use armcal_core::spatial::{Camera, Link, Pose};
 
 /// Where the camera hangs, by the tag on the gripper; by the drawing where that was left out.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CameraMount {
     /// Why the tag was not used.
@@ -30,7 +31,7 @@ pub struct CameraMount {
 }
 
 /// Where a further camera hangs, by the tags.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FurtherCamera {
     /// Its name in robot.toml.

@@ -7,12 +7,14 @@ use armcal_core::codes::Code;
 use std::path::{Path, PathBuf};
 
 use nalgebra::DMatrix;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::calib::result::file_error::CalibrationFileError;
 use armcal_core::document::{VERSION, parse_file};
 use armcal_core::kind::Kind;
 use armcal_core::robot::{FileIssue, RobotError, read_text};
+use armcal_core::schema::{first_line, schema_of};
 use armcal_core::text::printable;
 
 /// Above so many rows, a covariance is written with seven significant digits.
@@ -28,7 +30,7 @@ const HEAD: &str = "\
 
 /// Estimated parameters by [`Parameter::name`](crate::calib::Parameter::name): gains relative, offsets in rad, ... and
 /// their covariance.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CovarianceTable {
     /// Names in the order of the rows.
@@ -38,15 +40,24 @@ pub struct CovarianceTable {
 }
 
 /// The same as its file has it.
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct CovarianceFile {
     version: u32,
     #[serde(default = "Kind::covariance")]
     kind: Kind,
+    /// Hash of the calibration next to this file.
     calibration_hash: String,
+    /// Names of the parameters.
     parameters: Vec<String>,
+    /// Rows of the lower triangle.
     lower_triangle: Vec<Vec<f64>>,
+}
+
+/// Returns the schema of a covariance.
+#[must_use]
+pub fn covariance_schema() -> serde_json::Value {
+    schema_of::<CovarianceFile>(Kind::Covariance)
 }
 
 impl CovarianceTable {
@@ -78,7 +89,7 @@ impl CovarianceTable {
         let (version, kind, parameters) = (VERSION, Kind::Covariance, self.parameters.clone());
         let file = CovarianceFile { version, kind, calibration_hash, parameters, lower_triangle };
         let body = toml::to_string(&file).expect("names and numbers have a TOML form");
-        format!("{HEAD}{body}")
+        format!("{}{HEAD}{body}", first_line(Kind::Covariance))
     }
 
     /// What `covariance_hash` in calibration.toml is.

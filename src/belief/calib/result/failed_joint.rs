@@ -1,5 +1,6 @@
 //! `[[failed_joint]]` and `[prior]` of calibration.toml: what failed and what that costs, and whether a prior held.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use armcal_core::kinematics::JointKind;
@@ -7,7 +8,7 @@ use armcal_core::robot::FailedKind;
 use armcal_core::stats::Summary;
 
 /// One joint that failed, or whose sensor did.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FailedJointTable {
     /// Name of the joint in the URDF.
@@ -45,7 +46,7 @@ pub struct FailedJointTable {
 }
 
 /// The prior of a warm calibration, and how well the views agree with it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PriorTable {
     /// Whether prior and views can both be right. Where they cannot, a script's recalibration rests on the new views

@@ -1,6 +1,7 @@
 //! calibration.toml as a file: written, read, checked, and turned into sensors again.
 
 use armcal_core::codes::Code;
+use armcal_core::schema::first_line;
 use std::path::Path;
 
 use crate::calib::covariance::ParameterCovariance;
@@ -217,7 +218,7 @@ impl Calibration {
         let hashed = Self { covariance_hash: self.hash_of_covariance(), ..self.clone() };
         let body = toml::to_string(&hashed).expect("plain tables and finite numbers have a TOML form");
         let slides = if self.has_slide() { SLIDE_HEAD } else { "" };
-        format!("{head}{more}{slides}{}", in_metres(&body))
+        format!("{}{head}{more}{slides}{}", first_line(Kind::Calibration), in_metres(&body))
     }
 
     /// Of the covariance that it has, or was said to have by a file that was read without.

@@ -1,5 +1,6 @@
 //! `[[link]]` of calibration.toml: link geometry that was estimated.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::calib::covariance::ParameterCovariance;
@@ -8,7 +9,7 @@ use armcal_core::kinematics::LinkCorrection;
 use armcal_core::robot::Robot;
 
 /// Where a joint sits on its parent link, beyond the URDF's `origin`; in the parent link's frame.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LinkResult {
     /// The joint.

@@ -1,12 +1,14 @@
 //! `[map]` of calibration.toml: where the tags are, in place of a survey.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use armcal_core::document::VERSION;
 use armcal_core::kind::Kind;
+use armcal_core::schema::first_line;
 
 /// The map that a calibration used in place of a survey.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MapResult {
     /// What was known before.
@@ -28,7 +30,7 @@ pub struct MapResult {
 }
 
 /// How much of the map was known before.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SurveyCoverage {
     /// Where some tags are.
@@ -38,7 +40,7 @@ pub enum SurveyCoverage {
 }
 
 /// A tag of the map, in the arm's base frame.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MapTag {
     /// Number of the tag.
@@ -99,6 +101,7 @@ impl MapResult {
             base_tag: self.base_tag,
             tag: tag.collect(),
         };
-        toml::to_string(&file).expect("plain tables and finite numbers have a TOML form")
+        let body = toml::to_string(&file).expect("plain tables and finite numbers have a TOML form");
+        format!("{}{body}", first_line(Kind::TagMap))
     }
 }

@@ -4,10 +4,11 @@ use std::collections::BTreeMap;
 
 use crate::calib::baseline_comparison::BaselineComparison;
 use armcal_core::numeric::Outcome;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How the fitted views fit.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FitMetrics {
     /// How the solver ended.
@@ -45,7 +46,7 @@ fn as_the_datasheet_says() -> f64 {
 }
 
 /// Cross-validated views by the 95 % regions of what they measured, noise included: 95 % should lie within.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ViewContainment {
     /// Number of views that have a region.
@@ -55,7 +56,7 @@ pub struct ViewContainment {
 }
 
 /// How views fit that the fit did not use.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct HeldOutMetrics {
     /// Number of views that show a tag.

@@ -27,10 +27,10 @@ pub(crate) mod valid_range;
 pub(crate) mod validity;
 pub(crate) mod verdict_tables;
 
-pub use calibration::{Calibration, JointResult, Status};
+pub use calibration::{Calibration, JointResult, Status, calibration_schema};
 pub use camera_mount::{CameraMount, FurtherCamera};
 pub use compact::{CompactCalibration, CompactError, CompactJoint, MAX_COMPACT_BYTES, PredictedToolError};
-pub use covariance_file::{CovarianceTable, covariance_file};
+pub use covariance_file::{CovarianceTable, covariance_file, covariance_schema};
 pub use details::{CornerResidual, FitDetails, ObservedTag, TargetPrediction, ViewResidual};
 pub use failed_joint::{FailedJointTable, PriorTable};
 pub use file::CalibrationFiles;

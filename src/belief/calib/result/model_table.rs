@@ -1,9 +1,10 @@
 //! `[model]` of calibration.toml: what was estimated, and the sizes that the data gave the unknown errors.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// What `bundle` took for its model.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ModelTable {
     /// Measurement noise over what was stated for it.

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::calib::covariance::ParameterCovariance;
@@ -10,7 +11,7 @@ use armcal_core::kinematics::Sag;
 use armcal_core::robot::{FileIssue, Robot};
 
 /// Compliances under the torques of weight less buoyancy, by the URDF's masses, at the angles that the sensors show.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SagTable {
     /// Of the base on what carries it, about the base's axes, rad/(N m).
@@ -26,7 +27,7 @@ pub struct SagTable {
 }
 
 /// How much a joint turns behind its sensor.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct JointCompliance {
     /// Name of the joint in the URDF.

@@ -3,6 +3,7 @@
 use armcal_core::codes::Code;
 use std::path::Path;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::calib::covariance::ParameterCovariance;
@@ -12,7 +13,7 @@ use armcal_core::sensor::{Conditions, N_SHAPE, SensorModel, Terms};
 use armcal_core::time::Stamp;
 
 /// What the terms are counted from; absent values were not measured.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ReferenceTable {
     /// Oil temperature, degrees Celsius.
@@ -27,7 +28,7 @@ pub struct ReferenceTable {
 }
 
 /// Terms of one joint; those that are zero and were not estimated are left out.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct TermsTable {
     /// What the travel is divided by for the shape's functions.

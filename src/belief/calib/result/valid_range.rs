@@ -1,5 +1,6 @@
 //! `[valid]` of calibration.toml.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::calib::views::view::CaptureData;
@@ -12,7 +13,7 @@ const MARGIN_PA: f64 = 0.5e6;
 const MARGIN_H: f64 = 6.0;
 
 /// What the captured views covered; beyond it the result is a guess.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ValidRange {
     /// When the last view was captured, nanoseconds since the epoch.

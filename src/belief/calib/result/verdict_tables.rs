@@ -1,10 +1,11 @@
 //! `[observability]` and `[verdict]` of calibration.toml.
 
 use armcal_core::codes::Warning;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// What the data determine, before solving.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ObservabilityTable {
     /// Directions that the data tell more of than the priors do.
@@ -33,7 +34,7 @@ pub struct ObservabilityTable {
 }
 
 /// What the verdict of `bundle` rests on.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct VerdictTable {
     /// What deserves a look without being a reason to refuse.
@@ -45,7 +46,7 @@ pub struct VerdictTable {
 }
 
 /// One figure against its limit.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Check {
     /// The figure and its unit, in words.

@@ -1,11 +1,12 @@
 //! Inputs that may be wrong, and the code of each.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use armcal_core::codes::{Code, Coded};
 
 /// An input that is not what it is said to be, and how well the views fit with it and without.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct WrongInput {
     /// Which, and how it should be read.
     pub input: WrongInputKind,
@@ -20,7 +21,7 @@ pub struct WrongInput {
 }
 
 /// What may be wrong.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum WrongInputKind {
     /// The map's quaternions are x, y, z, w.

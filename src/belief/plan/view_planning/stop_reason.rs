@@ -1,9 +1,11 @@
 //! When a capture ends.
 
 use armcal_core::routine::CaptureSettings;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// Why a capture ends.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum StopReason {
     /// The predicted tool error at the task (root mean square) is at most `capture.stop_at_tool_error_m`.

@@ -21,6 +21,7 @@ mod yaml;
 pub use cameras::{NamedCamera, cameras_to_yaml, parse_cameras, read_cameras};
 pub use landmark::{FIRST_NAMED_ID, Landmark, LandmarkFile, NamedSurvey, UNKNOWN_ROTATION_STD_RAD, spoken_name};
 pub use landmarks::read_landmarks;
+pub use own::tag_map_schema;
 pub use read::{parse_tags, read_tags};
 pub use tag_file::{Remap, TagFile};
 pub use write::map_to_text;

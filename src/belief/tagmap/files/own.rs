@@ -12,6 +12,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use nalgebra::Isometry3;
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::tagmap::check::SIZE_RANGE_M;
@@ -23,47 +24,78 @@ use armcal_core::document::{VERSION, parse_file};
 use armcal_core::kind::Kind;
 use armcal_core::optics::Chessboard;
 use armcal_core::robot::{FileIssue, RobotError};
+use armcal_core::schema::{first_line, schema_of};
 use armcal_core::spatial::{Base, Pose, Tag};
 
 /// Squares of a board along one side.
 const MAX_SQUARES: f64 = 100.0;
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct MapToml {
     #[serde(rename = "version")]
     _version: u32,
     #[serde(rename = "kind")]
     _kind: Option<Kind>,
+    /// Frame of the poses, such as the base link of the URDF.
     frame: String,
+    /// Number of the tag that defines the frame.
     base_tag: Option<u32>,
+    /// Edge of tags without an entry.
+    #[schemars(range(min = 1e-3, max = 10.0))]
     default_size_m: Option<f64>,
+    /// Frames that move.
     #[serde(default)]
     body: Vec<BodyToml>,
+    /// Tags and boards.
     #[serde(default)]
     tag: Vec<TagToml>,
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct BodyToml {
+    /// Name of the frame.
     name: String,
+    /// True for a frame that moves.
     moving: bool,
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct TagToml {
+    /// Number of the tag.
     id: Option<u32>,
+    /// Name of a landmark that is not an AprilTag.
     name: Option<String>,
+    /// Edge of the black square.
+    #[schemars(range(min = 1e-3, max = 10.0))]
     size_m: Option<f64>,
+    /// Frame of the pose, where not the file's.
     frame: Option<String>,
+    /// Position of the centre.
+    #[schemars(inner(range(min = -1e4, max = 1e4)))]
     position_m: Option<[f64; 3]>,
+    /// Attitude: x right, y up as printed, z out of the tag.
     quaternion_wxyz: Option<[f64; 4]>,
+    /// Sigma of the position along x, y, z.
+    #[schemars(inner(range(min = 0.0, max = 100.0)))]
     position_std_m: Option<[f64; 3]>,
+    /// Sigma of the attitude about x, y, z.
+    #[schemars(inner(range(min = 0.0, max = 100.0)))]
     rotation_std_rad: Option<[f64; 3]>,
+    /// Squares of a chessboard or ChArUco board along x and y.
+    #[schemars(inner(range(min = 3, max = 100)))]
     squares: Option<[u32; 2]>,
+    /// Edge of a square of the board.
+    #[schemars(range(min = 1e-3, max = 10.0))]
     square_m: Option<f64>,
+}
+
+/// Returns the schema of a tag map.
+#[must_use]
+pub fn tag_map_schema() -> serde_json::Value {
+    schema_of::<MapToml>(Kind::TagMap)
 }
 
 /// The landmarks in the file's frame; those of other frames are left out.
@@ -207,7 +239,8 @@ fn body_of(out: &mut TagFile, bodies: &[BodyToml], frame: &str) -> usize {
 pub(super) fn to_text(groups: &[WrittenGroup]) -> String {
     let main = groups.first().map_or("base_link", |group| group.frame.as_str());
     let kind = Kind::TagMap.name();
-    let mut out = format!("version = {VERSION}\nkind = \"{kind}\"\nframe = {}\n", quoted(main));
+    let mut out =
+        format!("{}version = {VERSION}\nkind = \"{kind}\"\nframe = {}\n", first_line(Kind::TagMap), quoted(main));
     for group in groups.iter().filter(|group| !group.is_static) {
         let _ = writeln!(out, "\n[[body]]\nname = {}\nmoving = true", quoted(&group.frame));
     }

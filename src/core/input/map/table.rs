@@ -3,13 +3,14 @@
 use crate::codes::Code;
 use std::path::{Path, PathBuf};
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{ChildFrame, TagUse};
 use crate::robot::FileIssue;
 
 /// Form of a table's file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum TableFormat {
     /// A line of names, then one line per pose; separated by comma, semicolon or tab.
@@ -19,7 +20,7 @@ pub enum TableFormat {
 }
 
 /// How a rotation is written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RotationForm {
     /// Hamilton, the real part first.
@@ -60,7 +61,7 @@ impl RotationForm {
 }
 
 /// Which of the two poses a row holds; `a_from_b` maps coordinates in b to coordinates in a.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Direction {
     /// The tag's (board's) pose in the camera's frame.
@@ -70,7 +71,7 @@ pub enum Direction {
 }
 
 /// Which corner of a tag is the first, and which way round the others follow; as the tag is printed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum CornerOrder {
     /// Bottom left, bottom right, top right, top left: AprilRobotics/apriltag 1c21707, apriltag.h, line 220.
@@ -245,55 +246,74 @@ pub struct PoseColumns {
     pub rotation: Option<RotationColumns>,
 }
 
-#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 enum TimeUnit {
+    /// Seconds.
     #[default]
     S,
+    /// Milliseconds.
     Ms,
+    /// Microseconds.
     Us,
+    /// Nanoseconds.
     Ns,
 }
 
-#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 enum LengthUnit {
+    /// Metres.
     #[default]
     M,
+    /// Millimetres.
     Mm,
 }
 
-#[derive(Clone, Copy, Debug, Deserialize, PartialEq)]
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 enum AngleUnit {
+    /// Radians.
     Rad,
+    /// Degrees.
     Deg,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct TimeToml {
+    /// Name of the column.
     column: String,
+    /// Unit of its numbers.
     #[serde(default)]
     unit: TimeUnit,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct TableToml {
+    /// Form of the file; absent: by the end of its name.
     format: Option<TableFormat>,
+    /// Keys that lead to the rows of a YAML file, joined by dots.
     rows: Option<String>,
+    /// Column of the time; absent: rows are 1 s apart.
     time: Option<TimeToml>,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct TagTableToml {
+    /// File of the tags, from the folder of this file.
     file: String,
+    /// Form of the file; absent: by the end of its name.
     format: Option<TableFormat>,
+    /// Keys that lead to the rows of a YAML file, joined by dots.
     rows: Option<String>,
+    /// Column of the time: rows belong to the joints nearest in time.
     time: Option<TimeToml>,
+    /// Column with the same text in both tables.
     key: Option<String>,
+    /// That column's name in the table of the joints, where it differs.
     joints_key: Option<String>,
 }
 
@@ -305,20 +325,31 @@ pub(super) struct TagsOfTable<'a> {
     pub clock_offset_s: f64,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct TagColumnsToml {
+    /// Which pose a row holds.
     direction: Option<Direction>,
+    /// Columns of x, y, z.
     position: Option<[String; 3]>,
+    /// Columns of u and v of one corner.
     pixel: Option<[String; 2]>,
+    /// Column of the corner's number, 0 to 3.
     corner: Option<String>,
+    /// Columns of u and v of the four corners of a tag.
     corners: Option<[String; 8]>,
+    /// Order of a tag's corners.
     corner_order: Option<CornerOrder>,
+    /// Unit of the position.
     #[serde(default)]
     position_unit: LengthUnit,
+    /// Columns of the rotation, as many as its form has.
     rotation: Option<Vec<String>>,
+    /// Form of the rotation.
     rotation_form: Option<RotationForm>,
+    /// Unit of the rotation's angles.
     rotation_unit: Option<AngleUnit>,
+    /// Column of the tag's number, or of the board's corner.
     id: Option<String>,
 }
 

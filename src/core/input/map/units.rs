@@ -1,11 +1,12 @@
 //! In what units joints are recorded.
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::robot::JointSensorSpec;
 
 /// What the recorded numbers of the joints are.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum JointUnit {
     /// Raw readings, in the unit of robot.toml's scale.
@@ -50,7 +51,7 @@ impl JointUnit {
 }
 
 /// What the recorded numbers of slides are, where they are no raw readings.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SlideUnit {
     /// Metres.
