@@ -16,7 +16,7 @@ use crate::cli::stdout::say;
 use armcal_belief::calib::{Calibration, CalibrationFileError, Status};
 use armcal_belief::plan::{ClearanceModel, PlanFile, SceneCheck, SceneIssues, grips_at_first};
 use armcal_belief::tagmap::files::read_landmarks;
-use armcal_core::document::stated_kind;
+use armcal_core::document::{missing_kind, stated_kind};
 use armcal_core::input::{InputMap, SeenColumns, Source, TagUse, Topics, read_input_map, read_task};
 use armcal_core::kind::Kind;
 use armcal_core::robot::{self, Robot, Vehicle};
@@ -142,12 +142,13 @@ fn check_one(file: &Path, context: &Context) -> Result<Found> {
     let text = robot::read_text(file)?;
     let table: toml::Table = robot::parse_toml(file, &text)?;
     let kind = stated_kind(file, &table, is_robot_toml(file).then_some(Kind::Robot))?;
-    let mut found = check_kind(file, kind, &text, context)?;
-    if !table.contains_key("kind") {
-        let problem = format!("its kind is missing; add the line kind = \"{}\" at its start", kind.name());
-        found.warnings.push(Warning::new(Code::FileKind, problem));
-    }
-    Ok(found)
+    expect_stated(file, kind, &table)?;
+    check_kind(file, kind, &text, context)
+}
+
+/// Refuses a file that other commands read by its keys.
+fn expect_stated(file: &Path, kind: Kind, table: &toml::Table) -> Result<()> {
+    if table.contains_key("kind") { Ok(()) } else { Err(missing_kind(file, kind).into()) }
 }
 
 fn is_robot_toml(file: &Path) -> bool {
@@ -281,6 +282,8 @@ fn describe_input(map: &InputMap) -> String {
 /// What only planning lacks is a warning: an arm that records needs none of it.
 fn check_robot(folder: &Path) -> Result<Found> {
     let robot = robot::load(folder)?;
+    let file = folder.join("robot.toml");
+    expect_stated(&file, Kind::Robot, &robot::parse_toml(&file, &robot::read_text(&file)?)?)?;
     let missing = robot.planning_issues.iter();
     let refused = missing.map(|issue| format!("run and plan will refuse it: {}: {}", issue.key, issue.problem));
     let lost = robot.base_tag.filter(|_| robot.tags.is_empty());

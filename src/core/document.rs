@@ -46,8 +46,15 @@ pub fn check_head(kind: Kind, file: &Path, table: &Table) -> Result<(), FileIssu
     }
 }
 
+/// Returns the issue of a file of this kind that does not state it.
+#[must_use]
+pub fn missing_kind(file: &Path, kind: Kind) -> FileIssue {
+    let problem = format!("is missing; add the line kind = \"{}\" at its start", kind.name());
+    FileIssue::new(Code::FileKind, file, "kind", problem)
+}
+
 /// Returns the kind that a file states. A file of version 1 without `kind`, as they were until now, is of the kind that
-/// its keys suggest, or the expected one; `armcal check` names the line to add.
+/// its keys suggest, or the expected one; `armcal check` refuses it with the line to add.
 ///
 /// # Errors
 /// [`FileIssue`] with the line to add or to correct.

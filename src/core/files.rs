@@ -67,7 +67,11 @@ pub fn into_text(bytes: Vec<u8>) -> Result<String> {
     String::from_utf8(bytes).map_err(|error| {
         let what = match is_utf16 {
             true => "it is a text in UTF-16; save it in UTF-8".to_owned(),
-            false => format!("it is not a text in UTF-8: {}", error.utf8_error()),
+            false => {
+                let at = error.utf8_error().valid_up_to();
+                let line = 1 + error.as_bytes()[..at].iter().filter(|byte| **byte == b'\n').count();
+                format!("line {line} is not a text in UTF-8 (byte {at}); save the file in UTF-8")
+            }
         };
         Error::new(ErrorKind::InvalidData, what)
     })

@@ -38,15 +38,16 @@ struct CameraYaml {
     tagtopic: Option<String>,
 }
 
-/// Camera file of ROS, as `camera_calibration` and `camera_info_manager` write it.
+/// Camera file of ROS, as `camera_calibration` and `camera_info_manager` write it, and that of OpenCV's
+/// samples/cpp/calibration.cpp, which has the same keys without the model.
 #[derive(Debug, Deserialize)]
 struct RosCameraYaml {
-    image_width: u32,
-    image_height: u32,
+    image_width: Option<u32>,
+    image_height: Option<u32>,
     #[serde(default)]
     camera_name: String,
     camera_matrix: RosMatrix,
-    distortion_model: String,
+    distortion_model: Option<String>,
     distortion_coefficients: RosMatrix,
 }
 
@@ -90,10 +91,17 @@ fn ros_camera(file: &Path, raw: RosCameraYaml) -> Result<NamedCamera, RobotError
     let n = raw.camera_matrix.data.len();
     let k = raw.camera_matrix.data.try_into();
     let k = k.map_err(|_| issue("camera_matrix.data", format!("has {n} numbers, needs 9: row by row")))?;
+    let missing = |key: &str, what: &str| {
+        RobotError::from(FileIssue::new(Code::KeyMissing, file, key, format!("is missing; add the line {key}: {what}")))
+    };
+    let size = |key, side: Option<u32>| side.ok_or_else(|| missing(key, "the image's size, px"));
+    // Only OpenCV's own model has five coefficients; four are that of a fisheye, too.
+    let usual = (raw.distortion_coefficients.data.len() == 5).then(|| "plumb_bob".to_owned());
+    let model = raw.distortion_model.or(usual);
     let info = CameraInfo {
-        width: raw.image_width,
-        height: raw.image_height,
-        distortion_model: raw.distortion_model,
+        width: size("image_width", raw.image_width)?,
+        height: size("image_height", raw.image_height)?,
+        distortion_model: model.ok_or_else(|| missing("distortion_model", "plumb_bob, or equidistant"))?,
         d: raw.distortion_coefficients.data,
         k,
         ..CameraInfo::default()

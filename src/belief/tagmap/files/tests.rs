@@ -234,7 +234,20 @@ fn the_camera_file_of_ros_is_read_as_its_message_would_be() {
     assert_eq!((camera.name.as_str(), camera.model.resolution_px()), ("wrist", [800, 600]));
     assert_eq!((camera.model.focal_px(), camera.model.center_px()), ([410.5, 411.0], [400.25, 299.0]));
     assert_eq!(camera.model.distortion(), [-0.2, 0.05, 0.001, -0.002, 0.0]);
-    let changes = [("410.5, 0, 400.25, ", "410.5, "), ("plumb_bob", "thin_prism"), ("410.5", "0.5")];
+    // OpenCV's own file names no model where the number of coefficients tells it.
+    let opencv = text.replace("distortion_model: plumb_bob\n", "");
+    assert_eq!(parse_cameras(Path::new("ost.yaml"), &opencv).expect("it reads")[0].model, camera.model);
+    let changes = [
+        ("410.5, 0, 400.25, ", "410.5, "),
+        ("plumb_bob", "thin_prism"),
+        ("410.5", "0.5"),
+        ("image_width: 800\n", ""),
+        (
+            "distortion_model: plumb_bob\ndistortion_coefficients:\n  rows: 1\n  cols: 5\n  data: [-0.2, 0.05, 0.001, \
+             -0.002, 0]",
+            "distortion_coefficients:\n  data: [-0.2, 0.05, 0.001, -0.002]",
+        ),
+    ];
     let told = changes.map(|(from, to)| {
         assert!(text.contains(from), "{from}");
         parse_cameras(Path::new("ost.yaml"), &text.replace(from, to)).expect_err(to).to_string()
