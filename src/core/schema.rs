@@ -119,6 +119,7 @@ impl Transform for Tidy {
             }
         }
         without_null(object);
+        state_units(object);
     }
 }
 
@@ -137,6 +138,77 @@ fn without_null(object: &mut Map<String, Value>) {
     }
 }
 
+/// Units by the end of a key's name, the longer ends first.
+const UNITS: [(&str, &str); 45] = [
+    ("_counts_per_deg", "counts/deg"),
+    ("_counts_per_mm", "counts/mm"),
+    ("_rad_per_sqrt_turn", "rad/sqrt(turn)"),
+    ("_rad_per_sqrt_h", "rad/sqrt(h)"),
+    ("_rad_per_count", "rad/count"),
+    ("_rad_per_mpa", "rad/MPa"),
+    ("_rad_per_nm", "rad/(N m)"),
+    ("_rad_per_k", "rad/K"),
+    ("_rad_per_h", "rad/h"),
+    ("_m_per_sqrt_h", "m/sqrt(h)"),
+    ("_m_per_k", "m/K"),
+    ("_m_per_n", "m/N"),
+    ("_l_per_min", "L/min"),
+    ("_l_per_rad", "L/rad"),
+    ("_l_per_m", "L/m"),
+    ("_j_per_k", "J/K"),
+    ("_n_m_s_rad", "N m s/rad"),
+    ("_electrons_per_cd_m2", "m2/cd"),
+    ("_per_mpa", "1/MPa"),
+    ("_per_m3", "1/m3"),
+    ("_per_px", "1/px"),
+    ("_per_sr", "1/sr"),
+    ("_per_m", "1/m"),
+    ("_per_s", "1/s"),
+    ("_per_k", "1/K"),
+    ("_cd_m2", "cd/m2"),
+    ("_kg_m2", "kg m2"),
+    ("_kg_m3", "kg/m3"),
+    ("_rad_s", "rad/s"),
+    ("_m_s", "m/s"),
+    ("_n_m", "N m"),
+    ("_mpa", "MPa"),
+    ("_ppm", "ppm"),
+    ("_deg", "deg"),
+    ("_rad", "rad"),
+    ("_lux", "lux"),
+    ("_lm", "lm"),
+    ("_kg", "kg"),
+    ("_pa", "Pa"),
+    ("_px", "px"),
+    ("_hz", "Hz"),
+    ("_m", "m"),
+    ("_s", "s"),
+    ("_n", "N"),
+    ("_c", "deg C"),
+];
+
+/// Returns the unit that a key's name states.
+fn unit_of(key: &str) -> Option<&'static str> {
+    let ends = |(end, unit): &(&str, &'static str)| key.ends_with(end).then_some(*unit);
+    UNITS.iter().find_map(ends).or_else(|| key.ends_with("_k").then_some("K"))
+}
+
+/// Annotates numbers, and lists of them, with their unit.
+fn state_units(object: &mut Map<String, Value>) {
+    let Some(Value::Object(keys)) = object.get_mut("properties") else { return };
+    for (key, schema) in keys {
+        let Value::Object(schema) = schema else { continue };
+        let mut innermost = &*schema;
+        while let Some(Value::Object(items)) = innermost.get("items") {
+            innermost = items;
+        }
+        let is_number = innermost.get("type").is_some_and(|kind| kind == "number");
+        if let Some(unit) = unit_of(key).filter(|_| is_number) {
+            schema.insert("unit".to_owned(), unit.into());
+        }
+    }
+}
+
 /// Returns the schema of a table whose key `tag` has this value, of the schema of its other keys.
 #[must_use]
 pub fn tagged(mut schema: Schema, tag: &str, value: &str, description: &str) -> Schema {
@@ -148,4 +220,28 @@ pub fn tagged(mut schema: Schema, tag: &str, value: &str, description: &str) -> 
         keys.insert(0, tag.into());
     }
     schema
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_unit_is_the_longest_end_of_a_keys_name() {
+        let units = [
+            ("clearance_m", "m"),
+            ("noise_rad_per_sqrt_h", "rad/sqrt(h)"),
+            ("max_rate_rad_s", "rad/s"),
+            ("oil_rise_k", "K"),
+            ("joint_compliance_std_rad_per_nm", "rad/(N m)"),
+        ];
+        for (key, unit) in units {
+            assert_eq!(unit_of(key), Some(unit), "{key}");
+        }
+        assert_eq!(unit_of("gain_std"), None);
+        for (at, (end, _)) in UNITS.iter().enumerate() {
+            let hides = |(shorter, _): &&(&str, &str)| end.ends_with(shorter);
+            assert!(UNITS[..at].iter().find(hides).is_none(), "{end} is never reached");
+        }
+    }
 }

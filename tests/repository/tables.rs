@@ -77,7 +77,8 @@ impl<'a> Tables<'a, '_> {
             }
         }
         if !rows.is_empty() {
-            let _ = writeln!(self.out, "| key | type | allowed | default | meaning |\n|---|---|---|---|---|");
+            let _ =
+                writeln!(self.out, "| key | type | unit | allowed | default | meaning |\n|---|---|---|---|---|---|");
             rows.iter().for_each(|row| self.out.push_str(row));
         }
         for (key, of_key) in keys {
@@ -107,7 +108,8 @@ impl<'a> Tables<'a, '_> {
         };
         let text = of_key["description"].as_str().or_else(|| schema["description"].as_str()).unwrap_or_default();
         let (kind, allowed) = (self.kind(schema), self.allowed(schema));
-        Some(format!("| `{key}` | {kind} | {allowed} | {usual} | {} |\n", escaped(text)))
+        let unit = of_key["unit"].as_str().unwrap_or_default();
+        Some(format!("| `{key}` | {kind} | {unit} | {allowed} | {usual} | {} |\n", escaped(text)))
     }
 
     fn kind(&self, schema: &'a Value) -> String {
@@ -166,7 +168,8 @@ fn escaped(text: &str) -> String {
 fn keys_page() -> String {
     let mut page = "# Keys of TOML files\n\nAll keys of the files that people write, for looking one up. Made from \
                     the types that read the files;\n`armcal schema KIND` prints the same as JSON Schema for editors. \
-                    A key's unit is in its name.\nEvery file begins with `version = 1` and its `kind`.\n"
+                    Editors find it by\nthe first line of files that armcal writes, `#:schema ADDRESS`. \
+                    Every file begins with\n`version = 1` and its `kind`.\n"
         .to_owned();
     let mut written = BTreeMap::new();
     for kind in WRITTEN {
