@@ -75,7 +75,7 @@ struct RobotFile {
     joint_sensor: Vec<SensorFile>,
     /// Oil supply.
     hydraulics: Option<HydraulicsFile>,
-    /// How closely the arm follows its set-points.
+    /// Tracking error of the arm against its set-points.
     #[serde(default)]
     motion: MotionSpec,
     /// Sigmas of the geometry and loads.

@@ -187,7 +187,7 @@ pub(super) struct CalibrateKeys {
     /// Captured views that it uses.
     #[serde(default)]
     pub views: CalibrateViews,
-    /// What follows a refusal.
+    /// Action after a refusal.
     #[serde(default)]
     pub on_refusal: OnRefusal,
 }

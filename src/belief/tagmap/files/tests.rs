@@ -234,7 +234,7 @@ fn the_camera_file_of_ros_is_read_as_its_message_would_be() {
     assert_eq!((camera.name.as_str(), camera.model.resolution_px()), ("wrist", [800, 600]));
     assert_eq!((camera.model.focal_px(), camera.model.center_px()), ([410.5, 411.0], [400.25, 299.0]));
     assert_eq!(camera.model.distortion(), [-0.2, 0.05, 0.001, -0.002, 0.0]);
-    // OpenCV's own file names no model where the number of coefficients tells it.
+    // OpenCV's own file states no model; five coefficients have only one.
     let opencv = text.replace("distortion_model: plumb_bob\n", "");
     assert_eq!(parse_cameras(Path::new("ost.yaml"), &opencv).expect("it reads")[0].model, camera.model);
     let changes = [

@@ -313,7 +313,7 @@ pub(super) struct TagTableToml {
     time: Option<TimeToml>,
     /// Column with the same text in both tables.
     key: Option<String>,
-    /// That column's name in the table of the joints, where it differs.
+    /// Name of that column in the joints' table; absent: the same name.
     joints_key: Option<String>,
 }
 
