@@ -244,9 +244,19 @@ fn the_order_of_corners_is_proposed_by_their_winding() {
     }
     // Listed row by row: with the columns of the last two exchanged they are read.
     propose("four.csv", [3, 2, 0, 1]);
-    rig.calibrate("joints.csv").expect("crossed", 2, &["corner_order", "[views_missing]"]);
+    rig.calibrate("joints.csv").expect("crossed", 2, &["corner_order", "[input_corner_order]"]);
     edit(&rig.file("map.toml"), "\"x2\", \"y2\", \"x3\", \"y3\"", "\"x3\", \"y3\", \"x2\", \"y2\"");
     rig.expect_accepted("joints.csv");
+}
+
+/// The first corner is bottom right, and `inspect` takes it as top left: half of the tags would pass as moved.
+#[test]
+fn a_turn_of_all_tags_is_no_repair_of_each() {
+    let rig = Rig::new("kraft-predator", 30, 5);
+    rig.write_joints("joints.csv", &[("image", &image)], |_| true);
+    rig.write_tags("four.csv", ("image", &image), [1, 0, 3, 2]);
+    rig.inspect(&["joints.csv", "four.csv"]).expect("proposed", 0, &["written"]);
+    rig.calibrate("joints.csv").expect("turned", 4, &["REFUSED: the frames of all tags", "[input_tag_frames]"]);
 }
 
 /// The map names its table from its own folder.

@@ -14,7 +14,7 @@ use crate::calib::methods::end_stops;
 use crate::calib::result::calibration::{Calibration, Status};
 use crate::calib::views::association::{associate_within, declared_failed, surveyed};
 use crate::calib::views::calibration_data::{CalibrationData, HeldOut, hash_of, used_by};
-use crate::calib::views::data_checks::{check_joints, check_order, check_pose_variation};
+use crate::calib::views::data_checks::{check_corner_order, check_joints, check_order, check_pose_variation, no_views};
 use crate::calib::views::scale_identification::identify_scales;
 use crate::calib::views::view::CaptureData;
 
@@ -193,10 +193,10 @@ fn check_views(data: &CalibrationData) -> Result<(), CalibError> {
     if data.fit.is_empty() {
         return Err(CalibError::NoFitViews { recording: name.clone(), held_out: data.held_out.len() });
     }
+    check_corner_order(name, data)?;
     let views = data.fit.iter().filter(|view| !view.tags.is_empty()).count();
     if views == 0 {
-        let (known, seen) = (robot.tags.iter().map(|tag| tag.id).collect(), data.ids_seen.clone());
-        return Err(CalibError::NoTags { recording: name.clone(), robot: robot.name.clone(), known, seen });
+        return Err(no_views(name.clone(), robot, data));
     }
     if views < MIN_VIEWS {
         return Err(CalibError::TooFewViews { recording: name.clone(), views, needed: MIN_VIEWS });

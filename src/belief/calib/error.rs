@@ -56,6 +56,8 @@ pub enum CalibError {
     PriorSag { recording: String },
     #[error("{recording}: {n} of {of} messages rejected on {what}: too many to go on")]
     NotFinite { recording: String, what: String, n: u64, of: u64 },
+    #[error("{recording}: the corners of {n} of {of} tags run the wrong way round, as in a mirror; {todo}")]
+    CornerOrder { recording: String, n: usize, of: usize, todo: &'static str },
     #[error("{recording}: no view is left: {reasons}; {todo}")]
     AllRejected { recording: String, reasons: String, todo: &'static str },
     #[error("{recording}: {problem}")]
@@ -85,6 +87,7 @@ impl Coded for CalibError {
             | Self::AllRejected { .. }
             | Self::NoInterimEstimate { .. } => Code::ViewsMissing,
             Self::NoTags { .. } => Code::TagsNotSeen,
+            Self::CornerOrder { .. } => Code::InputCornerOrder,
             Self::NothingObservable { .. } | Self::NoStops { .. } => Code::NothingObservable,
             Self::Map { .. } => Code::MapFailed,
             Self::Identify { .. } => Code::ScaleUnmeasured,

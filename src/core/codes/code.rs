@@ -145,6 +145,7 @@ codes! {
     JointTurns = "joint_turns",
     ReadingsShifted = "readings_shifted",
     InputCamera = "input_camera",
+    InputCornerOrder = "input_corner_order",
     InputTagFrames = "input_tag_frames",
     InputMapUnit = "input_map_unit",
     RepairTooLarge = "repair_too_large",

@@ -35,7 +35,7 @@ use crate::calib::result::metrics::{HeldOutMetrics, ViewContainment};
 use crate::calib::tag_mapping::map_unknown_tags;
 use crate::calib::views::calibration_data::CalibrationData;
 use crate::calib::views::view::{ObservationRejection, Touch, View};
-use crate::calib::wrong_input::wrong_input;
+use crate::calib::wrong_input::{WrongInput, wrong_input};
 use crate::judge::{TargetError, U95Table};
 use armcal_core::codes::Code;
 use armcal_core::joints::JointAngles;
@@ -265,9 +265,15 @@ impl<'a> BundleCalibration<'a> {
     }
 
     /// Where the calibration is refused and the images contradict a file, or the readings mean something else than the
-    /// input map says, that comes first.
+    /// input map says, that comes first. Several repaired tags are refused, too, where one other reading of the whole
+    /// map or of the lens explains them.
     fn blame_input(&self, failures: &[Failure], calibration: &mut Calibration) {
         if calibration.status != Status::Refused {
+            let has_moved_tags = self.moved.n_moved() > 1;
+            let wrong = has_moved_tags.then(|| wrong_input(&self.data.data, &self.surveyed, &self.data.robot)).flatten();
+            if let Some(wrong) = wrong.filter(WrongInput::is_of_all_tags) {
+                calibration.refuse_first_for([Refusal::WrongInput(wrong)]);
+            }
             return;
         }
         let is_of_lens = calibration.refusals.iter().any(|refusal| matches!(refusal, Refusal::Lens { .. }));

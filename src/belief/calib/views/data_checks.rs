@@ -1,7 +1,7 @@
 //! Recordings that no method can make sense of, refused by name before anything is fitted.
 
 use crate::calib::CalibError;
-use crate::calib::views::view::CaptureData;
+use crate::calib::views::view::{CaptureData, ObservationRejection};
 use armcal_core::log::{Recording, Stream};
 use armcal_core::robot::Robot;
 
@@ -50,6 +50,35 @@ pub(crate) fn check_order(recording: &Recording) -> Result<(), CalibError> {
         let (recording, topic) = (recording.path.display().to_string(), topic.clone());
         Err(CalibError::Disorder { recording, topic, disorder: *disorder })
     })
+}
+
+/// Why no view shows a tag: what rejected most of those seen. Each arm moves between its poses, so that counts where
+/// nothing else does.
+pub(crate) fn no_views(recording: String, robot: &Robot, data: &CaptureData) -> CalibError {
+    if let Err(error) = check_corner_order(&recording, data) {
+        return error;
+    }
+    let known = data.rejected.iter().filter(|(why, _)| **why != ObservationRejection::UnknownTag);
+    let most = known.max_by_key(|(why, n)| (**why != ObservationRejection::ArmMoving, **n));
+    if let Some((most, _)) = most {
+        let reasons = data.rejected_by_reason();
+        let reasons: Vec<String> = reasons.iter().map(|(why, n)| format!("{n} {}", why.replace('_', " "))).collect();
+        return CalibError::AllRejected { recording, reasons: reasons.join(", "), todo: most.remedy() };
+    }
+    let known = robot.tags.iter().map(|tag| tag.id).collect();
+    CalibError::NoTags { recording, robot: robot.name.clone(), known, seen: data.ids_seen.clone() }
+}
+
+/// Refuses corners most of which run the wrong way round: what is left of them are squares seen from their edge.
+pub(crate) fn check_corner_order(name: &str, data: &CaptureData) -> Result<(), CalibError> {
+    let n = data.rejected.get(&ObservationRejection::CornerOrder).copied().unwrap_or(0);
+    let views = data.fit.iter().chain(&data.held_out);
+    let kept = views.flat_map(|view| &view.tags).filter(|tag| tag.corners().is_some()).count();
+    if n <= kept {
+        return Ok(());
+    }
+    let todo = ObservationRejection::CornerOrder.remedy();
+    Err(CalibError::CornerOrder { recording: name.to_owned(), n, of: n + kept, todo })
 }
 
 /// Views count as of one pose where no joint moved by more than this many sigma of its noise. Assumed.

@@ -20,6 +20,13 @@ pub struct WrongInput {
     pub size_hint: Option<String>,
 }
 
+impl WrongInput {
+    /// One reading of the whole map or of the lens, which explains all tags at once.
+    pub(crate) fn is_of_all_tags(&self) -> bool {
+        !matches!(self.input, WrongInputKind::ExchangedIds(_) | WrongInputKind::OtherMap)
+    }
+}
+
 /// What may be wrong.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]

@@ -40,6 +40,11 @@ impl MovedTags {
         moved.map_or(0.0, |moved| 0.5 * moved.chi2)
     }
 
+    /// Tags that are estimated because they are not where the survey has them.
+    pub(crate) fn n_moved(&self) -> usize {
+        self.freed.iter().chain(&self.group).collect::<std::collections::BTreeSet<_>>().len()
+    }
+
     /// Takes over what `drawing` says of tags, so that a freed tag's distance is from there.
     pub(crate) fn resurveyed(&mut self, robot: &mut Robot, drawing: &Drawing) {
         for fault in &drawing.tags {

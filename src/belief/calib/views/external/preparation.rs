@@ -3,9 +3,10 @@
 
 use std::collections::BTreeMap;
 
+use crate::calib::views::data_checks::{check_corner_order, no_views};
 use crate::calib::views::external::landmarks::PlainLandmark;
 use crate::calib::views::external::views::RecordingViews;
-use crate::calib::views::view::{CaptureData, ObservationRejection, View};
+use crate::calib::views::view::{CaptureData, View};
 use crate::calib::{CalibError, CalibrationData, HeldOut};
 use armcal_core::input::{ExternalRecording, InputMap, RawMeasurement};
 use armcal_core::robot::Robot;
@@ -76,6 +77,7 @@ pub fn prepare_external(
         });
         return Err(of_clocks.unwrap_or_else(|| no_views(name, robot, &data)));
     }
+    check_corner_order(&name, &data)?;
     let messages_hash = hash(&mut digests);
     Ok(CalibrationData {
         name,
@@ -92,17 +94,6 @@ fn names_of(recordings: &[ExternalRecording]) -> String {
     let mut names: Vec<String> = recordings.iter().map(|recording| recording.path.display().to_string()).collect();
     names.sort();
     names.join(", ")
-}
-
-fn no_views(recording: String, robot: &Robot, data: &CaptureData) -> CalibError {
-    let known = data.rejected.iter().filter(|(why, _)| **why != ObservationRejection::UnknownTag);
-    if let Some((most, _)) = known.max_by_key(|(_, n)| **n) {
-        let reasons = data.rejected_by_reason();
-        let reasons: Vec<String> = reasons.iter().map(|(why, n)| format!("{n} {}", why.replace('_', " "))).collect();
-        return CalibError::AllRejected { recording, reasons: reasons.join(", "), todo: most.remedy() };
-    }
-    let known = robot.tags.iter().map(|tag| tag.id).collect();
-    CalibError::NoTags { recording, robot: robot.name.clone(), known, seen: data.ids_seen.clone() }
 }
 
 /// Of the messages that the views come from, in whatever order and files they were.
