@@ -75,6 +75,8 @@ pub use armcal_detect as detect;
 #[doc(hidden)]
 pub use armcal_sim as sim;
 
+pub use front::{CalibrateError, Calibrator, Measurements, PoseAtRest};
+
 pub use armcal_belief::calib::{CalibError, Calibration, Status, calibrate, interim_estimate};
 pub use armcal_belief::plan::{ClearanceModel, JointErrorBounds, PathError, PathPlanner, Timing};
 pub use armcal_belief::session::{Outcome, Progress, Recorder, SessionError, SessionInputs, Unwatched};
@@ -97,6 +99,7 @@ pub mod campaign;
 pub mod cli;
 #[doc(hidden)]
 pub mod export;
+pub mod front;
 #[doc(hidden)]
 pub mod output;
 #[cfg(feature = "images")]

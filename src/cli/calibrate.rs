@@ -10,6 +10,7 @@ use clap::Args;
 use crate::cli::calibration_inputs::{Calibrated, CalibrationInputs, load_robot};
 use crate::cli::closing::ClosingArgs;
 use crate::cli::exit::Exit;
+use crate::cli::named;
 use crate::cli::stdout::warn;
 use crate::output::{self, accepted_kept};
 #[cfg(feature = "viewer")]
@@ -24,8 +25,8 @@ pub(super) struct CalibrateArgs {
     /// Recordings (.mcap); the views of several are pooled
     #[arg(required = true)]
     recordings: Vec<PathBuf>,
-    /// Folder of the robot (robot.toml and its URDF)
-    #[arg(long, value_name = "DIR")]
+    /// Folder of the robot (robot.toml and its URDF), or the name of one that comes with armcal
+    #[arg(long, value_name = "DIR", value_parser = named::robot())]
     robot: PathBuf,
     /// Input map (.toml) with topics and frames, for recordings that armcal did not make
     #[arg(long, value_name = "FILE")]
@@ -92,6 +93,19 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
         (Status::Accepted, true) => Exit::DataLost,
         (Status::Accepted, false) => Exit::Ok,
     })
+}
+
+/// Writes a calibration with its covariance, report and summary into `out`, or next to it where an accepted one stays
+/// there; returns the folder.
+///
+/// # Errors
+/// A folder that cannot be written to or that another program writes to.
+pub fn save_results(out: &Path, robot: &Robot, of: (&Calibration, &RunSummary)) -> Result<PathBuf> {
+    let _lock = output::FolderLock::take(out)?;
+    let folder = accepted_kept(out, of.0).map_or_else(|| out.to_owned(), |kept| kept.folder);
+    output::make_folder(&folder)?;
+    write_results(&folder, &[], robot, of)?;
+    Ok(folder)
 }
 
 /// Calibration with its covariance, report, summary and, where tags were mapped, the map.

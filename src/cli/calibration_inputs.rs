@@ -13,26 +13,27 @@ use crate::cli::file_kind::{FileKind, expect_kind, expect_option, expect_recordi
 use crate::cli::losses::{warn_of_external, warn_of_losses};
 use crate::cli::stdout::warn;
 use crate::cli::waiting::Waiting;
+use crate::front::Calibrator;
+use crate::front::measurements::add_lens;
 use armcal_belief::calib::online::{Batch, Follower, OnlineEvent, OnlineSettings};
 use armcal_belief::calib::{
-    Calibration, CalibrationData, CalibrationFileError, ExternalContext, PlainLandmark, Status, View, calibrate,
-    calibrate_data, calibrate_with_survey, check_joints, prepare_external, prepare_pooled, read_marked,
+    Calibration, CalibrationData, CalibrationFileError, Status, View, calibrate_data, check_joints, prepare_pooled,
+    read_marked,
 };
-use armcal_belief::tagmap::files::{LandmarkFile, NamedSurvey, read_landmarks};
+use armcal_belief::tagmap::files::{LandmarkFile, read_landmarks};
 #[cfg(not(feature = "images"))]
 use armcal_core::input::read_external;
-use armcal_core::input::{
-    CameraInfoLens, ChildFrame, ExternalRecording, InputMap, Source, TagUse, read_camera_info, read_input_map,
-    read_task,
-};
+use armcal_core::input::{ExternalRecording, InputMap, TagUse, read_input_map, read_task};
 #[cfg(feature = "images")]
-use armcal_core::input::{ImageDetector, ImageProblem, RecordedImage, TagCorners, Topics, read_external_images};
+use armcal_core::input::{
+    ImageDetector, ImageProblem, RecordedImage, Source, TagCorners, Topics, read_external_images,
+};
 #[cfg(feature = "images")]
 use armcal_core::log::for_each_raw;
 use armcal_core::log::{Recording, TopicMap, scan_recording};
 #[cfg(feature = "images")]
 use armcal_core::optics::TagFamily;
-use armcal_core::robot::{self, FailedJoint, FileIssue, Robot, SELF_COLLISION_FILE, TagSurvey};
+use armcal_core::robot::{self, FailedJoint, Robot, SELF_COLLISION_FILE, TagSurvey};
 use armcal_core::routine::Method;
 use armcal_core::streams::{Message, ReachTask};
 use armcal_core::text::counted;
@@ -96,6 +97,19 @@ impl CalibrationInputs<'_> {
         }
     }
 
+    /// Robot, tags and task.
+    fn calibrator(&self, landmarks: Option<(&Path, LandmarkFile)>, task: Option<ReachTask>) -> Calibrator<'_> {
+        let calibrator = Calibrator::new(self.robot).method(self.method);
+        let calibrator = match landmarks {
+            Some((file, landmarks)) => calibrator.tags(file, landmarks),
+            None => calibrator,
+        };
+        match task {
+            Some(task) => calibrator.task(task),
+            None => calibrator,
+        }
+    }
+
     /// Recordings that armcal made: they mark their views.
     fn of_own(
         &self,
@@ -103,27 +117,11 @@ impl CalibrationInputs<'_> {
         task: Option<ReachTask>,
         prior: Option<&Calibration>,
     ) -> Result<(Calibration, bool)> {
-        let survey = self.survey(landmarks)?;
         let (mut recordings, lost) = self.marked()?;
         let _waiting = Waiting::on(&format!("calibrating by {}", counted(recordings.len(), "recording")));
-        if let ([recording], None) = (&mut recordings[..], prior) {
-            // Its own marks say which views are for what.
-            let names_task = recording.messages.iter().any(|(_, message)| matches!(message, Message::Task(_)));
-            if let Some(task) = task.filter(|_| !names_task) {
-                recording.messages.push((task.stamp, Message::Task(task)));
-            }
-            return Ok((
-                match survey {
-                    Some(survey) => {
-                        calibrate_with_survey(recording, &self.robot.clone().with_survey(survey), self.method)?
-                    }
-                    None => calibrate(recording, self.robot, self.method)?,
-                },
-                lost,
-            ));
-        }
-        let prepared = prepare_pooled(&recordings, self.robot, survey.as_ref(), task.as_ref(), self.method)?;
-        Ok((calibrate_data(prepared, self.method, prior)?, lost))
+        let calibrator = self.calibrator(landmarks, task);
+        let calibrator = prior.into_iter().fold(calibrator, Calibrator::prior);
+        Ok((calibrator.of_marked(&mut recordings)?, lost))
     }
 
     /// Recordings of a real arm, by an input map.
@@ -263,24 +261,9 @@ impl CalibrationInputs<'_> {
         map.check_robot(file, self.robot)?;
         let mut robot = self.robot.clone();
         if map.tag_use.needs_lens() {
-            self.add_lens(&mut robot, &map)?;
-            map.further().iter().try_for_each(|further| robot.require_further_lens(&further.camera))?;
-        }
-        let named = match &landmarks {
-            Some((file, landmarks)) => landmarks.survey(file, &robot, map.tag_use)?,
-            None => {
-                let (names, boards) = Default::default();
-                NamedSurvey { survey: self.robot.survey(), names, boards }
-            }
-        };
-        let plain = plain_landmark(file, &map, &named)?;
-        let robot = robot.with_survey(named.survey);
-        if robot.tags.is_empty() {
-            return Err(UsageError::new(
-                Code::UsageInvalid,
-                "name the landmarks with --tag-map: the robot has no tags of its own".to_owned(),
-            )
-            .into());
+            add_lens(&mut robot, self.recordings, &map, &mut |path, note| {
+                warn(Code::CameraInfoInvalid, format_args!("{}: {note}", path.display()));
+            })?;
         }
         let mut recordings = Vec::new();
         let mut lost = false;
@@ -295,41 +278,13 @@ impl CalibrationInputs<'_> {
         if task.is_none() {
             warn(Code::TaskMissing, "no task is named (--task), so that no tool error is predicted");
         }
-        let context = ExternalContext { task, landmark_names: named.names, plain };
-        let prepared = prepare_external(&recordings, &map, &robot, context)?;
+        let prepared = self.calibrator(landmarks, task).of_external(&recordings, (&map, file), robot)?;
         for recording in &recordings {
             if let Some(doubt) = &recording.clock_doubt {
                 warn(Code::ClocksDiffer, format_args!("{}: {doubt}", recording.path.display()));
             }
         }
         Ok((prepared, lost))
-    }
-
-    /// A robot without a lens takes that of the recordings, where the input map names it.
-    fn add_lens(&self, robot: &mut Robot, map: &InputMap) -> Result<()> {
-        let topic = match &map.source {
-            Source::Topics(topics) if !robot.camera.lens.is_known() => topics.camera_info.as_deref(),
-            _ => None,
-        };
-        let Some(topic) = topic else { return Ok(robot.require_lens()?) };
-        let images = match &map.source {
-            Source::Topics(topics) => Some(topics.tags.as_str()),
-            Source::Table(_) => None,
-        };
-        for path in self.recordings {
-            let found = read_camera_info(path, topic)?;
-            let rectified = images.and_then(|images| found.rectified_note(images, topic));
-            let CameraInfoLens { lens, notes, .. } = found;
-            for note in notes.iter().chain(&rectified) {
-                warn(Code::CameraInfoInvalid, format_args!("{}: {note}", path.display()));
-            }
-            if robot.camera.lens.is_known() && robot.camera.lens != lens {
-                let problem = format!("{}: the lens on {topic} is not that of the others", path.display());
-                return Err(UsageError::new(Code::UsageInvalid, problem).into());
-            }
-            robot.camera.lens = lens;
-        }
-        Ok(())
     }
 }
 
@@ -430,29 +385,6 @@ pub(super) fn load_robot(folder: &Path, failed: &[String]) -> Result<Robot> {
     };
     let failed = failed.iter().map(failed_joint).collect::<Result<Vec<FailedJoint>, _>>()?;
     Ok(robot.with_failed(&failed))
-}
-
-/// The landmark that a plain `child_frame` means: the one of that name, or the only one there is where it has none.
-fn plain_landmark(file: &Path, map: &InputMap, named: &NamedSurvey) -> Result<PlainLandmark, FileIssue> {
-    let Some(ChildFrame::Plain(name)) = &map.child_frame else { return Ok(PlainLandmark::default()) };
-    if let Some((id, _)) = named.names.iter().find(|(_, known)| *known == name) {
-        let board = named.boards.get(id).copied().filter(|_| map.tag_use == TagUse::BoardCorners);
-        if board.is_none() && map.tag_use == TagUse::BoardCorners {
-            let problem = format!("is `{name}`, whose `squares` and `square_m` the tag map does not give");
-            return Err(FileIssue::new(Code::KeyMissing, file, "tags.child_frame", problem));
-        }
-        return Ok(PlainLandmark { id: Some(*id), board });
-    }
-    match &named.survey.tags[..] {
-        [only] if named.names.is_empty() && map.tag_use != TagUse::BoardCorners => {
-            Ok(PlainLandmark { id: Some(only.id), board: None })
-        }
-        tags => {
-            let ids = tags.iter().map(|tag| named.names.get(&tag.id).cloned().unwrap_or_else(|| tag.id.to_string()));
-            let problem = format!("no landmark `{name}` in the tag map; it has {:?}", ids.collect::<Vec<_>>());
-            Err(FileIssue::new(Code::NameUnknown, file, "tags.child_frame", problem))
-        }
-    }
 }
 
 /// An accepted calibration of this robot.

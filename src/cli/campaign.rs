@@ -18,6 +18,7 @@ use crate::cli::closing::{say_wrapped, terminal_width};
 use crate::cli::exit::{Exit, UsageError};
 use crate::cli::file_kind::expect_routine;
 use crate::cli::interrupt::Interrupt;
+use crate::cli::named;
 use crate::cli::overrides::OverrideArgs;
 use crate::cli::stdout::{note, say};
 use crate::output;
@@ -43,6 +44,7 @@ fn kept(text: &str) -> Result<KeptRuns, String> {
 pub(super) struct CampaignArgs {
     /// Routine (.toml); [campaign] in it may give seeds and a matrix of settings
     #[arg(required_unless_present = "merge", conflicts_with = "merge")]
+    #[arg(value_parser = named::routine())]
     routine: Option<PathBuf>,
     /// Seeds A..B, both included, or one number; default: campaign.seeds of the routine
     #[arg(long, value_name = "A..B")]

@@ -10,7 +10,7 @@ use serde::Serialize;
 #[cfg(feature = "sim")]
 use crate::campaign::Request;
 use crate::cli::closing::say_wrapped;
-use crate::cli::exit::{Exit, UsageError, chain_of, code_of};
+use crate::cli::exit::{Exit, UsageError, code_of, message_of};
 use crate::cli::file_kind::FileKind;
 use crate::cli::stdout::say;
 use armcal_belief::calib::{Calibration, CalibrationFileError, Status};
@@ -103,7 +103,7 @@ impl Checked {
             }
             Err(error) => {
                 let code = Some(code_of(&error));
-                let (warnings, error) = (Vec::new(), Some(chain_of(&error)));
+                let (warnings, error) = (Vec::new(), Some(message_of(&error)));
                 Self { file: name, ok: false, refused: false, holds: None, warnings, error, code }
             }
         }

@@ -2,8 +2,8 @@
 
 mod log_lines;
 
+use std::ffi::OsString;
 use std::io::{IsTerminal, Write};
-use std::process::ExitCode;
 use std::sync::LazyLock;
 
 use anyhow::Result;
@@ -15,6 +15,7 @@ use tracing_subscriber::util::SubscriberInitExt;
 
 use self::log_lines::LogLines;
 use crate::cli::examples::{EXAMPLES, with_examples};
+use crate::cli::exit::Exit;
 use crate::cli::groups::grouped;
 #[cfg(feature = "viewer")]
 use crate::cli::replay;
@@ -133,27 +134,28 @@ pub fn command() -> clap::Command {
     grouped(with_examples(Cli::command(), EXAMPLES))
 }
 
-/// Parses the command line, does what it says and gives the exit code; errors go to stderr once, here.
+/// Parses `words`, the first of which is the program's name, does what they say and returns how that ended; errors go
+/// to stderr once, here.
 #[must_use]
-pub fn main() -> ExitCode {
-    let cli: Cli = match parsed(command()) {
+pub fn main(words: impl IntoIterator<Item = OsString>) -> Exit {
+    let cli: Cli = match parsed(command(), words) {
         Ok(cli) => cli,
         Err(exit) => return exit,
     };
     carry_out(&cli.loudness, || cli.command.carry_out())
 }
 
-/// The words of this process as `command` understands them.
+/// The words of a command line as `command` understands them.
 ///
 /// # Errors
-/// The exit code, where help was asked for and printed, or where they are wrong, which was said.
-pub fn parsed<C: FromArgMatches>(command: clap::Command) -> Result<C, ExitCode> {
-    let matches = command.try_get_matches().and_then(|matches| C::from_arg_matches(&matches));
+/// The end of the program, where help was asked for and printed, or where they are wrong, which was said.
+pub fn parsed<C: FromArgMatches>(command: clap::Command, words: impl IntoIterator<Item = OsString>) -> Result<C, Exit> {
+    let matches = command.try_get_matches_from(words).and_then(|matches| C::from_arg_matches(&matches));
     matches.map_err(|answer| clap_answer(&answer))
 }
 
-/// Does a command's work, as loud as was asked for; says what failed, and gives the exit code.
-pub fn carry_out(loudness: &Loudness, work: impl FnOnce() -> Result<exit::Exit>) -> ExitCode {
+/// Does a command's work, as loud as was asked for; says what failed, and returns how it ended.
+pub fn carry_out(loudness: &Loudness, work: impl FnOnce() -> Result<Exit>) -> Exit {
     if loudness.quiet {
         be_quiet();
     }
@@ -162,7 +164,7 @@ pub fn carry_out(loudness: &Loudness, work: impl FnOnce() -> Result<exit::Exit>)
 }
 
 impl Command {
-    fn carry_out(&self) -> Result<exit::Exit> {
+    fn carry_out(&self) -> Result<Exit> {
         match self {
             Self::Calibrate(args) => calibrate::calibrate(args),
             Self::Plan(args) => plan::plan(args),
@@ -201,7 +203,8 @@ fn begin_log(level: tracing::Level) {
         .with_default(LevelFilter::from_level(level))
         .with_target("rustdds::network", LevelFilter::ERROR)
         .with_target("ros2_client::distributions", LevelFilter::ERROR);
-    tracing_subscriber::fmt()
+    // The first command of a process decides.
+    let _ = tracing_subscriber::fmt()
         .with_writer(LogLines::new(level, std::io::stderr))
         .with_ansi(false)
         .without_time()
@@ -210,28 +213,26 @@ fn begin_log(level: tracing::Level) {
         .log_internal_errors(false)
         .finish()
         .with(of_use)
-        .init();
+        .try_init();
 }
 
-fn ended(result: Result<exit::Exit>) -> ExitCode {
-    result
-        .unwrap_or_else(|error| {
-            complain(format_args!("error: {}", exit::explain(&error)));
-            exit::of_error(&error)
-        })
-        .into()
+fn ended(result: Result<Exit>) -> Exit {
+    result.unwrap_or_else(|error| {
+        complain(format_args!("error: {}", exit::explain(&error)));
+        exit::of_error(&error)
+    })
 }
 
 /// The help that was asked for, on stdout; or, on stderr, what is wrong with the command line.
-fn clap_answer(answer: &clap::Error) -> ExitCode {
+fn clap_answer(answer: &clap::Error) -> Exit {
     if answer.use_stderr() {
         let styled = answer.render();
         let text = if std::io::stderr().is_terminal() { styled.ansi().to_string() } else { styled.to_string() };
         // The code ends the first line; usage and hints follow.
         let (problem, rest) = text.split_once('\n').unwrap_or((&text, ""));
         let _ = write!(std::io::stderr().lock(), "{problem} [{}]\n{rest}", Code::UsageInvalid);
-        return exit::Exit::InvalidInput.into();
+        return Exit::InvalidInput;
     }
     let printed = answer.print().and_then(|()| std::io::stdout().flush());
-    ended(is_written(printed).map(|()| exit::Exit::Ok))
+    ended(is_written(printed).map(|()| Exit::Ok))
 }

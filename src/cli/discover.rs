@@ -7,6 +7,7 @@ use anyhow::Result;
 use clap::Args;
 
 use crate::cli::exit::Exit;
+use crate::cli::named;
 
 #[cfg(feature = "live")]
 mod looked;
@@ -21,7 +22,7 @@ pub(super) struct DiscoverArgs {
     #[arg(long = "network", value_name = "ADDRESS")]
     networks: Vec<Ipv4Addr>,
     /// Robot folder whose joints are matched to the driver's
-    #[arg(long)]
+    #[arg(long, value_parser = named::robot())]
     robot: Option<PathBuf>,
     /// Listening time, s
     #[arg(long = "for", value_name = "SECONDS", default_value_t = 5.0, value_parser = seconds)]

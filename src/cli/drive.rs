@@ -14,13 +14,15 @@ use clap::Args;
 
 use crate::cli::closed_loop::LoopArgs;
 use crate::cli::exit::Exit;
+use crate::cli::named;
 #[cfg(feature = "live")]
 pub(super) use ending::watch_memory;
 
 /// Moves a real arm by a routine, and asks before each motion.
 #[derive(Debug, Args)]
 pub(super) struct DriveArgs {
-    /// Routine (.toml)
+    /// Routine (.toml), or the name of one that comes with armcal
+    #[arg(value_parser = named::routine())]
     routine: PathBuf,
     /// Connection map of the arm: over DDS, or over the bridge that its [rosbridge] names
     #[arg(long, value_name = "ARM.toml")]

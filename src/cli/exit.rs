@@ -2,6 +2,7 @@
 
 use std::process::ExitCode;
 
+use crate::front::CalibrateError;
 use crate::output::OutputError;
 #[cfg(feature = "closed-loop")]
 use crate::report::RunSummary;
@@ -102,6 +103,7 @@ pub(super) fn of_cause(error: &(dyn std::error::Error + 'static)) -> Exit {
             || cause.is::<RoutineError>()
             || cause.is::<CalibrationFileError>()
             || cause.is::<CalibError>()
+            || cause.is::<CalibrateError>()
             || cause.is::<CompactError>()
             || cause.is::<PlanError>()
             || cause.is::<ItineraryError>()
@@ -155,11 +157,12 @@ fn is_write_failure(error: &LogError) -> bool {
 
 /// Returns the chain of causes and the code, printable, as the last line of a command that failed.
 pub(super) fn explain(error: &anyhow::Error) -> String {
-    format!("{} [{}]", chain_of(error), code_of(error))
+    format!("{} [{}]", message_of(error), code_of(error))
 }
 
 /// The chain of causes, printable, each said once: many messages already hold that of their source.
-pub(super) fn chain_of(error: &anyhow::Error) -> String {
+#[must_use]
+pub fn message_of(error: &anyhow::Error) -> String {
     let mut text = error.to_string();
     for cause in error.chain().skip(1) {
         let cause = cause.to_string();
@@ -172,7 +175,8 @@ pub(super) fn chain_of(error: &anyhow::Error) -> String {
 }
 
 /// Returns the code of the outermost cause that has one.
-pub(super) fn code_of(error: &anyhow::Error) -> Code {
+#[must_use]
+pub fn code_of(error: &anyhow::Error) -> Code {
     error.chain().find_map(code_of_cause).unwrap_or(Code::Internal)
 }
 
@@ -191,6 +195,7 @@ fn code_of_cause(cause: &(dyn std::error::Error + 'static)) -> Option<Code> {
     let of_belief = || {
         of::<CalibrationFileError>(cause)
             .or_else(|| of::<CalibError>(cause))
+            .or_else(|| of::<CalibrateError>(cause))
             .or_else(|| of::<CompactError>(cause))
             .or_else(|| of::<PlanError>(cause))
             .or_else(|| of::<PathError>(cause))

@@ -12,6 +12,7 @@ use serde_json::Value;
 use crate::cli::calibration_inputs::load_robot;
 use crate::cli::exit::{Exit, UsageError};
 use crate::cli::file_kind::{FileKind, expect_kind};
+use crate::cli::named;
 use crate::cli::stdout::{complain, say, warn};
 use crate::export::{
     LinkPoseForm, MAX_POINTS, MIN_POINTS, SensorTable, calibrated_link_poses, calibrated_urdf, camchain, csv_rows,
@@ -34,7 +35,7 @@ pub(super) struct ExportArgs {
     form: Form,
     /// Robot folder that the calibration was made with: required by urdf, ros2-control, ros-parameters, table,
     /// kalibr, ur, franka and lerobot; expands a compact line to the keys of calibration.toml
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_parser = named::robot())]
     robot: Option<PathBuf>,
     /// Points per joint of a table, 2 to 10000; default: as few as keep the tool within 0.02 mm
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(MIN_POINTS as i64..=MAX_POINTS as i64))]
@@ -126,20 +127,50 @@ pub(super) fn export(args: &ExportArgs) -> Result<Exit> {
         complain(format!("error: {file}: the calibration is refused: {why}; add --refused to export it as {form}"));
         return Ok(Exit::Refused);
     }
+    let mut left_out = Vec::new();
     let text = match input {
         Input::Full(calibration) => {
             if let Some(robot) = &robot {
                 calibration.sensors(robot)?;
             }
-            of_full(&calibration, robot.as_ref(), args)?
+            of_full(&calibration, robot.as_ref(), args, &mut left_out)?
         }
-        Input::Compact(compact) => of_compact(&compact, robot.as_ref(), args)?,
+        Input::Compact(compact) => of_compact(&compact, robot.as_ref(), args, &mut left_out)?,
     };
+    left_out.iter().for_each(|sentence| warn(Code::ExportIncomplete, sentence));
     say(text.trim_end())?;
     Ok(Exit::Ok)
 }
 
-fn of_full(calibration: &Calibration, robot: Option<&Robot>, args: &ExportArgs) -> Result<String> {
+/// A calibration in the form of that name, and what such a form cannot hold; `input` is the input map that `lerobot`
+/// needs.
+///
+/// # Errors
+/// Another name, or a calibration of another robot.
+pub fn export_text(
+    calibration: &Calibration,
+    robot: &Robot,
+    form: &str,
+    input: Option<&Path>,
+) -> Result<(String, Vec<String>)> {
+    let known = || Form::value_variants().iter().map(|form| form.name()).collect::<Vec<_>>().join(", ");
+    let form = Form::from_str(form, false).map_err(|_| {
+        UsageError::new(Code::UsageInvalid, format!("`{form}` is no form of a calibration; it is one of {}", known()))
+    })?;
+    calibration.sensors(robot)?;
+    let file = PathBuf::from("calibration");
+    let args = ExportArgs { file, form, robot: None, points: None, input: input.map(Path::to_owned), refused: true };
+    let mut left_out = Vec::new();
+    let text = of_full(calibration, Some(robot), &args, &mut left_out)?;
+    Ok((text, left_out))
+}
+
+fn of_full(
+    calibration: &Calibration,
+    robot: Option<&Robot>,
+    args: &ExportArgs,
+    left_out: &mut Vec<String>,
+) -> Result<String> {
     let file = &args.file;
     Ok(match args.form {
         Form::Yaml if calibration.has_slide() => to_yaml(&FullView::of(calibration).in_own_units()?)?,
@@ -156,48 +187,57 @@ fn of_full(calibration: &Calibration, robot: Option<&Robot>, args: &ExportArgs) 
         Form::RosParameters => ros_parameters(drawing(robot, args.form)?, calibration),
         Form::Urdf => {
             let urdf = calibrated_urdf(file, calibration, drawing(robot, args.form)?)?;
-            warn_left_out("a URDF", &urdf.left_out);
+            lacking("a URDF", &urdf.left_out, left_out);
             urdf.text
         }
         Form::Ros2ControlOffset => {
             let robot = drawing(robot, args.form)?;
-            let (text, left_out) = ros2_control_offsets(robot, &calibration.sensors(robot)?);
-            warn_left_out("an offset", &left_out);
+            let (text, lacks) = ros2_control_offsets(robot, &calibration.sensors(robot)?);
+            lacking("an offset", &lacks, left_out);
             text
         }
-        Form::Lerobot => of_lerobot(calibration, drawing(robot, args.form)?, args)?,
+        Form::Lerobot => of_lerobot(calibration, drawing(robot, args.form)?, args, left_out)?,
         Form::Ur | Form::Franka => {
             let poses = calibrated_link_poses(file, calibration, drawing(robot, args.form)?, args.form.link_poses())?;
-            warn_left_out("a file of link poses", &poses.left_out);
+            lacking("a file of link poses", &poses.left_out, left_out);
             poses.text
         }
         Form::Ros2Control | Form::Table => {
             let robot = drawing(robot, args.form)?;
-            of_sensors(robot, &calibration.sensors(robot)?, args)
+            of_sensors(robot, &calibration.sensors(robot)?, args, left_out)
         }
     })
 }
 
 /// LeRobot's JSON that the input map names, with new homing offsets.
-fn of_lerobot(calibration: &Calibration, robot: &Robot, args: &ExportArgs) -> Result<String> {
+fn of_lerobot(
+    calibration: &Calibration,
+    robot: &Robot,
+    args: &ExportArgs,
+    left_out: &mut Vec<String>,
+) -> Result<String> {
     let missing = || UsageError::new(Code::UsageInvalid, NO_MAP.to_owned());
     let map_file = args.input.as_deref().ok_or_else(missing)?;
     let map = read_input_map(map_file)?;
     let sensors = calibration.sensors(robot)?;
     let homings = lerobot_homings((map_file, &map), calibration, (robot, &sensors))?;
-    warn_left_out("LeRobot's JSON", &homings.left_out);
+    lacking("LeRobot's JSON", &homings.left_out, left_out);
     Ok(homings.text)
 }
 
 const NO_MAP: &str = "--as lerobot needs the input map that names LeRobot's JSON: add --input MAP";
 
-fn warn_left_out(form: &str, left_out: &[String]) {
-    for what in left_out {
-        warn(Code::ExportIncomplete, format_args!("left out, for {form} cannot hold it: {what}"));
-    }
+/// Adds a sentence for each thing that a form cannot hold.
+fn lacking(form: &str, lacks: &[String], left_out: &mut Vec<String>) {
+    left_out.extend(lacks.iter().map(|what| format!("left out, for {form} cannot hold it: {what}")));
 }
 
-fn of_compact(compact: &CompactCalibration, robot: Option<&Robot>, args: &ExportArgs) -> Result<String> {
+fn of_compact(
+    compact: &CompactCalibration,
+    robot: Option<&Robot>,
+    args: &ExportArgs,
+    left_out: &mut Vec<String>,
+) -> Result<String> {
     let sensors = robot.map(|robot| compact.sensors(robot)).transpose()?;
     let view = |sensors: Option<ArmSensors>| {
         let lookup = sensors.iter().flat_map(|sensors| &sensors.models).filter_map(LookupTable::of).collect();
@@ -212,7 +252,7 @@ fn of_compact(compact: &CompactCalibration, robot: Option<&Robot>, args: &Export
         (Form::Compact, _) => compact.to_text()?,
         (Form::Ros2Control | Form::Table, sensors) => {
             let robot = drawing(robot, args.form)?;
-            of_sensors(robot, &sensors.map_or_else(|| compact.sensors(robot), Ok)?, args)
+            of_sensors(robot, &sensors.map_or_else(|| compact.sensors(robot), Ok)?, args, left_out)
         }
         (
             Form::Urdf
@@ -235,14 +275,14 @@ fn of_compact(compact: &CompactCalibration, robot: Option<&Robot>, args: &Export
 }
 
 /// The forms that need no more than sensors. Terms that a transmission cannot hold are named.
-fn of_sensors(robot: &Robot, sensors: &ArmSensors, args: &ExportArgs) -> String {
+fn of_sensors(robot: &Robot, sensors: &ArmSensors, args: &ExportArgs, left_out: &mut Vec<String>) -> String {
     if args.form == Form::Table {
         return SensorTable::new(robot, sensors, args.points.map(usize::from)).to_csv(robot);
     }
     let bent = joints_with_terms(sensors).collect::<Vec<_>>().join(", ");
     if !bent.is_empty() {
         let text = "left out, for a transmission is a straight line: the terms of";
-        warn(Code::ExportIncomplete, format_args!("{text} {bent}; a table has them"));
+        left_out.push(format!("{text} {bent}; a table has them"));
     }
     ros2_control(robot, sensors)
 }

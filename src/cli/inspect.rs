@@ -10,6 +10,7 @@ use crate::cli::calibration_inputs::load_robot;
 use crate::cli::closing::{say_wrapped, terminal_width};
 use crate::cli::exit::{Exit, UsageError};
 use crate::cli::file_kind::expect_recording;
+use crate::cli::named;
 use crate::cli::stdout::{note, say};
 use crate::output;
 use crate::report::inspection::{State, inspect as look, to_text};
@@ -27,7 +28,7 @@ pub(super) struct InspectArgs {
     /// The other table, where joints and tags are in two; default: the one next to the first that fits
     other: Option<PathBuf>,
     /// Robot folder, to print which parameters the recording determines; default: the files attached to the recording
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_parser = named::robot())]
     robot: Option<PathBuf>,
     /// Print JSON instead of text
     #[arg(long)]

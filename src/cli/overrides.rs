@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use toml::Value;
 
+use crate::cli::named;
 use armcal_core::routine::{Override, Overrides};
 
 #[derive(Clone, Debug, Default, Args)]
@@ -13,7 +14,7 @@ pub struct OverrideArgs {
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<Override>,
     /// Robot folder instead of the routine's
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_parser = named::robot())]
     robot: Option<PathBuf>,
 }
 

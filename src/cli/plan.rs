@@ -13,10 +13,12 @@ use crate::cli::calibration_inputs::read_prior;
 use crate::cli::closing::{say_closing, terminal_width};
 use crate::cli::exit::Exit;
 use crate::cli::file_kind::{expect_option, expect_routine};
+use crate::cli::named;
 use crate::cli::overrides::OverrideArgs;
 use crate::cli::stdout::{is_quiet, note, say, warn};
 use crate::output;
 use crate::report::fit_columns;
+use armcal_belief::calib::Calibration;
 use armcal_belief::plan::{
     ArmBelief, ClearanceModel, ItineraryRequest, PlanFile, PlanHeader, PoseTable, SetName, plan_itinerary,
 };
@@ -27,7 +29,8 @@ use armcal_core::stats::stream_rng;
 
 #[derive(Debug, Args)]
 pub(super) struct PlanArgs {
-    /// Routine (.toml)
+    /// Routine (.toml), or the name of one that comes with armcal
+    #[arg(value_parser = named::routine())]
     routine: PathBuf,
     /// Accepted calibration.toml of this arm as prior; default: the datasheet
     #[arg(long, value_name = "CALIBRATION.toml")]
@@ -56,19 +59,9 @@ pub(super) fn plan(args: &PlanArgs) -> Result<Exit> {
     let (robot, vehicle) = routine.load_arm()?;
     let out = args.out.clone().unwrap_or_else(|| Path::new("recordings").join(format!("{}-plan", routine.name)));
     output::check_takes_files(&out)?;
-    let belief = match &args.prior {
-        None => ArmBelief::datasheet(&robot),
-        Some(file) => ArmBelief::of(&robot, read_prior(file, &robot)?)?,
-    };
-    let seed = routine.seed;
-    let header = PlanHeader {
-        routine: routine.name.clone(),
-        vehicle: vehicle.name.clone(),
-        seed,
-        inputs_hash: inputs_hash(&args.routine, &overrides, (&robot, &vehicle), args.prior.as_deref(), seed)?,
-        margin_m: routine.capture.clearance_m,
-    };
-    let file = planned(&routine, (&robot, &vehicle), &belief, header)?;
+    let prior = args.prior.as_deref().map(|file| Ok::<_, anyhow::Error>((read_prior(file, &robot)?, read(file)?)));
+    let prior = prior.transpose()?;
+    let file = plan_of((&args.routine, &overrides), &routine, (&robot, &vehicle), prior)?;
     for warning in &file.warnings {
         note(format_args!("warning: {warning}"));
     }
@@ -88,6 +81,46 @@ pub(super) fn plan(args: &PlanArgs) -> Result<Exit> {
     ])?;
     say_plan(args, &file, &out)?;
     Ok(Exit::Ok)
+}
+
+fn read(path: &Path) -> Result<Vec<u8>> {
+    files::read_bytes(path, Size::Text).with_context(|| format!("{}: cannot be read", path.display()))
+}
+
+/// The plan of a routine's first capture; `prior` is a calibration and the bytes of its file.
+///
+/// # Errors
+/// A routine that cannot be read, and targets or views that no certified path leads to.
+pub fn plan_routine(routine_file: &Path, prior: Option<Calibration>) -> Result<PlanFile> {
+    let routine = routine::load(routine_file)?;
+    let (robot, vehicle) = routine.load_arm()?;
+    let prior = prior.map(|prior| {
+        let text = prior.to_toml().into_bytes();
+        (prior, text)
+    });
+    plan_of((routine_file, &Overrides::default()), &routine, (&robot, &vehicle), prior)
+}
+
+fn plan_of(
+    (file, overrides): (&Path, &Overrides),
+    routine: &Routine,
+    (robot, vehicle): (&Robot, &Vehicle),
+    prior: Option<(Calibration, Vec<u8>)>,
+) -> Result<PlanFile> {
+    let (prior, prior_text) = prior.unzip();
+    let belief = match prior {
+        None => ArmBelief::datasheet(robot),
+        Some(prior) => ArmBelief::of(robot, prior)?,
+    };
+    let seed = routine.seed;
+    let header = PlanHeader {
+        routine: routine.name.clone(),
+        vehicle: vehicle.name.clone(),
+        seed,
+        inputs_hash: inputs_hash(file, overrides, (robot, vehicle), &prior_text.unwrap_or_default(), seed)?,
+        margin_m: routine.capture.clearance_m,
+    };
+    planned(routine, (robot, vehicle), &belief, header)
 }
 
 fn say_plan(args: &PlanArgs, file: &PlanFile, out: &Path) -> Result<()> {
@@ -144,16 +177,13 @@ fn inputs_hash(
     routine: &Path,
     overrides: &Overrides,
     (robot, vehicle): (&Robot, &Vehicle),
-    prior: Option<&Path>,
+    prior: &[u8],
     seed: u64,
 ) -> Result<String> {
     let mut hasher = blake3::Hasher::new();
     let mut add = |bytes: &[u8]| {
         hasher.update(&(bytes.len() as u64).to_le_bytes());
         hasher.update(bytes);
-    };
-    let read = |path: &Path| {
-        files::read_bytes(path, Size::Text).with_context(|| format!("{}: cannot be read", path.display()))
     };
     let mut table = effective_table(routine, &overrides.set)?;
     for key in ["seed", "robot", "vehicle", "world", "campaign", "regress"] {
@@ -166,7 +196,7 @@ fn inputs_hash(
     add(&read(&robot.folder.join("robot.toml"))?);
     add(robot.urdf_text.as_bytes());
     add(vehicle.text.as_bytes());
-    add(&prior.map(read).transpose()?.unwrap_or_default());
+    add(prior);
     Ok(hasher.finalize().to_hex().to_string())
 }
 

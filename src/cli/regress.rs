@@ -17,6 +17,7 @@ use crate::cli::closing::{say_wrapped, terminal_width};
 use crate::cli::exit::{Exit, UsageError};
 use crate::cli::file_kind::expect_routine;
 use crate::cli::interrupt::Interrupt;
+use crate::cli::named;
 use crate::cli::overrides::OverrideArgs;
 use crate::cli::stdout::{note, say};
 use crate::output;
@@ -28,6 +29,7 @@ use armcal_core::stats::quantile;
 #[command(group(clap::ArgGroup::new("side").required(true).args(["baseline", "write_baseline"])))]
 pub(super) struct RegressArgs {
     /// Routine (.toml); [regress] in it may give budgets
+    #[arg(value_parser = named::routine())]
     routine: PathBuf,
     /// Baseline table, written by --write-baseline or `armcal campaign`
     #[arg(long, value_name = "FILE")]

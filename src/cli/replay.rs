@@ -10,6 +10,7 @@ use crate::cli::exit::{Exit, UsageError};
 use crate::cli::file_kind::{FileKind, expect_kind};
 use crate::cli::live_view::LiveViewArgs;
 use crate::cli::losses::warn_of_losses;
+use crate::cli::named;
 use crate::cli::stdout::{say, warn};
 use crate::output;
 use armcal_belief::calib::online::BeliefLog;
@@ -32,7 +33,7 @@ pub(super) struct ReplayArgs {
     #[command(flatten)]
     view: LiveViewArgs,
     /// Robot folder, for recordings without attached robot files
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_parser = named::robot())]
     robot: Option<PathBuf>,
 }
 

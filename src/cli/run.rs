@@ -9,6 +9,7 @@ use clap::Args;
 use crate::cli::closed_loop::{Asking, LoopArgs};
 use crate::cli::exit::Exit;
 use crate::cli::interrupt::Interrupt;
+use crate::cli::named;
 use crate::cli::stdout::note;
 use crate::run::{RunInputs, execute};
 use armcal_core::routine::Step;
@@ -17,7 +18,8 @@ use armcal_sim::CameraMode;
 
 #[derive(Debug, Args)]
 pub(super) struct RunArgs {
-    /// Routine (.toml)
+    /// Routine (.toml), or the name of one that comes with armcal
+    #[arg(value_parser = named::routine())]
     routine: PathBuf,
     /// Seed of all random numbers; default: the routine's seed
     #[arg(long, value_name = "N")]

@@ -6,6 +6,7 @@ use anyhow::Result;
 use clap::Args;
 
 use crate::cli::exit::Exit;
+use crate::cli::named;
 use crate::cli::overrides::OverrideArgs;
 
 #[cfg(feature = "live")]
@@ -14,6 +15,7 @@ mod served;
 #[derive(Debug, Args)]
 pub(super) struct ServeArgs {
     /// The routine (.toml): its robot, vehicle, scene and world
+    #[arg(value_parser = named::routine())]
     routine: PathBuf,
     /// Connection map that the client also uses; default: the topics of armcal's recordings
     #[arg(long, value_name = "ARM.toml")]

@@ -14,6 +14,7 @@ use crate::cli::calibration_inputs::load_robot;
 use crate::cli::closing::say_wrapped;
 use crate::cli::exit::Exit;
 use crate::cli::file_kind::{expect_option, expect_recording};
+use crate::cli::named;
 use crate::cli::stdout::{note, say};
 use crate::output;
 use crate::report::{TAG_COLUMNS, TagMapPage, fit_lines, group_title, tag_map_html, tag_rows};
@@ -32,7 +33,7 @@ pub(super) struct TagmapArgs {
     /// The recording (.mcap)
     recording: PathBuf,
     /// Robot folder with camera, tags and base tag
-    #[arg(long, value_name = "DIR", required_unless_present_all = ["camera", "tags"])]
+    #[arg(long, value_name = "DIR", required_unless_present_all = ["camera", "tags"], value_parser = named::robot())]
     #[arg(conflicts_with_all = ["camera", "tags"])]
     robot: Option<PathBuf>,
     /// Cameras: cameras.yaml of TagSLAM or camchain.yaml of Kalibr

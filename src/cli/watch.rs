@@ -21,6 +21,7 @@ use crate::cli::exit::{Exit, UsageError};
 use crate::cli::interrupt::Interrupt;
 use crate::cli::live_view::{LiveViewArgs, OpenView, ViewOf};
 use crate::cli::losses::warn_of_losses;
+use crate::cli::named;
 use crate::output;
 use armcal_belief::calib::check_joints;
 use armcal_belief::calib::online::OnlineSettings;
@@ -42,8 +43,8 @@ pub(super) struct WatchArgs {
     /// Recordings, one after the other; a single .mcap may still be written by another program, and is waited for
     #[arg(required = true)]
     recordings: Vec<PathBuf>,
-    /// Folder of the robot (robot.toml and its URDF)
-    #[arg(long, value_name = "DIR")]
+    /// Folder of the robot (robot.toml and its URDF), or the name of one that comes with armcal
+    #[arg(long, value_name = "DIR", value_parser = named::robot())]
     robot: PathBuf,
     /// Input map (.toml) with topics and frames, for recordings that armcal did not make; they must be whole
     #[arg(long, value_name = "FILE")]

@@ -81,7 +81,7 @@ pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), OutputError> 
 
 /// Writes all of `files` beside their places and then puts each in its place in one step; if one cannot be written,
 /// none is replaced. The old last file goes first and the new one comes last: it vouches for the others.
-pub(crate) fn write_together(files: &[(&Path, &[u8])]) -> Result<(), OutputError> {
+pub fn write_together(files: &[(&Path, &[u8])]) -> Result<(), OutputError> {
     let written = files.iter().map(|(path, bytes)| Beside::begin(path)?.write(bytes)).collect::<Result<Vec<_>, _>>()?;
     if let [_, .., (last, _)] = files
         && last.is_file()

@@ -13,9 +13,10 @@ pub(crate) use accepted::accepted_kept;
 #[cfg(feature = "viewer")]
 pub(crate) use beside::Beside;
 pub use beside::check_takes_files;
+pub(crate) use beside::check_writable;
+pub use beside::write_together;
 #[cfg(feature = "sim")]
 pub(crate) use beside::write_whole;
-pub(crate) use beside::{check_writable, write_together};
 pub use files::OutputError;
 pub use files::make_folder;
 #[cfg(any(feature = "closed-loop", feature = "viewer"))]

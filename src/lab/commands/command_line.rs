@@ -60,11 +60,11 @@ const EXAMPLES: &[(&str, &[&str])] = &[
 
 pub(crate) fn main() -> ExitCode {
     if std::env::args_os().nth(1).is_some_and(|word| word == "run") {
-        return armcal::cli::main();
+        return armcal::cli::main(std::env::args_os()).into();
     }
-    let lab: Lab = match parsed(with_examples(Lab::command(), EXAMPLES)) {
+    let lab: Lab = match parsed(with_examples(Lab::command(), EXAMPLES), std::env::args_os()) {
         Ok(lab) => lab,
-        Err(exit) => return exit,
+        Err(exit) => return exit.into(),
     };
     carry_out(&lab.loudness, || match &lab.study {
         Study::Paper(args) => paper::paper(args),
@@ -79,6 +79,7 @@ pub(crate) fn main() -> ExitCode {
         Study::Dive(args) => dive::dive(args),
         Study::DiveFaults(args) => dive_faults::dive_faults(args),
     })
+    .into()
 }
 
 #[cfg(test)]

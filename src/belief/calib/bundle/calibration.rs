@@ -270,7 +270,8 @@ impl<'a> BundleCalibration<'a> {
     fn blame_input(&self, failures: &[Failure], calibration: &mut Calibration) {
         if calibration.status != Status::Refused {
             let has_moved_tags = self.moved.n_moved() > 1;
-            let wrong = has_moved_tags.then(|| wrong_input(&self.data.data, &self.surveyed, &self.data.robot)).flatten();
+            let wrong =
+                has_moved_tags.then(|| wrong_input(&self.data.data, &self.surveyed, &self.data.robot)).flatten();
             if let Some(wrong) = wrong.filter(WrongInput::is_of_all_tags) {
                 calibration.refuse_first_for([Refusal::WrongInput(wrong)]);
             }

@@ -237,7 +237,9 @@ impl VerdictInput<'_> {
             let scales = self.found.scales();
             let walked_rad = if self.found.model.walk.is_some() { scales.walk_std_rad[joint] } else { 0.0 };
             let std_rad = scales.joint_std_rad[joint];
-            let limit_rad = MAX_OVER_LINEARITY * spec.linearity_std_rad.max(stated.joint_std_rad[joint]);
+            // Its noise is no error of its own: where linearity is stated as none, that is what differs.
+            let noise_rad = (spec.noise_std_counts / spec.counts_per_rad).abs();
+            let limit_rad = MAX_OVER_LINEARITY * spec.linearity_std_rad.max(noise_rad).max(stated.joint_std_rad[joint]);
             let check = Check::at_most(
                 format!("{}: error from view to view, {}", spec.joint, spec.moves.si()),
                 std_rad,

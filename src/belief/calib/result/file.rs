@@ -108,7 +108,8 @@ impl Calibration {
     }
 
     /// The parameters relative to the sensors of `robot`, whose joints must be this calibration's.
-    pub(crate) fn parameters(&self, robot: &Robot) -> JointParameters {
+    #[must_use]
+    pub fn parameters(&self, robot: &Robot) -> JointParameters {
         let mut parameters = JointParameters::default();
         for (joint, (result, spec)) in self.joint.iter().zip(&robot.sensors).enumerate() {
             parameters.gain[joint] = result.gain_rad_per_count * spec.counts_per_rad;

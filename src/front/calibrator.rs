@@ -1,0 +1,171 @@
+//! Robot, tags, task and prior, and the calibration by measurements of that arm.
+
+use std::path::{Path, PathBuf};
+
+use armcal_belief::calib::{
+    Calibration, CalibrationData, ExternalContext, PlainLandmark, calibrate, calibrate_data, calibrate_with_survey,
+    prepare_external, prepare_pooled,
+};
+use armcal_belief::tagmap::files::{LandmarkFile, NamedSurvey};
+use armcal_core::codes::Code;
+use armcal_core::input::{ChildFrame, ExternalRecording, InputMap, TagUse};
+use armcal_core::robot::{FileIssue, Robot};
+use armcal_core::routine::Method;
+use armcal_core::streams::{Message, ReachTask};
+
+use crate::front::{CalibrateError, Measurements};
+
+/// All that a calibration takes with its measurements.
+///
+/// ```
+/// use std::path::Path;
+///
+/// use armcal::{Calibrator, Measurements, load_robot};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+/// let robot = load_robot(&root.join("robots/titan4"))?;
+/// let measurements = Measurements::read(&[root.join("recordings/sample/run.mcap")], &robot, None)?;
+/// let calibration = Calibrator::new(&robot).calibrate(measurements)?;
+/// println!("{:?}, within {:.4} m", calibration.status, calibration.u95.max_m.unwrap_or(f64::NAN));
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug)]
+pub struct Calibrator<'a> {
+    robot: &'a Robot,
+    tags: Option<(PathBuf, LandmarkFile)>,
+    task: Option<ReachTask>,
+    prior: Option<&'a Calibration>,
+    method: Method,
+}
+
+impl<'a> Calibrator<'a> {
+    /// Without tags, task and prior: by those of recording and robot, from the datasheet.
+    #[must_use]
+    pub fn new(robot: &'a Robot) -> Self {
+        Self { robot, tags: None, task: None, prior: None, method: Method::Bundle }
+    }
+
+    /// Tags instead of those that the recording or the robot's folder has; `file` names them in messages.
+    #[must_use]
+    pub fn tags(self, file: &Path, tags: LandmarkFile) -> Self {
+        Self { tags: Some((file.to_owned(), tags)), ..self }
+    }
+
+    /// Targets and tolerance, where no recording has them.
+    #[must_use]
+    pub fn task(self, task: ReachTask) -> Self {
+        Self { task: Some(task), ..self }
+    }
+
+    /// An accepted calibration of this arm to start from.
+    #[must_use]
+    pub fn prior(self, prior: &'a Calibration) -> Self {
+        Self { prior: Some(prior), ..self }
+    }
+
+    /// Another method than the bundle.
+    #[must_use]
+    pub fn method(self, method: Method) -> Self {
+        Self { method, ..self }
+    }
+
+    /// The calibration of the joint sensors, accepted or refused.
+    ///
+    /// # Errors
+    /// [`CalibrateError`]: tags or measurements that are of another arm, or too few to be fitted.
+    pub fn calibrate(&self, measurements: Measurements) -> Result<Calibration, CalibrateError> {
+        if let Some(prior) = self.prior {
+            prior.sensors(self.robot)?;
+        }
+        match measurements {
+            Measurements::Marked(mut recordings) => self.of_marked(&mut recordings),
+            Measurements::External { recordings, map, map_file, lens } => {
+                let mut robot = self.robot.clone();
+                if let Some(lens) = lens {
+                    robot.camera.lens = *lens;
+                }
+                let mut prepared = self.of_external(&recordings, (&map, &map_file), robot)?;
+                if self.method != Method::Bundle {
+                    prepared.data.keep_first_camera();
+                }
+                Ok(calibrate_data(prepared, self.method, self.prior)?)
+            }
+        }
+    }
+
+    /// Recordings that armcal made: they mark their views.
+    pub(crate) fn of_marked(
+        &self,
+        recordings: &mut [armcal_core::log::Recording],
+    ) -> Result<Calibration, CalibrateError> {
+        self.robot.require_lens()?;
+        let named = self.tags.as_ref().map(|(file, map)| map.survey(file, self.robot, TagUse::Corners)).transpose()?;
+        let survey = named.map(|named| named.survey);
+        if let ([recording], None) = (&mut *recordings, self.prior) {
+            // Its own marks say which views are for what.
+            let names_task = recording.messages.iter().any(|(_, message)| matches!(message, Message::Task(_)));
+            if let Some(task) = self.task.clone().filter(|_| !names_task) {
+                recording.messages.push((task.stamp, Message::Task(task)));
+            }
+            return Ok(match survey {
+                Some(survey) => calibrate_with_survey(recording, &self.robot.clone().with_survey(survey), self.method)?,
+                None => calibrate(recording, self.robot, self.method)?,
+            });
+        }
+        let prepared = prepare_pooled(recordings, self.robot, survey.as_ref(), self.task.as_ref(), self.method)?;
+        Ok(calibrate_data(prepared, self.method, self.prior)?)
+    }
+
+    /// The views of a real arm's recordings, read by an input map; `robot` is the arm with its lens.
+    pub(crate) fn of_external(
+        &self,
+        recordings: &[ExternalRecording],
+        (map, map_file): (&InputMap, &Path),
+        mut robot: Robot,
+    ) -> Result<CalibrationData, CalibrateError> {
+        if map.tag_use.needs_lens() {
+            robot.require_lens()?;
+            map.further().iter().try_for_each(|further| robot.require_further_lens(&further.camera))?;
+        }
+        let named = match &self.tags {
+            Some((file, landmarks)) => landmarks.survey(file, &robot, map.tag_use)?,
+            None => {
+                let (names, boards) = Default::default();
+                NamedSurvey { survey: self.robot.survey(), names, boards }
+            }
+        };
+        let plain = plain_landmark(map_file, map, &named)?;
+        robot = robot.with_survey(named.survey);
+        if robot.tags.is_empty() {
+            let problem = "name the landmarks with --tag-map: the robot has no tags of its own";
+            return Err(CalibrateError::Usage(problem.to_owned()));
+        }
+        let context = ExternalContext { task: self.task.clone(), landmark_names: named.names, plain };
+        Ok(prepare_external(recordings, map, &robot, context)?)
+    }
+}
+
+/// The landmark that a plain `child_frame` means: the one of that name, or the only one there is where it has none.
+fn plain_landmark(file: &Path, map: &InputMap, named: &NamedSurvey) -> Result<PlainLandmark, FileIssue> {
+    let Some(ChildFrame::Plain(name)) = &map.child_frame else { return Ok(PlainLandmark::default()) };
+    if let Some((id, _)) = named.names.iter().find(|(_, known)| *known == name) {
+        let board = named.boards.get(id).copied().filter(|_| map.tag_use == TagUse::BoardCorners);
+        if board.is_none() && map.tag_use == TagUse::BoardCorners {
+            let problem = format!("is `{name}`, whose `squares` and `square_m` the tag map does not give");
+            return Err(FileIssue::new(Code::KeyMissing, file, "tags.child_frame", problem));
+        }
+        return Ok(PlainLandmark { id: Some(*id), board });
+    }
+    match &named.survey.tags[..] {
+        [only] if named.names.is_empty() && map.tag_use != TagUse::BoardCorners => {
+            Ok(PlainLandmark { id: Some(only.id), board: None })
+        }
+        tags => {
+            let ids = tags.iter().map(|tag| named.names.get(&tag.id).cloned().unwrap_or_else(|| tag.id.to_string()));
+            let problem = format!("no landmark `{name}` in the tag map; it has {:?}", ids.collect::<Vec<_>>());
+            Err(FileIssue::new(Code::NameUnknown, file, "tags.child_frame", problem))
+        }
+    }
+}

@@ -1,0 +1,14 @@
+//! The front door: measurements in, a calibration out.
+//!
+//! `measurements` takes recordings, or readings and tags in memory; `calibrator` holds robot, tags, task and prior, and
+//! calibrates; `error` has all that may be wrong on the way. `shared` finds robots and routines by their names.
+
+mod calibrator;
+mod error;
+pub(crate) mod measurements;
+pub(crate) mod shared;
+
+pub use calibrator::Calibrator;
+pub use error::CalibrateError;
+pub use measurements::{Measurements, PoseAtRest};
+pub use shared::{robot_folder, routine_file, set_shared_folder};
