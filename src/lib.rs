@@ -77,7 +77,7 @@ pub use armcal_sim as sim;
 
 pub use front::{CalibrateError, Calibrator, Measurements, PoseAtRest};
 
-pub use armcal_belief::calib::{CalibError, Calibration, Status, calibrate, interim_estimate};
+pub use armcal_belief::calib::{CalibError, CalibratedArm, Calibration, Status, calibrate, interim_estimate};
 pub use armcal_belief::plan::{ClearanceModel, JointErrorBounds, PathError, PathPlanner, Timing};
 pub use armcal_belief::session::{Outcome, Progress, Recorder, SessionError, SessionInputs, Unwatched};
 pub use armcal_core::joints::{JointAngles, JointCounts};

@@ -254,7 +254,7 @@ fn corners_in_another_order_are_refused_with_the_key_to_change() {
     let mut command = program();
     command.arg("calibrate").arg(&table_file).arg("--robot").arg(&titan_folder).arg("--input").arg(&map);
     command.arg("--out").arg(folder.path().join("out"));
-    answer(&mut command).expect("mirrored", 2, &["[views_missing]"]);
+    answer(&mut command).expect("mirrored", 2, &["[input_corner_order]"]);
     write(&map, &proposed);
     answer(&mut command).expect("in the proposed order", 4, &["REFUSED"]);
 }

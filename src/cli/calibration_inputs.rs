@@ -265,20 +265,24 @@ impl CalibrationInputs<'_> {
                 warn(Code::CameraInfoInvalid, format_args!("{}: {note}", path.display()));
             })?;
         }
+        let needs_task = task.is_none();
+        let calibrator = self.calibrator(landmarks, task);
+        let arm = calibrator.surveyed((&map, file), robot)?;
+        let robot = &arm.robot;
         let mut recordings = Vec::new();
         let mut lost = false;
         for path in self.recordings {
-            let recording = read_with_images(path, &map, &robot)?;
+            let recording = read_with_images(path, &map, robot)?;
             let of_further: usize = recording.further_frames.iter().map(Vec::len).sum();
             let (readings, frames) = (recording.readings.len(), recording.frames.len() + of_further);
             tracing::info!("{}: {readings} joint readings, {frames} frames with tags", path.display());
-            lost |= warn_of_external(&recording, &robot);
+            lost |= warn_of_external(&recording, robot);
             recordings.push(recording);
         }
-        if task.is_none() {
+        if needs_task {
             warn(Code::TaskMissing, "no task is named (--task), so that no tool error is predicted");
         }
-        let prepared = self.calibrator(landmarks, task).of_external(&recordings, (&map, file), robot)?;
+        let prepared = calibrator.of_external(&recordings, &map, arm)?;
         for recording in &recordings {
             if let Some(doubt) = &recording.clock_doubt {
                 warn(Code::ClocksDiffer, format_args!("{}: {doubt}", recording.path.display()));

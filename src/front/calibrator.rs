@@ -1,5 +1,6 @@
 //! Robot, tags, task and prior, and the calibration by measurements of that arm.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use armcal_belief::calib::{
@@ -28,6 +29,10 @@ use crate::front::{CalibrateError, Measurements};
 /// let measurements = Measurements::read(&[root.join("recordings/sample/run.mcap")], &robot, None)?;
 /// let calibration = Calibrator::new(&robot).calibrate(measurements)?;
 /// println!("{:?}, within {:.4} m", calibration.status, calibration.u95.max_m.unwrap_or(f64::NAN));
+/// let arm = calibration.arm(&robot)?;
+/// let (counts, conditions) = (armcal::JointCounts::from_slice(&[32768.0; 6]), arm.sensors().reference);
+/// println!("the tool is at {:.3} m", arm.tool_pose(&counts, &conditions).translation);
+/// println!("with the covariance {:.2e} m^2", arm.tool_covariance_m2(&counts, &conditions));
 /// # Ok(())
 /// # }
 /// ```
@@ -86,7 +91,8 @@ impl<'a> Calibrator<'a> {
                 if let Some(lens) = lens {
                     robot.camera.lens = *lens;
                 }
-                let mut prepared = self.of_external(&recordings, (&map, &map_file), robot)?;
+                let arm = self.surveyed((&map, &map_file), robot)?;
+                let mut prepared = self.of_external(&recordings, &map, arm)?;
                 if self.method != Method::Bundle {
                     prepared.data.keep_first_camera();
                 }
@@ -118,13 +124,12 @@ impl<'a> Calibrator<'a> {
         Ok(calibrate_data(prepared, self.method, self.prior)?)
     }
 
-    /// The views of a real arm's recordings, read by an input map; `robot` is the arm with its lens.
-    pub(crate) fn of_external(
+    /// The arm with the tags that an input map reads, before recordings are read; `robot` has its lens.
+    pub(crate) fn surveyed(
         &self,
-        recordings: &[ExternalRecording],
         (map, map_file): (&InputMap, &Path),
-        mut robot: Robot,
-    ) -> Result<CalibrationData, CalibrateError> {
+        robot: Robot,
+    ) -> Result<SurveyedArm, CalibrateError> {
         if map.tag_use.needs_lens() {
             robot.require_lens()?;
             map.further().iter().try_for_each(|further| robot.require_further_lens(&further.camera))?;
@@ -137,14 +142,32 @@ impl<'a> Calibrator<'a> {
             }
         };
         let plain = plain_landmark(map_file, map, &named)?;
-        robot = robot.with_survey(named.survey);
+        let robot = robot.with_survey(named.survey);
         if robot.tags.is_empty() {
             let problem = "name the landmarks with --tag-map: the robot has no tags of its own";
             return Err(CalibrateError::Usage(problem.to_owned()));
         }
-        let context = ExternalContext { task: self.task.clone(), landmark_names: named.names, plain };
+        Ok(SurveyedArm { robot, landmark_names: named.names, plain })
+    }
+
+    /// The views of a real arm's recordings, read by an input map.
+    pub(crate) fn of_external(
+        &self,
+        recordings: &[ExternalRecording],
+        map: &InputMap,
+        arm: SurveyedArm,
+    ) -> Result<CalibrationData, CalibrateError> {
+        let SurveyedArm { robot, landmark_names, plain } = arm;
+        let context = ExternalContext { task: self.task.clone(), landmark_names, plain };
         Ok(prepare_external(recordings, map, &robot, context)?)
     }
+}
+
+/// An arm with the tags around it.
+pub(crate) struct SurveyedArm {
+    pub robot: Robot,
+    landmark_names: BTreeMap<u32, String>,
+    plain: PlainLandmark,
 }
 
 /// The landmark that a plain `child_frame` means: the one of that name, or the only one there is where it has none.

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-use armcal::joints::{JointAngles, JointCounts};
+use armcal::joints::JointCounts;
 use armcal::report::{About, Report, RunSummary, html};
-use armcal::sensor::{ArmSensors, Conditions};
-use armcal::{Calibrator, Method, Status};
+use armcal::sensor::Conditions;
+use armcal::{CalibratedArm, Calibrator, Method, Status};
 use numpy::ndarray::ArrayView1;
 use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods};
 use pyo3::exceptions::PyUserWarning;
@@ -18,7 +18,7 @@ use pyo3::types::PyDict;
 use crate::arrays::numbers;
 use crate::errors::{not_pickled, of_any, raised, wrong_value};
 use crate::interruptible::interruptible;
-use crate::robot::{Robot, TagMap, Task, check_prior, pose_array};
+use crate::robot::{Robot, TagMap, Task, by_rows, check_prior};
 use crate::views::Views;
 
 /// Calibrates the joint sensors of `robot` by `views`; returns a Calibration, accepted or refused.
@@ -65,17 +65,14 @@ pub fn calibrate(
 pub struct Calibration {
     pub inner: Arc<armcal::Calibration>,
     robot: Arc<armcal::Robot>,
-    /// With links and camera as calibrated.
-    applied: armcal::Robot,
-    sensors: ArmSensors,
+    arm: CalibratedArm,
     summary: RunSummary,
 }
 
 impl Calibration {
     pub fn new(robot: &Arc<armcal::Robot>, inner: armcal::Calibration, wall_s: f64) -> PyResult<Self> {
         Ok(Self {
-            sensors: inner.sensors(robot).map_err(raised)?,
-            applied: inner.applied_to(robot),
+            arm: inner.arm(robot).map_err(raised)?,
             summary: RunSummary::of_calibration(&inner, wall_s).judged(),
             robot: Arc::clone(robot),
             inner: Arc::new(inner),
@@ -88,7 +85,7 @@ impl Calibration {
                 return Err(wrong_value(format!("{name} must be within {most}; leave it out where it is not known")));
             }
         }
-        let reference = self.sensors.reference;
+        let reference = self.arm.sensors().reference;
         Ok(Conditions {
             oil_c: oil_c.or(reference.oil_c),
             pressure_pa: pressure_pa.or(reference.pressure_pa),
@@ -96,34 +93,30 @@ impl Calibration {
         })
     }
 
-    /// Angles of one reading (j,) or of several (n, j), and whether it was one.
-    fn angles_of(&self, counts: &Bound<'_, PyAny>, conditions: &Conditions) -> PyResult<(Vec<JointAngles>, bool)> {
+    /// `number` of one reading (j,) or of each of several (n, j), as one array of `shape` or (n, `shape`).
+    fn by_reading<'py>(
+        &self,
+        counts: &Bound<'py, PyAny>,
+        shape: &[usize],
+        number: impl Fn(&JointCounts) -> Vec<f64>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let py = counts.py();
         let (n, names) = (self.robot.n_joints(), self.robot.joint_names());
         let meaning = format!("({n},) or (n, {n}): a reading each for the joints {names:?}");
-        let is_one = counts.py().import("numpy")?.call_method1("ndim", (counts,))?.extract::<usize>()? == 1;
-        let shape: &[Option<usize>] = if is_one { &[Some(n)] } else { &[None, Some(n)] };
-        let read = numbers(counts, "counts", shape, &meaning)?;
-        let angles = |row: ArrayView1<'_, f64>| {
-            self.sensors.angles_under(&JointCounts::from_fn(n, |joint| row[joint]), conditions)
-        };
+        let is_one = py.import("numpy")?.call_method1("ndim", (counts,))?.extract::<usize>()? == 1;
+        let wanted: &[Option<usize>] = if is_one { &[Some(n)] } else { &[None, Some(n)] };
+        let read = numbers(counts, "counts", wanted, &meaning)?;
         let array = read.as_array();
-        let rows = array.to_shape((array.len() / n, n)).map_err(|_| wrong_value(format!("give counts {meaning}")))?;
-        if rows.iter().any(|count| !count.is_finite()) {
+        if array.iter().any(|count| !count.is_finite()) {
             return Err(wrong_value("counts has values that are not finite; leave such readings out"));
         }
-        Ok((rows.rows().into_iter().map(angles).collect(), is_one))
+        let rows = array.to_shape((array.len() / n, n)).map_err(|_| wrong_value(format!("give counts {meaning}")))?;
+        let of_row = |row: ArrayView1<'_, f64>| number(&JointCounts::from_fn(n, |joint| row[joint]));
+        let each: Vec<f64> = rows.rows().into_iter().flat_map(of_row).collect();
+        let first = (!is_one).then_some(rows.nrows());
+        let full: Vec<usize> = first.into_iter().chain(shape.iter().copied()).collect();
+        PyArray1::from_vec(py, each).reshape(full)
     }
-}
-
-/// Numbers of each reading as one array, without the first axis where there is one reading.
-fn stacked<'py>(
-    py: Python<'py>,
-    (each, is_one): (Vec<Vec<f64>>, bool),
-    shape: &[usize],
-) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-    let first = (!is_one).then_some(each.len());
-    let full: Vec<usize> = first.into_iter().chain(shape.iter().copied()).collect();
-    PyArray1::from_vec(py, each.concat()).reshape(full)
 }
 
 #[pymethods]
@@ -177,7 +170,7 @@ impl Calibration {
     /// Gain (j,) over that of the datasheet.
     #[getter]
     fn gain<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_iter(py, self.sensors.models.iter().map(|model| model.correction.gain))
+        PyArray1::from_iter(py, self.arm.sensors().models.iter().map(|model| model.correction.gain))
     }
 
     /// Gain (j,), rad (m for slides) per count.
@@ -249,9 +242,8 @@ impl Calibration {
         oil_c: Option<f64>,
         pressure_pa: Option<f64>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let (angles, is_one) = self.angles_of(counts, &self.conditions(oil_c, pressure_pa)?)?;
-        let each = angles.iter().map(|angles| angles.to_vec()).collect();
-        stacked(counts.py(), (each, is_one), &[self.robot.n_joints()])
+        let conditions = self.conditions(oil_c, pressure_pa)?;
+        self.by_reading(counts, &[self.robot.n_joints()], |counts| self.arm.angles(counts, &conditions).to_vec())
     }
 
     /// Pose of the tool (4, 4) or (n, 4, 4) in the frame of the base, m, by raw readings (j,) or (n, j).
@@ -262,11 +254,8 @@ impl Calibration {
         oil_c: Option<f64>,
         pressure_pa: Option<f64>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let (angles, is_one) = self.angles_of(counts, &self.conditions(oil_c, pressure_pa)?)?;
-        let py = counts.py();
-        let pose = |angles: &JointAngles| pose_array(py, &self.applied, angles).to_vec();
-        let each = angles.iter().map(pose).collect::<Result<Vec<_>, _>>()?;
-        stacked(py, (each, is_one), &[4, 4])
+        let conditions = self.conditions(oil_c, pressure_pa)?;
+        self.by_reading(counts, &[4, 4], |counts| by_rows(&self.arm.tool_pose(counts, &conditions).to_homogeneous()))
     }
 
     /// Covariance of the tool's position (3, 3) or (n, 3, 3) in the frame of the base, m^2, by raw readings: of the
@@ -279,14 +268,7 @@ impl Calibration {
         pressure_pa: Option<f64>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let conditions = self.conditions(oil_c, pressure_pa)?;
-        let (angles, is_one) = self.angles_of(counts, &conditions)?;
-        let (robot, covariance) = (self.inner.scaled_robot(&self.robot), self.inner.parameter_covariance(&self.robot));
-        let of = |angles: &JointAngles| {
-            let found = covariance.tool_position_under_m2(&robot, &self.sensors, angles, &conditions);
-            found.iter().copied().collect::<Vec<f64>>()
-        };
-        let each = angles.iter().map(of).collect();
-        stacked(counts.py(), (each, is_one), &[3, 3])
+        self.by_reading(counts, &[3, 3], |counts| by_rows(&self.arm.tool_covariance_m2(counts, &conditions)))
     }
 
     /// Writes the report, an HTML page that needs no other file.

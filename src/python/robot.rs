@@ -9,7 +9,7 @@ use armcal::joints::JointAngles;
 use armcal::streams::ReachTask;
 use armcal::tagmap::files::{Landmark, LandmarkFile, read_landmarks};
 use armcal_core::time::Stamp;
-use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
+use nalgebra::{Matrix3, Rotation3, SMatrix, UnitQuaternion};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
@@ -55,7 +55,8 @@ impl Robot {
         let meaning = format!("({n},): an angle each for the joints {:?}, rad", self.inner.joint_names());
         let angles = numbers(angles_rad, "angles_rad", &[Some(n)], &meaning)?;
         let angles = JointAngles::from_fn(n, |joint| angles.as_array()[joint]);
-        Ok(pose_array(angles_rad.py(), &self.inner, &angles))
+        let pose = self.inner.chain.frame(&angles, &self.inner.tool.mount).to_homogeneous();
+        PyArray1::from_vec(angles_rad.py(), by_rows(&pose)).reshape([4, 4])
     }
 
     fn __repr__(&self) -> String {
@@ -67,11 +68,9 @@ impl Robot {
     }
 }
 
-/// The tool's pose in the base frame.
-pub fn pose_array<'py>(py: Python<'py>, robot: &armcal::Robot, angles: &JointAngles) -> Bound<'py, PyArray2<f64>> {
-    let pose = robot.chain.frame(angles, &robot.tool.mount).to_homogeneous();
-    let flat: Vec<f64> = pose.transpose().iter().copied().collect();
-    PyArray1::from_vec(py, flat).reshape([4, 4]).expect("16 numbers")
+/// The numbers of a matrix row by row, as numpy has them.
+pub fn by_rows<const N: usize>(matrix: &SMatrix<f64, N, N>) -> Vec<f64> {
+    matrix.transpose().iter().copied().collect()
 }
 
 /// Tags or landmarks around an arm, with their poses.

@@ -49,11 +49,11 @@ pub use refusal::{InnovationQuantity, Refusal, in_files as refusals_in_files, wi
 pub use refusal_conditions::{MIN_HELD_OUT_VIEWS, MIN_VIEWS_PER_PARAMETER, fewest_views};
 pub use reservation::Reservation;
 pub use result::{
-    Calibration, CalibrationFileError, CalibrationFiles, CameraMount, Check, CompactCalibration, CompactError,
-    CompactJoint, CornerResidual, CovarianceTable, FailedJointTable, FitDetails, FitMetrics, FurtherCamera,
-    HeldOutMetrics, JointCompliance, JointResult, LinkResult, LookupTable, MAX_COMPACT_BYTES, MapResult, MapTag,
-    ModelTable, ObservabilityTable, ObservedTag, PredictedToolError, PriorTable, ReferenceTable, SagTable, Status,
-    SurveyCoverage, TargetPrediction, TermsTable, ValidRange, VerdictTable, ViewContainment, ViewResidual,
+    CalibratedArm, Calibration, CalibrationFileError, CalibrationFiles, CameraMount, Check, CompactCalibration,
+    CompactError, CompactJoint, CornerResidual, CovarianceTable, FailedJointTable, FitDetails, FitMetrics,
+    FurtherCamera, HeldOutMetrics, JointCompliance, JointResult, LinkResult, LookupTable, MAX_COMPACT_BYTES, MapResult,
+    MapTag, ModelTable, ObservabilityTable, ObservedTag, PredictedToolError, PriorTable, ReferenceTable, SagTable,
+    Status, SurveyCoverage, TargetPrediction, TermsTable, ValidRange, VerdictTable, ViewContainment, ViewResidual,
     calibration_schema, covariance_file, covariance_schema, metric,
 };
 pub(crate) use views::dropouts::replace_dropouts;

@@ -7,6 +7,7 @@
 pub(crate) mod assemble;
 #[cfg(test)]
 pub(in crate::calib) mod bare;
+mod calibrated_arm;
 pub(crate) mod calibration;
 pub(crate) mod camera_mount;
 mod compact;
@@ -27,6 +28,7 @@ pub(crate) mod valid_range;
 pub(crate) mod validity;
 pub(crate) mod verdict_tables;
 
+pub use calibrated_arm::CalibratedArm;
 pub use calibration::{Calibration, JointResult, Status, calibration_schema};
 pub use camera_mount::{CameraMount, FurtherCamera};
 pub use compact::{CompactCalibration, CompactError, CompactJoint, MAX_COMPACT_BYTES, PredictedToolError};
