@@ -67,7 +67,7 @@ impl Measurements {
         }
         let read = |path: &PathBuf| read_external(path, &map, &robot);
         let recordings = recordings.iter().map(read).collect::<Result<_, _>>()?;
-        let lens = robot.camera.lens.is_known().then(|| Box::new(robot.camera.lens.clone()));
+        let lens = robot.camera.lens.is_known().then(|| Box::new(robot.camera.lens));
         Ok(Self::External { recordings, map: Box::new(map), map_file: map_file.to_owned(), lens })
     }
 

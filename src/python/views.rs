@@ -96,7 +96,6 @@ impl Views {
     #[staticmethod]
     #[pyo3(signature = (robot, *, counts=None, angles_rad=None, t_s=None, view, tag, corners_px=None, positions_m=None,
                         poses=None))]
-    #[expect(clippy::too_many_arguments, reason = "keywords of Python")]
     fn from_arrays<'py>(
         robot: &Robot,
         counts: Option<&Bound<'py, PyAny>>,
