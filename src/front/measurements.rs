@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use armcal_belief::calib::read_marked;
 use armcal_core::input::{
-    ExternalDetection, ExternalRecording, InputError, InputMap, RawMeasurement, Reading, Source, TagFrame,
-    parse_input_map, read_camera_info, read_input_map,
+    ConditionKind, ConditionReading, ExternalDetection, ExternalRecording, InputError, InputMap, RawMeasurement,
+    Reading, Source, TagFrame, parse_input_map, read_camera_info, read_input_map,
 };
 use armcal_core::joints::JointCounts;
 use armcal_core::log::Recording;
@@ -18,8 +18,10 @@ use crate::front::CalibrateError;
 
 /// Poses at rest are this far apart at least, s: nearer ones would pass for one stream of readings of a moving arm.
 const MIN_APART_S: f64 = 0.3;
-/// Largest time of a pose, s: 31 years.
-const MAX_TIME_S: f64 = 1e9;
+/// Largest time of a pose, s: Unix times until the year 2096.
+const MAX_TIME_S: f64 = 4e9;
+/// Largest oil temperature, deg C.
+const MAX_OIL_C: f64 = 200.0;
 
 /// Measurements of one arm.
 #[derive(Clone, Debug)]
@@ -46,6 +48,8 @@ pub struct PoseAtRest {
     pub t_s: Option<f64>,
     /// Raw reading of each joint, base first.
     pub counts: JointCounts,
+    /// Temperature of the oil, deg C.
+    pub oil_c: Option<f64>,
     /// Tags by number, each once.
     pub tags: Vec<(u32, RawMeasurement)>,
 }
@@ -155,7 +159,8 @@ fn add_pose(
     if !t_s.is_finite() || t_s.abs() > MAX_TIME_S {
         return Err(format!("its time is {t_s} s; give seconds within {MAX_TIME_S:e}"));
     }
-    let stamp = Stamp::default().plus_s(t_s + MAX_TIME_S);
+    // Stamps begin at zero, times may be before.
+    let stamp = Stamp::default().plus_s(MAX_TIME_S).plus_s(t_s);
     let apart_s = recording.readings.last().map_or(f64::INFINITY, |last| stamp.since_s(last.stamp));
     if apart_s < MIN_APART_S {
         return Err(format!(
@@ -188,7 +193,16 @@ fn add_pose(
     if let Some(pair) = tags.windows(2).find(|pair| pair[0].id == pair[1].id) {
         return Err(format!("tag {} is given twice", pair[0].id.unwrap_or_default()));
     }
+    if let Some(oil_c) = pose.oil_c {
+        add(oil_c);
+        if !oil_c.is_finite() || oil_c.abs() > MAX_OIL_C {
+            return Err(format!("its oil temperature is {oil_c} deg C; give a value within {MAX_OIL_C}, or none"));
+        }
+    }
     let digest = *hasher.finalize().as_bytes();
+    if let Some(value) = pose.oil_c {
+        recording.conditions.push(ConditionReading { stamp, kind: ConditionKind::OilTemperature, value, digest });
+    }
     recording.readings.push(Reading { stamp, counts: pose.counts, digest });
     if !tags.is_empty() {
         recording.frames.push(TagFrame { stamp, tags, digests: vec![digest] });

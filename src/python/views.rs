@@ -89,18 +89,20 @@ impl Views {
     /// Views of arrays: n poses at rest, and m tags seen in them.
     ///
     /// counts (n, j): raw reading of each joint, base first; or angles_rad (n, j): angles by the datasheet, rad.
-    /// t_s (n,): times, at least 0.3 s apart; without them poses count as a second apart.
+    /// t_s (n,): times, at least 0.3 s apart; without them poses count as a second apart. oil_c (n,): temperatures of
+    /// the oil, which offsets may follow.
     /// view (m,): the pose in which a tag was seen, from 0. tag (m,): its number.
     /// corners_px (m, 4, 2): raw pixels of bottom left, bottom right, top right and top left as printed; or
     /// positions_m (m, 3): the tag in the camera's frame, m; or poses (m, 4, 4): camera_from_tag.
     #[staticmethod]
-    #[pyo3(signature = (robot, *, counts=None, angles_rad=None, t_s=None, view, tag, corners_px=None, positions_m=None,
-                        poses=None))]
+    #[pyo3(signature = (robot, *, counts=None, angles_rad=None, t_s=None, oil_c=None, view, tag, corners_px=None,
+                        positions_m=None, poses=None))]
     fn from_arrays<'py>(
         robot: &Robot,
         counts: Option<&Bound<'py, PyAny>>,
         angles_rad: Option<&Bound<'py, PyAny>>,
         t_s: Option<&Bound<'py, PyAny>>,
+        oil_c: Option<&Bound<'py, PyAny>>,
         view: &Bound<'py, PyAny>,
         tag: &Bound<'py, PyAny>,
         corners_px: Option<&Bound<'py, PyAny>>,
@@ -110,8 +112,11 @@ impl Views {
         let robot = &robot.inner;
         let readings = readings(robot, counts, angles_rad)?;
         let n = readings.len();
-        let times =
-            t_s.map(|t_s| numbers(t_s, "t_s", &[Some(n)], &format!("({n},): a time each pose, s"))).transpose()?;
+        let of_poses = |of: Option<&Bound<'py, PyAny>>, name: &str, what: &str| {
+            of.map(|of| numbers(of, name, &[Some(n)], &format!("({n},): {what} each pose"))).transpose()
+        };
+        let times = of_poses(t_s, "t_s", "a time, s,")?;
+        let oil = of_poses(oil_c, "oil_c", "a temperature, deg C,")?;
         let measured = |of: Option<&Bound<'py, PyAny>>, name, shape: &[Option<usize>], meaning| {
             of.map(|of| numbers(of, name, shape, meaning)).transpose()
         };
@@ -130,7 +135,12 @@ impl Views {
         let mut all: Vec<PoseAtRest> = readings
             .into_iter()
             .enumerate()
-            .map(|(k, counts)| PoseAtRest { t_s: times.as_ref().map(|t| t.as_array()[k]), counts, tags: Vec::new() })
+            .map(|(k, counts)| PoseAtRest {
+                t_s: times.as_ref().map(|t| t.as_array()[k]),
+                counts,
+                oil_c: oil.as_ref().map(|oil| oil.as_array()[k]),
+                tags: Vec::new(),
+            })
             .collect();
         for (k, (view, tag)) in view.into_iter().zip(tag).enumerate() {
             let Some(pose) = all.get_mut(view) else {

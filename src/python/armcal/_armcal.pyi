@@ -105,6 +105,7 @@ class Views:
         counts: ArrayLike | None = None,
         angles_rad: ArrayLike | None = None,
         t_s: ArrayLike | None = None,
+        oil_c: ArrayLike | None = None,
         corners_px: ArrayLike | None = None,
         positions_m: ArrayLike | None = None,
         poses: ArrayLike | None = None,
@@ -112,7 +113,8 @@ class Views:
         """Views of arrays: n poses at rest, and m tags seen in them.
 
         counts (n, j): raw reading of each joint, base first; or angles_rad (n, j): angles by the datasheet, rad.
-        t_s (n,): times, at least 0.3 s apart; without them poses count as a second apart.
+        t_s (n,): times, at least 0.3 s apart; without them poses count as a second apart. oil_c (n,): temperatures of
+        the oil, which offsets may follow.
         view (m,): the pose in which a tag was seen, from 0. tag (m,): its number.
         corners_px (m, 4, 2): raw pixels of bottom left, bottom right, top right and top left as printed; or
         positions_m (m, 3): the tag in the camera's frame, m; or poses (m, 4, 4): camera_from_tag.

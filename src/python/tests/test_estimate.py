@@ -74,6 +74,24 @@ def test_positions_and_poses_serve_as_well(robot, tags, task, measured):
         assert np.abs(found.gain - measured.gain)[1:4].max() < 0.01, found.refusal
 
 
+def test_times_of_any_epoch_and_the_oil_are_taken(robot, tags, task, measured):
+    """Unix times as loggers have them; and an offset that follows the oil is found where its temperature is given."""
+    n = len(measured.counts)
+    oil_c = np.linspace(5.0, 45.0, n)
+    drifted = measured.counts.copy()
+    drifted[:, 1] -= np.degrees(4e-4) * 180.0 * (oil_c - 25.0)
+    given = measured.arrays() | {"counts": drifted, "t_s": 1.8e9 + 10.0 * np.arange(n)}
+    without = armcal.calibrate(robot, armcal.Views.from_arrays(robot, **given), tags=tags, task=task)
+    found = armcal.calibrate(robot, armcal.Views.from_arrays(robot, **given, oil_c=oil_c), tags=tags, task=task)
+    true = measured.true_angles(measured.counts)[:, 1]
+
+    def error(cal):
+        return np.abs([cal.angles(row, oil_c=at)[1] for row, at in zip(drifted, oil_c)] - true).max()
+
+    assert found.status == "accepted" and error(found) < 0.002, found.refusal
+    assert without.status == "refused" or error(without) > 2 * error(found)
+
+
 def study(seeds):
     """python -c "import test_estimate; test_estimate.study(40)" in this folder: the figures of docs/results."""
     import tempfile
