@@ -20,6 +20,8 @@ use crate::front::CalibrateError;
 const MIN_APART_S: f64 = 0.3;
 /// Largest time of a pose, s: Unix times until the year 2096.
 const MAX_TIME_S: f64 = 4e9;
+/// Most poses: eleven days of one every ten seconds.
+const MAX_POSES: usize = 100_000;
 /// Largest oil temperature, deg C.
 const MAX_OIL_C: f64 = 200.0;
 
@@ -81,6 +83,10 @@ impl Measurements {
     /// [`CalibrateError::Value`] for readings of another number of joints, values that are not finite, a tag twice in
     /// one pose, and times that are not apart.
     pub fn at_rest(robot: &Robot, poses: &[PoseAtRest]) -> Result<Self, CalibrateError> {
+        if poses.len() > MAX_POSES {
+            let n = poses.len();
+            return Err(CalibrateError::Value(format!("there are {n} poses; give at most {MAX_POSES} at once")));
+        }
         let Some((_, like)) = poses.iter().flat_map(|pose| &pose.tags).next() else {
             return Err(CalibrateError::Value("no pose has a tag: give at least three with tags".to_owned()));
         };

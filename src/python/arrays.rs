@@ -38,6 +38,14 @@ pub fn numbers<'py>(
     Ok(array.readonly())
 }
 
+/// A whole number from 0 to `most`.
+pub fn whole(value: &Bound<'_, PyAny>, name: &str, most: u64) -> PyResult<u64> {
+    value.extract().ok().filter(|found| *found <= most).ok_or_else(|| {
+        let given = value.repr().map_or_else(|_| "another value".to_owned(), |given| given.to_string());
+        wrong_value(format!("{name} is {given}; give a whole number from 0 to {most}"))
+    })
+}
+
 /// Whole numbers from 0 on, as many as `n`.
 pub fn indices(value: &Bound<'_, PyAny>, name: &str, n: usize, meaning: &str) -> PyResult<Vec<usize>> {
     let found = numbers(value, name, &[Some(n)], meaning)?;

@@ -11,6 +11,7 @@ use armcal::session::Unwatched;
 use pyo3::prelude::*;
 use tempfile::TempDir;
 
+use crate::arrays::whole;
 use crate::calibration::{Calibration, as_python};
 use crate::errors::{not_pickled, of_any, raised, wrong_value};
 use crate::interruptible::interruptible;
@@ -26,10 +27,11 @@ use crate::robot::Robot;
 pub fn simulate(
     py: Python<'_>,
     routine: PathBuf,
-    seed: Option<u64>,
+    seed: Option<&Bound<'_, PyAny>>,
     out: Option<PathBuf>,
     set: Option<std::collections::BTreeMap<String, Bound<'_, PyAny>>>,
 ) -> PyResult<Run> {
+    let seed = seed.map(|seed| whole(seed, "seed", u64::MAX >> 1)).transpose()?;
     let file = armcal::front::routine_file(&routine);
     let mut overrides = Overrides::default();
     for (key, value) in set.iter().flatten() {

@@ -208,8 +208,8 @@ def plan(
     *,
     vehicle: _Path | None = None,
     prior: Calibration | None = None,
-    poses: int = 30,
-    seed: int = 1,
+    poses: int | None = None,
+    seed: int | None = None,
 ) -> dict[str, Any]:
     """Plans the views of a capture and certified paths to them; returns a dictionary with the keys of plan.toml."""
 
