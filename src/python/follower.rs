@@ -3,8 +3,11 @@
 use std::sync::Arc;
 
 use armcal::calib::online::{Follower as Belief, OnlineEvent, OnlineSettings};
+use armcal::input::TagUse;
 use armcal::joints::JointCounts;
-use armcal::streams::{JointSensorSample, Message, TagDetection, TagDetections, TemperatureSample, Thermometer};
+use armcal::streams::{
+    CaptureSet, JointSensorSample, Mark, MarkKind, Message, TagDetection, TagDetections, TemperatureSample, Thermometer,
+};
 use armcal_core::time::Stamp;
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -12,8 +15,11 @@ use pyo3::types::PyDict;
 
 use crate::arrays::numbers;
 use crate::calibration::{Calibration, as_python};
-use crate::errors::{not_pickled, wrong_value};
-use crate::robot::{Robot, Task};
+use crate::errors::{not_pickled, raised, wrong_value};
+use crate::robot::{Robot, TagMap, Task};
+
+/// Unix times until the year 2096.
+const MAX_TIME_S: f64 = 4e9;
 
 /// Follows the messages of an arm and keeps its sensors' estimate up to date.
 #[pyclass(module = "armcal")]
@@ -24,13 +30,22 @@ pub struct Follower {
 
 #[pymethods]
 impl Follower {
-    /// Begins at a calibration, or at the datasheet; task: what the tool's error is predicted for.
+    /// Begins at a calibration, or at the datasheet. tags: instead of those of the robot's folder. task: targets that the
+    /// tool's error is predicted for.
     #[new]
-    #[pyo3(signature = (robot, cal=None, *, task=None))]
-    fn new(robot: &Robot, cal: Option<&Calibration>, task: Option<&Task>) -> PyResult<Self> {
+    #[pyo3(signature = (robot, cal=None, *, tags=None, task=None))]
+    fn new(robot: &Robot, cal: Option<&Calibration>, tags: Option<&TagMap>, task: Option<&Task>) -> PyResult<Self> {
         let robot = Arc::clone(&robot.inner);
+        let survey = match tags {
+            Some(tags) => tags.inner.survey(&tags.file, &robot, TagUse::Corners).map_err(raised)?.survey,
+            None => robot.survey(),
+        };
+        if survey.tags.is_empty() {
+            return Err(wrong_value("the robot's folder has no tags; give those around it as tags, a TagMap"));
+        }
         let guess = cal.map(|cal| cal.inner.parameters(&robot));
-        let mut belief = Belief::new((*robot).clone(), OnlineSettings { guess, ..OnlineSettings::default() });
+        let surveyed = (*robot).clone().with_survey(survey);
+        let mut belief = Belief::new(surveyed, OnlineSettings { guess, ..OnlineSettings::default() });
         if let Some(task) = task {
             belief.set_task(&task.of(&robot)?);
         }
@@ -43,12 +58,24 @@ impl Follower {
     /// Views.from_arrays, {"t_s": .., "oil_c": ..}. Times are by one clock, s since any moment, and rise.
     fn push<'py>(&mut self, py: Python<'py>, message: &Bound<'py, PyDict>) -> PyResult<Bound<'py, PyAny>> {
         let t_s: f64 = item(message, "t_s")?.extract().map_err(|_| wrong_value("t_s is no number; give seconds"))?;
-        if !(0.0..=4e9).contains(&t_s) {
-            return Err(wrong_value(format!("t_s is {t_s}; it must be 0 to 4e9 s")));
+        if !(0.0..=MAX_TIME_S).contains(&t_s) {
+            return Err(wrong_value(format!("t_s is {t_s}; it must be 0 to {MAX_TIME_S:e} s")));
         }
         let stamp = Stamp::default().plus_s(t_s);
         let message = self.message(message, stamp)?;
         let events = self.belief.push(stamp, &message);
+        events_in_python(py, &events)
+    }
+
+    /// The arm stood still from `start_s` to `end_s`: what was pushed of this span makes a view. Say so after each pose;
+    /// rests that nobody marks count after 20 s only, and images of a moving arm by themselves.
+    fn rest<'py>(&mut self, py: Python<'py>, start_s: f64, end_s: f64) -> PyResult<Bound<'py, PyAny>> {
+        if !((0.0..=MAX_TIME_S).contains(&start_s) && (start_s..=MAX_TIME_S).contains(&end_s)) {
+            return Err(wrong_value(format!("the rest is from {start_s} to {end_s} s; give times of pushed messages")));
+        }
+        let [start, end] = [start_s, end_s].map(|t_s| Stamp::default().plus_s(t_s));
+        let kind = MarkKind::Capture { set: CaptureSet::Fit, pose_idx: self.belief.estimator().n_views() as u32 };
+        let events = self.belief.push(end, &Message::Mark(Mark { start, end, kind }));
         events_in_python(py, &events)
     }
 

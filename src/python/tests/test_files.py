@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import armcal
+from conftest import tool_m
 
 ROOT = Path(__file__).parents[3]
 
@@ -61,18 +62,40 @@ def test_exit_codes_and_streams_are_those_of_the_program():
     assert done.returncode == 2 and "no-such-file.mcap" in done.stderr and not done.stdout
 
 
-def test_a_follower_takes_views_in(measured, robot, tags):
-    titan = armcal.Robot.load("titan4")
+def test_a_follower_learns_what_a_calibration_does(measured, robot, tags, task, cal):
+    follower = armcal.Follower(robot, tags=tags, task=task)
+    assert follower.belief is None and follower.n_views == 0 and follower.u95_m(measured.counts[0]) is None
+    before = measured.counts[0]
+    for k, counts in enumerate(measured.counts):
+        # The way there, then two seconds of rest with four images.
+        for step in range(60):
+            share = step / 60
+            follower.push({"t_s": 1.8e9 + 5.0 * k - 3.0 + 0.05 * step, "counts": (1 - share) * before + share * counts})
+        before = counts
+        seen = {int(tag): px for view, tag, px in zip(measured.view, measured.tag, measured.corners_px) if view == k}
+        for step in range(40):
+            t_s = 1.8e9 + 5.0 * k + 0.05 * step
+            follower.push({"t_s": t_s, "counts": counts})
+            if step % 10 == 5:
+                follower.push({"t_s": t_s, "tags": seen})
+        follower.rest(1.8e9 + 5.0 * k, t_s)
+    follower.finish()
+    assert follower.n_views >= 20 and follower.belief["views"] == follower.n_views
+    datasheet = armcal.Follower(robot, tags=tags)
+    for counts in measured.counts[:5]:
+        off_m, before_m = (np.linalg.norm(robot.tool_pose(f.angles(counts))[:3, 3] - tool_m(measured.true_angles(counts)))
+                           for f in (follower, datasheet))
+        assert off_m < follower.u95_m(counts) < 0.05 and off_m < 0.3 * before_m
+    begun = armcal.Follower(robot, cal, tags=tags)
+    assert begun.n_views == 0
+
+
+def test_a_run_that_is_not_kept_is_there_as_long_as_its_object():
     run = armcal.simulate("titan4-quickstart", seed=2, set={"capture.poses": 20})
     assert run.summary["status"] == "accepted" and Path(run.recording).is_file()
-    follower = armcal.Follower(titan, run.calibration)
-    assert follower.belief is None and follower.n_views == 0
-    nominal = follower.angles(np.full(6, 20000.0))
-    assert nominal.shape == (6,)
-    follower.push({"t_s": 0.0, "oil_c": 10.0})
-    for k in range(40):
-        follower.push({"t_s": 1 + 0.05 * k, "counts": np.full(6, 20000.0)})
-    assert isinstance(follower.finish(), list)
+    folder = run.folder
+    del run
+    assert not folder.exists()
 
 
 @pytest.mark.parametrize("prior", [False, True])
