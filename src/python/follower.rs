@@ -30,8 +30,8 @@ pub struct Follower {
 
 #[pymethods]
 impl Follower {
-    /// Begins at a calibration, or at the datasheet. tags: instead of those of the robot's folder. task: targets that the
-    /// tool's error is predicted for.
+    /// Begins at a calibration, or at the datasheet. tags: instead of those of the robot's folder. task: targets that
+    /// the tool's error is predicted for.
     #[new]
     #[pyo3(signature = (robot, cal=None, *, tags=None, task=None))]
     fn new(robot: &Robot, cal: Option<&Calibration>, tags: Option<&TagMap>, task: Option<&Task>) -> PyResult<Self> {
@@ -67,8 +67,8 @@ impl Follower {
         events_in_python(py, &events)
     }
 
-    /// The arm stood still from `start_s` to `end_s`: what was pushed of this span makes a view. Say so after each pose;
-    /// rests that nobody marks count after 20 s only, and images of a moving arm by themselves.
+    /// The arm stood still from `start_s` to `end_s`: what was pushed of this span makes a view. Say so after each
+    /// pose; rests that nobody marks count after 20 s only, and images of a moving arm by themselves.
     fn rest<'py>(&mut self, py: Python<'py>, start_s: f64, end_s: f64) -> PyResult<Bound<'py, PyAny>> {
         if !((0.0..=MAX_TIME_S).contains(&start_s) && (start_s..=MAX_TIME_S).contains(&end_s)) {
             return Err(wrong_value(format!("the rest is from {start_s} to {end_s} s; give times of pushed messages")));
