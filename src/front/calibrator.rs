@@ -27,7 +27,7 @@ use crate::front::{CalibrateError, Measurements};
 /// let root = Path::new(env!("CARGO_MANIFEST_DIR"));
 /// let robot = load_robot(&root.join("robots/titan4"))?;
 /// let measurements = Measurements::read(&[root.join("recordings/sample/run.mcap")], &robot, None)?;
-/// let calibration = Calibrator::new(&robot).calibrate(measurements)?;
+/// let calibration = Calibrator::new(&robot).calibrate(&measurements)?;
 /// println!("{:?}, within {:.4} m", calibration.status, calibration.u95.max_m.unwrap_or(f64::NAN));
 /// let arm = calibration.arm(&robot)?;
 /// let (counts, conditions) = (armcal::JointCounts::from_slice(&[32768.0; 6]), arm.sensors().reference);
@@ -80,19 +80,19 @@ impl<'a> Calibrator<'a> {
     ///
     /// # Errors
     /// [`CalibrateError`]: tags or measurements that are of another arm, or too few to be fitted.
-    pub fn calibrate(&self, measurements: Measurements) -> Result<Calibration, CalibrateError> {
+    pub fn calibrate(&self, measurements: &Measurements) -> Result<Calibration, CalibrateError> {
         if let Some(prior) = self.prior {
             prior.sensors(self.robot)?;
         }
         match measurements {
-            Measurements::Marked(mut recordings) => self.of_marked(&mut recordings),
+            Measurements::Marked(recordings) => self.of_marked(&mut recordings.clone()),
             Measurements::External { recordings, map, map_file, lens } => {
                 let mut robot = self.robot.clone();
                 if let Some(lens) = lens {
-                    robot.camera.lens = *lens;
+                    robot.camera.lens = **lens;
                 }
-                let arm = self.surveyed((&map, &map_file), robot)?;
-                let mut prepared = self.of_external(&recordings, &map, arm)?;
+                let arm = self.surveyed((map, map_file), robot)?;
+                let mut prepared = self.of_external(recordings, map, arm)?;
                 if self.method != Method::Bundle {
                     prepared.data.keep_first_camera();
                 }

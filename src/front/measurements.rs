@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use armcal_belief::calib::read_marked;
 use armcal_core::input::{
-    ConditionKind, ConditionReading, ExternalDetection, ExternalRecording, InputError, InputMap, RawMeasurement,
-    Reading, Source, TagFrame, parse_input_map, read_camera_info, read_input_map,
+    ConditionKind, ConditionReading, ExternalDetection, ExternalRecording, InputError, InputMap, MAX_ROWS, MIN_APART_S,
+    RawMeasurement, Reading, Source, TagFrame, parse_input_map, read_camera_info, read_input_map,
 };
 use armcal_core::joints::JointCounts;
 use armcal_core::log::Recording;
@@ -16,14 +16,10 @@ use armcal_core::time::Stamp;
 
 use crate::front::CalibrateError;
 
-/// Poses at rest are this far apart at least, s: nearer ones would pass for one stream of readings of a moving arm.
-const MIN_APART_S: f64 = 0.3;
 /// Largest time of a pose, s: Unix times until the year 2096.
 const MAX_TIME_S: f64 = 4e9;
-/// Most poses: eleven days of one every ten seconds.
-const MAX_POSES: usize = 100_000;
 /// Largest oil temperature, deg C.
-const MAX_OIL_C: f64 = 200.0;
+pub const MAX_OIL_C: f64 = 200.0;
 
 /// Measurements of one arm.
 #[derive(Clone, Debug)]
@@ -83,9 +79,9 @@ impl Measurements {
     /// [`CalibrateError::Value`] for readings of another number of joints, values that are not finite, a tag twice in
     /// one pose, and times that are not apart.
     pub fn at_rest(robot: &Robot, poses: &[PoseAtRest]) -> Result<Self, CalibrateError> {
-        if poses.len() > MAX_POSES {
+        if poses.len() > MAX_ROWS {
             let n = poses.len();
-            return Err(CalibrateError::Value(format!("there are {n} poses; give at most {MAX_POSES} at once")));
+            return Err(CalibrateError::Value(format!("there are {n} poses; give at most {MAX_ROWS} at once")));
         }
         let Some((_, like)) = poses.iter().flat_map(|pose| &pose.tags).next() else {
             return Err(CalibrateError::Value("no pose has a tag: give at least three with tags".to_owned()));

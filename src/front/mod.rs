@@ -10,5 +10,5 @@ pub(crate) mod shared;
 
 pub use calibrator::Calibrator;
 pub use error::CalibrateError;
-pub use measurements::{Measurements, PoseAtRest};
+pub use measurements::{MAX_OIL_C, Measurements, PoseAtRest};
 pub use shared::{robot_folder, routine_file, set_shared_folder};

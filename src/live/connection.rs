@@ -53,7 +53,7 @@ pub struct Connection {
     pub pressure: String,
     /// `sensor_msgs/msg/Imu`.
     pub imu: String,
-    /// How the arm is told to stop.
+    /// Topic and service by which the arm is stopped.
     pub stop: StopWays,
     /// `None` where nobody has to hold a switch.
     pub deadman: Option<Deadman>,
@@ -133,7 +133,7 @@ impl CommandType {
     }
 }
 
-/// How the arm is told to stop; every way that is named is used.
+/// Topic and service by which the arm is stopped; each that is named is used.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct StopWays {

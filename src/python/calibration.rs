@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
+use armcal::front::MAX_OIL_C;
 use armcal::joints::JointCounts;
 use armcal::report::{About, Report, RunSummary, html};
 use armcal::sensor::Conditions;
@@ -54,7 +55,7 @@ pub fn calibrate(
         if let Some(prior) = &prior {
             calibrator = calibrator.prior(prior);
         }
-        let found = calibrator.calibrate(Arc::unwrap_or_clone(measured));
+        let found = calibrator.calibrate(&measured);
         (found, started.elapsed().as_secs_f64())
     })?;
     Calibration::new(&robot.inner, found.map_err(raised)?, wall_s)
@@ -80,7 +81,7 @@ impl Calibration {
     }
 
     fn conditions(&self, oil_c: Option<f64>, pressure_pa: Option<f64>) -> PyResult<Conditions> {
-        for (name, value, most) in [("oil_c", oil_c, 200.0), ("pressure_pa", pressure_pa, 2e8)] {
+        for (name, value, most) in [("oil_c", oil_c, MAX_OIL_C), ("pressure_pa", pressure_pa, 2e8)] {
             if value.is_some_and(|value| !value.is_finite() || value.abs() > most) {
                 return Err(wrong_value(format!("{name} must be within {most}; leave it out where it is not known")));
             }
@@ -97,10 +98,12 @@ impl Calibration {
     fn by_reading<'py>(
         &self,
         counts: &Bound<'py, PyAny>,
+        (oil_c, pressure_pa): (Option<f64>, Option<f64>),
         shape: &[usize],
-        number: impl Fn(&JointCounts) -> Vec<f64>,
+        number: impl Fn(&JointCounts, &Conditions) -> Vec<f64>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let py = counts.py();
+        let conditions = self.conditions(oil_c, pressure_pa)?;
         let (n, names) = (self.robot.n_joints(), self.robot.joint_names());
         let meaning = format!("({n},) or (n, {n}): a reading each for the joints {names:?}");
         let is_one = py.import("numpy")?.call_method1("ndim", (counts,))?.extract::<usize>()? == 1;
@@ -111,7 +114,7 @@ impl Calibration {
             return Err(wrong_value("counts has values that are not finite; leave such readings out"));
         }
         let rows = array.to_shape((array.len() / n, n)).map_err(|_| wrong_value(format!("give counts {meaning}")))?;
-        let of_row = |row: ArrayView1<'_, f64>| number(&JointCounts::from_fn(n, |joint| row[joint]));
+        let of_row = |row: ArrayView1<'_, f64>| number(&JointCounts::from_fn(n, |joint| row[joint]), &conditions);
         let each: Vec<f64> = rows.rows().into_iter().flat_map(of_row).collect();
         let first = (!is_one).then_some(rows.nrows());
         let full: Vec<usize> = first.into_iter().chain(shape.iter().copied()).collect();
@@ -242,8 +245,8 @@ impl Calibration {
         oil_c: Option<f64>,
         pressure_pa: Option<f64>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let conditions = self.conditions(oil_c, pressure_pa)?;
-        self.by_reading(counts, &[self.robot.n_joints()], |counts| self.arm.angles(counts, &conditions).to_vec())
+        let shape = [self.robot.n_joints()];
+        self.by_reading(counts, (oil_c, pressure_pa), &shape, |counts, at| self.arm.angles(counts, at).to_vec())
     }
 
     /// Pose of the tool (4, 4) or (n, 4, 4) in the frame of the base, m, by raw readings (j,) or (n, j).
@@ -254,8 +257,8 @@ impl Calibration {
         oil_c: Option<f64>,
         pressure_pa: Option<f64>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let conditions = self.conditions(oil_c, pressure_pa)?;
-        self.by_reading(counts, &[4, 4], |counts| by_rows(&self.arm.tool_pose(counts, &conditions).to_homogeneous()))
+        let pose = |counts: &JointCounts, at: &Conditions| by_rows(&self.arm.tool_pose(counts, at).to_homogeneous());
+        self.by_reading(counts, (oil_c, pressure_pa), &[4, 4], pose)
     }
 
     /// Covariance of the tool's position (3, 3) or (n, 3, 3) in the frame of the base, m^2, by raw readings: of the
@@ -267,8 +270,8 @@ impl Calibration {
         oil_c: Option<f64>,
         pressure_pa: Option<f64>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let conditions = self.conditions(oil_c, pressure_pa)?;
-        self.by_reading(counts, &[3, 3], |counts| by_rows(&self.arm.tool_covariance_m2(counts, &conditions)))
+        let covariance = |counts: &JointCounts, at: &Conditions| by_rows(&self.arm.tool_covariance_m2(counts, at));
+        self.by_reading(counts, (oil_c, pressure_pa), &[3, 3], covariance)
     }
 
     /// Writes the report, an HTML page that needs no other file.

@@ -39,6 +39,6 @@ pub use map::{
     parse_input_map, read_input_map,
 };
 pub use recording::ExternalRecording;
-pub use table::{TableColumn, TableContents, plain_key, read_table_contents, tag_number};
+pub use table::{MAX_ROWS, MIN_APART_S, TableColumn, TableContents, plain_key, read_table_contents, tag_number};
 pub use tags::{ExternalDetection, RawMeasurement, TagFrame};
 pub use task::{TaskFile, parse_task, read_task, task_schema};

@@ -31,8 +31,9 @@ mod yaml;
 pub use columns_seen::TableColumn;
 pub use contents::{TableContents, read_table_contents};
 use csv_text::csv_rows;
+pub use one_table::MIN_APART_S;
+pub use rows::{MAX_ROWS, plain_key, tag_number};
 use rows::{Rows, Wanted};
-pub use rows::{plain_key, tag_number};
 use yaml::yaml_rows;
 
 /// Reads a table, or two that the input map joins; each row is one pose at rest.

@@ -58,7 +58,7 @@ class Error(ValueError):
 def _shared_folder() -> _Path:
     """Robots and routines of the wheel, or of the repository that the package is in."""
     here = _Path(__file__).resolve().parent
-    return next((f for f in (here / "share", here.parents[2]) if (f / "robots").is_dir()), here / "share")
+    return next((f for f in (here / "share", *here.parents[2:3]) if (f / "robots").is_dir()), here / "share")
 
 
 _armcal.set_shared_folder(str(_shared_folder()))

@@ -159,6 +159,7 @@ def test_wrong_uses_of_a_calibration(cal, tmp_path, robot):
         with pytest.raises(armcal.Error) as caught:
             do()
         assert says in str(caught.value), str(caught.value)
+        assert caught.value.code and caught.value.remedy and caught.value.page
     with pytest.raises(AttributeError):
         cal.gain = 1
 

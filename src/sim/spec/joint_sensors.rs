@@ -55,7 +55,7 @@ table!(
         worn_dropout_per_s = 0.0, in 0.0..=100.0;
         /// Mean length of a drop-out. Assumed.
         dropout_mean_s = 0.05, in 1e-3..=100.0;
-        /// Steps that an encoder tells apart in a turn; 0 for as many as its word has.
+        /// Resolution of an encoder, steps per turn; 0: all steps of its word.
         encoder_steps_per_turn = 0.0, in 0.0..=1e9;
         /// Once-a-turn error of an encoder: the disc's distance from its axis over the radius of its lines.
         encoder_eccentricity_rad = 0.0, in 0.0..=0.1;

@@ -73,7 +73,7 @@ pub struct WorldSpec {
     /// does not say how large they are.
     #[serde(skip)]
     pub by_datasheet: [bool; 2],
-    /// What stands in the water and nobody has drawn: `[[world.obstacle]]`, as `[[obstacle]]`.
+    /// Obstacles that only the simulated world has, not the planner; the keys of `[[obstacle]]`.
     #[serde(skip_serializing_if = "UnmodelledObstacles::is_none")]
     pub obstacle: UnmodelledObstacles,
     /// What breaks: in the order of the routine's `fault` steps, then what has a time.

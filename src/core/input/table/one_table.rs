@@ -16,8 +16,8 @@ use crate::joints::JointCounts;
 use crate::robot::Robot;
 use crate::time::Stamp;
 
-/// Rows this close would pass for a stream of readings of a moving arm, s.
-const MIN_APART_S: f64 = 0.3;
+/// Poses at rest are this far apart at least, s: nearer ones would pass for readings of a moving arm.
+pub const MIN_APART_S: f64 = 0.3;
 /// Between rows without a time, s.
 pub(super) const ROW_S: f64 = 1.0;
 

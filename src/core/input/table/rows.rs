@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use crate::input::error::{BadPlace, InputError};
 
 /// Poses at rest: eleven days of one every ten seconds.
-pub(super) const MAX_ROWS: usize = 100_000;
+pub const MAX_ROWS: usize = 100_000;
 /// Columns of a table; those of poses and joints are some tens.
 pub(super) const MAX_COLUMNS: usize = 1000;
 
