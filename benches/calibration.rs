@@ -7,7 +7,8 @@ mod problems;
 use std::hint::black_box;
 
 use armcal::calib::bundle::{HyperparameterMode, estimate, least_squares};
-use armcal::calib::{JointParameters, PositionMethod, PositionProblem, SearchOptions, determined_by_variance};
+use armcal::calib::{PositionMethod, PositionProblem, SearchOptions, determined_by_variance};
+use armcal::model::JointParameters;
 use criterion::{Criterion, criterion_group, criterion_main};
 
 fn bundle(c: &mut Criterion) {

@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
-use armcal::calib::bundle::{BundleInput, HyperparameterMode, Hyperparameters, Model};
-use armcal::calib::{JointParameters, MeanCorners, Parameter, ParameterKind, TagMeasurement, TagObservation, View};
+use armcal::calib::bundle::{BundleInput, HyperparameterMode};
+use armcal::calib::{MeanCorners, TagMeasurement, TagObservation, View};
 use armcal::joints::{JointAngles, MAX_JOINTS};
 use armcal::kinematics::Chain;
+use armcal::model::{Block, Hyperparameters, JointParameters, Model, Parameter, ParameterKind};
 use armcal::optics::{CameraModel, square_corners};
 use armcal::robot::{CameraSpec, Robot, load};
 use armcal::sensor::ConditionChange;
@@ -75,18 +76,8 @@ fn model(robot: &Robot) -> Model {
         let terms = (0..N_TERMS).map(ParameterKind::Shape);
         [ParameterKind::Gain, ParameterKind::Offset].into_iter().chain(terms).collect()
     };
-    Model {
-        joints: (0..robot.n_joints()).map(kinds).collect(),
-        n_links: 0,
-        n_compliant: 0,
-        mount: true,
-        further_mounts: Vec::new(),
-        lens: false,
-        tags: true,
-        gripper_tag: false,
-        time_offset: false,
-        walk: None,
-    }
+    let blocks = [Block::Mount(0)].into_iter().chain(Block::tags(robot));
+    Model { joints: (0..robot.n_joints()).map(kinds).collect(), ..Model::of_blocks(0, blocks) }
 }
 
 /// The arm as it is: drawn from the priors of what has a column.
@@ -122,7 +113,8 @@ pub fn corners(n_views: u32, joint_std_rad: f64) -> Problem {
 pub fn corners_of_all(n_views: u32) -> Problem {
     let robot = robot();
     let (n, n_tags) = (robot.camera.mount.n_joints, robot.tags.len());
-    let model = Model { n_links: n, n_compliant: n, lens: true, ..model(&robot) };
+    let mut model = Model { n_links: n, n_compliant: n, ..model(&robot) };
+    model.blocks.insert(Block::Lens(0));
     corners_by(robot, model, n_views, Sight { joint_std_rad: 0.0, n_tags })
 }
 
@@ -159,7 +151,7 @@ fn draw(problem: &Problem, rng: &mut ChaCha8Rng) -> Truth {
     let mount = moved(&camera.mount.link_from_frame, camera.mount_std_m, camera.mount_std_rad, rng);
     let tags = robot.tags.iter();
     let tags = tags.map(|t| moved(t.base_from_tag.isometry(), t.position_std_m, t.rotation_std_rad, rng)).collect();
-    let lens = if problem.model.lens { lens(&robot.camera, rng) } else { robot.camera.lens };
+    let lens = if problem.model.has(Block::Lens(0)) { lens(&robot.camera, rng) } else { robot.camera.lens };
     Truth { chain: robot.chain.corrected(&parameters.links), parameters, lens, mount, tags }
 }
 

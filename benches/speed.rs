@@ -7,10 +7,10 @@ use std::path::Path;
 
 use armcal::calib::online::{DriftModel, FaultSearch, OnlineEstimator, OnlineSettings, ViewStream};
 use armcal::calib::{
-    JointParameters, Parameter, ParameterKind, PositionMethod, PositionProblem, SearchOptions, TagMeasurement,
-    TagObservation, View, minimum_distance,
+    PositionMethod, PositionProblem, SearchOptions, TagMeasurement, TagObservation, View, minimum_distance,
 };
 use armcal::log::read_recording;
+use armcal::model::{JointParameters, Parameter, ParameterKind};
 use armcal::plan::{ClearanceModel, Edge, JointErrorBounds};
 use armcal::robot::{Robot, Vehicle, load, load_vehicle};
 use armcal::routine::Scene;

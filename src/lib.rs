@@ -12,7 +12,7 @@
 //!
 //! | layer | modules | job |
 //! |---|---|---|
-//! | belief | [`calib`], [`tagmap`], [`plan`], [`verify`], [`session`] | estimates, plans, acts |
+//! | belief | [`model`], [`calib`], [`tagmap`], [`plan`], [`verify`], [`session`] | estimates, plans, acts |
 //! | meeting place | [`streams`], [`log`], [`routine`], [`input`] | messages, recordings, routines |
 //! | arm | [`robot`], [`sensor`], [`kinematics`], [`optics`]; `detect` (`images`) | nominal arm; tags in images |
 //! | base | [`joints`], [`spatial`], [`stats`], [`time`] | units and frames as types; random streams; stamps |
@@ -65,7 +65,7 @@
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]
 
-pub use armcal_belief::{calib, plan, session, tagmap, verify};
+pub use armcal_belief::{calib, model, plan, session, tagmap, verify};
 pub use armcal_core::{
     codes, input, joints, kinematics, log, optics, robot, routine, sensor, spatial, stats, streams, time,
 };

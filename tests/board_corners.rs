@@ -4,11 +4,11 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use armcal::calib::{
-    Calibration, CalibrationData, ExternalContext, Parameter, ParameterKind, PlainLandmark, Status, calibrate_data,
-    prepare_external,
+    Calibration, CalibrationData, ExternalContext, PlainLandmark, Status, calibrate_data, prepare_external,
 };
 use armcal::input::{parse_input_map, read_external};
 use armcal::log::{RecordingHeader, RecordingWriter, RosMessage, ros};
+use armcal::model::{Parameter, ParameterKind};
 use armcal::optics::{Chessboard, solve_board};
 use armcal::robot::Robot;
 use armcal::routine::Method;

@@ -1,6 +1,7 @@
 //! A tag on the gripper ties tool to camera: what the estimator makes of it, with known errors.
 
-use armcal::calib::{JointParameters, Status, associate, calibrate, mount_by_gripper_tag};
+use armcal::calib::{Status, associate, calibrate, mount_by_gripper_tag};
+use armcal::model::JointParameters;
 use armcal::robot::{Robot, load};
 use armcal::routine::Method;
 use armcal::spatial::log;

@@ -1,7 +1,8 @@
 //! What holds for any input: analytic Jacobians are derivatives, and nothing depends on the order of equal things.
 
-use armcal::calib::{JointParameters, Parameter, ParameterKind, PositionProblem, associate, calibrate};
+use armcal::calib::{PositionProblem, associate, calibrate};
 use armcal::kinematics::{IkGoal, IkSettings, JointLimits, solve_position};
+use armcal::model::{JointParameters, Parameter, ParameterKind};
 use armcal::routine::Method;
 use armcal::stats::stream_rng;
 use armcal::streams::{CaptureSet, JointAngles, Message};

@@ -13,7 +13,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use armcal::calib::bundle::{HyperparameterMode, least_squares};
-use armcal::calib::{JointParameters, PositionMethod, PositionProblem, SearchOptions};
+use armcal::calib::{PositionMethod, PositionProblem, SearchOptions};
+use armcal::model::JointParameters;
 use comfy_table::Table;
 
 const RELATIVE_GAIN: f64 = 1e-10;

@@ -4,7 +4,8 @@
 use std::fmt::Write;
 use std::ops::Range;
 
-use armcal::calib::{JointParameters, Parameter, TagMeasurement};
+use armcal::calib::TagMeasurement;
+use armcal::model::{JointParameters, Parameter};
 use armcal::robot::Robot;
 use armcal::sensor::ConditionChange;
 use nalgebra::Isometry3;

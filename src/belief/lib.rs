@@ -4,6 +4,8 @@
 
 pub mod calib;
 pub mod judge;
+mod measure;
+pub mod model;
 pub mod plan;
 pub mod session;
 #[cfg(test)]

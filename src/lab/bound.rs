@@ -10,11 +10,11 @@ use std::fmt::Write as _;
 
 use nalgebra::{DMatrix, DVector, Isometry3, Vector3};
 
-use armcal_belief::calib::bundle::{BundleInput, HyperparameterMode, Hyperparameters, Model, estimate};
+use armcal_belief::calib::bundle::{BundleInput, HyperparameterMode, estimate};
 use armcal_belief::calib::{
-    Calibration, JointParameters, MeanCorners, Parameter, ParameterCovariance, ParameterKind, Status, TagMeasurement,
-    TagObservation, View, associate, surveyed,
+    Calibration, MeanCorners, ParameterCovariance, Status, TagMeasurement, TagObservation, View, associate, surveyed,
 };
+use armcal_belief::model::{Block, Hyperparameters, JointParameters, JointPrior, Model, Parameter, ParameterKind};
 use armcal_belief::verify::{Belief, ReachRest, reaches};
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::kinematics::LinkCorrections;
@@ -145,18 +145,9 @@ impl Twin {
             true => vec![ParameterKind::Gain, ParameterKind::Offset],
             false => Vec::new(),
         };
-        let model = Model {
-            joints: (0..robot.n_joints()).map(kinds).collect(),
-            n_links: 0,
-            n_compliant: 0,
-            mount: true,
-            further_mounts: Vec::new(),
-            lens: false,
-            tags: true,
-            gripper_tag: false,
-            time_offset: false,
-            walk: None,
-        };
+        let blocks = [Block::Mount(0)].into_iter().chain(Block::tags(&robot));
+        let joints = (0..robot.n_joints()).map(kinds).collect();
+        let model = Model { joints, ..Model::of_blocks(0, blocks) };
         // Readings err by their noise alone.
         let scales = Hyperparameters { joint_std_rad: [EXACT_RAD; MAX_JOINTS], ..Hyperparameters::datasheet(&robot) };
         let columns: Vec<Parameter> = (0..robot.n_joints())
@@ -165,7 +156,7 @@ impl Twin {
         let mean = DVector::from_iterator(columns.len(), columns.iter().map(|p| parameters.get(*p)));
         let std = |p: &Parameter| scales.prior_std(&robot.sensors[p.joint], p.joint, p.kind);
         let info = DVector::from_iterator(columns.len(), columns.iter().map(|p| std(p).powi(-2)));
-        let joint_prior = Some((mean, DMatrix::from_diagonal(&info)));
+        let joint_prior = Some(JointPrior::of_parameters(mean, DMatrix::from_diagonal(&info)));
         let evidence = HyperparameterMode::Given;
         let input =
             BundleInput { robot: &robot, views: &views, model, scales, guess: parameters, joint_prior, evidence };

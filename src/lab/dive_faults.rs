@@ -10,7 +10,8 @@ use rand::{Rng, RngExt};
 use armcal_belief::calib::online::{
     Fault, Follower, OnlineEvent, OnlineSettings, Oracle, OracleGain, TagSet, ViewStream,
 };
-use armcal_belief::calib::{FindingKind, View, WornSpot};
+use armcal_belief::calib::{FindingKind, View};
+use armcal_belief::model::WornSpot;
 use armcal_core::log::Recording;
 use armcal_core::robot::{FailedJoint, Robot};
 use armcal_core::stats::{chi_square_above, stream_rng};

@@ -8,7 +8,8 @@ use std::fmt::Write as _;
 use nalgebra::Point3;
 use rand::RngExt;
 
-use armcal_belief::calib::{JointParameters, PositionMethod, PositionProblem, TagMeasurement, TagObservation, View};
+use armcal_belief::calib::{PositionMethod, PositionProblem, TagMeasurement, TagObservation, View};
+use armcal_belief::model::JointParameters;
 use armcal_belief::plan::{ClearanceModel, VisibilityModel};
 use armcal_charts::{Axis, Panel, Series, Style, svg};
 use armcal_core::joints::JointAngles;

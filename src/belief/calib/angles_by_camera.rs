@@ -3,8 +3,8 @@
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::Robot;
 
-use crate::calib::parameters::JointParameters;
 use crate::calib::views::view::{TagObservation, View};
+use crate::model::parameters::JointParameters;
 
 /// Tags farther than this from the survey hardly pull while an angle is searched for, m.
 const SEARCH_WIDTH_M: f64 = 0.1;

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use nalgebra::Vector3;
 
-use crate::calib::parameters::{Parameter, ParameterKind};
+use crate::model::parameters::{Parameter, ParameterKind};
 use armcal_core::kinematics::{AboutAxes, ArmLoads, Chain, LinkPoses, Sag};
 
 /// A bending arm at one configuration.

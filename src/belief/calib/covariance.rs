@@ -11,9 +11,9 @@ use nalgebra::{Const, DMatrix, DVector, Dyn, Matrix3, Matrix6, OMatrix, Vector3,
 
 use crate::calib::methods::gripper_tag::MountEstimate;
 use crate::calib::methods::position_problem::PositionProblem;
-use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::result::details::TargetPrediction;
 use crate::calib::views::view::{TagObservation, TaskRests};
+use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
 use armcal_core::kinematics::{IkGoal, IkSettings, JointLimits, solve_position};
 use armcal_core::robot::{FailedJoint, FailedKind, JointSensorSpec, Robot};
 use armcal_core::sensor::ConditionChange;

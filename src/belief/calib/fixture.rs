@@ -7,7 +7,8 @@ use rand_distr::{Distribution, StandardNormal};
 
 use crate::calib::result::calibration::Calibration;
 use crate::calib::result::covariance_file::CovarianceTable;
-use crate::calib::{JointParameters, Parameter, ParameterCovariance, ParameterKind, ReferenceTable, TermsTable};
+use crate::calib::{ParameterCovariance, ReferenceTable, TermsTable};
+use crate::model::{JointParameters, Parameter, ParameterKind};
 use armcal_core::robot::Robot;
 use armcal_core::sensor::{Conditions, Terms, shape_prior};
 use armcal_core::time::SIMULATION_EPOCH;

@@ -20,7 +20,6 @@ mod geometry_error;
 mod interim;
 mod methods;
 pub mod online;
-mod parameters;
 mod reading_error;
 mod refusal;
 mod refusal_conditions;
@@ -43,7 +42,6 @@ pub use methods::{
     SearchOptions, Solution, Unobservable, VarianceObjective, determined_by_variance, fisher_information, fit_stops,
     free_parameters, least_squares, minimum_distance, mount_by_gripper_tag,
 };
-pub use parameters::{JointParameters, Parameter, ParameterKind, WornSpot};
 pub use reading_error::{JointZero, MisreadReadings, ReadingError};
 pub use refusal::{InnovationQuantity, Refusal, in_files as refusals_in_files, with_advice};
 pub use refusal_conditions::{MIN_HELD_OUT_VIEWS, MIN_VIEWS_PER_PARAMETER, fewest_views};

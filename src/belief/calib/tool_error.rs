@@ -7,7 +7,7 @@
 use nalgebra::{DMatrix, Matrix3, Matrix6, SMatrix, SVector, Vector3, Vector6};
 
 use crate::calib::covariance::ParameterCovariance;
-use crate::calib::parameters::{Parameter, ParameterKind};
+use crate::model::parameters::{Parameter, ParameterKind};
 use armcal_core::kinematics::LinkPoses;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::{ArmSensors, ConditionChange, Conditions};

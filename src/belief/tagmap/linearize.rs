@@ -1,20 +1,21 @@
 //! Residuals, Jacobians and normal equations.
 //!
 //! A corner c (tag frame) of a tag at T (frame_from_tag) is seen by a camera at V (frame_from_camera) at
-//! `pixel = project(V^-1 T c)`. Both poses are perturbed on the right; with p = V^-1 T c and R the rotation of V^-1 T,
-//! `dp = [-I, [p]x] xi_V + R [I, -[c]x] xi_T`. Residual = whitened (measured - predicted).
+//! `pixel = project(X c)`, X = V^-1 T. Both poses are perturbed on the right, and a motion of the tag is one of the
+//! camera the other way: `xi_V = -Ad(X) xi_T`. Residual = whitened (measured - predicted).
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Matrix2x3, Matrix2x6, Matrix6, Vector2, Vector6};
+use nalgebra::{Isometry3, Matrix6, Point3, Vector2, Vector6};
 
+use crate::measure::ImagePoint;
 use crate::tagmap::attitude;
 use crate::tagmap::normal_equations::NormalEquations;
 use crate::tagmap::problem::{MapProblem, Observation, TagState};
 use crate::tagmap::sparse::Pattern;
 use armcal_core::numeric::Loss;
 use armcal_core::optics::CameraModel;
-use armcal_core::spatial::{adjoint, log, skew};
+use armcal_core::spatial::{adjoint, log};
 
 /// A corner that the lens does not see counts as one that is this many standard deviations off.
 const UNSEEN_SIGMAS: f64 = 1e4;
@@ -79,29 +80,29 @@ impl NormalEquations {
         let tag = &problem.tags[seen.tag];
         let camera = &problem.cameras[seen.camera];
         let camera_from_tag = block.pose.inv_mul(&tag.pose);
-        let rotation = *camera_from_tag.rotation.to_rotation_matrix().matrix();
+        let (mut h, mut g) = (Matrix6::zeros(), Vector6::zeros());
         for k in 0..4 {
-            let point = rotation * seen.corners_m[k] + camera_from_tag.translation.vector;
-            let Some((pixel, jacobian)) = camera.project_with_jacobian(&point) else {
+            let point = camera_from_tag * Point3::from(seen.corners_m[k]);
+            let Some(image) = ImagePoint::of(camera, &point.coords) else {
                 self.cost += loss.of(UNSEEN_SIGMAS * UNSEEN_SIGMAS).0;
                 continue;
             };
-            let residual = seen.whiten[k] * (seen.corners_px[k] - pixel);
+            let residual = seen.whiten[k] * (seen.corners_px[k] - image.pixel);
             let (cost, weight) = loss.of(residual.norm_squared());
             self.cost += cost;
-            let whitened: Matrix2x3<f64> = seen.whiten[k] * jacobian;
-            let turned = whitened * rotation;
-            let of_block = beside(&-whitened, &(whitened * skew(&point)));
-            let of_tag = beside(&turned, &(-turned * skew(&seen.corners_m[k])));
-            let weighted = of_block.transpose() * weight;
-            self.own[idx] += weighted * of_block;
-            self.own_right[idx] += weighted * residual;
-            if let Some(node) = tag.node {
-                self.cross[at] += weighted * of_tag;
-                let weighted = of_tag.transpose() * weight;
-                self.nodes[node] += weighted * of_tag;
-                self.nodes_right[node] += weighted * residual;
-            }
+            let rows = seen.whiten[k] * image.jacobian();
+            let weighted = rows.transpose() * weight;
+            h += weighted * rows;
+            g += weighted * residual;
+        }
+        self.own[idx] += h;
+        self.own_right[idx] += g;
+        if let Some(node) = tag.node {
+            // A motion of the tag is one of the camera the other way.
+            let by_tag = -adjoint(&camera_from_tag);
+            self.cross[at] += h * by_tag;
+            self.nodes[node] += by_tag.transpose() * (h * by_tag);
+            self.nodes_right[node] += by_tag.transpose() * g;
         }
     }
 
@@ -163,11 +164,4 @@ fn edges(problem: &MapProblem<'_>) -> std::collections::BTreeSet<(usize, usize)>
     }
     edges.extend(attitude::edges(problem));
     edges
-}
-
-fn beside(left: &Matrix2x3<f64>, right: &Matrix2x3<f64>) -> Matrix2x6<f64> {
-    let mut out = Matrix2x6::zeros();
-    out.fixed_view_mut::<2, 3>(0, 0).copy_from(left);
-    out.fixed_view_mut::<2, 3>(0, 3).copy_from(right);
-    out
 }

@@ -1,12 +1,13 @@
 //! Where the camera was, by the tags of one image whose places are known; and the same for a tag by its images.
 
-use nalgebra::{Isometry3, Matrix2x3, Matrix2x6, Matrix6, Vector6};
+use nalgebra::{Isometry3, Matrix6, Point3, Vector6};
 
+use crate::measure::{ImagePoint, TwistSums};
 use crate::tagmap::linearize::squares;
 use crate::tagmap::problem::Observation;
 use armcal_core::numeric::{Damping, LeastSquares, Loss, Proposal, StopRule, minimize};
 use armcal_core::optics::CameraModel;
-use armcal_core::spatial::{exp, skew};
+use armcal_core::spatial::{adjoint, exp};
 
 /// Width of the Cauchy loss by which starts are compared, px: a start is a few pixels off, a wrong one tens.
 const COMPARE_PX: f64 = 5.0;
@@ -97,26 +98,32 @@ fn step(
     seen: &[(&Observation, Isometry3<f64>)],
     frame_from_camera: &Isometry3<f64>,
 ) -> Option<Vector6<f64>> {
-    let loss = Loss::Cauchy { c: COMPARE_PX };
-    let mut normal = Matrix6::zeros();
-    let mut right = Vector6::zeros();
+    let (mut normal, mut right) = (Matrix6::zeros(), Vector6::zeros());
     for (observation, frame_from_tag) in seen {
         let camera_from_tag = frame_from_camera.inv_mul(frame_from_tag);
-        for (corner, measured) in observation.corners_m.iter().zip(&observation.corners_px) {
-            let point = camera_from_tag * nalgebra::Point3::from(*corner);
-            let camera = &cameras[observation.camera];
-            let Some((pixel, of_point)) = camera.project_with_jacobian(&point.coords) else { continue };
-            let residual = measured - pixel;
-            let (_, weight) = loss.of(residual.norm_squared());
-            let mut jacobian = Matrix2x6::zeros();
-            jacobian.fixed_view_mut::<2, 3>(0, 0).copy_from(&-of_point);
-            let of_turn: Matrix2x3<f64> = of_point * skew(&point.coords);
-            jacobian.fixed_view_mut::<2, 3>(0, 3).copy_from(&of_turn);
-            normal += jacobian.transpose() * jacobian * weight;
-            right += jacobian.transpose() * residual * weight;
-        }
+        let (h, g) = information(&cameras[observation.camera], observation, &camera_from_tag);
+        normal += h;
+        right += g;
     }
     normal.cholesky().map(|normal| normal.solve(&right))
+}
+
+/// Of one tag in one image on the camera's pose, under the comparing loss.
+fn information(
+    camera: &CameraModel,
+    seen: &Observation,
+    camera_from_tag: &Isometry3<f64>,
+) -> (Matrix6<f64>, Vector6<f64>) {
+    let loss = Loss::Cauchy { c: COMPARE_PX };
+    let mut sums = TwistSums::default();
+    for (corner, measured) in seen.corners_m.iter().zip(&seen.corners_px) {
+        let point = camera_from_tag * Point3::from(*corner);
+        let Some(image) = ImagePoint::of(camera, &point.coords) else { continue };
+        let residual = measured - image.pixel;
+        let (_, weight) = loss.of(residual.norm_squared());
+        image.by_twist.iter().zip(&residual).for_each(|(row, residual)| sums.add(row, *residual, weight));
+    }
+    sums.weighted(1.0)
 }
 
 /// A tag's pose for which its images fit best, out of the solutions of each, and its misfit; `images` with
@@ -156,25 +163,14 @@ fn tag_step(
     images: &[(&Observation, Isometry3<f64>)],
     frame_from_tag: &Isometry3<f64>,
 ) -> Option<Vector6<f64>> {
-    let loss = Loss::Cauchy { c: COMPARE_PX };
-    let mut normal = Matrix6::zeros();
-    let mut right = Vector6::zeros();
+    let (mut normal, mut right) = (Matrix6::zeros(), Vector6::zeros());
     for (observation, frame_from_camera) in images {
         let camera_from_tag = frame_from_camera.inv_mul(frame_from_tag);
-        let turn = camera_from_tag.rotation.to_rotation_matrix();
-        for (corner, measured) in observation.corners_m.iter().zip(&observation.corners_px) {
-            let point = camera_from_tag * nalgebra::Point3::from(*corner);
-            let camera = &cameras[observation.camera];
-            let Some((pixel, of_point)) = camera.project_with_jacobian(&point.coords) else { continue };
-            let residual = measured - pixel;
-            let (_, weight) = loss.of(residual.norm_squared());
-            let turned = of_point * turn.matrix();
-            let mut jacobian = Matrix2x6::zeros();
-            jacobian.fixed_view_mut::<2, 3>(0, 0).copy_from(&turned);
-            jacobian.fixed_view_mut::<2, 3>(0, 3).copy_from(&(-turned * skew(corner)));
-            normal += jacobian.transpose() * jacobian * weight;
-            right += jacobian.transpose() * residual * weight;
-        }
+        let (h, g) = information(&cameras[observation.camera], observation, &camera_from_tag);
+        // A motion of the tag is one of the camera the other way.
+        let by_tag = -adjoint(&camera_from_tag);
+        normal += by_tag.transpose() * (h * by_tag);
+        right += by_tag.transpose() * g;
     }
     normal.cholesky().map(|normal| normal.solve(&right))
 }

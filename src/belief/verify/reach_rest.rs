@@ -107,7 +107,7 @@ pub fn reaches(recording: &Recording, robot: &Robot, beliefs: &[Belief<'_>]) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calib::JointParameters;
+    use crate::model::JointParameters;
     use armcal_core::streams::{JointSensorSample, Mark, ReachTask, TemperatureSample, Thermometer};
     use armcal_core::time::SIMULATION_EPOCH;
 

@@ -10,10 +10,9 @@
 use crate::falsified::capture::Capture;
 use crate::falsified::error::FalsifiedError;
 use crate::falsified::perturbation::{CaptureHalf, Perturbation, SoundReading, falsified_robot};
-use armcal_belief::calib::bundle::{
-    BundleInput, HyperparameterMode, Hyperparameters, Model, estimate, least_squares, model_for, reference,
-};
-use armcal_belief::calib::{JointParameters, MeanCorners, TagMeasurement, TagObservation, View, associate};
+use armcal_belief::calib::bundle::{BundleInput, HyperparameterMode, estimate, least_squares, model_for, reference};
+use armcal_belief::calib::{MeanCorners, TagMeasurement, TagObservation, View, associate};
+use armcal_belief::model::{Hyperparameters, JointParameters, Model};
 use armcal_core::kinematics::LinkPoses;
 use armcal_core::optics::square_corners;
 use armcal_core::robot::Robot;

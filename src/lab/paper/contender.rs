@@ -1,11 +1,9 @@
 //! A method with its settings.
 
 use crate::paper::scene::{Draw, Guess, Setting};
-use armcal_belief::calib::bundle::{BundleInput, HyperparameterMode, Hyperparameters, Model, estimate};
-use armcal_belief::calib::{
-    Gauge, JointParameters, Parameter, ParameterKind, PositionMethod, PositionProblem, PositionSearch, Scaling,
-    SearchOptions, Solution,
-};
+use armcal_belief::calib::bundle::{BundleInput, HyperparameterMode, estimate};
+use armcal_belief::calib::{Gauge, PositionMethod, PositionProblem, PositionSearch, Scaling, SearchOptions, Solution};
+use armcal_belief::model::{Hyperparameters, JointParameters, Model, Parameter, ParameterKind};
 use armcal_core::numeric::Outcome;
 
 /// What solves.
@@ -93,18 +91,8 @@ impl MethodVariant {
 fn bundle(draw: &Draw, guess: &JointParameters) -> Solution {
     let n_seen = draw.robot.camera.mount.n_joints;
     let kinds = |joint| if joint < n_seen { vec![ParameterKind::Gain, ParameterKind::Offset] } else { Vec::new() };
-    let model = Model {
-        joints: (0..draw.robot.n_joints()).map(kinds).collect(),
-        n_links: 0,
-        n_compliant: 0,
-        mount: false,
-        further_mounts: Vec::new(),
-        lens: false,
-        tags: false,
-        gripper_tag: false,
-        time_offset: false,
-        walk: None,
-    };
+    let joints = (0..draw.robot.n_joints()).map(kinds).collect();
+    let model = Model { joints, ..Model::of_blocks(0, []) };
     let input = BundleInput {
         robot: &draw.robot,
         views: &draw.views,

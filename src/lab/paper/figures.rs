@@ -6,7 +6,8 @@ use crate::paper::PaperStudyError;
 use crate::paper::contender::MethodVariant;
 use crate::paper::scene::{Draw, Setting};
 use crate::paper::trials::PaperRow;
-use armcal_belief::calib::{Gauge, JointParameters};
+use armcal_belief::calib::Gauge;
+use armcal_belief::model::JointParameters;
 use armcal_charts::{Axis, Panel, Series, Style, svg};
 use armcal_core::robot::Robot;
 

@@ -6,7 +6,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::paper::PaperStudyError;
-use armcal_belief::calib::{JointParameters, Parameter, ParameterKind, TagMeasurement, TagObservation, View};
+use armcal_belief::calib::{TagMeasurement, TagObservation, View};
+use armcal_belief::model::{JointParameters, Parameter, ParameterKind};
 use armcal_core::joints::JointAngles;
 use armcal_core::kinematics::Attachment;
 use armcal_core::robot::{Robot, SurveyedTag, TagSurvey};

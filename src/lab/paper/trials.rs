@@ -91,7 +91,7 @@ fn pair(
     Ok(Paired {
         trials: contenders.iter().map(trial).collect(),
         bound_m2: (setting.noise_m > 0.0).then(|| bound_m2(&draw, setting.noise_m)).flatten(),
-        before_m: draw.tool_rms_m(&armcal_belief::calib::JointParameters::default()),
+        before_m: draw.tool_rms_m(&armcal_belief::model::JointParameters::default()),
     })
 }
 

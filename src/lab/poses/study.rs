@@ -2,10 +2,9 @@
 
 use rayon::prelude::*;
 
-use armcal_belief::calib::bundle::{
-    BundleInput, Estimate, HyperparameterMode, Hyperparameters, estimate, model_for, reference,
-};
-use armcal_belief::calib::{JointParameters, ParameterCovariance, View};
+use armcal_belief::calib::bundle::{BundleInput, Estimate, HyperparameterMode, estimate, model_for, reference};
+use armcal_belief::calib::{ParameterCovariance, View};
+use armcal_belief::model::{Hyperparameters, JointParameters};
 use armcal_belief::plan::{
     ClearanceModel, JointErrorBounds, PlanError, PosePool, PoseRequest, TargetRequest, VisibilityModel, plan_targets,
 };

@@ -6,9 +6,10 @@ use serde::Serialize;
 
 use armcal_belief::calib::associate;
 use armcal_belief::calib::{
-    JointParameters, MIN_VIEWS, MIN_VIEWS_PER_PARAMETER, MarkedSpans, Parameter, PositionProblem, View,
-    free_parameters, identify_scales, mount_by_gripper_tag, surveyed,
+    MIN_VIEWS, MIN_VIEWS_PER_PARAMETER, MarkedSpans, PositionProblem, View, free_parameters, identify_scales,
+    mount_by_gripper_tag, surveyed,
 };
+use armcal_belief::model::{JointParameters, Parameter};
 use armcal_core::log::{LogError, Recording, TopicMap, scan_recording};
 use armcal_core::robot::Robot;
 

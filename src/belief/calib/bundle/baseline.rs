@@ -9,10 +9,13 @@
 
 use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
-use crate::calib::bundle::model::{Hyperparameters, Model, further_mounts, is_loose, reference};
+use crate::calib::bundle::model::{further_mounts, reference};
 use crate::calib::bundle::model_selection::CAMERA_ERROR_STD;
-use crate::calib::parameters::JointParameters;
 use crate::calib::views::view::{TagObservation, View};
+use crate::model::blocks::{Block, is_loose};
+use crate::model::estimated::Model;
+use crate::model::parameters::JointParameters;
+use crate::model::scales::Hyperparameters;
 use armcal_core::robot::Robot;
 
 /// Ways to do without a calibration of joints: the datasheet's arm, least squares, and joint errors by the evidence.
@@ -58,18 +61,9 @@ impl Baseline {
 
     /// Before any view.
     fn start(robot: &Robot, views: &[View]) -> Self {
-        let model = Model {
-            joints: vec![Vec::new(); robot.n_joints()],
-            n_links: 0,
-            n_compliant: 0,
-            mount: is_loose(&robot.camera),
-            further_mounts: further_mounts(robot, views),
-            lens: false,
-            tags: true,
-            gripper_tag: false,
-            time_offset: false,
-            walk: None,
-        };
+        let first = [Block::Mount(0)].into_iter().filter(|_| is_loose(&robot.camera));
+        let blocks = first.chain(further_mounts(robot, views)).chain(Block::tags(robot));
+        let model = Model::of_blocks(robot.n_joints(), blocks);
         let mut scales = Hyperparameters::datasheet(robot);
         let has_corners = views.iter().flat_map(|view| &view.tags).any(TagObservation::is_in_pixels);
         let camera_error_std = has_corners.then_some(CAMERA_ERROR_STD);

@@ -48,7 +48,7 @@ impl NormalEquations {
                 self.few_cells::<6>(first + a, tag).iter_mut().zip(&by.data.0[0]).for_each(|(cell, by)| *cell -= by);
             }
         }
-        if let Some(lens) = layout.lens {
+        if let Some(lens) = columns.lens {
             let by_lens = (sums.by_lens - sums.h_sum * (sums.m * sums.by_lens)).transpose();
             for (a, twist) in twists.column_iter().enumerate() {
                 let by = by_lens * twist;

@@ -26,7 +26,6 @@ use crate::calib::error::CalibError;
 use crate::calib::methods::Solution;
 use crate::calib::methods::observability::{Unobservable, grouped_names};
 use crate::calib::methods::position_problem::PositionProblem;
-use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::refusal::Refusal;
 use crate::calib::result::assemble::{Evidence, Fit, Provenance, assemble, is_near, noise_dof, refusal_by_priors};
 use crate::calib::result::calibration::{Calibration, Status};
@@ -37,6 +36,8 @@ use crate::calib::views::calibration_data::CalibrationData;
 use crate::calib::views::view::{ObservationRejection, Touch, View};
 use crate::calib::wrong_input::{WrongInput, wrong_input};
 use crate::judge::{TargetError, U95Table};
+use crate::model::blocks::Block;
+use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
 use armcal_core::codes::Code;
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::{JointSensorSpec, Robot, SurveyedTag};
@@ -349,7 +350,7 @@ impl<'a> BundleCalibration<'a> {
         let without_failed = setup.without_failed(&estimate.parameters());
         let mut with_steps = setup.with_estimated_angles(estimate, &without_failed);
         let mut datasheet = setup.applied.robot.clone();
-        if estimate.problem.layout.lens.is_some() {
+        if estimate.has(Block::Lens(0)) {
             datasheet.camera.lens = estimate.as_found(robot).camera.lens;
             with_steps.iter_mut().for_each(|view| view.see_through(&datasheet));
         }
@@ -629,7 +630,7 @@ fn cross_validated(
             .collect();
         // Where no sensor tells an angle, the view's own tags tell where to linearize, with nothing of other folds.
         for (_, view) in &mut with_places {
-            if all.model.lens {
+            if all.model.has(Block::Lens(0)) {
                 view.see_through(&as_found);
             }
             set_by_camera(&as_found, view, &found.parameters());

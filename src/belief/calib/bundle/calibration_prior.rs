@@ -15,11 +15,14 @@ use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::failures::{Failure, FailureAdjusted};
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::bundle::model::reference;
-use crate::calib::bundle::model::{Hyperparameters, Model};
-use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::refusal::{MIN_USED_SHARE, Refusal};
 use crate::calib::result::calibration::Calibration;
 use crate::calib::views::view::View;
+use crate::model::blocks::Block;
+use crate::model::estimated::Model;
+use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
+use crate::model::prior::JointPrior;
+use crate::model::scales::Hyperparameters;
 use armcal_core::robot::{JointSensorSpec, Robot};
 use armcal_core::sensor::Conditions;
 use armcal_core::time::Stamp;
@@ -135,7 +138,7 @@ impl CalibrationPrior {
             ..model(applied, &guess.reference, &known.parameters)
         };
         let mount = prior.camera_mount.as_ref().and_then(|table| Some((table.link_from_camera()?, mount_rows(prior)?)));
-        let mount = mount.filter(|_| model.mount);
+        let mount = mount.filter(|_| model.has(Block::Mount(0)));
         if let Some((link_from_camera, rows)) = &mount {
             robot.camera.mount.link_from_frame = *link_from_camera;
             let rms = |from: usize| {
@@ -172,9 +175,18 @@ impl CalibrationPrior {
             model: self.model.clone(),
             scales: self.scales.clone(),
             guess: self.guess,
-            joint_prior: Some((self.mean.clone(), Cholesky::new(covariance.clone())?.inverse())),
+            joint_prior: Some(self.known(Cholesky::new(covariance.clone())?.inverse())),
             evidence,
         })
+    }
+
+    /// With this information on the parameters, and on the mount if the prior has it.
+    fn known(&self, information: DMatrix<f64>) -> JointPrior {
+        let n = self.model.parameters().len();
+        let mean = self.mean.rows(0, n).into_owned();
+        let has_mount = self.mean.len() > n;
+        let of = if has_mount { JointPrior::with_mount } else { JointPrior::of_parameters };
+        of(mean, information)
     }
 
     /// Gains and offsets that the prior knows no better than half as well as the datasheet.
@@ -214,7 +226,8 @@ impl CalibrationPrior {
         let n = state.joint.len();
         moved.rows_mut(0, n).copy_from(&(&state.joint - self.mean.rows(0, n)));
         if self.mean.len() == n + 6 {
-            let by: Vector6<f64> = armcal_core::spatial::log(&found.problem.prior.mount.inv_mul(&state.mount));
+            let by: Vector6<f64> =
+                armcal_core::spatial::log(&found.problem.prior.mean.pose(Block::Mount(0)).inv_mul(state.mount(0)));
             moved.rows_mut(n, 6).copy_from(&by);
         }
         moved
@@ -354,7 +367,7 @@ fn chi_square_999(degrees_of_freedom: usize) -> f64 {
 
 /// Rows of the camera mount: its covariance with the joints' parameters and itself, for calibration.toml.
 pub fn with_mount_rows(found: &Estimate<'_>) -> Option<DMatrix<f64>> {
-    let at = found.problem.layout.mount?;
+    let at = found.problem.layout.at(Block::Mount(0))?;
     let n = found.problem.layout.n_joint();
     debug_assert_eq!(at, n);
     Some(found.wide_covariance().view((0, 0), (n + 6, n + 6)).into_owned())

@@ -24,11 +24,13 @@ use crate::calib::bundle::evidence::SCALE_BOUNDS;
 use crate::calib::bundle::input::BundleInput;
 use crate::calib::bundle::model_selection::log_evidence_of_all;
 use crate::calib::bundle::schur::Group;
-use crate::calib::bundle::score_test::{GeometryElement, Score};
+use crate::calib::bundle::score_test::Score;
 use crate::calib::bundle::tags::group::moved_group;
 use crate::calib::bundle::tags::identity::{TagFault, common_size_ratio};
+use crate::model::blocks::Block;
+use crate::model::scales::MAX_CAMERAS;
 use armcal_core::joints::MAX_JOINTS;
-use armcal_core::robot::{MAX_FURTHER_CAMERAS, Robot};
+use armcal_core::robot::Robot;
 
 mod sag_start;
 
@@ -47,9 +49,7 @@ pub(crate) struct LinkStart {
     n_links: usize,
     /// Over robot.toml's: shift, turn.
     multiples: [[f64; 2]; MAX_JOINTS],
-    mount_scale: [f64; 2],
-    /// The same of each further camera.
-    further_mount_scale: [[f64; 2]; MAX_FURTHER_CAMERAS],
+    mount_scale: [[f64; 2]; MAX_CAMERAS],
     /// Gain of these sizes over that of all links at their stated sigmas, nats.
     beyond_stated_nats: f64,
 }
@@ -76,7 +76,7 @@ impl Drawing {
     /// Gives `input` the columns of this drawing.
     pub(crate) fn apply(&self, input: &mut BundleInput<'_>) {
         if self.has_lens {
-            input.model.lens = true;
+            input.model.blocks.insert(Block::Lens(0));
             input.scales.lens_scale = LENS_SCALE;
         }
         if let Some(start) = &self.sag {
@@ -90,7 +90,6 @@ impl Drawing {
             *turn = by_turn * priors.link_rotation_std_rad;
         }
         input.scales.mount_scale = start.mount_scale;
-        input.scales.further_mount_scale = start.further_mount_scale;
     }
 
     /// The drawing of most evidence, if another than this explains the views much better, and by more than
@@ -198,9 +197,7 @@ impl Estimate<'_> {
         let score = self.score();
         let n_links = self.n_seen_joints();
         let priors = [robot.geometry.link_position_std_m, robot.geometry.link_rotation_std_rad];
-        let mount = [robot.camera.mount_std_m, robot.camera.mount_std_rad];
-        let of_joints = (0..n_links).flat_map(|joint| [0, 1].map(|kind| (GeometryElement::Joint(joint), kind)));
-        let of_mount = self.problem.layout.mount.iter().flat_map(|_| [0, 1].map(|kind| (GeometryElement::Mount, kind)));
+        let of_joints = (0..n_links).flat_map(|joint| [0, 1].map(|kind| (joint, kind)));
         let mut best = (0.0, Loosened::AllLinks, 1.0);
         let mut consider = |score: &Score, columns: &[(usize, f64)], element| {
             for multiple in MULTIPLES {
@@ -211,21 +208,16 @@ impl Estimate<'_> {
             }
         };
         let three = |first: usize, std: f64| (first..first + 3).map(move |column| (column, std));
-        for (element, kind) in of_joints.chain(of_mount) {
-            let (first, std) = match element {
-                GeometryElement::Joint(joint) => (6 * joint + 3 * kind, priors[kind]),
-                GeometryElement::Mount => (6 * MAX_JOINTS + 3 * kind, mount[kind]),
-            };
-            consider(&score, &three(first, std).collect::<Vec<_>>(), Loosened::Element(element, kind));
+        for (joint, kind) in of_joints {
+            let columns: Vec<_> = three(6 * joint + 3 * kind, priors[kind]).collect();
+            consider(&score, &columns, Loosened::Joint(joint, kind));
         }
-        for (further, camera) in robot.further_cameras.iter().enumerate() {
-            if self.problem.layout.mount_of(further + 1).is_none() {
-                continue;
-            }
-            let score = self.score_of(|group| by_mount_of(group, further + 1));
+        for number in (0..=robot.further_cameras.len()).filter(|&number| self.has(Block::Mount(number))) {
+            let camera = robot.camera_at(number);
+            let score = self.score_of(|group| by_mount_of(group, number));
             for (kind, std) in [camera.mount_std_m, camera.mount_std_rad].into_iter().enumerate() {
                 let columns: Vec<_> = three(3 * kind, std).collect();
-                consider(&score, &columns, Loosened::FurtherMount(further, kind));
+                consider(&score, &columns, Loosened::Mount(number, kind));
             }
         }
         let all = (0..n_links).flat_map(|joint| [0, 1].map(|kind| three(6 * joint + 3 * kind, priors[kind]))).flatten();
@@ -236,14 +228,12 @@ impl Estimate<'_> {
         let mut start = LinkStart {
             n_links,
             multiples: [[1.0; 2]; MAX_JOINTS],
-            mount_scale: [1.0; 2],
-            further_mount_scale: [[1.0; 2]; MAX_FURTHER_CAMERAS],
+            mount_scale: [[1.0; 2]; MAX_CAMERAS],
             beyond_stated_nats: gain - by_stated,
         };
         match element {
-            Loosened::Element(GeometryElement::Joint(joint), kind) => start.multiples[joint][kind] = multiple,
-            Loosened::Element(GeometryElement::Mount, kind) => start.mount_scale[kind] = multiple,
-            Loosened::FurtherMount(further, kind) => start.further_mount_scale[further][kind] = multiple,
+            Loosened::Joint(joint, kind) => start.multiples[joint][kind] = multiple,
+            Loosened::Mount(number, kind) => start.mount_scale[number][kind] = multiple,
             Loosened::AllLinks => start.multiples = [[multiple; 2]; MAX_JOINTS],
         }
         (start, gain)
@@ -253,10 +243,10 @@ impl Estimate<'_> {
 /// What has wider priors than the drawing's at the start.
 #[derive(Clone, Copy)]
 enum Loosened {
-    /// Shift (0) or turn (1) of a joint's place or of the first camera's mount.
-    Element(GeometryElement, usize),
-    /// The same of a further camera, by its number among these.
-    FurtherMount(usize, usize),
+    /// Shift (0) or turn (1) of a joint's place.
+    Joint(usize, usize),
+    /// The same of the mount of the camera of that number.
+    Mount(usize, usize),
     AllLinks,
 }
 

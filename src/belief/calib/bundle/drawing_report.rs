@@ -16,10 +16,10 @@ use crate::calib::geometry_error::{BASE, ErrorKind, GeometryError};
 use crate::calib::refusal::Refusal;
 use crate::calib::result::calibration::Calibration;
 use crate::calib::wrong_input::margin_hint;
+use crate::model::blocks::Block;
 use armcal_core::codes::{Coded, Warning};
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::Robot;
-use armcal_core::spatial::log;
 
 /// Sigmas, of stated size and estimate together, from which an element is named: three axes together exceed four as
 /// seldom (0.1 %) as one axis 3.3.
@@ -61,7 +61,7 @@ struct Departure {
 impl Estimate<'_> {
     /// Writes what is not as drawn to `calibration`, the most telling first; `task`: angles at which the tool matters.
     pub(crate) fn report_drawing(&self, drawing: &Drawing, task: &[JointAngles], calibration: &mut Calibration) {
-        let all = self.link_departures(task).chain(self.mount_departures()).chain(self.further_mount_departures());
+        let all = self.link_departures(task).chain(self.mount_departures());
         let mut found: Vec<Departure> = all.collect();
         found.sort_by(|a, b| b.weight.total_cmp(&a.weight));
         let n = found.iter().filter(|departure| departure.weight > NAMED_SIGMAS).count();
@@ -126,28 +126,25 @@ impl Estimate<'_> {
     }
 
     fn mount_departures(&self) -> impl Iterator<Item = Departure> {
-        let at = self.problem.layout.mount;
-        at.into_iter().flat_map(|at| self.departures_of_mount(0, at, "camera mount".to_owned()))
-    }
-
-    fn further_mount_departures(&self) -> impl Iterator<Item = Departure> {
-        let cameras = self.problem.robot.further_cameras.iter().zip(&self.problem.layout.further_mounts).enumerate();
-        cameras.filter_map(|(further, (camera, at))| Some((further + 1, camera, (*at)?))).flat_map(
-            |(number, camera, at)| {
-                let name = format!("mount of the camera {}", camera.name);
-                self.departures_of_mount(number, at, name)
-            },
-        )
+        let mounts = self.problem.layout.blocks().filter_map(|(block, at)| match block {
+            Block::Mount(number) => Some((number, at)),
+            _ => None,
+        });
+        mounts.flat_map(|(number, at)| self.departures_of_mount(number, at))
     }
 
     /// Shift and turn of the mount of the camera of that number, whose columns begin at `at`.
-    fn departures_of_mount(&self, number: usize, at: usize, name: String) -> [Departure; 2] {
+    fn departures_of_mount(&self, number: usize, at: usize) -> [Departure; 2] {
         let camera = self.problem.robot.camera_at(number);
+        let name = match number {
+            0 => "camera mount".to_owned(),
+            _ => format!("mount of the camera {}", camera.name),
+        };
         let priors = [camera.mount_std_m, camera.mount_std_rad];
-        let drawn = number.checked_sub(1).map(|further| self.problem.prior.further_mounts[further].0);
-        let off = log(&drawn.unwrap_or(self.problem.prior.mount).inv_mul(self.solved.state.mount_of(number)));
+        let block = Block::Mount(number);
+        let off = self.solved.state.blocks[block].off(&self.problem.prior.mean[block]);
         [(at, 0), (at + 3, 1)].map(|(first, kind)| {
-            let size = off.fixed_rows::<3>(3 * kind).into_owned();
+            let size = Vector3::from_fn(|axis, _| off[3 * kind + axis]);
             let covariance = self.covariance3(first);
             Departure {
                 kind: FindingKind::CameraMount,
@@ -166,8 +163,8 @@ impl Estimate<'_> {
 
     /// A focal length that differs from robot.toml's by more than a repair may.
     fn lens_beyond_bound(&self) -> Option<Refusal> {
-        let at = self.problem.layout.lens?;
-        let (lens, stated) = (&self.solved.state.lens, &self.problem.prior.lens);
+        let at = self.problem.layout.at(Block::Lens(0))?;
+        let (lens, stated) = (self.solved.state.lens(0), self.problem.prior.mean.lens(0));
         let ([found_px, stated_px], stated_std) =
             ([lens, stated].map(|lens| lens.focal_px()[0]), self.problem.robot.camera.lens_priors.focal_std);
         let ratio = found_px / stated_px;
@@ -184,8 +181,8 @@ impl Estimate<'_> {
 
     /// The lens, where it has columns.
     fn lens_finding(&self) -> Option<(Finding, String)> {
-        let at = self.problem.layout.lens?;
-        let (lens, drawn) = (&self.solved.state.lens, &self.problem.prior.lens);
+        let at = self.problem.layout.at(Block::Lens(0))?;
+        let (lens, drawn) = (self.solved.state.lens(0), self.problem.prior.mean.lens(0));
         let std = |k: usize| self.posterior.covariance[(at + k, at + k)].max(0.0).sqrt();
         let ratio = lens.focal_px()[0] / drawn.focal_px()[0] - 1.0;
         let shift = [0, 1].map(|k| lens.center_px()[k] - drawn.center_px()[k]);

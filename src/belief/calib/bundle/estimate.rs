@@ -3,16 +3,19 @@
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Vector6};
 
-use crate::calib::bundle::evidence::{Marginal, Posterior, ScaleTarget, change, joint_info, updated};
+use crate::calib::bundle::evidence::{Marginal, Posterior, ScaleTarget, change, updated};
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
-use crate::calib::bundle::model::{Hyperparameters, Model};
 use crate::calib::bundle::outliers::{Outlier, outliers, reject};
-use crate::calib::bundle::priors::{mount_std, prior};
-use crate::calib::bundle::problem::{BundleProblem, ObservationTerm, State, WeightedMeasurement, parameters_of};
+use crate::calib::bundle::problem::{BundleProblem, parameters_of};
 use crate::calib::bundle::robust_start::{RobustStart, robust_start, straight_sensor_std};
 use crate::calib::bundle::solve::{LOOSE, Solved, TIGHT, solve, until};
-use crate::calib::parameters::{JointParameters, Parameter};
 use crate::calib::result::details::FitDetails;
+use crate::measure::{ObservationTerm, WeightedMeasurement};
+use crate::model::blocks::Block;
+use crate::model::estimated::Model;
+use crate::model::parameters::{JointParameters, Parameter};
+use crate::model::scales::Hyperparameters;
+use crate::model::state::State;
 use armcal_core::joints::JointAngles;
 use armcal_core::numeric::{Loss, Outcome};
 use armcal_core::robot::Robot;
@@ -53,12 +56,10 @@ const CONVERGED_CHANGE: f64 = 0.01;
 #[must_use]
 pub fn estimate<'a>(input: &BundleInput<'a>) -> Option<Estimate<'a>> {
     let RobustStart { parameters: start, steps, mut iterations } = robust_start(input);
-    let prior = |scales: &Hyperparameters| prior(input, scales);
-    let mut problem = BundleProblem::new(input, prior(&input.scales));
+    let mut problem = BundleProblem::new(input, input.prior());
     let first_state = problem.start(&input.guess);
     let mut state = problem.start(&start);
     problem.set_steps(&mut state, &steps);
-    state.tags.clone_from(&first_state.tags);
     // Robustly on the corners; straight sensors leave what the datasheet says.
     problem.scales.joint_std_rad = straight_sensor_std(input);
     let mut solved = solve(&problem, state, Loss::Cauchy { c: CORNER_WIDTH }, LOOSE);
@@ -79,11 +80,7 @@ pub fn estimate<'a>(input: &BundleInput<'a>) -> Option<Estimate<'a>> {
             let next = updated(&problem, &solved.state, &solved.normal, &posterior, &ScaleTarget::fitted(&first));
             settled &= change(&next, &problem.scales) < CONVERGED_CHANGE;
             if !settled {
-                problem.set_scales(next);
-                if input.joint_prior.is_none() {
-                    problem.prior.joint_info = joint_info(&problem, &problem.scales);
-                    problem.prior.mount_std = mount_std(input.robot, &problem.scales);
-                }
+                problem.take_scales(next, input.joint_prior.is_none());
             }
         }
         round += 1;
@@ -128,8 +125,7 @@ pub struct LeastSquares {
 /// Minimizes until one more step would save less than `relative_gain` of the cost.
 #[must_use]
 pub fn least_squares(input: &BundleInput<'_>, relative_gain: f64) -> LeastSquares {
-    let prior = prior(input, &input.scales);
-    let problem = BundleProblem::new(input, prior);
+    let problem = BundleProblem::new(input, input.prior());
     let start = problem.start(&input.guess);
     let solved = solve(&problem, start, Loss::Square, until(TIGHT.max_iterations, relative_gain));
     LeastSquares {
@@ -223,7 +219,7 @@ impl Estimate<'_> {
     /// before the fitted noise, px; `None` without corners.
     pub(crate) fn mean_corner_std_px(&self) -> Option<f64> {
         let variance = |observation: &ObservationTerm| match &observation.data {
-            WeightedMeasurement::Corners { info, .. } if observation.is_used => Some(1.0 / info),
+            WeightedMeasurement::Corners(corners) if observation.is_used => Some(1.0 / corners.info),
             WeightedMeasurement::Board { points } if observation.is_used => {
                 Some(points.iter().map(|point| 1.0 / point.info).sum::<f64>() / points.len() as f64)
             }
@@ -249,8 +245,8 @@ impl Estimate<'_> {
     /// How much later the joint sensors' stamps are than the camera's, and one sigma; `None` where it is not estimated.
     #[must_use]
     pub fn time_offset_s(&self) -> Option<[f64; 2]> {
-        let at = self.problem.layout.time?;
-        Some([self.solved.state.time_s, self.posterior.covariance[(at, at)].sqrt()])
+        let at = self.problem.layout.at(Block::Clock)?;
+        Some([self.solved.state.clock_s(), self.posterior.covariance[(at, at)].sqrt()])
     }
 
     /// The joints' parameters in the order of [`Self::joint_covariance`].
@@ -266,44 +262,49 @@ impl Estimate<'_> {
         self.wide_covariance().view((0, 0), (n, n)).into_owned()
     }
 
-    /// `link_from_camera`, and its covariance (translation m, rotation rad, on the right); the prior's where it is not
-    /// estimated.
+    /// `link_from_camera` of the camera of that number, and its covariance (translation m, rotation rad, on the right);
+    /// the prior's where it is not estimated.
     #[must_use]
-    pub fn mount(&self) -> (Isometry3<f64>, Matrix6<f64>) {
-        let covariance = match self.problem.layout.mount {
+    pub fn mount(&self, camera: usize) -> (Isometry3<f64>, Matrix6<f64>) {
+        let block = Block::Mount(camera);
+        let covariance = match self.problem.layout.at(block) {
             Some(at) => self.wide_covariance().fixed_view::<6, 6>(at, at).into_owned(),
-            None => Matrix6::from_diagonal(&Vector6::from(self.problem.prior.mount_std.map(|std| std * std))),
+            None => {
+                let std = Vector6::from_fn(|k, _| self.problem.prior.std[block][k]);
+                Matrix6::from_diagonal(&std.component_mul(&std))
+            }
         };
-        (self.solved.state.mount, covariance)
+        (*self.solved.state.mount(camera), covariance)
     }
 
-    /// The same of a further camera, by its number among these; `None` where it has no column.
+    /// Whether a block is estimated.
     #[must_use]
-    pub fn further_mount(&self, further: usize) -> Option<(Isometry3<f64>, Matrix6<f64>)> {
-        let at = self.problem.layout.further_mounts.get(further).copied().flatten()?;
-        let covariance = self.wide_covariance().fixed_view::<6, 6>(at, at).into_owned();
-        Some((self.solved.state.further_mounts[further], covariance))
+    pub fn has(&self, block: Block) -> bool {
+        self.problem.layout.at(block).is_some()
     }
 
     /// `base_from_tag` of each of the robot's tags, and its covariance (on the right); `None` for tags that were not
     /// seen.
     #[must_use]
     pub fn tag(&self, tag_idx: usize) -> (Isometry3<f64>, Option<Matrix6<f64>>) {
-        let at = self.problem.layout.tags[tag_idx];
+        let at = self.problem.layout.at(Block::Tag(tag_idx));
         let covariance = at.map(|at| self.posterior.covariance.fixed_view::<6, 6>(at, at).into_owned());
-        (self.solved.state.tags[tag_idx], covariance)
+        (*self.solved.state.tag(tag_idx), covariance)
     }
 
     /// `robot` with camera and tags where they were found.
     #[must_use]
     pub fn as_found(&self, robot: &Robot) -> Robot {
-        let (mount, covariance) = self.mount();
+        let (mount, covariance) = self.mount(0);
         let mut found = self.parameters().with_links(robot.clone()).with_camera_at(mount, &covariance);
-        if self.problem.layout.lens.is_some() {
-            found.camera.lens = self.solved.state.lens;
+        let state = &self.solved.state;
+        let cameras = std::iter::once(&mut found.camera).chain(&mut found.further_cameras);
+        for (number, camera) in cameras.enumerate() {
+            camera.mount.link_from_frame = *state.mount(number);
+            if self.has(Block::Lens(number)) {
+                camera.lens = *state.lens(number);
+            }
         }
-        let mounts = self.solved.state.further_mounts.iter();
-        mounts.zip(&mut found.further_cameras).for_each(|(at, camera)| camera.mount.link_from_frame = *at);
         for (tag_idx, tag) in found.tags.iter_mut().enumerate() {
             let (pose, covariance) = self.tag(tag_idx);
             tag.base_from_tag = Pose::from_isometry(pose);

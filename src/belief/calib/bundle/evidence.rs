@@ -4,13 +4,17 @@
 //! are told by the data, and `s^2 = (sum x^2 + nu s0^2) / (gamma + nu)` (MacKay 1992, eq. 4.9), with nu
 //! pseudo-observations of the datasheet's s0. The noise: `(sum chi^2 + nu) / (N - gamma_all + nu)`.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector6};
+use nalgebra::{Cholesky, DMatrix, Dyn};
 
 use crate::calib::bundle::linearize::NormalEquations;
-use crate::calib::bundle::model::{Hyperparameters, SHAPE_LENGTH};
-use crate::calib::bundle::problem::{BundleProblem, N_VIEW_PARAMETERS, State, WeightedMeasurement};
-use crate::calib::bundle::walk_modes::mode_std;
-use crate::calib::parameters::ParameterKind;
+use crate::calib::bundle::problem::{BundleProblem, N_VIEW_PARAMETERS};
+use crate::measure::WeightedMeasurement;
+use crate::model::blocks::{Block, Std};
+use crate::model::parameters::ParameterKind;
+use crate::model::prior::at_least;
+use crate::model::scales::{Hyperparameters, SHAPE_LENGTH};
+use crate::model::state::State;
+use crate::model::walk_modes::mode_std;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::numeric::Loss;
 use armcal_core::sensor::shape_prior;
@@ -306,23 +310,18 @@ impl ScaleUpdate<'_, '_> {
         if layout.links.is_empty() {
             return;
         }
-        let prior = &problem.prior;
-        if let Some(at) = layout.mount {
-            let off = log(&prior.mount.inv_mul(&state.mount));
-            next.mount_scale = self.mount_scale((at, &prior.mount_std), &off, problem.scales.mount_scale);
-        }
-        for (further, (mean, std)) in prior.further_mounts.iter().enumerate() {
-            let Some(at) = layout.mount_of(further + 1) else { continue };
-            let (off, scale) =
-                (log(&mean.inv_mul(&state.further_mounts[further])), problem.scales.further_mount_scale[further]);
-            next.further_mount_scale[further] = self.mount_scale((at, std), &off, scale);
+        for (block, at) in layout.blocks() {
+            let Block::Mount(camera) = block else { continue };
+            let off = state.blocks[block].off(&problem.prior.mean[block]);
+            let (std, scale) = (&problem.prior.std[block], problem.scales.mount_scale[camera]);
+            next.mount_scale[camera] = self.mount_scale((at, std), &off, scale);
         }
     }
 
     /// Of a mount whose columns begin at `at`, whose prior is `std`, and which is `off` its drawing: shift and turn.
-    fn mount_scale(&self, (at, std): (usize, &[f64; 6]), off: &Vector6<f64>, now: [f64; 2]) -> [f64; 2] {
+    fn mount_scale(&self, (at, std): (usize, &Std), off: &Std, now: [f64; 2]) -> [f64; 2] {
         let Self { posterior, .. } = *self;
-        let unit = std.map(BundleProblem::at_least);
+        let unit = std.map(at_least);
         [0, 1].map(|kind| {
             let (mut sums, scale) = (Sums::default(), now[kind]);
             for row in 3 * kind..3 * kind + 3 {
@@ -410,9 +409,7 @@ enum NoiseKind {
 impl NoiseKind {
     fn n_coordinates(self, data: &WeightedMeasurement) -> usize {
         match (self, data) {
-            (Self::Corner, WeightedMeasurement::Corners { .. } | WeightedMeasurement::Board { .. }) => {
-                data.n_coordinates()
-            }
+            (Self::Corner, WeightedMeasurement::Corners(_) | WeightedMeasurement::Board { .. }) => data.n_coordinates(),
             (Self::Position, WeightedMeasurement::Position { .. } | WeightedMeasurement::Pose { .. })
             | (Self::Rotation, WeightedMeasurement::Pose { .. }) => 3,
             _ => 0,
@@ -449,24 +446,16 @@ fn share_of(problem: &BundleProblem<'_>, state: &State, normal: &NormalEquations
 /// How many parameters, the views' own among them, the data determine.
 pub(crate) fn determined(problem: &BundleProblem<'_>, posterior: &Posterior) -> f64 {
     let layout = &problem.layout;
-    let n = problem.prior.joint_info.nrows();
-    let mount = layout.mount.filter(|_| n == layout.n_joint());
+    let information = &problem.prior.information.matrix;
+    let n = information.nrows();
     let prior_share = |at: usize, std: f64| {
-        if std.is_finite() { posterior.covariance[(at, at)] / BundleProblem::at_least(std).powi(2) } else { 0.0 }
+        if std.is_finite() { posterior.covariance[(at, at)] / at_least(std).powi(2) } else { 0.0 }
     };
     let mut gamma = layout.n as f64;
-    gamma -= posterior.covariance.view((0, 0), (n, n)).component_mul(&problem.prior.joint_info).sum();
-    let mut poses = vec![(mount, problem.prior.mount_std), (layout.gripper_tag, problem.prior.gripper_tag_std)];
-    poses.extend(layout.tags.iter().copied().zip(problem.prior.tags_std.iter().copied()));
-    let further = problem.prior.further_mounts.iter().map(|(_, std)| *std);
-    poses.extend(layout.further_mounts.iter().copied().zip(further));
-    for (at, std) in poses.into_iter().filter_map(|(at, std)| Some((at?, std))) {
-        gamma -= (0..6).map(|k| prior_share(at + k, std[k])).sum::<f64>();
+    gamma -= posterior.covariance.view((0, 0), (n, n)).component_mul(information).sum();
+    for (_, at, std) in problem.prior.by_std(layout) {
+        gamma -= std.iter().enumerate().map(|(k, std)| prior_share(at + k, *std)).sum::<f64>();
     }
-    if let Some(at) = layout.lens {
-        gamma -= (0..8).map(|k| prior_share(at + k, problem.prior.lens_std[k])).sum::<f64>();
-    }
-    gamma -= layout.time.map_or(0.0, |at| prior_share(at, problem.prior.time_std_s));
     for (view, own) in problem.views.iter().zip(&posterior.own) {
         for (joint, variance) in own.iter().take(MAX_JOINTS).enumerate().filter(|(_, v)| **v > 0.0) {
             gamma += (1.0 - variance / problem.joint_error_var(view, joint)).clamp(0.0, 1.0);
@@ -483,15 +472,6 @@ impl PartialEq for Sums {
     fn eq(&self, other: &Self) -> bool {
         self.squares == other.squares && self.gamma == other.gamma
     }
-}
-
-/// The prior's information on the joints' parameters under `scales`.
-pub(crate) fn joint_info(problem: &BundleProblem<'_>, scales: &Hyperparameters) -> DMatrix<f64> {
-    let info = problem.layout.parameters.iter().map(|p| {
-        let std = scales.prior_std(&problem.robot.sensors[p.joint], p.joint, p.kind);
-        BundleProblem::at_least(std).powi(-2)
-    });
-    DMatrix::from_diagonal(&DVector::from_iterator(problem.layout.n_joint(), info))
 }
 
 /// The largest relative change of any scale.
@@ -512,8 +492,7 @@ pub(crate) fn change(a: &Hyperparameters, b: &Hyperparameters) -> f64 {
         all.extend(s.walk_std_rad);
         all.extend(s.link_std.iter().flatten());
         all.extend(s.compliance_std);
-        all.extend(s.mount_scale);
-        all.extend(s.further_mount_scale.iter().flatten());
+        all.extend(s.mount_scale.iter().flatten());
         all.extend(s.camera_error_std.into_iter().flatten());
         all
     };

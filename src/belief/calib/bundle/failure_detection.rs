@@ -15,11 +15,11 @@ use crate::calib::bundle::failures::{
 use crate::calib::bundle::input::HyperparameterMode;
 use crate::calib::bundle::model_selection::log_evidence_of_all;
 use crate::calib::bundle::outliers::rejected;
-use crate::calib::bundle::problem::ObservationTerm;
 use crate::calib::bundle::setup::BundleSetup;
-use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::result::calibration::Calibration;
 use crate::calib::views::view::View;
+use crate::measure::ObservationTerm;
+use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
 use armcal_core::robot::{FailedKind, Robot};
 use armcal_core::stats::quantile;
 
@@ -271,7 +271,7 @@ pub(crate) fn score(found: &Estimate<'_>) -> f64 {
     };
     let mut sum: f64 = observations.map(of_observation).sum();
     let off = &found.solved.state.joint - &problem.prior.joint_mean;
-    sum += (&problem.prior.joint_info * &off).dot(&off);
+    sum += (&problem.prior.information.matrix * &off).dot(&off);
     sum += PER_STEP * problem.layout.parameters.iter().filter(|p| p.is_step()).count() as f64;
     for (view, errors) in problem.views.iter().zip(&found.solved.state.joint_error) {
         for (joint, error) in errors.iter().enumerate().take(problem.n_seen_joints) {

@@ -7,10 +7,11 @@
 use crate::calib::angles_by_camera::set_by_camera;
 use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
-use crate::calib::bundle::model::{Hyperparameters, Model};
 use crate::calib::bundle::model::{model_for, reference};
-use crate::calib::parameters::{JointParameters, ParameterKind};
 use crate::calib::views::view::View;
+use crate::model::estimated::Model;
+use crate::model::parameters::{JointParameters, ParameterKind};
+use crate::model::scales::Hyperparameters;
 use armcal_core::robot::{FailedJoint, FailedKind, Robot};
 use armcal_core::stats::quantile;
 use armcal_core::units::Unit;

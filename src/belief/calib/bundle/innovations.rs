@@ -7,16 +7,18 @@
 //! camera of each view free, what is left is the noise within the views; the difference is chi-square with six numbers
 //! a view: how well cameras are foretold.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Isometry3};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::input::BundleInput;
 use crate::calib::bundle::linearize::NormalEquations;
-use crate::calib::bundle::observation_term::unseen_chi2;
 use crate::calib::bundle::outliers::Outlier;
-use crate::calib::bundle::problem::{BundleProblem, ObservationTerm, State, WeightedMeasurement};
+use crate::calib::bundle::problem::BundleProblem;
 use crate::calib::result::metrics::ViewContainment;
 use crate::calib::views::view::View;
+use crate::measure::{ObservationTerm, WeightedMeasurement, unseen_chi2};
+use crate::model::blocks::Block;
+use crate::model::state::State;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::numeric::Loss;
 use armcal_core::stats::chi_square_quantile;
@@ -73,8 +75,8 @@ impl Estimate<'_> {
         for (at, (view_idx, view)) in left_out.iter().enumerate() {
             let observations = problem.views[at].observations.clone();
             for (observation, tag) in problem.observations[observations].iter_mut().zip(&view.tags) {
-                let is_known =
-                    problem.layout.tags.iter().all(Option::is_none) || problem.layout.tags[observation.tag].is_some();
+                let layout = &problem.layout;
+                let is_known = layout.tags().next().is_none() || layout.at(Block::Tag(observation.tag)).is_some();
                 let mut used = [is_known; 4];
                 for out in outliers.iter().filter(|out| out.view_idx == *view_idx && out.tag_id == tag.id) {
                     match out.corner {
@@ -85,11 +87,7 @@ impl Estimate<'_> {
                 observation.set_used(used);
             }
         }
-        let state = State {
-            joint_error: vec![[0.0; MAX_JOINTS]; views.len()],
-            camera_error: vec![Isometry3::identity(); views.len()],
-            ..self.solved.state.clone()
-        };
+        let state = self.solved.state.with_views(views.len());
         // A tag at the border may be foretold to lie beyond it.
         let mut normal = NormalEquations::new(&problem);
         normal.update(&problem, &state, Loss::Square);
@@ -128,26 +126,18 @@ impl Estimate<'_> {
     fn chi2_of_view(&self, input: &BundleInput<'_>, view: &[View], observations: Vec<ObservationTerm>) -> Option<f64> {
         let mut problem = self.data_only(input, view);
         problem.observations = observations;
-        let state = State {
-            joint_error: vec![[0.0; MAX_JOINTS]],
-            camera_error: vec![Isometry3::identity()],
-            ..self.solved.state.clone()
-        };
+        let state = self.solved.state.with_views(1);
         self.with_data(&problem, &state).map(|(_, chi2)| chi2)
     }
 
     /// `views` in this estimate's columns, without any prior but the views' own.
     fn data_only<'a>(&self, input: &BundleInput<'a>, views: &'a [View]) -> BundleProblem<'a> {
         let mut prior = self.problem.prior.clone();
-        prior.joint_info.fill(0.0);
-        (prior.mount_std, prior.gripper_tag_std) = ([f64::INFINITY; 6], [f64::INFINITY; 6]);
-        (prior.time_std_s, prior.lens_std) = (f64::INFINITY, [f64::INFINITY; 8]);
-        prior.tags_std.fill([f64::INFINITY; 6]);
-        prior.further_mounts.iter_mut().for_each(|(_, std)| *std = [f64::INFINITY; 6]);
+        prior.information.matrix.fill(0.0);
+        prior.forget(|_| true);
         let scales = self.problem.scales.clone();
-        let mut problem = BundleProblem::new(&BundleInput { views, scales, ..input.clone() }, prior);
-        problem.layout = self.problem.layout.clone();
-        problem
+        let input = BundleInput { views, scales, ..input.clone() };
+        BundleProblem::with_layout(&input, self.problem.layout.clone(), prior)
     }
 
     /// The data of `problem` linearized at `state` and joined to this estimate; and chi-square of their innovations.
@@ -212,9 +202,9 @@ fn camera_numbers(problem: &BundleProblem<'_>, view_idx: usize) -> usize {
     for observation in used {
         match observation.data {
             WeightedMeasurement::Position { .. } => points += 1,
-            WeightedMeasurement::Corners { .. }
-            | WeightedMeasurement::Pose { .. }
-            | WeightedMeasurement::Board { .. } => poses += 1,
+            WeightedMeasurement::Corners(_) | WeightedMeasurement::Pose { .. } | WeightedMeasurement::Board { .. } => {
+                poses += 1
+            }
         }
     }
     match (poses, points) {

@@ -10,10 +10,12 @@
 use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, SVector, Vector6};
 
 use crate::calib::bundle::body_twists::{BodySums, body_twists, sag_twist};
-use crate::calib::bundle::observation_term::{LensInformation, PoseInformation, right_jacobian_inverse};
-use crate::calib::bundle::problem::{BundleProblem, N_VIEW_PARAMETERS, State};
+use crate::calib::bundle::problem::{BundleProblem, N_VIEW_PARAMETERS};
 use crate::calib::bundle::schur::{Columns, Directions, Group, MOUNT, N_DIRECTIONS, SchurBlock, TIME};
 use crate::calib::bundle::time_error::TimeError;
+use crate::measure::{LensInformation, PoseInformation, right_jacobian_inverse};
+use crate::model::blocks::Block;
+use crate::model::state::State;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::kinematics::LinkCorrections;
 use armcal_core::numeric::Loss;
@@ -88,9 +90,8 @@ impl NormalEquations {
 
     /// Linearizes `problem` at `state`.
     pub(crate) fn update(&mut self, problem: &BundleProblem<'_>, state: &State, loss: Loss) {
-        let n = problem.layout.n;
         // A prior of all columns is copied in the place of zeros.
-        let is_full = problem.prior.joint_info.nrows() == n && n > problem.layout.n_joint();
+        let is_full = problem.prior.is_full();
         if is_full {
             self.start_with_full_prior(problem, state);
         } else {
@@ -131,7 +132,7 @@ impl NormalEquations {
         self.add_common(&columns, &(along * (q * directions)));
         self.add_common_right(&columns, &(along * (g_sum - h_sum * shift)));
         self.add_tags(&columns, &infos, &directions, &Eliminated { block: own, m, shift, m_h_sum });
-        if let Some(at) = problem.layout.lens {
+        if let Some(at) = columns.lens {
             let lens = LensSums {
                 at,
                 infos: &infos,
@@ -208,18 +209,16 @@ impl NormalEquations {
             let observation = &problem.observations[at];
             let (pose, column) = match &problem.robot.gripper_tag {
                 Some(tag) if observation.tag == problem.robot.tags.len() => {
-                    (group.poses.link(tag.mount.n_joints) * state.gripper_tag, problem.layout.gripper_tag)
+                    let pose = group.poses.link(tag.mount.n_joints) * state.gripper_tag();
+                    (pose, problem.layout.at(Block::GripperTag))
                 }
-                _ => (state.tags[observation.tag], problem.layout.tags[observation.tag]),
+                _ => (*state.tag(observation.tag), problem.layout.at(Block::Tag(observation.tag))),
             };
             let camera_from_tag = group.base_from_camera.inv_mul(&pose);
-            if problem.layout.lens.is_some() {
+            if problem.layout.at(Block::Lens(group.camera)).is_some() {
                 self.lens_infos.push(LensInformation::zeros());
             }
-            let camera = problem.views[group.view_idx].camera;
-            // A further camera's lens is as robot.toml has it.
-            let by_lens = self.lens_infos.last_mut().filter(|_| camera == 0);
-            let lens = problem.lens_of(camera, state);
+            let (by_lens, lens) = (self.lens_infos.last_mut(), state.lens(group.camera));
             let of = PoseInformation::of(&observation.data, &camera_from_tag, lens, problem.scales.noise, by_lens);
             self.infos.push(of.unwrap_or_else(|| PoseInformation::unseen(&observation.data)));
             let Some(info) = self.infos.last_mut() else { continue };

@@ -8,11 +8,11 @@
 //! is left to explain, `chi2 / (n - 2)` (Birge 1932, with the same mean).
 
 use crate::calib::bundle::estimate::Estimate;
-use crate::calib::bundle::evidence::{Marginal, Posterior, ScaleTarget, joint_info, updated};
+use crate::calib::bundle::evidence::{Marginal, Posterior, ScaleTarget, updated};
 use crate::calib::bundle::innovations::Innovations;
 use crate::calib::bundle::linearize::NormalEquations;
-use crate::calib::bundle::model::{Hyperparameters, Model};
-use crate::calib::bundle::priors::mount_std;
+use crate::model::estimated::Model;
+use crate::model::scales::Hyperparameters;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::numeric::Loss;
 use nalgebra::DMatrix;
@@ -28,11 +28,8 @@ impl Estimate<'_> {
         }
         let mut problem = self.problem.clone();
         let target = ScaleTarget::mean(first);
-        problem.set_scales(updated(&problem, &self.solved.state, &self.solved.normal, &self.posterior, &target));
-        if self.has_own_priors {
-            problem.prior.joint_info = joint_info(&problem, &problem.scales);
-            problem.prior.mount_std = mount_std(problem.robot, &problem.scales);
-        }
+        let scales = updated(&problem, &self.solved.state, &self.solved.normal, &self.posterior, &target);
+        problem.take_scales(scales, self.has_own_priors);
         let mut normal = NormalEquations::new(&problem);
         normal.update(&problem, &self.solved.state, Loss::Square);
         let factor = chi2 / (n - 2.0);
@@ -49,11 +46,7 @@ impl Estimate<'_> {
         let problem = &mut self.problem;
         let target = ScaleTarget::mean(first);
         let scales = updated(problem, &self.solved.state, &self.solved.normal, &self.posterior, &target);
-        problem.set_scales(scales);
-        if self.has_own_priors {
-            problem.prior.joint_info = joint_info(problem, &problem.scales);
-            problem.prior.mount_std = mount_std(problem.robot, &problem.scales);
-        }
+        problem.take_scales(scales, self.has_own_priors);
         self.solved.normal.update(problem, &self.solved.state, Loss::Square);
     }
 

@@ -12,11 +12,14 @@ use nalgebra::Cholesky;
 use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::input::BundleInput;
 use crate::calib::bundle::linearize::NormalEquations;
-use crate::calib::bundle::model::TIME_JITTER_STD_S;
 use crate::calib::bundle::outliers::{Rejected, rejected};
-use crate::calib::bundle::problem::{BundleProblem, WeightedMeasurement};
+use crate::calib::bundle::problem::BundleProblem;
 use crate::calib::bundle::solve::{TIGHT, solve};
-use crate::calib::parameters::ParameterKind;
+use crate::measure::WeightedMeasurement;
+use crate::model::blocks::Block;
+use crate::model::parameters::ParameterKind;
+use crate::model::prior::at_least;
+use crate::model::scales::TIME_JITTER_STD_S;
 
 /// A term that not every recording has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,7 +84,7 @@ fn candidates(input: &BundleInput<'_>) -> Vec<OptionalTerm> {
     if input.scales.camera_error_std.is_none() && input.views.iter().any(positions) {
         out.push(OptionalTerm::CameraError);
     }
-    if moves && !input.model.time_offset {
+    if moves && !input.model.has(Block::Clock) {
         out.push(OptionalTerm::TimeOffset);
     }
     // A prior has its own columns.
@@ -93,7 +96,7 @@ fn candidates(input: &BundleInput<'_>) -> Vec<OptionalTerm> {
 
 /// With the offset between the clocks goes what an image's stamp is off beside it.
 pub(crate) fn estimate_clock(input: &mut BundleInput<'_>) {
-    input.model.time_offset = true;
+    input.model.blocks.insert(Block::Clock);
     input.scales.time_jitter_std_s = TIME_JITTER_STD_S;
 }
 
@@ -141,18 +144,15 @@ pub(crate) fn log_evidence(problem: &BundleProblem<'_>, normal: &NormalEquations
         Cholesky::new(matrix.clone()).map(|f| 2.0 * f.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>())
     };
     let Some(of_normal) = log_det(&normal.matrix) else { return f64::NEG_INFINITY };
-    let further = problem.layout.further_mounts.iter().zip(&problem.prior.further_mounts);
-    let of_further_mounts: f64 = further.filter_map(|(at, (_, std))| at.map(|_| log_sum(std))).sum();
-    let of_prior = log_det(&problem.prior.joint_info).unwrap_or(f64::NEG_INFINITY)
-        - 2.0 * problem.layout.time.map_or(0.0, |_| problem.prior.time_std_s.ln())
-        - 2.0 * problem.layout.lens.map_or(0.0, |_| log_sum(&problem.prior.lens_std))
-        - 2.0 * problem.layout.mount.map_or(0.0, |_| log_sum(&problem.prior.mount_std))
-        - 2.0 * of_further_mounts;
+    let of_information = log_det(&problem.prior.information.matrix).unwrap_or(f64::NEG_INFINITY);
+    // The tags' priors are the same under all models.
+    let by_std = problem.prior.by_std(&problem.layout).filter(|(block, ..)| !block.is_tag());
+    let of_prior = of_information - 2.0 * by_std.map(|(.., std)| log_sum(std)).sum::<f64>();
     let of_views: f64 = normal.eliminated.iter().map(|own| own.log_ratio).sum();
     let log_noise = |data: &WeightedMeasurement| {
         let [position, rotation] = [problem.scales.position_std_m, problem.scales.rotation_std_rad].map(f64::ln);
         match data {
-            WeightedMeasurement::Corners { .. } | WeightedMeasurement::Board { .. } => {
+            WeightedMeasurement::Corners(_) | WeightedMeasurement::Board { .. } => {
                 data.n_coordinates() as f64 * problem.scales.noise.ln()
             }
             WeightedMeasurement::Position { .. } => 3.0 * position,
@@ -165,7 +165,7 @@ pub(crate) fn log_evidence(problem: &BundleProblem<'_>, normal: &NormalEquations
 }
 
 fn log_sum(std: &[f64]) -> f64 {
-    std.iter().map(|std| BundleProblem::at_least(*std).ln()).sum()
+    std.iter().map(|std| at_least(*std).ln()).sum()
 }
 
 /// With what is rejected at the cost that it is rejected at, so that estimates that reject others compare.

@@ -14,10 +14,12 @@ use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
 use crate::calib::bundle::input::BundleInput;
 use crate::calib::bundle::linearize::NormalEquations;
-use crate::calib::bundle::priors::prior;
-use crate::calib::bundle::problem::{BundleProblem, Layout};
+use crate::calib::bundle::problem::BundleProblem;
 use crate::calib::bundle::robust_start::robust_start;
-use crate::calib::parameters::ParameterKind;
+use crate::model::blocks::Block;
+use crate::model::layout::Layout;
+use crate::model::parameters::ParameterKind;
+use crate::model::prior::{Prior, at_least};
 use armcal_core::numeric::Loss;
 use armcal_core::robot::Robot;
 
@@ -65,11 +67,10 @@ const NAMED: f64 = 0.3;
 #[must_use]
 pub fn observability(input: &BundleInput<'_>) -> Option<Observability> {
     let start = robust_start(input);
-    let mut priors = prior(input, &input.scales);
-    let layout = Layout::new(input.robot, &input.model, input.views);
+    let (mut prior, layout) = (input.prior(), input.layout());
     let kept = |column: usize| {
         layout.parameters.get(column).map_or_else(
-            || !layout.tags.iter().flatten().any(|at| (*at..at + 6).contains(&column)),
+            || !layout.block_of(column).is_some_and(|(block, _)| matches!(block, Block::Tag(_))),
             |p| !matches!(p.kind, ParameterKind::Shape(_)) && !p.is_past() && !p.kind.is_of_body(),
         )
     };
@@ -77,17 +78,15 @@ pub fn observability(input: &BundleInput<'_>) -> Option<Observability> {
     if wanted.is_empty() {
         return None;
     }
-    let sigma = sigmas(&layout, input, &priors);
+    let sigma = sigmas(&layout, input, &prior);
     // A warm start's prior holds the mount, too.
-    let with_mount = layout.n_joint()..priors.joint_info.nrows();
+    let with_mount = layout.n_joint()..prior.n_covered();
     for column in (0..layout.n_joint()).filter(|&column| kept(column)).chain(with_mount) {
-        priors.joint_info.row_mut(column).fill(0.0);
-        priors.joint_info.column_mut(column).fill(0.0);
+        prior.information.matrix.row_mut(column).fill(0.0);
+        prior.information.matrix.column_mut(column).fill(0.0);
     }
-    (priors.mount_std, priors.gripper_tag_std) = ([f64::INFINITY; 6], [f64::INFINITY; 6]);
-    (priors.time_std_s, priors.lens_std) = (f64::INFINITY, [f64::INFINITY; 8]);
-    priors.further_mounts.iter_mut().for_each(|(_, std)| *std = [f64::INFINITY; 6]);
-    let problem = BundleProblem::new(input, priors);
+    prior.forget(|block| !matches!(block, Block::Tag(_)));
+    let problem = BundleProblem::new(input, prior);
     let mut normal = NormalEquations::new(&problem);
     let mut state = problem.start(&start.parameters);
     problem.set_steps(&mut state, &start.steps);
@@ -99,11 +98,7 @@ pub fn observability(input: &BundleInput<'_>) -> Option<Observability> {
     };
     let is_angle = |column: usize| match layout.parameters.get(column) {
         Some(p) => p.kind == ParameterKind::Offset,
-        None => {
-            let mut poses =
-                layout.mount.iter().chain(layout.further_mounts.iter().flatten()).chain(&layout.gripper_tag);
-            poses.any(|at| (at + 3..at + 6).contains(&column))
-        }
+        None => layout.block_of(column).is_some_and(|(block, k)| block.is_pose() && k >= 3),
     };
     let named = |&column: &usize| Name {
         text: name(input.robot, &layout, column),
@@ -116,26 +111,17 @@ pub fn observability(input: &BundleInput<'_>) -> Option<Observability> {
 }
 
 /// One prior sigma of each column.
-fn sigmas(layout: &Layout, input: &BundleInput<'_>, priors: &crate::calib::bundle::problem::Prior) -> Vec<f64> {
+fn sigmas(layout: &Layout, input: &BundleInput<'_>, prior: &Prior) -> Vec<f64> {
     let mut sigma = vec![1.0; layout.n];
     for (column, p) in layout.parameters.iter().enumerate() {
         sigma[column] = input.scales.prior_std(&input.robot.sensors[p.joint], p.joint, p.kind);
     }
-    let further = layout.further_mounts.iter().zip(&priors.further_mounts).map(|(at, (_, std))| (*at, *std));
-    let poses = [(layout.mount, priors.mount_std), (layout.gripper_tag, priors.gripper_tag_std)];
-    for (at, std) in poses.into_iter().chain(further) {
-        if let Some(at) = at {
-            sigma[at..at + 6].copy_from_slice(&std);
-        }
-    }
-    if let Some(at) = layout.time {
-        sigma[at] = priors.time_std_s;
-    }
-    if let Some(at) = layout.lens {
-        sigma[at..at + 8].copy_from_slice(&priors.lens_std);
+    for (block, at) in layout.blocks().filter(|(block, _)| !matches!(block, Block::Tag(_))) {
+        let n = block.n_columns();
+        sigma[at..at + n].copy_from_slice(&prior.std[block][..n]);
     }
     for std in &mut sigma {
-        *std = if std.is_finite() { BundleProblem::at_least(*std) } else { UNKNOWN };
+        *std = if std.is_finite() { at_least(*std) } else { UNKNOWN };
     }
     sigma
 }
@@ -240,21 +226,5 @@ fn name(robot: &Robot, layout: &Layout, column: usize) -> String {
     if let Some(parameter) = layout.parameters.get(column) {
         return parameter.name(robot);
     }
-    let axes = ["along x", "along y", "along z", "turn about x", "turn about y", "turn about z"];
-    let within = |at: Option<usize>, n: usize| at.filter(|at| (*at..at + n).contains(&column)).map(|at| column - at);
-    if let Some(k) = within(layout.mount, 6) {
-        return format!("camera mount {}", axes[k]);
-    }
-    for (at, camera) in layout.further_mounts.iter().zip(&robot.further_cameras) {
-        if let Some(k) = within(*at, 6) {
-            return format!("mount of the camera {} {}", camera.name, axes[k]);
-        }
-    }
-    if let Some(k) = within(layout.gripper_tag, 6) {
-        return format!("gripper tag {}", axes[k]);
-    }
-    if within(layout.time, 1).is_some() {
-        return "time offset".to_owned();
-    }
-    within(layout.lens, 8).map_or_else(String::new, |k| format!("lens number {}", k + 1))
+    layout.block_of(column).map_or_else(String::new, |(block, k)| block.name(robot, k))
 }

@@ -5,9 +5,10 @@
 //! such corners, or chi-square of all without any, are a tag that is elsewhere or another one: all four go.
 
 use crate::calib::bundle::linearize::NormalEquations;
-use crate::calib::bundle::problem::{BundleProblem, ObservationTerm, WeightedMeasurement};
+use crate::calib::bundle::problem::BundleProblem;
 use crate::calib::bundle::solve::Solved;
 use crate::calib::views::view::View;
+use crate::measure::{ObservationTerm, WeightedMeasurement};
 
 /// A tag observation, or a corner of one, that does not fit the rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,7 +53,7 @@ pub(crate) fn reject_by(problem: &mut BundleProblem<'_>, normal: &NormalEquation
     for (at, observation) in problem.observations.iter_mut().enumerate() {
         let before = observation.used();
         let used = match observation.data {
-            WeightedMeasurement::Corners { .. } => fitting_corners(before, &normal.corner_chi2[at]),
+            WeightedMeasurement::Corners(_) => fitting_corners(before, &normal.corner_chi2[at]),
             _ => {
                 let n = observation.data.n_coordinates() as f64;
                 let excess = noise_excess(&observation.data);
@@ -95,7 +96,7 @@ pub(crate) fn rejected(observation: &ObservationTerm) -> Rejected {
 /// Positions and poses come with a standard deviation that is a guess until the scales are fitted.
 fn noise_excess(seen: &WeightedMeasurement) -> f64 {
     match seen {
-        WeightedMeasurement::Corners { .. } | WeightedMeasurement::Board { .. } => 1.0,
+        WeightedMeasurement::Corners(_) | WeightedMeasurement::Board { .. } => 1.0,
         WeightedMeasurement::Position { .. } | WeightedMeasurement::Pose { .. } => 4.0,
     }
 }

@@ -7,10 +7,10 @@
 //! squares. Where nothing depends on time, the p-value is uniform.
 
 use crate::calib::bundle::estimate::Estimate;
-use crate::calib::bundle::model::Hyperparameters;
 use crate::calib::bundle::step_test::JointError;
 use crate::calib::bundle::walk::WARMTH_WORTH_A_FIT;
-use crate::calib::parameters::ParameterKind;
+use crate::model::parameters::ParameterKind;
+use crate::model::scales::Hyperparameters;
 use armcal_core::joints::JointAngles;
 use armcal_core::stats::stream_rng;
 use nalgebra::{DMatrix, DVector};

@@ -1,103 +1,24 @@
-//! What is solved: columns, priors, views and observations in the form that the loops want.
+//! What is solved: views and observations in the form that the loops want, with columns and priors.
 
 use std::ops::Range;
-use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector, Isometry3, Point3, SMatrix, Vector3};
+use nalgebra::{DVector, Isometry3, SMatrix, Vector3};
 
 use crate::calib::bundle::input::BundleInput;
-use crate::calib::bundle::model::{Hyperparameters, Model, Walk};
-use crate::calib::bundle::walk_modes::mode;
-use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::views::view::{BoardPoint, BoardPoints, MeanCorners, TagMeasurement, View};
+use crate::measure::{ObservationTerm, WeightedCorners, WeightedMeasurement, WeightedPoint};
+use crate::model::blocks::Block;
+use crate::model::estimated::Walk;
+use crate::model::layout::Layout;
+use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
+use crate::model::prior::Prior;
+use crate::model::scales::Hyperparameters;
+use crate::model::state::State;
+use crate::model::walk_modes::mode;
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
 use armcal_core::kinematics::{ArmLoads, LinkCorrections, LinkPoses};
-use armcal_core::optics::CameraModel;
 use armcal_core::robot::{CameraSpec, Robot};
 use armcal_core::time::Stamp;
-
-/// Where each parameter's column is.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Layout {
-    /// Columns 0.. : the joints' parameters, joint by joint.
-    pub parameters: Vec<Parameter>,
-    pub of_joint: Vec<Range<usize>>,
-    /// Six columns of each joint whose place on its parent link is estimated, base first; the last of `parameters`.
-    pub links: Range<usize>,
-    /// Right after them those of how the arm bends.
-    pub sag: Range<usize>,
-    pub mount: Option<usize>,
-    /// By number of the further camera.
-    pub further_mounts: Vec<Option<usize>>,
-    pub time: Option<usize>,
-    pub lens: Option<usize>,
-    /// By the robot's tags.
-    pub tags: Vec<Option<usize>>,
-    pub gripper_tag: Option<usize>,
-    pub n: usize,
-}
-
-/// One tag in one view.
-#[derive(Clone, Debug)]
-pub(crate) struct ObservationTerm {
-    /// Index into the robot's tags; the gripper's comes after them.
-    pub tag: usize,
-    pub data: WeightedMeasurement,
-    /// Sightings that are out of the estimate keep their place.
-    pub is_used: bool,
-}
-
-impl ObservationTerm {
-    /// Which corners are used; of a position or pose all four or none.
-    pub(crate) fn used(&self) -> [bool; 4] {
-        match self.data {
-            WeightedMeasurement::Corners { used, .. } if self.is_used => used,
-            _ => [self.is_used; 4],
-        }
-    }
-
-    /// Uses no other corners than these; an observation without any is out as a whole.
-    pub(crate) fn set_used(&mut self, corners: [bool; 4]) {
-        self.is_used = corners.contains(&true);
-        if let WeightedMeasurement::Corners { used, .. } = &mut self.data {
-            *used = if self.is_used { corners } else { [true; 4] };
-        }
-    }
-}
-
-/// Measurements with the inverse of their variance.
-#[derive(Clone, Debug)]
-pub(crate) enum WeightedMeasurement {
-    Corners { corners_px: [[f64; 2]; 4], half_size_m: f64, info: f64, used: [bool; 4] },
-    Position { in_camera_m: Vector3<f64>, info: f64 },
-    Pose { tag_from_camera: Isometry3<f64>, info_position: f64, info_rotation: f64 },
-    Board { points: Arc<[WeightedPoint]> },
-}
-
-/// A corner of a board and where it was seen.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct WeightedPoint {
-    pub on_board: Point3<f64>,
-    pub pixel: [f64; 2],
-    pub info: f64,
-}
-
-impl WeightedMeasurement {
-    /// Of the corners that are used.
-    pub(crate) fn n_coordinates(&self) -> usize {
-        match self {
-            Self::Corners { used, .. } => 2 * used.iter().filter(|is_used| **is_used).count(),
-            Self::Position { .. } => 3,
-            Self::Pose { .. } => 6,
-            Self::Board { points } => 2 * points.len(),
-        }
-    }
-
-    /// Whether it is of pixels, whose noise is that of corners.
-    pub(crate) fn is_in_pixels(&self) -> bool {
-        matches!(self, Self::Corners { .. } | Self::Board { .. })
-    }
-}
 
 /// A view as the loops want it.
 #[derive(Clone, Debug)]
@@ -123,28 +44,6 @@ pub(crate) struct ViewData {
     pub n_cameras: f64,
 }
 
-/// Priors of all but the views' own parameters.
-#[derive(Clone, Debug)]
-pub(crate) struct Prior {
-    pub joint_mean: DVector<f64>,
-    /// Six rows more than the mean: the mount's prior is in it, and `mount_std` is not looked at. As many rows as there
-    /// are columns: all priors are in it, about the means below.
-    pub joint_info: DMatrix<f64>,
-    pub mount: Isometry3<f64>,
-    pub mount_std: [f64; 6],
-    /// By number of the further camera.
-    pub further_mounts: Vec<(Isometry3<f64>, [f64; 6])>,
-    pub time_s: f64,
-    pub time_std_s: f64,
-    pub lens: CameraModel,
-    pub lens_std: [f64; 8],
-    pub tags: Vec<Isometry3<f64>>,
-    /// Infinite where nothing is known.
-    pub tags_std: Vec<[f64; 6]>,
-    pub gripper_tag: Isometry3<f64>,
-    pub gripper_tag_std: [f64; 6],
-}
-
 #[derive(Clone, Debug)]
 pub(crate) struct BundleProblem<'a> {
     pub robot: &'a Robot,
@@ -159,135 +58,17 @@ pub(crate) struct BundleProblem<'a> {
     pub n_seen_joints: usize,
 }
 
-/// Everything that is estimated.
-#[derive(Clone, Debug)]
-pub(crate) struct State {
-    pub joint: DVector<f64>,
-    pub mount: Isometry3<f64>,
-    /// By number of the further camera.
-    pub further_mounts: Vec<Isometry3<f64>>,
-    pub time_s: f64,
-    /// Of the first camera.
-    pub lens: CameraModel,
-    pub tags: Vec<Isometry3<f64>>,
-    pub gripper_tag: Isometry3<f64>,
-    /// Of each view: what each joint is off beyond the sensor's model, rad.
-    pub joint_error: Vec<[f64; MAX_JOINTS]>,
-    /// Of each view: the camera's pose error.
-    pub camera_error: Vec<Isometry3<f64>>,
-}
-
-impl State {
-    /// Becomes `other` in its own memory; both are of one problem.
-    pub(crate) fn copy_from(&mut self, other: &Self) {
-        self.joint.copy_from(&other.joint);
-        self.mount = other.mount;
-        self.further_mounts.copy_from_slice(&other.further_mounts);
-        self.time_s = other.time_s;
-        self.lens = other.lens;
-        self.tags.copy_from_slice(&other.tags);
-        self.gripper_tag = other.gripper_tag;
-        self.joint_error.copy_from_slice(&other.joint_error);
-        self.camera_error.copy_from_slice(&other.camera_error);
-    }
-}
-
-impl State {
-    /// Of the camera of that number.
-    pub(crate) fn mount_of(&self, camera: usize) -> &Isometry3<f64> {
-        camera.checked_sub(1).map_or(&self.mount, |further| &self.further_mounts[further])
-    }
-}
-
 /// A view's own parameters: an error of each joint, then the camera's six.
 pub(crate) const N_VIEW_PARAMETERS: usize = MAX_JOINTS + 6;
 /// Of a view's own parameters by one another.
 pub(crate) type Own = SMatrix<f64, N_VIEW_PARAMETERS, N_VIEW_PARAMETERS>;
 
-/// Least standard deviation of a prior: what is said to be exact stays where it is.
-const MIN_STD: f64 = 1e-9;
 /// Degrees of freedom that the corner noise by robot.toml counts for, beside the scatter between a view's frames.
 const CORNER_PRIOR_DOF: f64 = 16.0;
 
-impl Layout {
-    /// With columns of the tags that the views see.
-    pub(crate) fn new(robot: &Robot, model: &Model, views: &[View]) -> Self {
-        let seen = |tag_idx: usize| views.iter().flat_map(|v| &v.tags).any(|tag| tag.tag_idx == tag_idx);
-        Self::with_tags(robot, model, seen)
-    }
-
-    /// With columns of those tags.
-    pub(crate) fn with_tags(robot: &Robot, model: &Model, has_column: impl Fn(usize) -> bool) -> Self {
-        let mut layout = Self { tags: vec![None; robot.tags.len()], ..Self::default() };
-        layout.parameters = model.parameters();
-        let mut start = 0;
-        for kinds in &model.joints {
-            layout.of_joint.push(start..start + kinds.len());
-            start += kinds.len();
-        }
-        layout.n = layout.parameters.len();
-        layout.links = start..start + 6 * model.n_links;
-        layout.sag = layout.links.end..layout.n;
-        let mut take = |wanted: bool, n: usize| {
-            let at = layout.n;
-            wanted.then(|| {
-                layout.n += n;
-                at
-            })
-        };
-        layout.mount = take(model.mount, 6);
-        layout.further_mounts = model.further_mounts.iter().map(|wanted| take(*wanted, 6)).collect();
-        layout.time = take(model.time_offset, 1);
-        layout.lens = take(model.lens, 8);
-        for tag_idx in 0..robot.tags.len() {
-            layout.tags[tag_idx] = take(model.tags && has_column(tag_idx), 6);
-        }
-        layout.gripper_tag = take(model.gripper_tag, 6);
-        layout
-    }
-
-    /// First column of the tags.
-    pub(crate) fn first_of_tags(&self) -> usize {
-        self.tags.iter().flatten().chain(&self.gripper_tag).copied().min().unwrap_or(self.n)
-    }
-
-    /// First column of each pose: mounts, tags, the gripper's tag.
-    pub(crate) fn poses(&self) -> impl Iterator<Item = usize> + '_ {
-        let mounts = self.mount.iter().chain(self.further_mounts.iter().flatten());
-        mounts.chain(self.tags.iter().flatten()).chain(&self.gripper_tag).copied()
-    }
-
-    /// First column of the mount of the camera of that number.
-    pub(crate) fn mount_of(&self, camera: usize) -> Option<usize> {
-        let further = |at: usize| self.further_mounts.get(at).copied().flatten();
-        camera.checked_sub(1).map_or(self.mount, further)
-    }
-
-    /// The same with eight columns of the lens before the tags.
-    pub(crate) fn with_lens(&self) -> Self {
-        let moved = |at: &Option<usize>| at.map(|at| at + 8);
-        Self {
-            lens: Some(self.first_of_tags()),
-            tags: self.tags.iter().map(moved).collect(),
-            gripper_tag: moved(&self.gripper_tag),
-            n: self.n + 8,
-            ..self.clone()
-        }
-    }
-
-    /// Columns of links and sag.
-    pub(crate) fn body(&self) -> Range<usize> {
-        self.links.start..self.sag.end
-    }
-
-    pub(crate) fn n_joint(&self) -> usize {
-        self.parameters.len()
-    }
-}
-
 impl<'a> BundleProblem<'a> {
     pub(crate) fn new(input: &BundleInput<'a>, prior: Prior) -> Self {
-        Self::with_layout(input, Layout::new(input.robot, &input.model, input.views), prior)
+        Self::with_layout(input, input.layout(), prior)
     }
 
     /// The same with columns that may be more than the views' own.
@@ -317,7 +98,7 @@ impl<'a> BundleProblem<'a> {
                 observations.push(ObservationTerm { tag: tag.tag_idx, data, is_used: true });
             }
             let to = observations.len();
-            let gripper_size_m = robot.gripper_tag.filter(|_| model.gripper_tag).map(|tag| tag.size_m);
+            let gripper_size_m = robot.gripper_tag.filter(|_| model.has(Block::GripperTag)).map(|tag| tag.size_m);
             let gripper = view.gripper_tag.as_ref().zip(gripper_size_m).map(|(seen, size_m)| {
                 observations.push(ObservationTerm {
                     tag: robot.tags.len(),
@@ -332,6 +113,14 @@ impl<'a> BundleProblem<'a> {
         Self { robot, layout, views: data, observations, prior, scales, guess_links, n_seen_joints }
     }
 
+    /// Takes `scales` over, with the weights and, where they are the datasheet's, the priors that depend on them.
+    pub(crate) fn take_scales(&mut self, scales: Hyperparameters, has_own_priors: bool) {
+        self.set_scales(scales);
+        if has_own_priors {
+            self.prior.rescale(self.robot, &self.layout.parameters, &self.scales);
+        }
+    }
+
     /// Takes `scales` over, with the weights that depend on them.
     pub(crate) fn set_scales(&mut self, scales: Hyperparameters) {
         self.scales = scales;
@@ -344,7 +133,7 @@ impl<'a> BundleProblem<'a> {
         let rotation = factor[1] * self.scales.rotation_std_rad.powi(-2);
         for observation in &mut self.observations {
             match &mut observation.data {
-                WeightedMeasurement::Corners { .. } | WeightedMeasurement::Board { .. } => {}
+                WeightedMeasurement::Corners(_) | WeightedMeasurement::Board { .. } => {}
                 WeightedMeasurement::Position { info, .. } => *info = position,
                 WeightedMeasurement::Pose { info_position, info_rotation, .. } => {
                     (*info_position, *info_rotation) = (position, rotation);
@@ -358,12 +147,7 @@ impl<'a> BundleProblem<'a> {
         let parameters = &self.layout.parameters;
         State {
             joint: DVector::from_iterator(parameters.len(), parameters.iter().map(|p| guess.get(*p))),
-            mount: self.prior.mount,
-            further_mounts: self.prior.further_mounts.iter().map(|(mount, _)| *mount).collect(),
-            time_s: self.prior.time_s,
-            lens: self.prior.lens,
-            tags: self.prior.tags.clone(),
-            gripper_tag: self.prior.gripper_tag,
+            blocks: self.prior.mean.clone(),
             joint_error: vec![[0.0; MAX_JOINTS]; self.views.len()],
             camera_error: vec![Isometry3::identity(); self.views.len()],
         }
@@ -410,13 +194,8 @@ impl<'a> BundleProblem<'a> {
         JointAngles::from_fn(self.robot.n_joints(), |j| {
             let columns = self.layout.of_joint[j].clone();
             let estimated: f64 = columns.map(|column| view.basis[column] * state.joint[column]).sum();
-            view.fixed_rad[j] + estimated + state.joint_error[view_idx][j] + view.rate_rad_s[j] * state.time_s
+            view.fixed_rad[j] + estimated + state.joint_error[view_idx][j] + view.rate_rad_s[j] * state.clock_s()
         })
-    }
-
-    /// The lens of the camera of that number.
-    pub(crate) fn lens_of<'b>(&'b self, camera: usize, state: &'b State) -> &'b CameraModel {
-        if camera == 0 { &state.lens } else { &self.robot.camera_at(camera).lens }
     }
 
     /// The links' corrections in `state`; those of the guess where they are not estimated.
@@ -464,18 +243,14 @@ impl<'a> BundleProblem<'a> {
         };
         poses.in_frame(&self.robot.tag_frame)
     }
-
-    /// One sigma of a standard deviation that is in use: never zero.
-    pub(crate) fn at_least(std: f64) -> f64 {
-        std.max(MIN_STD)
-    }
 }
 
 /// Corners with the variance of their mean: the scatter between frames, with robot.toml's figure for a few frames more.
 fn corners(camera: &CameraSpec, seen: &MeanCorners, size_m: f64) -> WeightedMeasurement {
     let dof = 8.0 * seen.n_frames.saturating_sub(1) as f64;
     let info = seen.n_frames.max(1) as f64 / one_frame_px2(camera, seen.scatter_px2, dof);
-    WeightedMeasurement::Corners { corners_px: seen.corners_px, half_size_m: 0.5 * size_m, info, used: [true; 4] }
+    let (corners_px, half_size_m, used) = (seen.corners_px, 0.5 * size_m, [true; 4]);
+    WeightedMeasurement::Corners(WeightedCorners { corners_px, half_size_m, info, used })
 }
 
 /// Corners of a board in the same way.

@@ -16,6 +16,7 @@ use crate::calib::bundle::touch_term::TouchUpdate;
 use crate::calib::finding::FindingUnit;
 use crate::calib::geometry_error::ErrorKind;
 use crate::calib::reservation::Reservation;
+use crate::model::blocks::Block;
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::GeometryPriors;
 
@@ -86,7 +87,7 @@ impl Estimate<'_> {
         let mut elements = self.held_elements(touches, task, &tool);
         elements.extend(lens.iter().flat_map(|lens| lens.elements(&tool)));
         // Without a tag on the gripper and without touches nothing watches over what is beyond the camera.
-        let is_watched = touches.is_some() || self.problem.layout.gripper_tag.is_some();
+        let is_watched = touches.is_some() || self.has(Block::GripperTag);
         let worth_m = if is_watched { WORTH_SHARE } else { WORTH_SHARE_UNWATCHED } * predicted_m;
         let covariance = |at: usize| {
             if let Some(touches) = touches {
@@ -116,7 +117,7 @@ impl Estimate<'_> {
         let robot = self.problem.robot;
         let score = self.score();
         let joints = (0..robot.tool.mount.n_joints).map(GeometryElement::Joint);
-        let mount = self.problem.layout.mount.map(|_| GeometryElement::Mount);
+        let mount = self.has(Block::Mount(0)).then_some(GeometryElement::Mount);
         let mut elements = Vec::new();
         let six =
             || [ErrorKind::Shift, ErrorKind::Turn].into_iter().flat_map(|error| (0..3).map(move |axis| (error, axis)));
@@ -143,7 +144,7 @@ impl Estimate<'_> {
         let kind = usize::from(error == ErrorKind::Turn);
         let (is_estimated, prior_std) = match element {
             GeometryElement::Mount => {
-                (true, scales.mount_scale[kind] * [camera.mount_std_m, camera.mount_std_rad][kind])
+                (true, scales.mount_scale[0][kind] * [camera.mount_std_m, camera.mount_std_rad][kind])
             }
             GeometryElement::Joint(joint) if joint < n_links => (true, scales.link_std[joint][kind]),
             GeometryElement::Joint(_) => (false, [priors.link_position_std_m, priors.link_rotation_std_rad][kind]),

@@ -1,12 +1,12 @@
 //! Where the estimate starts: gains and offsets from the tags' positions alone, under a robust loss that narrows.
 
 use crate::calib::bundle::input::BundleInput;
-use crate::calib::bundle::model::{Hyperparameters, Model};
-use crate::calib::bundle::priors::prior;
 use crate::calib::bundle::problem::{BundleProblem, parameters_of};
 use crate::calib::bundle::solve::{LOOSE, solve};
-use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::views::view::TagMeasurement;
+use crate::model::estimated::Model;
+use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
+use crate::model::scales::Hyperparameters;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::numeric::Loss;
 
@@ -38,18 +38,8 @@ pub(crate) fn robust_start(input: &BundleInput<'_>) -> RobustStart {
     let of_joint = |(joint, kinds): (usize, &Vec<ParameterKind>)| {
         if joint < n_before { kinds.iter().copied().filter(linear).collect() } else { Vec::new() }
     };
-    let model = Model {
-        joints: input.model.joints.iter().enumerate().map(of_joint).collect(),
-        n_links: 0,
-        n_compliant: 0,
-        mount: false,
-        further_mounts: Vec::new(),
-        lens: false,
-        tags: false,
-        gripper_tag: false,
-        time_offset: false,
-        walk: None,
-    };
+    let joints = input.model.joints.iter().enumerate().map(of_joint).collect();
+    let model = Model { joints, ..Model::of_blocks(0, []) };
     let (mut parameters, mut steps) = (input.guess, Vec::new());
     let mut iterations = 0;
     for std_m in START_STD_M {
@@ -59,7 +49,7 @@ pub(crate) fn robust_start(input: &BundleInput<'_>) -> RobustStart {
             ..input.scales.clone()
         };
         let linear = BundleInput { views: &views, model: model.clone(), joint_prior: None, scales, ..input.clone() };
-        let problem = BundleProblem::new(&linear, prior(&linear, &linear.scales));
+        let problem = BundleProblem::new(&linear, linear.prior());
         let mut start = problem.start(&parameters);
         problem.set_steps(&mut start, &steps);
         let solved = solve(&problem, start, Loss::Cauchy { c: START_WIDTH }, LOOSE);

@@ -4,8 +4,11 @@ use std::ops::Range;
 
 use nalgebra::{Const, DMatrix, DVector, Isometry3, Matrix6, Matrix6xX, SMatrix, SVector, Vector6};
 
-use crate::calib::bundle::problem::{BundleProblem, Layout, N_VIEW_PARAMETERS, Own, State, ViewData};
+use crate::calib::bundle::problem::{BundleProblem, N_VIEW_PARAMETERS, Own, ViewData};
 use crate::calib::bundle::time_error::TimeError;
+use crate::model::blocks::Block;
+use crate::model::layout::Layout;
+use crate::model::state::State;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::kinematics::LinkPoses;
 use armcal_core::spatial::adjoint;
@@ -72,7 +75,7 @@ impl<'a> Group<'a> {
         let view = &problem.views[view_idx];
         let error = &state.camera_error[view_idx];
         let camera = problem.robot.camera_at(view.camera);
-        let before = poses.link(camera.mount.n_joints) * state.mount_of(view.camera);
+        let before = poses.link(camera.mount.n_joints) * state.mount(view.camera);
         let of_tags = Self {
             view_idx,
             camera: view.camera,
@@ -109,11 +112,20 @@ pub(crate) struct Columns<'a> {
     layout: &'a Layout,
     view: &'a ViewData,
     joints: Range<usize>,
+    /// First columns of mount and lens of the camera that the view is of, and of the clock.
+    mount: Option<usize>,
+    pub lens: Option<usize>,
+    clock: Option<usize>,
 }
 
 impl<'a> Columns<'a> {
     pub(crate) fn new(problem: &'a BundleProblem<'_>, group: &Group<'_>) -> Self {
-        Self { layout: &problem.layout, view: &problem.views[group.view_idx], joints: group.joints.clone() }
+        Self::of_view(&problem.layout, &problem.views[group.view_idx], group.joints.clone())
+    }
+
+    fn of_view(layout: &'a Layout, view: &'a ViewData, joints: Range<usize>) -> Self {
+        let [mount, lens] = [Block::Mount(view.camera), Block::Lens(view.camera)].map(|block| layout.at(block));
+        Self { layout, view, joints, mount, lens, clock: layout.at(Block::Clock) }
     }
 
     pub(crate) fn layout(&self) -> &'a Layout {
@@ -122,14 +134,9 @@ impl<'a> Columns<'a> {
 
     /// The directions that have columns.
     pub(crate) fn directions(&self) -> impl Iterator<Item = usize> + use<> {
-        let mount = if self.mount().is_some() { MOUNT..MOUNT + 6 } else { 0..0 };
-        let time = if self.layout.time.is_some() { TIME..TIME + 1 } else { 0..0 };
+        let mount = if self.mount.is_some() { MOUNT..MOUNT + 6 } else { 0..0 };
+        let time = if self.clock.is_some() { TIME..TIME + 1 } else { 0..0 };
         self.joints.clone().chain(mount).chain(time)
-    }
-
-    /// First column of the mount of the camera that the view is of.
-    fn mount(&self) -> Option<usize> {
-        self.layout.mount_of(self.view.camera)
     }
 
     /// The columns of a direction, which lie side by side: the first of them, and the direction's derivative by each.
@@ -137,8 +144,8 @@ impl<'a> Columns<'a> {
     pub(crate) fn of(&self, direction: usize) -> (usize, &'a [f64]) {
         let one = |at: Option<usize>, k: usize| at.map_or((0, &[][..]), |at| (at + k, &[1.0][..]));
         match direction {
-            TIME => one(self.layout.time, 0),
-            MOUNT..TIME => one(self.mount(), direction - MOUNT),
+            TIME => one(self.clock, 0),
+            MOUNT..TIME => one(self.mount, direction - MOUNT),
             joint => {
                 let columns = self.layout.of_joint[joint].clone();
                 (columns.start, &self.view.basis[columns])
@@ -241,7 +248,7 @@ impl SchurBlock {
                 pushed -= u * step.fixed_rows::<6>(*column);
             }
         }
-        if let Some(at) = problem.layout.lens {
+        if let Some(at) = columns.lens {
             pushed += self.by_lens * step.fixed_rows::<8>(at);
         }
         for (k, column) in problem.layout.body().enumerate() {
@@ -256,7 +263,7 @@ impl SchurBlock {
             Some(tag) if view.gripper == Some(self.range.start) => problem.n_seen_joints..tag.mount.n_joints,
             _ => 0..view.n_seen_joints,
         };
-        Columns { layout: &problem.layout, view, joints }
+        Columns::of_view(&problem.layout, view, joints)
     }
 
     /// `sum H_i A`: the observations' pull on the camera's twist by the common columns.
@@ -281,7 +288,7 @@ impl SchurBlock {
                 view -= u;
             }
         }
-        if let Some(at) = layout.lens {
+        if let Some(at) = columns.lens {
             let mut view = out.fixed_view_mut::<6, 8>(0, at);
             view += self.by_lens;
         }
@@ -311,7 +318,7 @@ impl SchurBlock {
                 view -= self.twists.transpose() * u;
             }
         }
-        if let Some(at) = layout.lens {
+        if let Some(at) = columns.lens {
             let mut view = out.generic_view_mut((0, at), (Const::<N_VIEW_PARAMETERS>, Const::<8>));
             view += self.twists.transpose() * self.by_lens;
         }

@@ -10,12 +10,13 @@ use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, Vector3, Vector6};
 
 use crate::calib::bundle::body_twists::link_twist;
 use crate::calib::bundle::estimate::Estimate;
-use crate::calib::bundle::observation_term::PoseInformation;
-use crate::calib::bundle::problem::{N_VIEW_PARAMETERS, WeightedMeasurement};
+use crate::calib::bundle::problem::N_VIEW_PARAMETERS;
 use crate::calib::bundle::schur::Group;
 use crate::calib::geometry_error::ErrorKind;
-use crate::calib::parameters::{JointParameters, Parameter};
 use crate::calib::views::view::View;
+use crate::measure::{PoseInformation, WeightedMeasurement};
+use crate::model::blocks::Block;
+use crate::model::parameters::{JointParameters, Parameter};
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
 use armcal_core::kinematics::LinkPoses;
 use armcal_core::robot::Robot;
@@ -74,7 +75,7 @@ impl Estimate<'_> {
     pub fn score_tests(&self, task: &[JointAngles]) -> Vec<ScoreTestResult> {
         let score = self.score();
         let mut elements: Vec<GeometryElement> = (0..self.n_seen_joints()).map(GeometryElement::Joint).collect();
-        elements.extend(self.problem.layout.mount.map(|_| GeometryElement::Mount));
+        elements.extend(self.has(Block::Mount(0)).then_some(GeometryElement::Mount));
         let both = elements.iter().flat_map(|&element| [(element, ErrorKind::Shift), (element, ErrorKind::Turn)]);
         let task = self.tool_jacobians(task);
         let mut out: Vec<ScoreTestResult> =
@@ -86,7 +87,7 @@ impl Estimate<'_> {
     /// Joints, base first, that some view sees move.
     pub(crate) fn n_seen_joints(&self) -> usize {
         match &self.problem.robot.gripper_tag {
-            Some(tag) if self.problem.layout.gripper_tag.is_some() => tag.mount.n_joints,
+            Some(tag) if self.has(Block::GripperTag) => tag.mount.n_joints,
             _ => self.problem.n_seen_joints,
         }
     }
@@ -172,13 +173,13 @@ impl Estimate<'_> {
         {
             let pose = match &problem.robot.gripper_tag {
                 Some(tag) if observation.tag == problem.robot.tags.len() => {
-                    group.poses.link(tag.mount.n_joints) * state.gripper_tag
+                    group.poses.link(tag.mount.n_joints) * state.gripper_tag()
                 }
-                _ => state.tags[observation.tag],
+                _ => *state.tag(observation.tag),
             };
             let camera_from_tag = group.base_from_camera.inv_mul(&pose);
             let data: &WeightedMeasurement = &observation.data;
-            let lens = problem.lens_of(group.camera, state);
+            let lens = state.lens(group.camera);
             if let Some(info) = PoseInformation::of(data, &camera_from_tag, lens, problem.scales.noise, None) {
                 h += info.h;
                 g += info.g;

@@ -8,10 +8,10 @@ use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::bundle::model_selection::{Selection, estimate_clock, select_model};
 use crate::calib::covariance::ParameterCovariance;
 use crate::calib::methods::observability::Unobservable;
-use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::refusal::Refusal;
 use crate::calib::result::calibration::Calibration;
 use crate::calib::views::view::View;
+use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
 use armcal_core::robot::{FailedKind, Robot};
 
 /// The views under one hypothesis of failed joints.

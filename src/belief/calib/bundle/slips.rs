@@ -9,12 +9,12 @@
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::failure_detection::FailureSearch;
 use crate::calib::bundle::failures::Failure;
-use crate::calib::bundle::model::STEP_STD_RAD;
 use crate::calib::bundle::model_selection::log_evidence_of_all;
 use crate::calib::bundle::problem::past_derivative;
 use crate::calib::bundle::step_test::{MIN_SIDE, OffsetPrior, StepCandidate};
-use crate::calib::parameters::{Parameter, ParameterKind};
 use crate::calib::views::view::View;
+use crate::model::parameters::{Parameter, ParameterKind};
+use crate::model::scales::STEP_STD_RAD;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::time::Stamp;
 

@@ -7,8 +7,9 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Vector6};
 
 use crate::calib::bundle::linearize::NormalEquations;
-use crate::calib::bundle::problem::{BundleProblem, State};
+use crate::calib::bundle::problem::BundleProblem;
 use crate::calib::bundle::schur::SchurBlock;
+use crate::model::state::State;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::numeric::{Damping, LeastSquares, Loss, Outcome, Proposal, StopRule, minimize};
 use armcal_core::spatial::exp;
@@ -168,12 +169,6 @@ pub(crate) fn own_gain(normal: &NormalEquations) -> f64 {
     normal.eliminated.iter().filter(|own| own.has_any).map(|own| own.gradient.dot(&(own.inverse * own.gradient))).sum()
 }
 
-/// Moves what is estimated by `step` of the common parameters; the views' own stay.
-pub(crate) fn shifted(problem: &BundleProblem<'_>, step: &DVector<f64>, state: &mut State) {
-    let from = state.clone();
-    step_common(problem, &from, step, state);
-}
-
 #[cfg(test)]
 pub(crate) fn stepped(
     problem: &BundleProblem<'_>,
@@ -194,7 +189,8 @@ pub(crate) fn take_step(
     step: &DVector<f64>,
     next: &mut State,
 ) {
-    step_common(problem, state, step, next);
+    next.copy_from(state);
+    next.step(&problem.layout, step);
     let mut groups = normal.eliminated.iter();
     for (view_idx, view) in problem.views.iter().enumerate() {
         let n_groups = 1 + usize::from(view.gripper.is_some());
@@ -202,36 +198,6 @@ pub(crate) fn take_step(
             let pushed = own.push(problem, &normal.by_tag, view_idx, step);
             add_own(problem, own, view_idx, &pushed, next);
         }
-    }
-}
-
-fn step_common(problem: &BundleProblem<'_>, state: &State, step: &DVector<f64>, next: &mut State) {
-    let layout = &problem.layout;
-    let twist = |at: usize| Vector6::from_fn(|k, _| step[at + k]);
-    next.copy_from(state);
-    next.joint += step.rows(0, layout.n_joint());
-    if let Some(at) = layout.mount {
-        next.mount *= exp(&twist(at));
-    }
-    for (mount, column) in next.further_mounts.iter_mut().zip(&layout.further_mounts) {
-        if let Some(at) = column {
-            *mount *= exp(&twist(*at));
-        }
-    }
-    if let Some(at) = layout.time {
-        next.time_s += step[at];
-    }
-    if let Some(at) = layout.lens {
-        let now = next.lens.intrinsics();
-        next.lens = next.lens.with_intrinsics(std::array::from_fn(|k| now[k] + step[at + k]));
-    }
-    for (pose, column) in next.tags.iter_mut().zip(&layout.tags) {
-        if let Some(at) = column {
-            *pose *= exp(&twist(*at));
-        }
-    }
-    if let Some(at) = layout.gripper_tag {
-        next.gripper_tag *= exp(&twist(at));
     }
 }
 

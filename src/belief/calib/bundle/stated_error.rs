@@ -2,11 +2,11 @@
 //! grow with what the model fails to explain.
 
 use crate::calib::bundle::estimate::Estimate;
-use crate::calib::bundle::evidence::{Posterior, joint_info};
+use crate::calib::bundle::evidence::Posterior;
 use crate::calib::bundle::input::BundleInput;
 use crate::calib::bundle::linearize::NormalEquations;
-use crate::calib::bundle::model::Hyperparameters;
 use crate::calib::covariance::ParameterCovariance;
+use crate::model::scales::Hyperparameters;
 use armcal_core::joints::JointAngles;
 use armcal_core::numeric::Loss;
 use armcal_core::stats::quantile;
@@ -27,7 +27,7 @@ impl Estimate<'_> {
         let mut problem = self.problem.clone();
         problem.scales = at_most_stated(&problem.scales, input);
         if input.joint_prior.is_none() {
-            problem.prior.joint_info = joint_info(&problem, &problem.scales);
+            problem.prior.rescale(problem.robot, &problem.layout.parameters, &problem.scales);
         }
         let mut normal = NormalEquations::new(&problem);
         normal.update(&problem, &self.solved.state, Loss::Square);

@@ -11,7 +11,8 @@ use crate::calib::result::failed_joint::PriorTable;
 use crate::calib::result::map_table::MapResult;
 use crate::calib::result::model_table::ModelTable;
 use crate::calib::views::view::View;
-use armcal_core::robot::{CameraSpec, Robot};
+use crate::model::blocks::Block;
+use armcal_core::robot::Robot;
 use armcal_core::spatial::{Base, Camera, Link, Pose, Tag};
 
 pub(crate) fn model_table(robot: &Robot, found: &Estimate<'_>, selections: &[Selection]) -> ModelTable {
@@ -49,11 +50,11 @@ pub(crate) fn add_clock(model: &mut ModelTable, offset_s: f64, selection: &Selec
 
 /// The camera mount as estimated; the tags tell of it, too.
 pub(crate) fn camera_mount_table(robot: &Robot, found: &Estimate<'_>, views: &[View]) -> CameraMount {
-    let (mount, covariance) = found.mount();
+    let (mount, covariance) = found.mount(0);
     let link_from_camera: Pose<Link, Camera> = Pose::from_isometry(mount);
     let std = |row: usize| covariance[(row, row)].max(0.0).sqrt();
     let seen = views.iter().filter(|view| view.gripper_tag.is_some()).count();
-    let left_out = robot.gripper_tag.filter(|_| !found.model.gripper_tag).map(|tag| {
+    let left_out = robot.gripper_tag.filter(|_| !found.has(Block::GripperTag)).map(|tag| {
         format!("the tag on the gripper ({}) was seen in {seen} views; {MIN_GRIPPER_VIEWS} are needed", tag.id)
     });
     CameraMount {
@@ -62,27 +63,27 @@ pub(crate) fn camera_mount_table(robot: &Robot, found: &Estimate<'_>, views: &[V
         quaternion_wxyz: link_from_camera.quaternion_wxyz(),
         position_std_m: [0, 1, 2].map(std),
         rotation_std_rad: [3, 4, 5].map(std),
-        views: if found.model.gripper_tag { seen } else { 0 },
+        views: if found.has(Block::GripperTag) { seen } else { 0 },
         rms_px: None,
     }
 }
 
 /// Each further camera whose mount was estimated.
 pub(crate) fn further_camera_tables(robot: &Robot, found: &Estimate<'_>, views: &[View]) -> Vec<FurtherCamera> {
-    let table = |(further, camera): (usize, &CameraSpec)| {
-        let (mount, covariance) = found.further_mount(further)?;
+    let table = |number: usize| {
+        let (mount, covariance) = found.mount(number);
         let link_from_camera: Pose<Link, Camera> = Pose::from_isometry(mount);
         let std = |row: usize| covariance[(row, row)].max(0.0).sqrt();
-        Some(FurtherCamera {
-            name: camera.name.clone(),
+        FurtherCamera {
+            name: robot.camera_at(number).name.clone(),
             position_m: link_from_camera.origin().to_array(),
             quaternion_wxyz: link_from_camera.quaternion_wxyz(),
             position_std_m: [0, 1, 2].map(std),
             rotation_std_rad: [3, 4, 5].map(std),
-            views: views.iter().filter(|view| view.camera == further + 1).count(),
-        })
+            views: views.iter().filter(|view| view.camera == number).count(),
+        }
     };
-    robot.further_cameras.iter().enumerate().filter_map(table).collect()
+    (1..=robot.further_cameras.len()).filter(|&number| found.has(Block::Mount(number))).map(table).collect()
 }
 
 /// The map's tags where `bundle` found them.

@@ -16,7 +16,6 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Vector3};
 
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::score_test::{GeometryElement, Score, ToolJacobian, columns};
-use crate::calib::bundle::solve::shifted;
 use crate::calib::finding::{Finding, FindingKind, FindingUnit};
 use crate::calib::geometry_error::ErrorKind;
 use crate::calib::refusal::Refusal;
@@ -151,7 +150,7 @@ impl Estimate<'_> {
     pub(crate) fn with_touches(&self, update: &TouchUpdate) -> Self {
         let mut updated = self.clone();
         let n = update.n;
-        shifted(&self.problem, &update.mean.rows(0, n).into_owned(), &mut updated.solved.state);
+        updated.solved.state.step(&self.problem.layout, &update.mean.rows(0, n).into_owned());
         updated.posterior.covariance = update.covariance.view((0, 0), (n, n)).into_owned();
         updated
     }

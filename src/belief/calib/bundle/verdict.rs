@@ -5,18 +5,20 @@ use crate::calib::baseline_comparison::SIGNIFICANCE;
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::innovations::{Innovations, JointInnovation};
 use crate::calib::bundle::input::BundleInput;
-use crate::calib::bundle::model::{Hyperparameters, Walk};
 use crate::calib::bundle::observability::{Observability, observability};
 use crate::calib::bundle::score_test::{GeometryElement, ScoreTestResult};
 use crate::calib::covariance::numbered_task_angles;
 use crate::calib::finding::{Finding, FindingKind, FindingUnit};
 use crate::calib::geometry_error::{BASE, ErrorKind, GeometryError};
-use crate::calib::parameters::{Parameter, ParameterKind};
 use crate::calib::refusal::{InnovationQuantity, Refusal};
 use crate::calib::result::calibration::Calibration;
 use crate::calib::result::validity::Extrapolation;
 use crate::calib::result::verdict_tables::{Check, ObservabilityTable, VerdictTable};
 use crate::calib::views::view::TaskRests;
+use crate::model::blocks::Block;
+use crate::model::estimated::Walk;
+use crate::model::parameters::{Parameter, ParameterKind};
+use crate::model::scales::Hyperparameters;
 use armcal_core::codes::{Code, Warning};
 use armcal_core::input::TagNoise;
 use armcal_core::joints::JointAngles;
@@ -421,7 +423,7 @@ impl VerdictInput<'_> {
     /// Links between camera and tool that no tag shows.
     fn has_unseen_links(&self) -> bool {
         let robot = self.input.robot;
-        robot.tool.mount.n_joints > robot.n_seen_joints() && !self.input.model.gripper_tag
+        robot.tool.mount.n_joints > robot.n_seen_joints() && !self.input.model.has(Block::GripperTag)
     }
 
     fn table(&self, found: &Observability) -> ObservabilityTable {

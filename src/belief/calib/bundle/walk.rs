@@ -15,11 +15,11 @@
 
 use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::input::BundleInput;
-use crate::calib::bundle::model::Walk;
 use crate::calib::bundle::model_selection::{OptionalTerm, Selection, evidence_gain_nats};
-use crate::calib::bundle::walk_modes::{N_WALK_MODES, mode, mode_std};
-use crate::calib::parameters::ParameterKind;
 use crate::calib::views::view::View;
+use crate::model::estimated::Walk;
+use crate::model::parameters::ParameterKind;
+use crate::model::walk_modes::{N_WALK_MODES, mode, mode_std};
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::time::Stamp;
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};

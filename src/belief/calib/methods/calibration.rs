@@ -12,7 +12,6 @@ use crate::calib::methods::minimum_variance::{determined_by_variance, variance_c
 use crate::calib::methods::observability::{Unobservable, free_parameters, grouped_names};
 use crate::calib::methods::position_problem::PositionProblem;
 use crate::calib::methods::{PositionMethod, SearchOptions, Solution};
-use crate::calib::parameters::{JointParameters, Parameter};
 use crate::calib::result::assemble::{Evidence, Fit, Provenance, assemble, held_out_metrics};
 use crate::calib::result::calibration::Calibration;
 use crate::calib::result::camera_mount::CameraMount;
@@ -21,6 +20,7 @@ use crate::calib::result::metrics::HeldOutMetrics;
 use crate::calib::tag_mapping::map_unknown_tags;
 use crate::calib::views::calibration_data::{CalibrationData, HeldOut};
 use crate::calib::views::view::View;
+use crate::model::parameters::{JointParameters, Parameter};
 use armcal_core::robot::Robot;
 use armcal_core::routine::Method;
 

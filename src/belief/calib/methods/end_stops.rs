@@ -5,12 +5,12 @@ use crate::calib::error::CalibError;
 use crate::calib::methods::joint_limits::fit_stops;
 use crate::calib::methods::observability::grouped_names;
 use crate::calib::methods::position_problem::PositionProblem;
-use crate::calib::parameters::JointParameters;
 use crate::calib::result::assemble::{Evidence, Fit, Provenance, assemble, held_out_metrics};
 use crate::calib::result::calibration::Calibration;
 use crate::calib::views::calibration_data::CalibrationData;
 use crate::calib::views::view::EndStopReading;
 use crate::calib::views::view::View;
+use crate::model::parameters::JointParameters;
 use armcal_core::routine::Method;
 
 /// # Errors

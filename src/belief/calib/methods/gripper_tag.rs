@@ -11,14 +11,15 @@
 
 use std::ops::Range;
 
-use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Matrix6, SMatrix, SVector, Vector2, Vector6};
+use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, SMatrix, SVector, Vector2, Vector6};
 
-use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::views::view::{MeanCorners, View};
+use crate::measure::ImagePoint;
+use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
 use armcal_core::numeric::{Damping, LeastSquares, Outcome, Proposal, StopRule, minimize};
 use armcal_core::optics::square_corners;
 use armcal_core::robot::{GripperTag, Robot};
-use armcal_core::spatial::{exp, log, skew};
+use armcal_core::spatial::{adjoint, exp, log};
 use armcal_core::streams::JointAngles;
 
 /// Camera mount and the joints behind the camera, by the tag on the gripper.
@@ -286,7 +287,8 @@ impl Problem<'_> {
         let poses = robot.chain.link_poses(&angles);
         let camera_from_base = (poses.link(robot.camera.mount.n_joints) * state.link_from_camera).inverse();
         let camera_from_tag = camera_from_base * poses.link(self.tag.mount.n_joints) * state.link_from_tag;
-        let rotation = *camera_from_tag.rotation.to_rotation_matrix().matrix();
+        // A motion of the tag is one of the camera the other way.
+        let by_tag = -adjoint(&camera_from_tag);
         let mut view = Linearized {
             residual_px: SVector::zeros(),
             by_poses: SMatrix::zeros(),
@@ -294,19 +296,16 @@ impl Problem<'_> {
         };
         for (k, corner) in square_corners(self.tag.size_m).iter().enumerate() {
             let in_camera = (camera_from_tag * corner).coords;
-            let (pixel, by_point) = robot.camera.lens.project_with_jacobian(&in_camera)?;
-            let residual = Vector2::from(seen.corners_px[k]) - pixel;
+            let image = ImagePoint::of(&robot.camera.lens, &in_camera)?;
+            let residual = Vector2::from(image.residual_px(&seen.corners_px[k]));
             view.residual_px.fixed_rows_mut::<2>(2 * k).copy_from(&residual);
-            // Of mount * exp(xi): -translation + point x rotation. Of tag * exp(xi): R (translation - corner x
-            // rotation).
-            let blocks = [-Matrix3::identity(), skew(&in_camera), rotation, -rotation * skew(&corner.coords)];
-            for (n, block) in blocks.iter().enumerate() {
-                view.by_poses.fixed_view_mut::<2, 3>(2 * k, 3 * n).copy_from(&(by_point * block));
-            }
+            let by_camera = image.jacobian();
+            view.by_poses.fixed_view_mut::<2, 6>(2 * k, 0).copy_from(&by_camera);
+            view.by_poses.fixed_view_mut::<2, 6>(2 * k, 6).copy_from(&(by_camera * by_tag));
             let in_base = camera_from_base.inverse() * nalgebra::Point3::from(in_camera);
             for (n, joint) in self.joints.clone().enumerate() {
                 let by_angle = camera_from_base.rotation * poses.point_jacobian(joint, &in_base.coords);
-                view.by_angle[n].fixed_rows_mut::<2>(2 * k).copy_from(&(by_point * by_angle));
+                view.by_angle[n].fixed_rows_mut::<2>(2 * k).copy_from(&(image.by_point * by_angle));
             }
         }
         Some(view)

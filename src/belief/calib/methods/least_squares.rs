@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::calib::methods::Solution;
 use crate::calib::methods::position_problem::PositionProblem;
-use crate::calib::parameters::{JointParameters, Parameter};
+use crate::model::parameters::{JointParameters, Parameter};
 use armcal_core::numeric::{Damping, LeastSquares, Proposal, StopRule, minimize};
 
 const DAMPING: Damping = Damping { first: 1e-6, min: 1e-15, max: 1e12, down: 0.1, up: 10.0, min_after_rejection: 0.0 };

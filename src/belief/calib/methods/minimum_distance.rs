@@ -3,7 +3,7 @@
 
 use crate::calib::methods::position_problem::PositionProblem;
 use crate::calib::methods::{PositionMethod, SearchOptions, Solution};
-use crate::calib::parameters::{JointParameters, Parameter};
+use crate::model::parameters::{JointParameters, Parameter};
 
 /// Minimizes [`PositionProblem::sum_of_distances_m`] over `free`, from `guess`; the other parameters stay there.
 #[must_use]

@@ -12,7 +12,7 @@ use nalgebra::{Const, DMatrix, DVector, Dyn, OMatrix, Vector3};
 use crate::calib::covariance::{CommonErrors, ParameterCovariance};
 use crate::calib::methods::observability::Unobservable;
 use crate::calib::methods::position_problem::{PositionProblem, TagResidual};
-use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
+use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
 use armcal_core::robot::Robot;
 
 /// What becomes of the first joint's offset under minimum variance.

@@ -8,7 +8,7 @@
 use nalgebra::DMatrix;
 
 use crate::calib::methods::position_problem::PositionProblem;
-use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
+use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
 use armcal_core::robot::Robot;
 
 /// A parameter that stays at its datasheet value, and why.

@@ -5,7 +5,7 @@ use crate::calib::methods::minimum_variance::VarianceObjective;
 use crate::calib::methods::position_problem::PositionProblem;
 use crate::calib::methods::search::{self, PositionSearch, SearchOptions};
 use crate::calib::methods::solution::Solution;
-use crate::calib::parameters::{JointParameters, Parameter};
+use crate::model::parameters::{JointParameters, Parameter};
 
 /// An equation over landmark positions in the base frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

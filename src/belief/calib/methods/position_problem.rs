@@ -5,8 +5,8 @@
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Point3, Vector2, Vector3};
 
-use crate::calib::parameters::{JointParameters, Parameter};
 use crate::calib::views::view::{TagMeasurement, View};
+use crate::model::parameters::{JointParameters, Parameter};
 use armcal_core::kinematics::LinkPoses;
 use armcal_core::robot::{Robot, SurveyedTag};
 use armcal_core::sensor::ConditionChange;

@@ -9,7 +9,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use crate::calib::methods::position_problem::PositionProblem;
 use crate::calib::methods::solution::Solution;
-use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
+use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
 use armcal_core::numeric::Outcome;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::wrap_symmetric;

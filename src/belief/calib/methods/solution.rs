@@ -1,6 +1,6 @@
 //! What a method's solver found.
 
-use crate::calib::parameters::JointParameters;
+use crate::model::parameters::JointParameters;
 use armcal_core::numeric::Outcome;
 
 /// A method's answer.

@@ -3,8 +3,8 @@
 use crate::calib::online::filter::{Filter, ViewUpdate};
 use crate::calib::online::hypothesis::Fault;
 use crate::calib::online::process_noise::ProcessNoise;
-use crate::calib::parameters::WornSpot;
 use crate::calib::views::view::View;
+use crate::model::parameters::WornSpot;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::ConditionChange;
 use armcal_core::time::Stamp;

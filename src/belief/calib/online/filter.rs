@@ -11,16 +11,20 @@ use crate::calib::angles_by_camera::seen_angles;
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::bundle::linearize::NormalEquations;
-use crate::calib::bundle::model::{Hyperparameters, Model};
 use crate::calib::bundle::outliers::{reject_by, rejected};
-use crate::calib::bundle::prior_terms::off_by;
-use crate::calib::bundle::priors::prior;
-use crate::calib::bundle::problem::{BundleProblem, Layout, ObservationTerm, Prior, State};
+use crate::calib::bundle::problem::BundleProblem;
 use crate::calib::bundle::solve::{own_gain, take_step};
 use crate::calib::bundle::time_error::TimeErrorOfView;
 use crate::calib::online::view_stream::is_moving;
-use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::views::view::View;
+use crate::measure::ObservationTerm;
+use crate::model::blocks::{Block, MAX_COLUMNS, PerBlock};
+use crate::model::estimated::Model;
+use crate::model::layout::Layout;
+use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
+use crate::model::prior::{Covers, Information, Prior, at_least, off_by};
+use crate::model::scales::Hyperparameters;
+use crate::model::state::State;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::numeric::{Loss, cholesky, solve_lower};
 use armcal_core::robot::Robot;
@@ -122,17 +126,14 @@ impl Filter {
     /// nothing.
     pub(crate) fn of_estimate(estimate: &Estimate<'_>, robot: &Robot) -> Option<Self> {
         let (problem, solved) = (&estimate.problem, &estimate.solved);
-        let layout = Layout::with_tags(robot, &estimate.model, |_| true);
-        let n_common = problem.layout.first_of_tags();
+        let layout = Layout::new(robot, &estimate.model, |_| true);
         let mut info = DMatrix::zeros(layout.n, layout.n);
         // Column of the batch by column here.
         let mut column_of: Vec<Option<usize>> = vec![None; layout.n];
-        (0..n_common).for_each(|column| column_of[column] = Some(column));
-        let poses = layout.tags.iter().zip(&problem.layout.tags);
-        let gripper = (&layout.gripper_tag, &problem.layout.gripper_tag);
-        for (here, there) in poses.chain([gripper]) {
-            let Some(here) = *here else { continue };
-            (0..6).for_each(|k| column_of[here + k] = there.map(|there| there + k));
+        (0..layout.n_joint()).for_each(|column| column_of[column] = Some(column));
+        for (block, here) in layout.blocks() {
+            let there = problem.layout.at(block);
+            (0..block.n_columns()).for_each(|k| column_of[here + k] = there.map(|there| there + k));
         }
         for (row, of_row) in column_of.iter().enumerate() {
             for (column, of_column) in column_of.iter().enumerate().take(row + 1) {
@@ -141,14 +142,12 @@ impl Filter {
                 (info[(row, column)], info[(column, row)]) = (value, value);
             }
         }
-        for (tag_idx, at) in layout.tags.iter().enumerate() {
-            let Some(at) = at.filter(|at| column_of[*at].is_none()) else { continue };
-            for (k, std) in problem.prior.tags_std[tag_idx].iter().enumerate() {
-                info[(at + k, at + k)] = BundleProblem::at_least(std.min(UNKNOWN_STD)).powi(-2);
+        for (block, at) in layout.blocks().filter(|(_, at)| column_of[*at].is_none()) {
+            for (k, std) in problem.prior.std[block][..block.n_columns()].iter().enumerate() {
+                info[(at + k, at + k)] = at_least(std.min(UNKNOWN_STD)).powi(-2);
             }
         }
-        let mut state = solved.state.clone();
-        (state.joint_error, state.camera_error) = (vec![[0.0; MAX_JOINTS]], vec![Isometry3::identity()]);
+        let state = solved.state.with_views(1);
         let log_det = log_det(&cholesky(info.clone())?);
         let (model, scales, guess) = (estimate.model.clone(), problem.scales.clone(), estimate.guess);
         Some(Self { model, scales, guess, layout, state, info, log_det, noise_in_motion: 1.0 })
@@ -162,12 +161,12 @@ impl Filter {
 
     /// First of the six columns of the camera's mount.
     pub(crate) fn mount_column(&self) -> Option<usize> {
-        self.layout.mount
+        self.layout.at(Block::Mount(0))
     }
 
     /// First of the six columns of a tag.
     pub(crate) fn tag_column(&self, tag_idx: usize) -> Option<usize> {
-        self.layout.tags[tag_idx]
+        self.layout.at(Block::Tag(tag_idx))
     }
 
     /// Whether a worn spot of a joint's sensor has a column.
@@ -197,17 +196,17 @@ impl Filter {
 
     /// `link_from_camera`, as believed.
     pub(crate) fn mount(&self) -> &Isometry3<f64> {
-        &self.state.mount
+        self.state.mount(0)
     }
 
     /// `base_from_tag`, as believed.
     pub(crate) fn tag(&self, tag_idx: usize) -> &Isometry3<f64> {
-        &self.state.tags[tag_idx]
+        self.state.tag(tag_idx)
     }
 
     /// How much later the joint sensors' stamps are than the camera's, s, and its column.
     pub(crate) fn clock_offset(&self) -> Option<(f64, usize)> {
-        self.layout.time.map(|at| (self.state.time_s, at))
+        self.layout.at(Block::Clock).map(|at| (self.state.clock_s(), at))
     }
 
     /// Covariance of the joints' parameters, which are the first columns; `None` only after an overflow.
@@ -233,7 +232,7 @@ impl Filter {
             return None;
         }
         let covariance = cholesky(reference.info.clone())?.inverse();
-        let off = off_by(&self.layout, &reference.state.means(), &self.state, self.layout.n);
+        let off = off_by(&self.layout, (&reference.state.joint, &reference.state.blocks), &self.state, self.layout.n);
         Some(DVector::from_fn(self.layout.n, |k, _| off[k] / covariance[(k, k)].sqrt()))
     }
 
@@ -283,7 +282,7 @@ impl Filter {
         let means = std::mem::replace(&mut self.state.joint, DVector::zeros(0));
         self.state.joint = means.insert_row(at, self.guess.get(parameter));
         self.model.joints[joint].push(kind);
-        self.layout = Layout::with_tags(robot, &self.model, |_| true);
+        self.layout = Layout::new(robot, &self.model, |_| true);
     }
 
     /// Adds `D D^T` to the covariance.
@@ -316,17 +315,17 @@ impl Filter {
         let info = std::mem::replace(&mut self.info, DMatrix::zeros(0, 0));
         let (log_det_before, before) = (self.log_det, self.state.clone());
         let input = self.input(robot, views);
-        let prior = self.prior(&input, info);
+        let prior = self.prior(robot, info);
         let mut problem = BundleProblem::with_layout(&input, self.layout.clone(), prior);
         self.set_rates(&mut problem, robot, view);
         self.set_shape_errors(&mut problem, view);
         let Some(solved) = self.solve(&mut problem, view, &before) else {
-            self.info = problem.prior.joint_info;
+            self.info = problem.prior.information.matrix;
             return None;
         };
         let update = view_update(&problem, &solved, log_det_before);
         if !update.log_evidence.is_finite() {
-            self.info = problem.prior.joint_info;
+            self.info = problem.prior.information.matrix;
             return None;
         }
         let SolvedView { state, normal, factor } = solved;
@@ -392,8 +391,7 @@ impl Filter {
             model: self.model.clone(),
             scales: Hyperparameters { noise: self.noise(&views[0]), ..self.scales.clone() },
             guess: self.guess,
-            // The belief so far is put in its place.
-            joint_prior: Some((DVector::zeros(0), DMatrix::zeros(0, 0))),
+            joint_prior: None,
             evidence: HyperparameterMode::Given,
         }
     }
@@ -403,17 +401,12 @@ impl Filter {
     }
 
     /// The belief so far as a view's prior.
-    fn prior(&self, input: &BundleInput<'_>, info: DMatrix<f64>) -> Prior {
-        let state = &self.state;
+    fn prior(&self, robot: &Robot, info: DMatrix<f64>) -> Prior {
         Prior {
-            joint_mean: state.joint.clone(),
-            joint_info: info,
-            mount: state.mount,
-            time_s: state.time_s,
-            lens: state.lens,
-            tags: state.tags.clone(),
-            gripper_tag: state.gripper_tag,
-            ..prior(input, &self.scales)
+            joint_mean: self.state.joint.clone(),
+            information: Information { matrix: info, covers: Covers::All },
+            mean: self.state.blocks.clone(),
+            std: PerBlock::new(robot, |_| [f64::INFINITY; MAX_COLUMNS]),
         }
     }
 }
@@ -547,14 +540,14 @@ fn view_errors(problem: &BundleProblem<'_>, solved: &SolvedView) -> ([JointError
 /// With W the information before and P the covariance after, `a = W (x' - x)` and `b = W - W P W`, both along each
 /// offset and along the place of each tag.
 fn scores(problem: &BundleProblem<'_>, state: &State, factor: &Cholesky<f64, Dyn>) -> Scores {
-    let info = &problem.prior.joint_info;
-    let pull = info * off_by(&problem.layout, &problem.prior.means(), state, info.nrows());
+    let info = &problem.prior.information.matrix;
+    let pull = info * problem.prior.off(&problem.layout, state);
     let columns = problem.layout.parameters.iter().enumerate();
     let offsets: Vec<(usize, usize)> =
         columns.filter(|(_, p)| p.kind == ParameterKind::Offset).map(|(column, p)| (p.joint, column)).collect();
     let seen = problem.observations.iter().filter(|observation| observation.is_used);
     let tags: Vec<(usize, usize)> =
-        seen.filter_map(|of| Some((of.tag, (*problem.layout.tags.get(of.tag)?)?))).collect();
+        seen.filter_map(|of| Some((of.tag, problem.layout.at(Block::Tag(of.tag))?))).collect();
     let all: Vec<usize> =
         offsets.iter().map(|(_, column)| *column).chain(tags.iter().flat_map(|(_, at)| *at..at + 3)).collect();
     let mut half = info.select_columns(&all);

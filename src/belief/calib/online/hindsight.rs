@@ -8,8 +8,8 @@ use nalgebra::{Matrix3, Vector3};
 use crate::calib::online::branch::{Branch, Step, speaks};
 use crate::calib::online::filter::{Filter, Scores};
 use crate::calib::online::hypothesis::Fault;
-use crate::calib::parameters::WornSpot;
 use crate::calib::views::view::View;
+use crate::model::parameters::WornSpot;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::robot::Robot;
 

@@ -4,8 +4,8 @@ use nalgebra::{DMatrix, Matrix6};
 
 use crate::calib::finding::FindingKind;
 use crate::calib::online::filter::Filter;
-use crate::calib::parameters::{Parameter, ParameterKind, WornSpot};
 use crate::calib::views::view::View;
+use crate::model::parameters::{Parameter, ParameterKind, WornSpot};
 use armcal_core::robot::Robot;
 use armcal_core::spatial::adjoint;
 

@@ -6,9 +6,9 @@
 //! the belief before a view counts as given), from a prior about the datasheet's figure.
 
 use crate::calib::bundle::calibration_prior::drift_std_rad_per_sqrt_h;
-use crate::calib::bundle::model::Hyperparameters;
 use crate::calib::bundle::time_error::TimeErrorOfView;
 use crate::calib::online::filter::{Filter, ViewUpdate};
+use crate::model::scales::Hyperparameters;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::ConditionChange;

@@ -1,7 +1,9 @@
 //! What an online estimator is told beforehand.
 
-use crate::calib::bundle::model::{Hyperparameters, Model, Scope, TIME_JITTER_STD_S, model_of};
-use crate::calib::parameters::JointParameters;
+use crate::calib::bundle::model::{Scope, model_of};
+use crate::model::estimated::Model;
+use crate::model::parameters::JointParameters;
+use crate::model::scales::{Hyperparameters, TIME_JITTER_STD_S};
 use armcal_core::robot::Robot;
 
 /// How much larger an effect may be than its datasheet's figure.

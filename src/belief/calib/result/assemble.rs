@@ -3,7 +3,6 @@
 use crate::calib::covariance::{ParameterCovariance, ToolErrorPrediction};
 use crate::calib::methods::Solution;
 use crate::calib::methods::position_problem::PositionProblem;
-use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::refusal::Refusal;
 use crate::calib::refusal_conditions::{AcceptanceData, HeldOutLimit, refusal};
 use crate::calib::result::calibration::{Calibration, JointResult, Status};
@@ -17,6 +16,7 @@ use crate::calib::result::valid_range::ValidRange;
 use crate::calib::views::scale_identification::IdentifiedScale;
 use crate::calib::views::view::{CaptureData, EndStopReading, TagMeasurement, View};
 use crate::judge::{TargetError, TargetU95, U95Table};
+use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
 use armcal_core::codes::Code;
 use armcal_core::document::VERSION;
 use armcal_core::input::TagNoise;

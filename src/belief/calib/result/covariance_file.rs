@@ -28,7 +28,7 @@ const HEAD: &str = "\
 # their keys, the camera mount in m and rad.
 ";
 
-/// Estimated parameters by [`Parameter::name`](crate::calib::Parameter::name): gains relative, offsets in rad, ... and
+/// Estimated parameters by [`Parameter::name`](crate::model::Parameter::name): gains relative, offsets in rad, ... and
 /// their covariance.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

@@ -3,9 +3,9 @@
 use nalgebra::{Matrix3, Point3, Vector2};
 
 use crate::calib::methods::position_problem::{PositionProblem, TagResidual};
-use crate::calib::parameters::JointParameters;
 use crate::calib::views::view::View;
 use crate::judge::{ErrorDistribution, TargetError};
+use crate::model::parameters::JointParameters;
 use armcal_core::joints::JointAngles;
 use armcal_core::optics::square_corners;
 use armcal_core::stats::Summary;

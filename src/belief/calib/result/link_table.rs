@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::calib::covariance::ParameterCovariance;
-use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
+use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
 use armcal_core::kinematics::LinkCorrection;
 use armcal_core::robot::Robot;
 

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::calib::covariance::ParameterCovariance;
-use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
+use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
 use armcal_core::kinematics::Sag;
 use armcal_core::robot::{FileIssue, Robot};
 

@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::calib::covariance::ParameterCovariance;
-use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
+use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
 use armcal_core::robot::FileIssue;
 use armcal_core::sensor::{Conditions, N_SHAPE, SensorModel, Terms};
 use armcal_core::time::Stamp;

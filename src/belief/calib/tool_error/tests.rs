@@ -5,8 +5,8 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::calib::parameters::JointParameters;
 use crate::calib::tool_error::*;
+use crate::model::parameters::JointParameters;
 use armcal_core::sensor::Terms;
 use armcal_core::spatial::skew;
 use armcal_core::stats::stream_rng;

@@ -5,14 +5,15 @@
 //! in the camera. Each view's camera pose comes from all its tags' corners; the turn's common axis is the principal one
 //! of the rotation vectors, its direction the drawing's; the slope of the turn against the readings is the gain.
 
-use nalgebra::{DVector, Isometry3, Matrix3, Matrix6, SMatrix, Vector2, Vector3, Vector6};
+use nalgebra::{DVector, Isometry3, Matrix3, Matrix6, Vector3, Vector6};
 
 use crate::calib::CalibError;
 use crate::calib::views::view::{CaptureData, View};
+use crate::measure::{ImagePoint, TwistSums};
 use armcal_core::numeric::{Damping, LeastSquares, Outcome, Proposal, StopRule, minimize};
 use armcal_core::optics::{solve_square, square_corners};
 use armcal_core::robot::Robot;
-use armcal_core::spatial::{exp, skew};
+use armcal_core::spatial::exp;
 use armcal_core::streams::JointAngles;
 
 /// A sensor's measured scale.
@@ -136,25 +137,22 @@ struct Linearized {
 
 impl Linearized {
     fn at(robot: &Robot, view: &View, pose: Isometry3<f64>) -> Option<Self> {
-        let mut out = Self { pose, normal: Matrix6::zeros(), gradient: Vector6::zeros(), cost: 0.0 };
+        let (mut sums, mut cost) = (TwistSums::default(), 0.0);
         let camera_from_base = pose.inverse();
         for seen in &view.tags {
             let tag = &robot.tags[seen.tag_idx];
             let Some(corners) = seen.corners() else { continue };
             for (corner, measured) in square_corners(tag.size_m).iter().zip(&corners.corners_px) {
                 let in_camera = (camera_from_base * (tag.base_from_tag.isometry() * corner)).coords;
-                let (pixel, by_point) = robot.camera.lens.project_with_jacobian(&in_camera)?;
-                let residual = Vector2::from(*measured) - pixel;
-                // d(point in camera)/d(xi) of pose * exp(xi): -translation + point x rotation.
-                let mut by_pose = SMatrix::<f64, 3, 6>::zeros();
-                by_pose.fixed_view_mut::<3, 3>(0, 0).copy_from(&-Matrix3::identity());
-                by_pose.fixed_view_mut::<3, 3>(0, 3).copy_from(&skew(&in_camera));
-                let jacobian = by_point * by_pose;
-                out.normal += jacobian.transpose() * jacobian;
-                out.gradient += jacobian.transpose() * residual;
-                out.cost += residual.norm_squared();
+                let image = ImagePoint::of(&robot.camera.lens, &in_camera)?;
+                for (row, residual) in image.by_twist.iter().zip(image.residual_px(measured)) {
+                    sums.add(row, residual, 1.0);
+                    cost += residual * residual;
+                }
             }
         }
+        let (normal, gradient) = sums.weighted(1.0);
+        let out = Self { pose, normal, gradient, cost };
         out.cost.is_finite().then_some(out)
     }
 }

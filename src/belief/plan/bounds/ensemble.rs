@@ -9,7 +9,8 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::calib::{Calibration, Parameter, ParameterKind};
+use crate::calib::Calibration;
+use crate::model::{Parameter, ParameterKind};
 use armcal_core::kinematics::LinkPoses;
 use armcal_core::robot::{JointSensorSpec, Robot};
 use armcal_core::sensor::{ArmSensors, ConditionChange, Conditions};

@@ -7,7 +7,7 @@
 
 use nalgebra::{Cholesky, DMatrix, Matrix6, SMatrix, SymmetricEigen};
 
-use crate::calib::ParameterKind;
+use crate::model::ParameterKind;
 use crate::plan::view_planning::parameter_prior::{N_COMMON, N_DIRECTIONS, ParameterPrior, WIDTH, columns};
 use crate::plan::view_planning::view_information::{Twists, WhitenedView};
 use armcal_core::routine::PoseCriterion;

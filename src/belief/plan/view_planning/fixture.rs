@@ -7,8 +7,8 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::calib::bundle::Hyperparameters;
-use crate::calib::{JointParameters, MeanCorners, TagMeasurement, TagObservation, View};
+use crate::calib::{MeanCorners, TagMeasurement, TagObservation, View};
+use crate::model::{Hyperparameters, JointParameters};
 use crate::plan::view_planning::parameter_prior::columns;
 use crate::plan::view_planning::{PosePlan, PosePool, PoseRequest};
 use crate::plan::{ClearanceModel, JointErrorBounds, PlanError, VisibilityModel};

@@ -7,8 +7,9 @@
 
 use nalgebra::{DMatrix, Matrix6, Vector6};
 
-use crate::calib::bundle::{Hyperparameters, MOUNT_ROWS};
-use crate::calib::{Calibration, Parameter, ParameterCovariance, ParameterKind};
+use crate::calib::bundle::MOUNT_ROWS;
+use crate::calib::{Calibration, ParameterCovariance};
+use crate::model::{Hyperparameters, Parameter, ParameterKind};
 use crate::plan::view_planning::request::PoseRequest;
 use armcal_core::robot::{FailedKind, Robot};
 use armcal_core::sensor::{N_SHAPE, nonlinearity_basis};

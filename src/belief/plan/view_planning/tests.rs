@@ -3,8 +3,9 @@
 use nalgebra::{Cholesky, DMatrix, Vector6};
 use rand_chacha::ChaCha8Rng;
 
-use crate::calib::bundle::{BundleInput, HyperparameterMode, Hyperparameters, estimate, model_for};
-use crate::calib::{JointParameters, ParameterCovariance, ParameterKind};
+use crate::calib::ParameterCovariance;
+use crate::calib::bundle::{BundleInput, HyperparameterMode, estimate, model_for};
+use crate::model::{Hyperparameters, JointParameters, ParameterKind};
 use crate::plan::PlanError;
 use crate::plan::view_planning::candidates::Candidate;
 use crate::plan::view_planning::criterion::{DesignObjective, DesignState};

@@ -1,6 +1,6 @@
 //! An arm that goes where its controller is told at once, whose oil warms while it does.
 
-use crate::calib::JointParameters;
+use crate::model::JointParameters;
 use crate::session::motion::*;
 use armcal_core::log::{RecordingHeader, RecordingWriter, read_recording};
 use armcal_core::sensor::Terms;

@@ -11,7 +11,7 @@ use crate::calib::bundle::drawing::{MULTIPLES, gain_nats};
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::input::BundleInput;
 use crate::calib::bundle::schur::Group;
-use crate::calib::parameters::Parameter;
+use crate::model::parameters::Parameter;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::kinematics::Sag;
 

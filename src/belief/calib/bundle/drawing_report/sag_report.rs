@@ -4,7 +4,7 @@ use nalgebra::{Cholesky, DVector};
 
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::finding::{Finding, FindingKind, FindingUnit};
-use crate::calib::parameters::{Parameter, ParameterKind};
+use crate::model::parameters::{Parameter, ParameterKind};
 use armcal_core::joints::JointAngles;
 
 /// Sigmas of the estimate from which a compliance is named.

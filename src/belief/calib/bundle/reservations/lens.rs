@@ -9,10 +9,10 @@ use nalgebra::{Const, DMatrix, Dyn, Matrix3, OMatrix, SMatrix, SVector};
 
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::linearize::NormalEquations;
-use crate::calib::bundle::problem::Layout;
 use crate::calib::bundle::reservations::HeldElement;
 use crate::calib::bundle::score_test::ToolJacobian;
 use crate::calib::finding::FindingUnit;
+use crate::model::blocks::Block;
 use armcal_core::numeric::Loss;
 use armcal_core::robot::{CameraSpec, LensPriors};
 
@@ -35,11 +35,11 @@ impl Estimate<'_> {
     /// `None` where the lens is estimated, or where nobody says what it is: then no view holds corners.
     pub(super) fn held_lens(&self) -> Option<HeldLens> {
         let (mut problem, at) = (self.problem.clone(), self.problem.layout.first_of_tags());
-        if problem.layout.lens.is_some() || !problem.robot.camera.lens.is_known() {
+        if self.has(Block::Lens(0)) || !problem.robot.camera.lens.is_known() {
             return None;
         }
-        problem.layout = Layout::with_lens(&self.problem.layout);
-        problem.prior.lens_std = [f64::INFINITY; 8];
+        problem.layout = self.problem.layout.with(Block::Lens(0));
+        problem.prior.forget(|block| block == Block::Lens(0));
         let mut normal = NormalEquations::new(&problem);
         normal.update(&problem, &self.solved.state, Loss::Square);
         let camera = &problem.robot.camera;

@@ -19,6 +19,7 @@ use crate::calib::bundle::drawing::{MULTIPLES, gain_nats};
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::tags::group::candidate_sets;
 use crate::calib::bundle::tags::identity::TagFault;
+use crate::model::blocks::Block;
 use armcal_core::spatial::{adjoint, exp, log};
 
 /// A tag whose survey is better known than this is no suspect, m and rad.
@@ -58,14 +59,15 @@ impl SurveyScore {
     /// `None` where fewer than two tags are seen.
     fn new(found: &Estimate<'_>) -> Option<Self> {
         let prior = &found.problem.prior;
-        let is_suspect = |tag: usize| prior.tags_std[tag].iter().all(|std| *std > LEAST_STD);
-        let seen = found.problem.layout.tags.iter().enumerate().filter_map(|(tag, at)| Some((tag, (*at)?)));
-        let seen: Vec<(usize, usize)> = seen.filter(|(tag, _)| is_suspect(*tag)).collect();
-        let first = seen.get(1).map(|_| prior.tags_std[seen[0].0])?;
-        let by_std = |tag: usize| Vector6::from(prior.tags_std[tag].map(f64::recip));
-        let motion = |tag: usize| adjoint(&prior.tags[tag].inverse());
+        let std = |tag: usize| &prior.std[Block::Tag(tag)][..6];
+        let drawn = |tag: usize| prior.mean.pose(Block::Tag(tag));
+        let is_suspect = |tag: usize| std(tag).iter().all(|std| *std > LEAST_STD);
+        let seen: Vec<(usize, usize)> = found.problem.layout.tags().filter(|(tag, _)| is_suspect(*tag)).collect();
+        let first = seen.get(1).map(|_| std(seen[0].0))?;
+        let by_std = |tag: usize| Vector6::from_column_slice(std(tag)).map(f64::recip);
+        let motion = |tag: usize| adjoint(&drawn(tag).inverse());
         let score = seen.iter().map(|&(tag, _)| {
-            let departure = log(&prior.tags[tag].inv_mul(&found.solved.state.tags[tag]));
+            let departure = log(&drawn(tag).inv_mul(found.solved.state.tag(tag)));
             let weight = by_std(tag);
             motion(tag).tr_mul(&departure.component_mul(&weight).component_mul(&weight))
         });
@@ -78,7 +80,7 @@ impl SurveyScore {
         Some(Self {
             score: score.collect(),
             information: seen.iter().map(|a| seen.iter().map(|b| information(a, b)).collect()).collect(),
-            places: seen.iter().map(|(tag, _)| prior.tags[*tag].translation.vector).collect(),
+            places: seen.iter().map(|(tag, _)| drawn(*tag).translation.vector).collect(),
             tags: seen.into_iter().map(|(tag, _)| tag).collect(),
             std: [first[0], first[3]],
         })

@@ -8,6 +8,8 @@
 use nalgebra::{Matrix6, Vector6};
 
 use crate::calib::bundle::estimate::Estimate;
+use crate::model::blocks::Block;
+use crate::model::prior::at_least;
 use armcal_core::spatial::log;
 use armcal_core::stats::chi_square_quantile;
 
@@ -62,8 +64,9 @@ impl Estimate<'_> {
     pub(crate) fn tag_departure(&self, tag_idx: usize) -> Option<TagDeparture> {
         let (pose, covariance) = self.tag(tag_idx);
         let prior = &self.problem.prior;
-        let by: Vector6<f64> = log(&prior.tags[tag_idx].inv_mul(&pose));
-        let std = Vector6::from(prior.tags_std[tag_idx]).map(|std| std.max(1e-9));
+        let block = Block::Tag(tag_idx);
+        let by: Vector6<f64> = log(&prior.mean.pose(block).inv_mul(&pose));
+        let std = Vector6::from_column_slice(&prior.std[block][..6]).map(at_least);
         let scaled = covariance?.component_div(&(std * std.transpose()));
         let told = (Matrix6::identity() - scaled).symmetric_eigen();
         let departure = by.component_div(&std);

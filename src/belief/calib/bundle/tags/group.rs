@@ -68,8 +68,7 @@ struct Departures {
 
 impl Departures {
     fn new(robot: &Robot, found: &Estimate<'_>) -> Option<Self> {
-        let seen: Vec<(usize, usize)> =
-            found.problem.layout.tags.iter().enumerate().filter_map(|(tag, at)| Some((tag, (*at)?))).collect();
+        let seen: Vec<(usize, usize)> = found.problem.layout.tags().collect();
         let n = 6 * seen.len();
         let column = |row: usize| seen[row / 6].1 + row % 6;
         let mut covariance = DMatrix::from_fn(n, n, |i, k| found.posterior.covariance[(column(i), column(k))]);

@@ -10,8 +10,8 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::calib::bundle::estimate::Estimate;
-use crate::calib::bundle::problem::WeightedMeasurement;
 use crate::calib::views::view::{TagObservation, View};
+use crate::measure::WeightedMeasurement;
 use armcal_core::robot::Robot;
 use armcal_core::spatial::Pose;
 use armcal_core::stats::quantile;
@@ -164,12 +164,12 @@ impl Estimate<'_> {
             let of_view = &problem.observations[data.observations.clone()];
             let is_placed = of_view.iter().any(|other| other.is_used && other.tag != tag_idx);
             let Some(tag) = view.tags.iter().find(|tag| tag.tag_idx == tag_idx).filter(|_| is_placed) else { continue };
-            let is_image = of_view.iter().all(|other| matches!(other.data, WeightedMeasurement::Corners { .. }));
+            let is_image = of_view.iter().all(|other| matches!(other.data, WeightedMeasurement::Corners(_)));
             if is_image {
                 let state = &self.solved.state;
                 let camera = problem.robot.camera_at(view.camera);
                 let link = *problem.link_poses(view_idx, state).link(camera.mount.n_joints);
-                let base_from_camera = link * state.mount_of(view.camera) * state.camera_error[view_idx];
+                let base_from_camera = link * state.mount(view.camera) * state.camera_error[view_idx];
                 observations.push((base_from_camera, tag.center_in_camera_m));
             }
         }

@@ -2,14 +2,15 @@
 
 use rand::seq::SliceRandom;
 
-use crate::calib::bundle::model::{Hyperparameters, model_for};
+use crate::calib::bundle::model::model_for;
 use crate::calib::bundle::tests::data::{Noise, Truth, rng, titan, views};
 use crate::calib::calibrate_data;
-use crate::calib::parameters::JointParameters;
 use crate::calib::refusal::Refusal;
 use crate::calib::result::calibration::{Calibration, Status};
 use crate::calib::views::calibration_data::{CalibrationData, HeldOut};
 use crate::calib::views::view::{CaptureData, View};
+use crate::model::parameters::JointParameters;
+use crate::model::scales::Hyperparameters;
 use crate::shared::Shared;
 use armcal_core::routine::Method;
 

@@ -7,9 +7,10 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::calib::bundle::model::{Hyperparameters, Model};
-use crate::calib::parameters::JointParameters;
 use crate::calib::views::view::{MeanCorners, TagMeasurement, TagObservation, View};
+use crate::model::estimated::Model;
+use crate::model::parameters::JointParameters;
+use crate::model::scales::Hyperparameters;
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
 use armcal_core::kinematics::Attachment;
 use armcal_core::optics::square_corners;
@@ -116,15 +117,23 @@ impl Truth {
         }
         let camera = &robot.camera;
         let mount = &camera.mount.link_from_frame;
-        let mount = if model.mount { moved(mount, camera.mount_std_m, camera.mount_std_rad, rng) } else { *mount };
-        let tags = robot.tags.iter().map(|tag| {
+        let mount = if model.has(Block::Mount(0)) {
+            moved(mount, camera.mount_std_m, camera.mount_std_rad, rng)
+        } else {
+            *mount
+        };
+        let tags = robot.tags.iter().enumerate().map(|(tag_idx, tag)| {
             let pose = tag.base_from_tag.isometry();
-            if model.tags { moved(pose, tag.position_std_m, tag.rotation_std_rad, rng) } else { *pose }
+            if model.has(Block::Tag(tag_idx)) {
+                moved(pose, tag.position_std_m, tag.rotation_std_rad, rng)
+            } else {
+                *pose
+            }
         });
         let tags = tags.collect();
         let gripper_tag = robot
             .gripper_tag
-            .filter(|_| model.gripper_tag)
+            .filter(|_| model.has(Block::GripperTag))
             .map(|tag| moved(&tag.mount.link_from_frame, tag.position_std_m, tag.rotation_std_rad, rng));
         let further = robot.further_cameras.iter();
         let further_mounts = further

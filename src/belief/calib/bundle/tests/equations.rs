@@ -6,16 +6,17 @@ use rand::RngExt;
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::bundle::linearize::NormalEquations;
 use crate::calib::bundle::model::model_for;
-use crate::calib::bundle::model::{Hyperparameters, Model};
-use crate::calib::bundle::priors::prior;
-use crate::calib::bundle::problem::{BundleProblem, State};
+use crate::calib::bundle::problem::BundleProblem;
 use crate::calib::bundle::solve::{LOOSE, solve, stepped, until};
 use crate::calib::bundle::tests::data::{
     Noise, Truth, normal, reference, rng, titan_watched_by_two, titan_with_gripper_tag, titan_with_two_cameras, views,
     watched_titan,
 };
-use crate::calib::parameters::JointParameters;
 use crate::calib::views::view::{TagMeasurement, View};
+use crate::model::estimated::Model;
+use crate::model::parameters::JointParameters;
+use crate::model::scales::Hyperparameters;
+use crate::model::state::State;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::numeric::Loss;
 use armcal_core::robot::Robot;
@@ -32,18 +33,10 @@ fn case(robot: Robot, seed: u64) -> Case {
     let mut rng = rng(seed, "equations");
     let mut scales = Hyperparameters::datasheet(&robot);
     scales.camera_error_std = Some([0.003, 0.004]);
-    let mut model = Model {
-        joints: vec![Vec::new(); robot.n_joints()],
-        n_links: robot.n_joints(),
-        n_compliant: if robot.is_watched() { 0 } else { robot.n_joints() },
-        mount: true,
-        further_mounts: vec![true; robot.further_cameras.len()],
-        lens: true,
-        tags: true,
-        gripper_tag: robot.gripper_tag.is_some(),
-        time_offset: true,
-        walk: None,
-    };
+    let blocks = Block::all(&robot).filter(|block| *block != Block::GripperTag || robot.gripper_tag.is_some());
+    let mut model = Model::of_blocks(robot.n_joints(), blocks);
+    model.n_links = robot.n_joints();
+    model.n_compliant = if robot.is_watched() { 0 } else { robot.n_joints() };
     let truth = Truth::draw(&robot, &model, &scales, &mut rng);
     let noise = Noise { corner_px: 0.3, n_frames: 5, joint_rad: [1e-3; MAX_JOINTS] };
     let mut views = views(&robot, &truth, &noise, 10, &mut rng);

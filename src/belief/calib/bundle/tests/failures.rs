@@ -8,16 +8,16 @@ use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::failure_detection::{FailureSearch, is_suspicious};
 use crate::calib::bundle::failures::{Failure, FailureAdjusted, FailureSource, SensorUse};
 use crate::calib::bundle::input::HyperparameterMode;
-use crate::calib::bundle::model::Hyperparameters;
 use crate::calib::bundle::model::model_for;
 use crate::calib::bundle::tests::data::{Noise, Truth, rng, titan, views};
 use crate::calib::bundle::tests::score_test::with_link;
 use crate::calib::calibrate_data;
-use crate::calib::parameters::JointParameters;
 use crate::calib::refusal::Refusal;
 use crate::calib::result::calibration::Calibration;
 use crate::calib::views::calibration_data::{CalibrationData, HeldOut};
 use crate::calib::views::view::{CaptureData, View};
+use crate::model::parameters::JointParameters;
+use crate::model::scales::Hyperparameters;
 use armcal_core::robot::{FailedKind, Robot};
 use armcal_core::routine::Method;
 use armcal_core::spatial::Pose;
@@ -58,7 +58,7 @@ pub(super) fn case(seed: u64, locked: Option<usize>) -> Case {
     if let Some(joint) = locked {
         // It stands in the middle; its sensor is straight, so that this is one angle.
         moving.sensors[joint].half_range_rad = 1e-12;
-        model.joints[joint].retain(|kind| matches!(kind, crate::calib::parameters::ParameterKind::Offset));
+        model.joints[joint].retain(|kind| matches!(kind, crate::model::parameters::ParameterKind::Offset));
     }
     let truth = Truth::draw(&robot, &model, &scales, &mut rng);
     let views = views(&moving, &truth, &noise, N_VIEWS, &mut rng);

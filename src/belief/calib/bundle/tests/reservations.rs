@@ -4,11 +4,12 @@ use nalgebra::{Isometry3, Vector3};
 
 use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
-use crate::calib::bundle::model::{Hyperparameters, model_for};
+use crate::calib::bundle::model::model_for;
 use crate::calib::bundle::tests::data::{Noise, Truth, reference, rng, titan, titan_with_gripper_tag, views};
-use crate::calib::parameters::JointParameters;
 use crate::calib::reservation::Reservation;
 use crate::calib::views::view::View;
+use crate::model::parameters::JointParameters;
+use crate::model::scales::Hyperparameters;
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
 use armcal_core::kinematics::Chain;
 use armcal_core::robot::Robot;

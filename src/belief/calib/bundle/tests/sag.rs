@@ -3,7 +3,6 @@
 use crate::calib::bundle::drawing::Drawing;
 use crate::calib::bundle::estimate::{Estimate, estimate, least_squares};
 use crate::calib::bundle::input::BundleInput;
-use crate::calib::bundle::model::Model;
 use crate::calib::bundle::tests::arms::{Built, arm, better};
 use crate::calib::bundle::tests::data::{normal, rng, titan};
 use crate::calib::bundle::tests::drawing::{Case, case_changed, tool_errors_m};
@@ -11,6 +10,7 @@ use crate::calib::bundle::tests::score_test::input;
 use crate::calib::finding::FindingKind;
 use crate::calib::views::view::View;
 use crate::calib::{Calibration, CalibrationData, CaptureData, HeldOut, Refusal, Status, calibrate_data};
+use crate::model::estimated::Model;
 use armcal_core::joints::JointAngles;
 use armcal_core::kinematics::Sag;
 use armcal_core::numeric::Outcome;
@@ -123,7 +123,8 @@ fn steps_that_overshoot_are_shortened() {
     for seed in 0..10 {
         let case = soft_case(&robot, soft(&robot, 1e-6, 100.0, seed), seed);
         let mut wide = input(&robot, &case.views, &case.model);
-        wide.model = Model { n_links: n, n_compliant: n, lens: true, ..wide.model };
+        wide.model = Model { n_links: n, n_compliant: n, ..wide.model };
+        wide.model.blocks.insert(Block::Lens(0));
         let [rough, fine] = [1e-10, 1e-13].map(|gain| least_squares(&wide, gain));
         let beyond = rough.cost_final / fine.cost_final - 1.0;
         println!("{} and {} steps, {beyond:.1e}", rough.iterations, fine.iterations);

@@ -6,15 +6,16 @@ use crate::calib::angles_by_camera::set_by_camera;
 use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::bundle::model::model_for;
-use crate::calib::bundle::model::{Hyperparameters, Model};
 use crate::calib::bundle::observability::{Observability, observability};
 use crate::calib::bundle::tests::arms::{Arm, Built, arm};
 use crate::calib::bundle::tests::data::{Noise, Truth, reference, rng, titan, views};
 use crate::calib::bundle::{GeometryElement, ScoreTestResult};
 use crate::calib::cross_validation::{FOLDS, fold_of};
 use crate::calib::geometry_error::ErrorKind;
-use crate::calib::parameters::JointParameters;
 use crate::calib::views::view::View;
+use crate::model::estimated::Model;
+use crate::model::parameters::JointParameters;
+use crate::model::scales::Hyperparameters;
 use armcal_core::kinematics::Chain;
 use armcal_core::robot::Robot;
 use armcal_core::stats::chi_square_quantile;
@@ -47,18 +48,8 @@ pub(super) fn views_of_changed(
 ) -> (Vec<View>, Model) {
     let mut rng = rng(seed, "alarm");
     let scales = Hyperparameters::datasheet(robot);
-    let mut model = Model {
-        joints: vec![Vec::new(); robot.n_joints()],
-        n_links: 0,
-        n_compliant: 0,
-        mount: true,
-        further_mounts: Vec::new(),
-        lens: false,
-        tags: true,
-        gripper_tag: false,
-        time_offset: false,
-        walk: None,
-    };
+    let blocks = [Block::Mount(0)].into_iter().chain(Block::tags(robot));
+    let mut model = Model::of_blocks(robot.n_joints(), blocks);
     let noise = Noise { corner_px: 0.3, n_frames: 8, joint_rad: scales.joint_std_rad };
     let first = Truth::draw(robot, &model, &scales, &mut rng);
     model.joints = model_for(robot, &views(robot, &first, &noise, 10, &mut rng)).joints;

@@ -10,14 +10,15 @@ use crate::calib::bundle::evidence::Posterior;
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::bundle::linearize::NormalEquations;
 use crate::calib::bundle::model::model_for;
-use crate::calib::bundle::model::{Hyperparameters, Model};
-use crate::calib::bundle::priors::prior;
-use crate::calib::bundle::problem::{BundleProblem, State};
+use crate::calib::bundle::problem::BundleProblem;
 use crate::calib::bundle::tests::data::{
     Noise, Truth, reference, rng, titan, titan_with_gripper_tag, views, watched_titan,
 };
-use crate::calib::parameters::{JointParameters, Parameter};
 use crate::calib::views::view::{TagMeasurement, View};
+use crate::model::estimated::Model;
+use crate::model::parameters::{JointParameters, Parameter};
+use crate::model::scales::Hyperparameters;
+use crate::model::state::State;
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
 use armcal_core::numeric::Loss;
 use armcal_core::robot::Robot;
@@ -43,18 +44,12 @@ pub(super) fn case(robot: &Robot, seed: u64, n_views: usize) -> Case<'_> {
     let mut rng = rng(seed, "statistics");
     let scales = scales(robot);
     // A first look tells which terms are excited; the truth is then drawn with them.
-    let mut model = Model {
-        joints: vec![Vec::new(); robot.n_joints()],
-        n_links: 0,
-        n_compliant: 0,
-        mount: true,
-        further_mounts: vec![true; robot.further_cameras.len()],
-        lens: false,
-        tags: true,
-        gripper_tag: robot.gripper_tag.is_some(),
-        time_offset: false,
-        walk: None,
-    };
+    let blocks = Block::all(robot).filter(|block| match block {
+        Block::Mount(_) | Block::Tag(_) => true,
+        Block::Clock | Block::Lens(_) => false,
+        Block::GripperTag => robot.gripper_tag.is_some(),
+    });
+    let mut model = Model::of_blocks(robot.n_joints(), blocks);
     let noise = Noise { corner_px: 0.3, n_frames: N_FRAMES, joint_rad: scales.joint_std_rad };
     let drawn = Truth::draw(robot, &model, &scales, &mut rng);
     model.joints = model_for(robot, &views(robot, &drawn, &noise, 10, &mut rng)).joints;
@@ -115,15 +110,17 @@ pub(super) fn tool_jacobian(
 }
 
 fn state_of(case: &Case<'_>, found: &Estimate<'_>) -> State {
-    let parameters = found.joint_parameters();
-    State {
-        joint: DVector::from_iterator(parameters.len(), parameters.iter().map(|p| case.truth.parameters.get(*p))),
-        mount: case.truth.mount,
-        further_mounts: case.truth.further_mounts.clone(),
-        tags: case.truth.tags.clone(),
-        gripper_tag: case.truth.gripper_tag.unwrap_or(found.solved.state.gripper_tag),
-        ..found.solved.state.clone()
+    let (parameters, truth) = (found.joint_parameters(), &case.truth);
+    let mut state = found.solved.state.clone();
+    state.joint = DVector::from_iterator(parameters.len(), parameters.iter().map(|p| truth.parameters.get(*p)));
+    let mounts = [truth.mount].into_iter().chain(truth.further_mounts.iter().copied());
+    mounts.enumerate().for_each(|(camera, at)| state.blocks[Block::Mount(camera)] = Value::Pose(at));
+    let tags = truth.tags.iter().enumerate();
+    tags.for_each(|(tag, at)| state.blocks[Block::Tag(tag)] = Value::Pose(*at));
+    if let Some(at) = truth.gripper_tag {
+        state.blocks[Block::GripperTag] = Value::Pose(at);
     }
+    state
 }
 
 /// The Bayesian Cramer-Rao bound (van Trees): the inverse information at the truth, under the true scales.
@@ -177,11 +174,11 @@ pub(super) fn tally(robot: &Robot, seeds: std::ops::Range<u64>, n_views: usize) 
         for (k, p) in parameters.iter().enumerate() {
             add(at.get(*p) - case.truth.parameters.get(*p), covariance[(k, k)]);
         }
-        let (mount, mount_covariance) = found.mount();
+        let (mount, mount_covariance) = found.mount(0);
         let off = log(&case.truth.mount.inv_mul(&mount));
         (0..6).for_each(|k| add(off[k], mount_covariance[(k, k)]));
         for (further, truth) in case.truth.further_mounts.iter().enumerate() {
-            let (mount, covariance) = found.further_mount(further).expect("it has views");
+            let (mount, covariance) = found.mount(further + 1);
             let off = log(&truth.inv_mul(&mount));
             (0..6).for_each(|k| add(off[k], covariance[(k, k)]));
         }
@@ -247,7 +244,7 @@ fn two_calibrations_from_disjoint_views_agree() {
         let (first, second) = case.views.split_at(25);
         let [a, b] =
             [first, second].map(|half| estimate(&input(&case, half, HyperparameterMode::Given)).expect("solved"));
-        if a.problem.layout.tags != b.problem.layout.tags {
+        if !a.problem.layout.blocks().eq(b.problem.layout.blocks()) {
             continue;
         }
         let prior = full_prior(&a);
@@ -276,10 +273,8 @@ fn full_prior(found: &Estimate<'_>) -> DMatrix<f64> {
     let (layout, prior) = (&found.problem.layout, &found.problem.prior);
     let mut info = DMatrix::zeros(layout.n, layout.n);
     let joints = layout.n_joint();
-    info.view_mut((0, 0), (joints, joints)).copy_from(&prior.joint_info);
-    let mut poses = vec![(layout.mount, prior.mount_std)];
-    poses.extend(layout.tags.iter().copied().zip(prior.tags_std.iter().copied()));
-    for (at, std) in poses.into_iter().filter_map(|(at, std)| Some((at?, std))) {
+    info.view_mut((0, 0), (joints, joints)).copy_from(&prior.information.matrix);
+    for (_, at, std) in prior.by_std(layout).filter(|(block, ..)| *block != Block::GripperTag) {
         (0..6).for_each(|k| info[(at + k, at + k)] = std[k].powi(-2));
     }
     info

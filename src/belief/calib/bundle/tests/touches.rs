@@ -5,14 +5,15 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::model::model_for;
-use crate::calib::bundle::model::{Hyperparameters, Model};
 use crate::calib::bundle::tests::data::{Noise, Truth, normal, reference, rng, titan, views};
 use crate::calib::bundle::tests::score_test::input;
 use crate::calib::bundle::touch_term::{MIN_TOUCHES, MOUNT_TURN, SURVEY_TURN, TOOL_POINT};
-use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::refusal::Refusal;
 use crate::calib::reservation::Reservation;
 use crate::calib::views::view::{Touch, View};
+use crate::model::estimated::Model;
+use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
+use crate::model::scales::Hyperparameters;
 use armcal_core::joints::JointAngles;
 use armcal_core::kinematics::Chain;
 use armcal_core::robot::Robot;
@@ -51,18 +52,8 @@ fn built(robot: &Robot, rng: &mut ChaCha8Rng) -> Robot {
 fn case(robot: &Robot, seed: u64, change: impl FnOnce(&mut Robot, &mut Truth)) -> Case {
     let mut rng = rng(seed, "touches");
     let scales = Hyperparameters::datasheet(robot);
-    let mut model = Model {
-        joints: vec![Vec::new(); robot.n_joints()],
-        n_links: 0,
-        n_compliant: 0,
-        mount: true,
-        further_mounts: Vec::new(),
-        lens: false,
-        tags: true,
-        gripper_tag: false,
-        time_offset: false,
-        walk: None,
-    };
+    let blocks = [Block::Mount(0)].into_iter().chain(Block::tags(robot));
+    let mut model = Model::of_blocks(robot.n_joints(), blocks);
     let noise = Noise { corner_px: 0.3, n_frames: 8, joint_rad: scales.joint_std_rad };
     let mut real = built(robot, &mut rng);
     let first = Truth::draw(robot, &model, &scales, &mut rng);

@@ -3,11 +3,12 @@
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::failures::FailureAdjusted;
 use crate::calib::bundle::input::HyperparameterMode;
-use crate::calib::bundle::model::{Hyperparameters, model_for};
+use crate::calib::bundle::model::model_for;
 use crate::calib::bundle::tests::data::{Noise, Truth, normal, rng, titan, views};
 use crate::calib::covariance::ParameterCovariance;
-use crate::calib::parameters::JointParameters;
 use crate::calib::views::view::View;
+use crate::model::parameters::JointParameters;
+use crate::model::scales::Hyperparameters;
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
 use armcal_core::robot::Robot;
 use armcal_core::sensor::ConditionChange;

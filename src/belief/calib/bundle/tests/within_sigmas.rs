@@ -9,7 +9,7 @@ use crate::calib::bundle::tests::data::{Truth, normal, rng, titan};
 use crate::calib::bundle::tests::sag::revised;
 use crate::calib::bundle::tests::score_test::{input, views_of_changed};
 use crate::calib::covariance::ParameterCovariance;
-use crate::calib::parameters::JointParameters;
+use crate::model::parameters::JointParameters;
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
 use armcal_core::kinematics::LinkCorrection;
 use armcal_core::robot::Robot;

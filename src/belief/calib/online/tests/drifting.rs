@@ -3,12 +3,12 @@
 
 use rand_chacha::ChaCha8Rng;
 
-use crate::calib::bundle::model::Hyperparameters;
 use crate::calib::bundle::tests::data::{Noise, Truth, normal, rng, titan, views};
 use crate::calib::online::estimator::OnlineEstimator;
 use crate::calib::online::event::OnlineEvent;
 use crate::calib::online::settings::{OnlineSettings, online_model};
 use crate::calib::views::view::View;
+use crate::model::scales::Hyperparameters;
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
 use armcal_core::robot::Robot;
 use armcal_core::sensor::Conditions;
@@ -59,7 +59,7 @@ impl<'a> Dive<'a> {
         let mut scales = Hyperparameters::datasheet(robot);
         let mut model = online_model(robot);
         for kinds in &mut model.joints {
-            use crate::calib::parameters::ParameterKind as Kind;
+            use crate::model::parameters::ParameterKind as Kind;
             kinds.retain(|kind| !matches!(kind, Kind::OffsetPerK | Kind::GainPerK | Kind::OffsetPerMpa));
         }
         scales.joint_std_rad.iter_mut().for_each(|std| *std *= if seed.is_multiple_of(2) { 0.5 } else { 1.5 });

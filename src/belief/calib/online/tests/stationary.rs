@@ -4,13 +4,14 @@ use rand::seq::SliceRandom;
 
 use crate::calib::bundle::estimate::estimate;
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
-use crate::calib::bundle::model::{Hyperparameters, Model};
 use crate::calib::bundle::tests::data::{Noise, Truth, rng, titan, views};
 use crate::calib::online::estimator::OnlineEstimator;
 use crate::calib::online::filter::Filter;
 use crate::calib::online::settings::{DriftModel, FaultSearch, OnlineSettings, online_model};
-use crate::calib::parameters::JointParameters;
 use crate::calib::views::view::View;
+use crate::model::estimated::Model;
+use crate::model::parameters::JointParameters;
+use crate::model::scales::Hyperparameters;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::Conditions;
 

@@ -1,0 +1,128 @@
+//! What one observation says of the camera's pose relative to the tag.
+//!
+//! With X = camera_from_tag, a point c of the tag is at p = X c. The camera's pose perturbed on the right by xi = (rho,
+//! omega) moves it by `dp = -rho - omega x p`; the tag's by xi_T does the same with the opposite sign and
+//! `xi = Ad(X) xi_T`. So one 6x6 matrix in the camera's frame carries all: `H = sum J^T W J`, `g = sum J^T W r`, J =
+//! d(prediction)/d(xi), r = measured - predicted.
+
+use nalgebra::{Isometry3, Matrix6, SMatrix, SVector, Vector6};
+
+use crate::measure::observation::WeightedMeasurement;
+use crate::measure::{board, corners, pose, position};
+use armcal_core::optics::CameraModel;
+
+/// An observation linearized, in the camera's frame.
+#[derive(Clone, Debug)]
+pub(crate) struct PoseInformation {
+    pub h: Matrix6<f64>,
+    pub g: Vector6<f64>,
+    /// Ad(camera_from_tag).
+    pub adjoint: Matrix6<f64>,
+    /// Sum of squares of the whitened residuals.
+    pub chi2: f64,
+    /// The same of each corner, used or not; zero without corners.
+    pub corner_chi2: [f64; 4],
+}
+
+/// The lens's part, by its intrinsics: focal lengths, centre, four coefficients of distortion.
+#[derive(Clone, Debug)]
+pub(crate) struct LensInformation {
+    pub cross: SMatrix<f64, 6, 8>,
+    pub h: SMatrix<f64, 8, 8>,
+    pub g: SVector<f64, 8>,
+}
+
+impl LensInformation {
+    pub(crate) fn zeros() -> Self {
+        Self { cross: SMatrix::zeros(), h: SMatrix::zeros(), g: SVector::zeros() }
+    }
+
+    pub(crate) fn weighted(&mut self, weight: f64) {
+        self.cross *= weight;
+        self.h *= weight;
+        self.g *= weight;
+    }
+
+    /// Adds a coordinate of a point: its rows by the twist and by the intrinsics, its residual, its weight.
+    pub(crate) fn add(&mut self, row: &[f64; 6], by_intrinsics: &SVector<f64, 8>, residual: f64, weight: f64) {
+        let weighted = by_intrinsics * weight;
+        self.cross += Vector6::from(*row) * weighted.transpose();
+        self.h += by_intrinsics * weighted.transpose();
+        self.g += weighted * residual;
+    }
+}
+
+/// Sums of the rows of residuals while they are added.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct TwistSums {
+    /// Lower triangle.
+    h: [[f64; 6]; 6],
+    g: [f64; 6],
+}
+
+impl TwistSums {
+    /// Adds a coordinate of a point: its row by the twist, its residual, its weight.
+    #[inline]
+    pub(crate) fn add(&mut self, row: &[f64; 6], residual: f64, weight: f64) {
+        for i in 0..6 {
+            let by = weight * row[i];
+            self.g[i] += by * residual;
+            for k in 0..=i {
+                self.h[i][k] += by * row[k];
+            }
+        }
+    }
+
+    /// `H` and `g`, times a weight that all rows share.
+    pub(crate) fn weighted(&self, weight: f64) -> (Matrix6<f64>, Vector6<f64>) {
+        let h = Matrix6::from_fn(|i, k| weight * if i >= k { self.h[i][k] } else { self.h[k][i] });
+        (h, Vector6::from(self.g) * weight)
+    }
+}
+
+/// An observation that the lens cannot have seen counts as this many sigma off in each coordinate.
+const UNSEEN_SIGMAS: f64 = 1e3;
+
+/// What it costs that the lens cannot have seen `seen`.
+pub(crate) fn unseen_chi2(seen: &WeightedMeasurement) -> f64 {
+    seen.n_coordinates() as f64 * UNSEEN_SIGMAS * UNSEEN_SIGMAS
+}
+
+impl PoseInformation {
+    /// Linearizes; `noise` multiplies the corners' standard deviations. Adds the lens's part to `by_lens` where that is
+    /// wanted. `None` where a corner is beyond the lens's view.
+    pub(crate) fn of(
+        seen: &WeightedMeasurement,
+        camera_from_tag: &Isometry3<f64>,
+        lens: &CameraModel,
+        noise: f64,
+        by_lens: Option<&mut LensInformation>,
+    ) -> Option<Self> {
+        let scale = noise.powi(-2);
+        match seen {
+            WeightedMeasurement::Corners(seen) => {
+                corners::information(seen, camera_from_tag, lens, (seen.info * scale, by_lens))
+            }
+            WeightedMeasurement::Board { points } => {
+                board::information(points, camera_from_tag, lens, (scale, by_lens))
+            }
+            WeightedMeasurement::Position { in_camera_m, info } => {
+                Some(position::information(in_camera_m, *info, camera_from_tag))
+            }
+            WeightedMeasurement::Pose { tag_from_camera, info_position, info_rotation } => {
+                Some(pose::information(tag_from_camera, [*info_position, *info_rotation], camera_from_tag))
+            }
+        }
+    }
+
+    /// An observation that is not possible: it pulls nowhere and costs much.
+    pub(crate) fn unseen(seen: &WeightedMeasurement) -> Self {
+        let (chi2, corner_chi2) = (unseen_chi2(seen), [UNSEEN_SIGMAS * UNSEEN_SIGMAS; 4]);
+        Self { h: Matrix6::zeros(), g: Vector6::zeros(), adjoint: Matrix6::identity(), chi2, corner_chi2 }
+    }
+
+    pub(crate) fn weighted(&mut self, weight: f64) {
+        self.h *= weight;
+        self.g *= weight;
+    }
+}

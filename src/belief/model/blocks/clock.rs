@@ -1,0 +1,20 @@
+//! How much later the joint sensors' stamps are than the camera's, s.
+
+use crate::model::blocks::{MAX_COLUMNS, Std, Value};
+
+/// One sigma, s. Assumed: clocks of one vehicle that nobody set beside each other.
+const CLOCK_STD_S: f64 = 0.05;
+
+pub(super) fn drawn() -> Value {
+    Value::Number(0.0)
+}
+
+pub(super) fn drawn_std() -> Std {
+    let mut std = [0.0; MAX_COLUMNS];
+    std[0] = CLOCK_STD_S;
+    std
+}
+
+pub(super) fn name() -> String {
+    "time offset".to_owned()
+}

@@ -1,0 +1,106 @@
+//! Blocks: parameters that move together, beside those of the joints.
+//!
+//! Each has a file with what the drawing says of it, how well, and its name; `value` is what a step does to it. The
+//! variants of [`Block`] stand in the order of their columns. A new block is a file, a variant, and a line in each
+//! function of `Block`; everything else iterates.
+
+mod clock;
+mod gripper_tag;
+mod lens;
+mod mount;
+mod per_block;
+mod tag;
+mod value;
+
+pub use mount::is_loose;
+pub(crate) use per_block::PerBlock;
+pub(crate) use value::{MAX_COLUMNS, Std, Value, six};
+
+use crate::model::scales::Hyperparameters;
+use armcal_core::robot::Robot;
+
+/// A group of parameters that move together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Block {
+    /// Where the camera of that number hangs on its link, about the drawing's place.
+    Mount(usize),
+    /// How much later the joint sensors' stamps are than the camera's.
+    Clock,
+    /// Focal lengths, centre and distortion of the camera of that number, about robot.toml's.
+    Lens(usize),
+    /// Where a tag is, by its index among the robot's, about the survey's place.
+    Tag(usize),
+    /// Where the tag on the gripper is, about the drawing's place.
+    GripperTag,
+}
+
+impl Block {
+    /// All that `robot` has, in the order of their columns.
+    pub fn all(robot: &Robot) -> impl Iterator<Item = Self> + use<> {
+        Self::in_order(1 + robot.further_cameras.len(), robot.tags.len())
+    }
+
+    fn in_order(n_cameras: usize, n_tags: usize) -> impl Iterator<Item = Self> {
+        let mounts = (0..n_cameras).map(Self::Mount);
+        let lenses = (0..n_cameras).map(Self::Lens);
+        mounts.chain([Self::Clock]).chain(lenses).chain((0..n_tags).map(Self::Tag)).chain([Self::GripperTag])
+    }
+
+    /// Those of its tags.
+    pub fn tags(robot: &Robot) -> impl Iterator<Item = Self> + use<> {
+        (0..robot.tags.len()).map(Self::Tag)
+    }
+
+    /// Number of columns.
+    #[inline]
+    pub(crate) fn n_columns(self) -> usize {
+        match self {
+            Self::Mount(_) | Self::Tag(_) | Self::GripperTag => 6,
+            Self::Clock => 1,
+            Self::Lens(_) => MAX_COLUMNS,
+        }
+    }
+
+    /// What the drawing, robot.toml or the survey says of it.
+    pub(crate) fn drawn(self, robot: &Robot) -> Value {
+        match self {
+            Self::Mount(camera) => mount::drawn(robot, camera),
+            Self::Clock => clock::drawn(),
+            Self::Lens(camera) => lens::drawn(robot, camera),
+            Self::Tag(tag) => tag::drawn(robot, tag),
+            Self::GripperTag => gripper_tag::drawn(robot),
+        }
+    }
+
+    /// One sigma of that, column by column, in the columns' units; infinite where nothing is known.
+    pub(crate) fn drawn_std(self, robot: &Robot, scales: &Hyperparameters) -> Std {
+        match self {
+            Self::Mount(camera) => mount::drawn_std(robot, camera, scales),
+            Self::Clock => clock::drawn_std(),
+            Self::Lens(camera) => lens::drawn_std(robot, camera, scales),
+            Self::Tag(tag) => tag::drawn_std(robot, tag),
+            Self::GripperTag => gripper_tag::drawn_std(robot),
+        }
+    }
+
+    /// One of its columns in words.
+    pub(crate) fn name(self, robot: &Robot, column: usize) -> String {
+        match self {
+            Self::Mount(camera) => mount::name(robot, camera, column),
+            Self::Clock => clock::name(),
+            Self::Lens(camera) => lens::name(robot, camera, column),
+            Self::Tag(tag) => tag::name(robot, tag, column),
+            Self::GripperTag => gripper_tag::name(column),
+        }
+    }
+
+    /// Whether its columns are a place and an attitude: shifts in m, then turns in rad.
+    pub(crate) fn is_pose(self) -> bool {
+        matches!(self, Self::Mount(_) | Self::Tag(_) | Self::GripperTag)
+    }
+
+    /// Whether it is where a tag is that stands about the arm or is on its gripper.
+    pub(crate) fn is_tag(self) -> bool {
+        matches!(self, Self::Tag(_) | Self::GripperTag)
+    }
+}

@@ -1,0 +1,98 @@
+//! Where each parameter's column is.
+
+use std::ops::Range;
+
+use crate::model::blocks::{Block, PerBlock};
+use crate::model::estimated::Model;
+use crate::model::parameters::Parameter;
+use armcal_core::robot::Robot;
+
+/// The columns of a problem: the joints' parameters first, then the blocks in their order.
+#[derive(Clone, Debug)]
+pub(crate) struct Layout {
+    /// Columns 0.. : the joints' parameters, joint by joint.
+    pub parameters: Vec<Parameter>,
+    pub of_joint: Vec<Range<usize>>,
+    /// Six columns of each joint whose place on its parent link is estimated, base first; the last of `parameters`.
+    pub links: Range<usize>,
+    /// Right after them those of how the arm bends.
+    pub sag: Range<usize>,
+    /// First column of each block that has any.
+    first: PerBlock<Option<usize>>,
+    pub n: usize,
+}
+
+impl Layout {
+    /// With columns of those tags, if the model has any.
+    pub(crate) fn new(robot: &Robot, model: &Model, has_column: impl Fn(usize) -> bool) -> Self {
+        let is_wanted = |block: Block| match block {
+            Block::Tag(tag) => model.has(block) && has_column(tag),
+            _ => model.has(block),
+        };
+        let parameters = model.parameters();
+        let mut of_joint = Vec::with_capacity(model.joints.len());
+        let mut start = 0;
+        for kinds in &model.joints {
+            of_joint.push(start..start + kinds.len());
+            start += kinds.len();
+        }
+        let links = start..start + 6 * model.n_links;
+        let sag = links.end..parameters.len();
+        let mut n = parameters.len();
+        let first = PerBlock::new(robot, |block| is_wanted(block).then(|| take(&mut n, block)));
+        Self { parameters, of_joint, links, sag, first, n }
+    }
+
+    /// The same with one more block.
+    pub(crate) fn with(&self, block: Block) -> Self {
+        let mut n = self.n_joint();
+        let mut first = self.first.clone();
+        for (of, at) in first.iter_mut() {
+            *at = (at.is_some() || of == block).then(|| take(&mut n, of));
+        }
+        Self { first, n, ..self.clone() }
+    }
+
+    /// First column of a block.
+    #[inline]
+    pub(crate) fn at(&self, block: Block) -> Option<usize> {
+        self.first[block]
+    }
+
+    /// The blocks that have columns, with the first of these, in their order.
+    pub(crate) fn blocks(&self) -> impl Iterator<Item = (Block, usize)> + '_ {
+        self.first.iter().filter_map(|(block, at)| Some((block, (*at)?)))
+    }
+
+    /// The block that a column is of, and which of its columns it is; `None` for the joints' parameters.
+    pub(crate) fn block_of(&self, column: usize) -> Option<(Block, usize)> {
+        let mut blocks = self.blocks();
+        let (block, at) = blocks.find(|(block, at)| (*at..at + block.n_columns()).contains(&column))?;
+        Some((block, column - at))
+    }
+
+    /// The tags about the arm that have columns, by their index, with the first of these.
+    pub(crate) fn tags(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        self.first.tags().iter().enumerate().filter_map(|(tag, at)| Some((tag, (*at)?)))
+    }
+
+    /// First column of the tags.
+    pub(crate) fn first_of_tags(&self) -> usize {
+        self.blocks().find(|(block, _)| block.is_tag()).map_or(self.n, |(_, at)| at)
+    }
+
+    /// Columns of links and sag.
+    pub(crate) fn body(&self) -> Range<usize> {
+        self.links.start..self.sag.end
+    }
+
+    pub(crate) fn n_joint(&self) -> usize {
+        self.parameters.len()
+    }
+}
+
+fn take(n: &mut usize, block: Block) -> usize {
+    let at = *n;
+    *n += block.n_columns();
+    at
+}

@@ -1,0 +1,134 @@
+//! How large the things are that are not known exactly: standard deviations that the data themselves may tell.
+
+use crate::model::parameters::ParameterKind;
+use crate::model::walk_modes::mode_std;
+use armcal_core::joints::MAX_JOINTS;
+use armcal_core::robot::{JointSensorSpec, MAX_FURTHER_CAMERAS, Robot};
+use armcal_core::sensor::shape_prior;
+
+/// The first and all further ones.
+pub const MAX_CAMERAS: usize = 1 + MAX_FURTHER_CAMERAS;
+
+/// Standard deviations that the data themselves may tell.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Hyperparameters {
+    /// What each joint is off in each view anew, rad: what the sensor's model leaves.
+    pub joint_std_rad: [f64; MAX_JOINTS],
+    /// Of a joint whose sensor says nothing.
+    pub free_joint_std_rad: f64,
+    /// Size of each sensor's nonlinearity.
+    pub shape_std_rad: [f64; MAX_JOINTS],
+    /// Change of an offset with the oil temperature.
+    pub offset_std_rad_per_k: f64,
+    /// Change of a gain with the oil temperature.
+    pub gain_std_per_k: f64,
+    /// Change of an offset with the ambient pressure.
+    pub offset_std_rad_per_mpa: f64,
+    /// Drift of an offset.
+    pub drift_std_rad_per_h: f64,
+    /// Half of the backlash between joint and sensor shaft.
+    pub half_play_std_rad: f64,
+    /// Of the random walk of each joint's offset from the first view to the last, rad.
+    pub walk_std_rad: [f64; MAX_JOINTS],
+    /// Of each joint's place on its parent link: shift m, turn rad.
+    pub link_std: [[f64; 2]; MAX_JOINTS],
+    /// Of the joints' compliances, and of the base's on what carries it, rad/(N m).
+    pub compliance_std: [f64; 2],
+    /// Of the load at the tool, N.
+    pub tool_load_std_n: f64,
+    /// Of each camera's mount, by its number, over what robot.toml says of it: shift, turn.
+    pub mount_scale: [[f64; 2]; MAX_CAMERAS],
+    /// Of the lenses, over their priors'.
+    pub lens_scale: f64,
+    /// All measurements' standard deviations over what is stated for them.
+    pub noise: f64,
+    /// Of positions and poses that a recording gives in place of corners.
+    pub position_std_m: f64,
+    /// Of poses that a recording gives in place of corners.
+    pub rotation_std_rad: f64,
+    /// The error that all tags of a view share (positions by SLAM have it): translation m, rotation rad. `None`: there
+    /// is none.
+    pub camera_error_std: Option<[f64; 2]>,
+    /// Of an image's stamp about the camera's clock, s: what a moving arm's angles are off by, times its rates.
+    pub time_jitter_std_s: f64,
+}
+
+/// Correlation length of a sensor's nonlinearity, half ranges. Assumed: four waves over the range are then still half
+/// as likely as one.
+pub const SHAPE_LENGTH: f64 = 0.16;
+
+/// Of an image's stamp about the camera's clock, with what sensors of moving joints are late by, s. Assumed.
+pub(crate) const TIME_JITTER_STD_S: f64 = 0.005;
+
+/// How far a sensor may slip on its shaft, rad. Assumed: wide, the views tell it.
+pub(crate) const STEP_STD_RAD: f64 = 0.1;
+
+/// Height of a worn spot's bump, rad. Assumed: wide, the views tell it.
+pub(crate) const BUMP_STD_RAD: f64 = 0.03;
+
+impl Hyperparameters {
+    /// What robot.toml says, and where it is silent what is usual (assumed; the data correct it).
+    #[must_use]
+    pub fn datasheet(robot: &Robot) -> Self {
+        let mut joint_std_rad = [1e-3; MAX_JOINTS];
+        let mut shape_std_rad = [1e-3; MAX_JOINTS];
+        let mut known_per_k = 0.0_f64;
+        for (joint, spec) in robot.sensors.iter().enumerate() {
+            joint_std_rad[joint] = usual_joint_std_rad(spec);
+            shape_std_rad[joint] = spec.linearity_std_rad.max(1e-5);
+            known_per_k = known_per_k.max(spec.temperature_std_rad_per_k);
+        }
+        Self {
+            joint_std_rad,
+            free_joint_std_rad: 1.0,
+            shape_std_rad,
+            offset_std_rad_per_k: if known_per_k > 0.0 { known_per_k } else { 3e-4 },
+            gain_std_per_k: 3e-5,
+            offset_std_rad_per_mpa: 1e-4,
+            drift_std_rad_per_h: 1e-3,
+            half_play_std_rad: 2e-4,
+            walk_std_rad: joint_std_rad,
+            link_std: [[robot.geometry.link_position_std_m, robot.geometry.link_rotation_std_rad]; MAX_JOINTS],
+            compliance_std: [
+                robot.geometry.joint_compliance_std_rad_per_nm,
+                robot.geometry.mount_compliance_std_rad_per_nm,
+            ],
+            tool_load_std_n: robot.geometry.tool_load_std_n,
+            mount_scale: [[1.0; 2]; MAX_CAMERAS],
+            lens_scale: 1.0,
+            noise: 1.0,
+            position_std_m: 0.005,
+            rotation_std_rad: 0.02,
+            camera_error_std: None,
+            time_jitter_std_s: 0.0,
+        }
+    }
+
+    /// One sigma of a joint parameter's prior, in its own unit.
+    #[must_use]
+    pub fn prior_std(&self, spec: &JointSensorSpec, joint: usize, kind: ParameterKind) -> f64 {
+        match kind {
+            ParameterKind::Gain => spec.gain_std,
+            ParameterKind::Offset => spec.offset_std_rad,
+            ParameterKind::Shape(h) => self.shape_std_rad[joint] * shape_prior(SHAPE_LENGTH)[usize::from(h)],
+            ParameterKind::OffsetPerK => self.offset_std_rad_per_k,
+            ParameterKind::GainPerK => self.gain_std_per_k,
+            ParameterKind::OffsetPerMpa => self.offset_std_rad_per_mpa,
+            ParameterKind::DriftPerH => self.drift_std_rad_per_h,
+            ParameterKind::HalfBacklash => self.half_play_std_rad,
+            ParameterKind::StepBefore(_) => STEP_STD_RAD,
+            ParameterKind::WalkMode(k) => self.walk_std_rad[joint] * mode_std(k),
+            ParameterKind::Bump(_) => BUMP_STD_RAD,
+            ParameterKind::LinkShift(_) => self.link_std[joint][0],
+            ParameterKind::LinkTurn(_) => self.link_std[joint][1],
+            ParameterKind::Compliance => self.compliance_std[0],
+            ParameterKind::MountCompliance(_) => self.compliance_std[1],
+            ParameterKind::ToolLoad => self.tool_load_std_n,
+        }
+    }
+}
+
+/// A tenth of what a straight line leaves.
+fn usual_joint_std_rad(spec: &JointSensorSpec) -> f64 {
+    (0.1 * spec.linearity_std_rad).max(1e-5)
+}
