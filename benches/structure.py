@@ -8,7 +8,8 @@ names knows less than a compiler: where a design renames what the tables below n
 
 lines        lines of src/belief and src/paper with product code: not blank, not comment alone, not of a `use` statement.
 constants    numbers that decide in belief: constants with a number, numbers in comparisons other than ORDINARY, numbers of defaults.
-block        files of belief that name the mounts of further cameras as a block of parameters.
+block        files of belief that list blocks of parameters by hand: the mounts of further cameras beside the others, or three
+             variants of `Block`.
 corner       files of src/core and src/belief that name the pixels of a tag's four corners.
 carriers     structs and enums of those folders that hold these pixels, formats of messages aside.
 projections  functions of belief that ask a lens for the Jacobian of its projection, or difference its pixels.
@@ -25,9 +26,9 @@ LIMITS = {"lines": 28_500, "constants": 200, "constants outside of tables": 0, "
           "projections": 1, "events": 1, "circles": 0}
 TEST_NAME = re.compile(r"/(tests?|fixtures?)(/|\.rs$)|_tests\.rs$")
 TABLE_NAME = re.compile(r"/constants\.rs$")  # One table for each room.
-# A block of parameters that is listed by hand: as fields, or as a variant of a later design.
-BLOCK = re.compile(r"\bfurther_mounts\b|\bBlock::(?:Further)?Mount\b")
-BLOCK_OTHERWISE = re.compile(r"\bfurther_mount\w*|\bFurtherMount\b|\bBlock::(?:Further)?Mount\b")
+# A block of parameters that is listed by hand: as a field beside the others, or as one of several variants.
+BLOCK_FIELD = re.compile(r"\bfurther_mounts\b")
+BLOCK = re.compile(r"\b(?:Block|Self)::(Mount|Clock|Lens|Tag|GripperTag)\b")
 FOUR_PIXELS = r"\[\[f64; 2\]; 4\]|\[(?:Vector2<f64>|Point2<f64>|Pixel\w*|Point); 4\]"
 CORNER = re.compile(rf"\bcorners_px\b|{FOUR_PIXELS}")
 CORNER_OTHERWISE = re.compile(rf"\bcorners_px\b|{FOUR_PIXELS}|\bMeanCorners\b|\b(?:Raw|Tag|Weighted)Measurement::Corners\b|\bTagCorners\b")
@@ -172,6 +173,12 @@ def files_naming(name, sources, pattern):
     return name, sum(1 for _, hits in found if hits), [f"{s.name}: {len(hits)} times, first {hits[0]}" for s, hits in found if hits]
 
 
+def listing_blocks(sources):
+    found = {s.name: sorted(set(BLOCK.findall(s.body)) | set(BLOCK_FIELD.findall(s.body))) for s in sources}
+    places = [f"{name}: {', '.join(kinds)}" for name, kinds in found.items() if len(kinds) > 2 or "further_mounts" in kinds]
+    return "block", len(places), places
+
+
 def carriers(sources):
     places, formats = [], 0
     for source in sources:
@@ -282,7 +289,7 @@ def main():
         "src/belief/", ("src/belief/", "src/paper/"), ("src/core/", "src/belief/")))
     figures = [
         *lines(estimators), *constants(belief),
-        files_naming("block", belief, BLOCK), files_naming("  files with any name of it", belief, BLOCK_OTHERWISE),
+        listing_blocks(belief), files_naming("  files that name any", belief, BLOCK),
         files_naming("corner", passed, CORNER), files_naming("  files with any name of its data", passed, CORNER_OTHERWISE),
         *carriers(passed), *projections(belief), *events(s for s in everything if not s.name.startswith(NOT_THE_PRODUCT)),
         circles("circles", belief, True), circles("  with single files as rooms too", belief, False),

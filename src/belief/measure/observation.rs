@@ -6,12 +6,13 @@ use nalgebra::{Isometry3, Vector3};
 
 use crate::measure::board::WeightedPoint;
 use crate::measure::corners::WeightedCorners;
+use crate::model::blocks::Block;
 
 /// One tag in one view.
 #[derive(Clone, Debug)]
 pub(crate) struct ObservationTerm {
-    /// Index into the robot's tags; the gripper's comes after them.
-    pub tag: usize,
+    /// The tag.
+    pub block: Block,
     pub data: WeightedMeasurement,
     /// Sightings that are out of the estimate keep their place.
     pub is_used: bool,

@@ -5,7 +5,6 @@ use nalgebra::{DVector, Isometry3};
 use crate::model::blocks::{Block, PerBlock, Value};
 use crate::model::layout::Layout;
 use armcal_core::joints::MAX_JOINTS;
-use armcal_core::optics::CameraModel;
 
 /// Parameters of the joints, blocks, and what each view has of its own.
 #[derive(Clone, Debug)]
@@ -45,28 +44,9 @@ impl State {
         }
     }
 
-    /// `link_from_camera` of the camera of that number.
-    pub(crate) fn mount(&self, camera: usize) -> &Isometry3<f64> {
-        self.blocks.pose(Block::Mount(camera))
-    }
-
-    /// Of the camera of that number.
-    pub(crate) fn lens(&self, camera: usize) -> &CameraModel {
-        self.blocks.lens(camera)
-    }
-
-    /// Where a tag about the arm is.
-    pub(crate) fn tag(&self, tag_idx: usize) -> &Isometry3<f64> {
-        self.blocks.pose(Block::Tag(tag_idx))
-    }
-
-    /// Where the tag on the gripper is on its link.
-    pub(crate) fn gripper_tag(&self) -> &Isometry3<f64> {
-        self.blocks.pose(Block::GripperTag)
-    }
-
-    /// How much later the joint sensors' stamps are than the camera's, s.
-    pub(crate) fn clock_s(&self) -> f64 {
-        self.blocks.clock_s()
+    /// Of a block that is a pose.
+    #[inline]
+    pub(crate) fn pose(&self, block: Block) -> &Isometry3<f64> {
+        self.blocks.pose(block)
     }
 }

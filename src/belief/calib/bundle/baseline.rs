@@ -9,10 +9,10 @@
 
 use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
-use crate::calib::bundle::model::{further_mounts, reference};
+use crate::calib::bundle::model::{has_views, reference};
 use crate::calib::bundle::model_selection::CAMERA_ERROR_STD;
 use crate::calib::views::view::{TagObservation, View};
-use crate::model::blocks::{Block, is_loose};
+use crate::model::blocks::{Block, Shown};
 use crate::model::estimated::Model;
 use crate::model::parameters::JointParameters;
 use crate::model::scales::Hyperparameters;
@@ -61,8 +61,8 @@ impl Baseline {
 
     /// Before any view.
     fn start(robot: &Robot, views: &[View]) -> Self {
-        let first = [Block::Mount(0)].into_iter().filter(|_| is_loose(&robot.camera));
-        let blocks = first.chain(further_mounts(robot, views)).chain(Block::tags(robot));
+        let shown = Shown { motion: false, gripper_tag: false, by_camera: &|camera| has_views(views, camera) };
+        let blocks = Block::all(robot).filter(|block| block.is_told(robot, &shown));
         let model = Model::of_blocks(robot.n_joints(), blocks);
         let mut scales = Hyperparameters::datasheet(robot);
         let has_corners = views.iter().flat_map(|view| &view.tags).any(TagObservation::is_in_pixels);

@@ -226,8 +226,9 @@ impl CalibrationPrior {
         let n = state.joint.len();
         moved.rows_mut(0, n).copy_from(&(&state.joint - self.mean.rows(0, n)));
         if self.mean.len() == n + 6 {
-            let by: Vector6<f64> =
-                armcal_core::spatial::log(&found.problem.prior.mean.pose(Block::Mount(0)).inv_mul(state.mount(0)));
+            let by: Vector6<f64> = armcal_core::spatial::log(
+                &found.problem.prior.mean.pose(Block::Mount(0)).inv_mul(state.pose(Block::Mount(0))),
+            );
             moved.rows_mut(n, 6).copy_from(&by);
         }
         moved

@@ -164,7 +164,8 @@ impl Estimate<'_> {
     /// A focal length that differs from robot.toml's by more than a repair may.
     fn lens_beyond_bound(&self) -> Option<Refusal> {
         let at = self.problem.layout.at(Block::Lens(0))?;
-        let (lens, stated) = (self.solved.state.lens(0), self.problem.prior.mean.lens(0));
+        let (lens, stated) =
+            (self.solved.state.blocks.lens(Block::Lens(0)), self.problem.prior.mean.lens(Block::Lens(0)));
         let ([found_px, stated_px], stated_std) =
             ([lens, stated].map(|lens| lens.focal_px()[0]), self.problem.robot.camera.lens_priors.focal_std);
         let ratio = found_px / stated_px;
@@ -182,7 +183,8 @@ impl Estimate<'_> {
     /// The lens, where it has columns.
     fn lens_finding(&self) -> Option<(Finding, String)> {
         let at = self.problem.layout.at(Block::Lens(0))?;
-        let (lens, drawn) = (self.solved.state.lens(0), self.problem.prior.mean.lens(0));
+        let (lens, drawn) =
+            (self.solved.state.blocks.lens(Block::Lens(0)), self.problem.prior.mean.lens(Block::Lens(0)));
         let std = |k: usize| self.posterior.covariance[(at + k, at + k)].max(0.0).sqrt();
         let ratio = lens.focal_px()[0] / drawn.focal_px()[0] - 1.0;
         let shift = [0, 1].map(|k| lens.center_px()[k] - drawn.center_px()[k]);

@@ -246,7 +246,7 @@ impl Estimate<'_> {
     #[must_use]
     pub fn time_offset_s(&self) -> Option<[f64; 2]> {
         let at = self.problem.layout.at(Block::Clock)?;
-        Some([self.solved.state.clock_s(), self.posterior.covariance[(at, at)].sqrt()])
+        Some([self.solved.state.blocks.number(Block::Clock), self.posterior.covariance[(at, at)].sqrt()])
     }
 
     /// The joints' parameters in the order of [`Self::joint_covariance`].
@@ -274,7 +274,7 @@ impl Estimate<'_> {
                 Matrix6::from_diagonal(&std.component_mul(&std))
             }
         };
-        (*self.solved.state.mount(camera), covariance)
+        (*self.solved.state.pose(Block::Mount(camera)), covariance)
     }
 
     /// Whether a block is estimated.
@@ -289,7 +289,7 @@ impl Estimate<'_> {
     pub fn tag(&self, tag_idx: usize) -> (Isometry3<f64>, Option<Matrix6<f64>>) {
         let at = self.problem.layout.at(Block::Tag(tag_idx));
         let covariance = at.map(|at| self.posterior.covariance.fixed_view::<6, 6>(at, at).into_owned());
-        (*self.solved.state.tag(tag_idx), covariance)
+        (*self.solved.state.pose(Block::Tag(tag_idx)), covariance)
     }
 
     /// `robot` with camera and tags where they were found.
@@ -300,9 +300,9 @@ impl Estimate<'_> {
         let state = &self.solved.state;
         let cameras = std::iter::once(&mut found.camera).chain(&mut found.further_cameras);
         for (number, camera) in cameras.enumerate() {
-            camera.mount.link_from_frame = *state.mount(number);
+            camera.mount.link_from_frame = *state.pose(Block::Mount(number));
             if self.has(Block::Lens(number)) {
-                camera.lens = *state.lens(number);
+                camera.lens = *state.blocks.lens(Block::Lens(number));
             }
         }
         for (tag_idx, tag) in found.tags.iter_mut().enumerate() {

@@ -17,7 +17,6 @@ use crate::calib::bundle::problem::BundleProblem;
 use crate::calib::result::metrics::ViewContainment;
 use crate::calib::views::view::View;
 use crate::measure::{ObservationTerm, WeightedMeasurement, unseen_chi2};
-use crate::model::blocks::Block;
 use crate::model::state::State;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::numeric::Loss;
@@ -76,7 +75,7 @@ impl Estimate<'_> {
             let observations = problem.views[at].observations.clone();
             for (observation, tag) in problem.observations[observations].iter_mut().zip(&view.tags) {
                 let layout = &problem.layout;
-                let is_known = layout.tags().next().is_none() || layout.at(Block::Tag(observation.tag)).is_some();
+                let is_known = layout.tags().next().is_none() || layout.at(observation.block).is_some();
                 let mut used = [is_known; 4];
                 for out in outliers.iter().filter(|out| out.view_idx == *view_idx && out.tag_id == tag.id) {
                     match out.corner {

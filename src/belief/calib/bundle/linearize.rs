@@ -207,23 +207,16 @@ impl NormalEquations {
         self.lens_infos.clear();
         for at in group.observations.clone() {
             let observation = &problem.observations[at];
-            let (pose, column) = match &problem.robot.gripper_tag {
-                Some(tag) if observation.tag == problem.robot.tags.len() => {
-                    let pose = group.poses.link(tag.mount.n_joints) * state.gripper_tag();
-                    (pose, problem.layout.at(Block::GripperTag))
-                }
-                _ => (*state.tag(observation.tag), problem.layout.at(Block::Tag(observation.tag))),
-            };
-            let camera_from_tag = group.base_from_camera.inv_mul(&pose);
+            let camera_from_tag = group.camera_from_tag(state, observation.block);
             if problem.layout.at(Block::Lens(group.camera)).is_some() {
                 self.lens_infos.push(LensInformation::zeros());
             }
-            let (by_lens, lens) = (self.lens_infos.last_mut(), state.lens(group.camera));
+            let (by_lens, lens) = (self.lens_infos.last_mut(), state.blocks.lens(Block::Lens(group.camera)));
             let of = PoseInformation::of(&observation.data, &camera_from_tag, lens, problem.scales.noise, by_lens);
             self.infos.push(of.unwrap_or_else(|| PoseInformation::unseen(&observation.data)));
             let Some(info) = self.infos.last_mut() else { continue };
             (self.chi2[at], self.corner_chi2[at]) = (info.chi2, info.corner_chi2);
-            self.by_tag[at].1 = column;
+            self.by_tag[at].1 = problem.layout.at(observation.block);
             let (cost, weight) = if observation.is_used {
                 loss.of_coordinates(info.chi2, observation.data.n_coordinates())
             } else {

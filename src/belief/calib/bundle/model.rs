@@ -1,7 +1,7 @@
 //! What a recording can tell, and is estimated for that.
 
 use crate::calib::views::view::View;
-use crate::model::blocks::{Block, is_loose};
+use crate::model::blocks::{Block, Shown};
 use crate::model::estimated::Model;
 use crate::model::parameters::ParameterKind;
 use armcal_core::robot::Robot;
@@ -28,10 +28,13 @@ pub fn model_for(robot: &Robot, views: &[View]) -> Model {
     let gripper_tag = views.iter().filter(|view| view.gripper_tag.is_some()).count() >= MIN_GRIPPER_VIEWS;
     let from_both_sides =
         |joint: usize| [-1.0, 1.0].iter().all(|side| views.iter().any(|v| v.approach[joint] == *side));
-    let scope = Scope { warmed, dived, gripper_tag, from_both_sides: &from_both_sides, time_offset: false };
-    let mut model = model_of(robot, &scope);
-    model.blocks.extend(further_mounts(robot, views));
-    model
+    let shown = Shown { motion: false, gripper_tag, by_camera: &|camera| has_views(views, camera) };
+    model_of(robot, &Scope { warmed, dived, from_both_sides: &from_both_sides, shown })
+}
+
+/// Whether the camera of that number shows tags, as the first one always does.
+pub(crate) fn has_views(views: &[View], camera: usize) -> bool {
+    camera == 0 || views.iter().any(|view| view.camera == camera && !view.tags.is_empty())
 }
 
 /// What a recording can tell of.
@@ -39,24 +42,14 @@ pub(crate) struct Scope<'a> {
     /// The oil's temperature and the pressure change.
     pub warmed: bool,
     pub dived: bool,
-    /// There are views of a tag on the gripper.
-    pub gripper_tag: bool,
     /// Whether a joint came to rest from both sides.
     pub from_both_sides: &'a dyn Fn(usize) -> bool,
-    /// Images are taken while the arm moves.
-    pub time_offset: bool,
-}
-
-/// Those of further cameras that have views, unless they are exact.
-pub(crate) fn further_mounts(robot: &Robot, views: &[View]) -> impl Iterator<Item = Block> {
-    let has_views = |camera: usize| views.iter().any(|view| view.camera == camera && !view.tags.is_empty());
-    let further = 1..=robot.further_cameras.len();
-    further.filter(move |&camera| is_loose(robot.camera_at(camera)) && has_views(camera)).map(Block::Mount)
+    pub shown: Shown<'a>,
 }
 
 /// Sensors before the camera, or before the tag on the gripper, with the mount and the tags.
 pub(crate) fn model_of(robot: &Robot, scope: &Scope<'_>) -> Model {
-    let gripper_joints = robot.gripper_tag.filter(|_| scope.gripper_tag).map_or(0, |tag| tag.mount.n_joints);
+    let gripper_joints = robot.gripper_tag.filter(|_| scope.shown.gripper_tag).map_or(0, |tag| tag.mount.n_joints);
     let last = gripper_joints.max(robot.n_seen_joints());
     let joint = |joint: usize| {
         let spec = &robot.sensors[joint];
@@ -75,14 +68,9 @@ pub(crate) fn model_of(robot: &Robot, scope: &Scope<'_>) -> Model {
         let kinds = wanted.into_iter().filter(|(wanted, _)| *wanted).map(|(_, kind)| kind);
         kinds.chain(shape_kinds().filter(|_| spec.linearity_std_rad > 0.0)).collect()
     };
-    let wanted = [
-        (is_loose(&robot.camera), Block::Mount(0)),
-        (scope.time_offset, Block::Clock),
-        (scope.gripper_tag, Block::GripperTag),
-    ];
-    let wanted = wanted.into_iter().filter(|(wanted, _)| *wanted).map(|(_, block)| block);
-    let blocks = wanted.chain(Block::tags(robot)).collect();
-    Model { joints: (0..robot.n_joints()).map(joint).collect(), n_links: 0, n_compliant: 0, blocks, walk: None }
+    let joints = (0..robot.n_joints()).map(joint).collect();
+    let blocks = Block::all(robot).filter(|block| block.is_told(robot, &scope.shown));
+    Model { joints, ..Model::of_blocks(0, blocks) }
 }
 
 /// The middle of the views' conditions.

@@ -95,13 +95,13 @@ impl<'a> BundleProblem<'a> {
                     },
                     TagMeasurement::Board(seen) => board(camera, seen),
                 };
-                observations.push(ObservationTerm { tag: tag.tag_idx, data, is_used: true });
+                observations.push(ObservationTerm { block: Block::Tag(tag.tag_idx), data, is_used: true });
             }
             let to = observations.len();
             let gripper_size_m = robot.gripper_tag.filter(|_| model.has(Block::GripperTag)).map(|tag| tag.size_m);
             let gripper = view.gripper_tag.as_ref().zip(gripper_size_m).map(|(seen, size_m)| {
                 observations.push(ObservationTerm {
-                    tag: robot.tags.len(),
+                    block: Block::GripperTag,
                     data: corners(&robot.camera, seen, size_m),
                     is_used: true,
                 });
@@ -194,7 +194,10 @@ impl<'a> BundleProblem<'a> {
         JointAngles::from_fn(self.robot.n_joints(), |j| {
             let columns = self.layout.of_joint[j].clone();
             let estimated: f64 = columns.map(|column| view.basis[column] * state.joint[column]).sum();
-            view.fixed_rad[j] + estimated + state.joint_error[view_idx][j] + view.rate_rad_s[j] * state.clock_s()
+            view.fixed_rad[j]
+                + estimated
+                + state.joint_error[view_idx][j]
+                + view.rate_rad_s[j] * state.blocks.number(Block::Clock)
         })
     }
 

@@ -62,6 +62,8 @@ pub(crate) struct Group<'a> {
     pub observations: Range<usize>,
     pub poses: &'a LinkPoses,
     pub base_from_camera: Isometry3<f64>,
+    /// What carries the tags; `None`: they stand in the frame of the poses.
+    pub carrier: Option<Isometry3<f64>>,
 }
 
 impl<'a> Group<'a> {
@@ -75,7 +77,7 @@ impl<'a> Group<'a> {
         let view = &problem.views[view_idx];
         let error = &state.camera_error[view_idx];
         let camera = problem.robot.camera_at(view.camera);
-        let before = poses.link(camera.mount.n_joints) * state.mount(view.camera);
+        let before = poses.link(camera.mount.n_joints) * state.pose(Block::Mount(view.camera));
         let of_tags = Self {
             view_idx,
             camera: view.camera,
@@ -87,6 +89,7 @@ impl<'a> Group<'a> {
             observations: view.observations.clone(),
             poses,
             base_from_camera: before * error,
+            carrier: None,
         };
         let of_gripper = view.gripper.zip(problem.robot.gripper_tag).map(|(observation, tag)| Self {
             view_idx,
@@ -99,8 +102,20 @@ impl<'a> Group<'a> {
             observations: observation..observation + 1,
             poses,
             base_from_camera: before,
+            carrier: Some(*poses.link(tag.mount.n_joints)),
         });
         std::iter::once(of_tags).chain(of_gripper)
+    }
+}
+
+impl Group<'_> {
+    /// A tag of the group in the camera's frame.
+    pub(crate) fn camera_from_tag(&self, state: &State, tag: Block) -> Isometry3<f64> {
+        let pose = state.pose(tag);
+        match &self.carrier {
+            None => self.base_from_camera.inv_mul(pose),
+            Some(carrier) => self.base_from_camera.inv_mul(&(carrier * pose)),
+        }
     }
 }
 

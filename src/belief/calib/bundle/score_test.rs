@@ -171,15 +171,9 @@ impl Estimate<'_> {
         for observation in
             problem.observations[group.observations.clone()].iter().filter(|observation| observation.is_used)
         {
-            let pose = match &problem.robot.gripper_tag {
-                Some(tag) if observation.tag == problem.robot.tags.len() => {
-                    group.poses.link(tag.mount.n_joints) * state.gripper_tag()
-                }
-                _ => *state.tag(observation.tag),
-            };
-            let camera_from_tag = group.base_from_camera.inv_mul(&pose);
+            let camera_from_tag = group.camera_from_tag(state, observation.block);
             let data: &WeightedMeasurement = &observation.data;
-            let lens = state.lens(group.camera);
+            let lens = state.blocks.lens(Block::Lens(group.camera));
             if let Some(info) = PoseInformation::of(data, &camera_from_tag, lens, problem.scales.noise, None) {
                 h += info.h;
                 g += info.g;

@@ -13,6 +13,7 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, SMatrix, SVector, Vector2, Vector6};
 
+use crate::calib::mount_estimate::MountEstimate;
 use crate::calib::views::view::{MeanCorners, View};
 use crate::measure::ImagePoint;
 use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
@@ -21,23 +22,6 @@ use armcal_core::optics::square_corners;
 use armcal_core::robot::{GripperTag, Robot};
 use armcal_core::spatial::{adjoint, exp, log};
 use armcal_core::streams::JointAngles;
-
-/// Camera mount and the joints behind the camera, by the tag on the gripper.
-#[derive(Clone, Debug)]
-pub struct MountEstimate {
-    /// Estimated pose of the camera on the link that carries it.
-    pub link_from_camera: Isometry3<f64>,
-    /// The joints between camera and tag.
-    pub joints: Range<usize>,
-    /// Theirs are estimated, the others as they were given.
-    pub parameters: JointParameters,
-    /// Rows: mount (translation m, rotation rad, on the right), then gain and offset (rad) of each joint.
-    pub covariance: DMatrix<f64>,
-    /// Number of views that show the tag.
-    pub views: usize,
-    /// Root mean square per corner (2D), px.
-    pub rms_px: f64,
-}
 
 /// Fewer views than this are left to the priors.
 const MIN_VIEWS: usize = 4;

@@ -1,8 +1,9 @@
 //! The paper's proposed method: least sum of distances between seen and surveyed landmarks, over all landmarks, by
 //! BOBYQA.
 
-use crate::calib::methods::position_problem::PositionProblem;
-use crate::calib::methods::{PositionMethod, SearchOptions, Solution};
+use crate::calib::methods::{PositionMethod, SearchOptions};
+use crate::calib::position_problem::PositionProblem;
+use crate::calib::solution::Solution;
 use crate::model::parameters::{JointParameters, Parameter};
 
 /// Minimizes [`PositionProblem::sum_of_distances_m`] over `free`, from `guess`; the other parameters stay there.

@@ -14,19 +14,15 @@ mod minimum_distance;
 mod minimum_variance;
 pub(crate) mod observability;
 mod position_method;
-pub(crate) mod position_problem;
 mod search;
-mod solution;
 #[cfg(test)]
 mod tests;
 
-pub use gripper_tag::{MountEstimate, mount_by_gripper_tag};
+pub use gripper_tag::mount_by_gripper_tag;
 pub use joint_limits::{EndStopFit, fit_stops};
 pub use least_squares::{fisher_information, least_squares};
 pub use minimum_distance::minimum_distance;
 pub use minimum_variance::{Gauge, VarianceObjective, determined_by_variance};
-pub use observability::{Unobservable, free_parameters};
+pub use observability::free_parameters;
 pub use position_method::PositionMethod;
-pub use position_problem::PositionProblem;
 pub use search::{Interpolation, PositionSearch, Scaling, SearchOptions};
-pub use solution::Solution;

@@ -7,25 +7,9 @@
 
 use nalgebra::DMatrix;
 
-use crate::calib::methods::position_problem::PositionProblem;
+use crate::calib::position_problem::PositionProblem;
+use crate::calib::unobservable::Unobservable;
 use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
-use armcal_core::robot::Robot;
-
-/// A parameter that stays at its datasheet value, and why.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Unobservable {
-    /// Gain or offset of a joint.
-    pub parameter: Parameter,
-    /// End of a sentence about the parameter, for people.
-    pub reason: String,
-}
-
-impl Unobservable {
-    /// Of a joint that lies between camera and tool.
-    pub(crate) fn distal(parameter: Parameter) -> Self {
-        Self { parameter, reason: "the joint is distal to the camera".to_owned() }
-    }
-}
 
 /// Assumed error of one seen tag position per axis before any residual is known, m: what 0.3 px corners, a mount off by
 /// 2 mm and a survey off by 1 mm come to at 1 m. It decides only what is hopeless, so its exact size matters little.
@@ -101,19 +85,4 @@ fn data_std_in_prior_units(problem: &PositionProblem<'_>, free: &[Parameter], gu
             variance.sqrt()
         })
         .collect()
-}
-
-/// `wrist_rotate gain and offset: why`, one line a joint and reason.
-pub(crate) fn grouped_names(robot: &Robot, unobservable: &[Unobservable]) -> Vec<String> {
-    let mut lines: Vec<String> = Vec::new();
-    let mut rest = unobservable.iter().peekable();
-    while let Some(first) = rest.next() {
-        let twin = |next: &&Unobservable| next.parameter.joint == first.parameter.joint && next.reason == first.reason;
-        let name = first.parameter.name(robot);
-        match rest.next_if(twin) {
-            Some(_) => lines.push(format!("{name} and offset: {}", first.reason)),
-            None => lines.push(format!("{name}: {}", first.reason)),
-        }
-    }
-    lines
 }

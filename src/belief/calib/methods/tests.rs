@@ -10,7 +10,7 @@ use rand_distr::{Distribution, StandardNormal};
 use crate::calib::covariance::CommonErrors;
 use crate::calib::methods::minimum_variance::variance_covariance;
 use crate::calib::methods::*;
-use crate::calib::{TagMeasurement, TagObservation, View};
+use crate::calib::{PositionProblem, TagMeasurement, TagObservation, View};
 use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
 use armcal_core::numeric::Outcome;
 use armcal_core::robot::{Robot, load};

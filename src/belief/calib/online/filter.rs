@@ -69,8 +69,8 @@ pub(crate) struct ViewUpdate {
     pub observation_cost: f64,
     /// Logarithm of the probability of the view by the belief so far, up to what is the same for all beliefs.
     pub log_evidence: f64,
-    /// Indices into the robot's tags of observations that were left out as a whole.
-    pub rejected: Vec<usize>,
+    /// Tags whose observations were left out as a whole.
+    pub rejected: Vec<Block>,
     /// What each joint is off in this view beyond its sensor's model, rad, and its variance before and after.
     pub joint_error: [JointErrorOfView; MAX_JOINTS],
     /// Of the image's time.
@@ -196,17 +196,17 @@ impl Filter {
 
     /// `link_from_camera`, as believed.
     pub(crate) fn mount(&self) -> &Isometry3<f64> {
-        self.state.mount(0)
+        self.state.pose(Block::Mount(0))
     }
 
     /// `base_from_tag`, as believed.
     pub(crate) fn tag(&self, tag_idx: usize) -> &Isometry3<f64> {
-        self.state.tag(tag_idx)
+        self.state.pose(Block::Tag(tag_idx))
     }
 
     /// How much later the joint sensors' stamps are than the camera's, s, and its column.
     pub(crate) fn clock_offset(&self) -> Option<(f64, usize)> {
-        self.layout.at(Block::Clock).map(|at| (self.state.clock_s(), at))
+        self.layout.at(Block::Clock).map(|at| (self.state.blocks.number(Block::Clock), at))
     }
 
     /// Covariance of the joints' parameters, which are the first columns; `None` only after an overflow.
@@ -500,7 +500,7 @@ fn view_update(problem: &BundleProblem<'_>, solved: &SolvedView, log_det_before:
         observation_cost: chi2.map(|(_, chi2)| chi2).sum(),
         n_coordinates: used.map(|observation| observation.data.n_coordinates()).sum(),
         log_evidence: 0.5 * (of_own - normal.cost - rejected_cost - volume),
-        rejected: problem.observations.iter().filter(is_rejected).map(|observation| observation.tag).collect(),
+        rejected: problem.observations.iter().filter(is_rejected).map(|observation| observation.block).collect(),
         joint_error,
         time_error,
         scores: scores(problem, state, factor),
@@ -547,7 +547,7 @@ fn scores(problem: &BundleProblem<'_>, state: &State, factor: &Cholesky<f64, Dyn
         columns.filter(|(_, p)| p.kind == ParameterKind::Offset).map(|(column, p)| (p.joint, column)).collect();
     let seen = problem.observations.iter().filter(|observation| observation.is_used);
     let tags: Vec<(usize, usize)> =
-        seen.filter_map(|of| Some((of.tag, problem.layout.at(Block::Tag(of.tag))?))).collect();
+        seen.filter_map(|of| Some((of.block.tag_about_arm()?, problem.layout.at(of.block)?))).collect();
     let all: Vec<usize> =
         offsets.iter().map(|(_, column)| *column).chain(tags.iter().flat_map(|(_, at)| *at..at + 3)).collect();
     let mut half = info.select_columns(&all);

@@ -1,6 +1,7 @@
 //! What an online estimator is told beforehand.
 
 use crate::calib::bundle::model::{Scope, model_of};
+use crate::model::blocks::Shown;
 use crate::model::estimated::Model;
 use crate::model::parameters::JointParameters;
 use crate::model::scales::{Hyperparameters, TIME_JITTER_STD_S};
@@ -53,7 +54,8 @@ impl Default for OnlineSettings {
 #[must_use]
 pub fn online_model(robot: &Robot) -> Model {
     let gripper_tag = robot.gripper_tag.is_some();
-    model_of(robot, &Scope { warmed: true, dived: true, gripper_tag, from_both_sides: &|_| true, time_offset: true })
+    let shown = Shown { motion: true, gripper_tag, by_camera: &|camera| camera == 0 };
+    model_of(robot, &Scope { warmed: true, dived: true, from_both_sides: &|_| true, shown })
 }
 
 /// The datasheet's scales for a whole dive: what only a dive shows may be wrong by half, and images of a moving arm

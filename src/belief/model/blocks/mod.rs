@@ -12,7 +12,6 @@ mod per_block;
 mod tag;
 mod value;
 
-pub use mount::is_loose;
 pub(crate) use per_block::PerBlock;
 pub(crate) use value::{MAX_COLUMNS, Std, Value, six};
 
@@ -34,6 +33,16 @@ pub enum Block {
     GripperTag,
 }
 
+/// What views show.
+pub(crate) struct Shown<'a> {
+    /// The arm while it moves.
+    pub motion: bool,
+    /// The tag on the gripper, often enough.
+    pub gripper_tag: bool,
+    /// Whether the camera of that number sees tags.
+    pub by_camera: &'a dyn Fn(usize) -> bool,
+}
+
 impl Block {
     /// All that `robot` has, in the order of their columns.
     pub fn all(robot: &Robot) -> impl Iterator<Item = Self> + use<> {
@@ -44,6 +53,18 @@ impl Block {
         let mounts = (0..n_cameras).map(Self::Mount);
         let lenses = (0..n_cameras).map(Self::Lens);
         mounts.chain([Self::Clock]).chain(lenses).chain((0..n_tags).map(Self::Tag)).chain([Self::GripperTag])
+    }
+
+    /// Where it stands in that order.
+    #[inline]
+    fn place(self, n_cameras: usize, n_tags: usize) -> usize {
+        match self {
+            Self::Mount(camera) => camera,
+            Self::Clock => n_cameras,
+            Self::Lens(camera) => n_cameras + 1 + camera,
+            Self::Tag(tag) => 2 * n_cameras + 1 + tag,
+            Self::GripperTag => 2 * n_cameras + 1 + n_tags,
+        }
     }
 
     /// Those of its tags.
@@ -58,6 +79,17 @@ impl Block {
             Self::Mount(_) | Self::Tag(_) | Self::GripperTag => 6,
             Self::Clock => 1,
             Self::Lens(_) => MAX_COLUMNS,
+        }
+    }
+
+    /// Whether it is estimated from the start; a lens only where the views call for it.
+    pub(crate) fn is_told(self, robot: &Robot, shown: &Shown<'_>) -> bool {
+        match self {
+            Self::Mount(camera) => mount::is_loose(robot.camera_at(camera)) && (shown.by_camera)(camera),
+            Self::Clock => shown.motion,
+            Self::Lens(_) => false,
+            Self::Tag(_) => true,
+            Self::GripperTag => shown.gripper_tag,
         }
     }
 
@@ -97,6 +129,14 @@ impl Block {
     /// Whether its columns are a place and an attitude: shifts in m, then turns in rad.
     pub(crate) fn is_pose(self) -> bool {
         matches!(self, Self::Mount(_) | Self::Tag(_) | Self::GripperTag)
+    }
+
+    /// Index of a tag that stands about the arm.
+    pub(crate) fn tag_about_arm(self) -> Option<usize> {
+        match self {
+            Self::Tag(tag) => Some(tag),
+            _ => None,
+        }
     }
 
     /// Whether it is where a tag is that stands about the arm or is on its gripper.

@@ -23,7 +23,6 @@ pub(super) fn name(robot: &Robot, camera: usize, column: usize) -> String {
 }
 
 /// Whether the drawing leaves anything of a camera's mount open.
-#[must_use]
-pub fn is_loose(camera: &CameraSpec) -> bool {
+pub(super) fn is_loose(camera: &CameraSpec) -> bool {
     camera.mount_std_m > 0.0 || camera.mount_std_rad > 0.0
 }

@@ -49,13 +49,7 @@ impl<T> PerBlock<T> {
 
     #[inline]
     fn place(&self, block: Block) -> usize {
-        match block {
-            Block::Mount(camera) => camera,
-            Block::Clock => self.n_cameras,
-            Block::Lens(camera) => self.n_cameras + 1 + camera,
-            Block::Tag(tag) => 2 * self.n_cameras + 1 + tag,
-            Block::GripperTag => 2 * self.n_cameras + 1 + self.n_tags,
-        }
+        block.place(self.n_cameras, self.n_tags)
     }
 }
 
@@ -93,21 +87,21 @@ impl PerBlock<Value> {
         }
     }
 
-    /// Of the camera of that number.
+    /// Of a block that is a lens.
     #[inline]
-    pub(crate) fn lens(&self, camera: usize) -> &CameraModel {
-        match &self[Block::Lens(camera)] {
+    pub(crate) fn lens(&self, block: Block) -> &CameraModel {
+        match &self[block] {
             Value::Lens(lens) => lens,
-            other => unreachable!("the lens {camera} is {other:?}"),
+            other => unreachable!("{block:?} is a lens, not {other:?}"),
         }
     }
 
-    /// How much later the joint sensors' stamps are than the camera's, s.
+    /// Of a block that is a number.
     #[inline]
-    pub(crate) fn clock_s(&self) -> f64 {
-        match &self[Block::Clock] {
-            Value::Number(seconds) => *seconds,
-            other => unreachable!("the clock is {other:?}"),
+    pub(crate) fn number(&self, block: Block) -> f64 {
+        match &self[block] {
+            Value::Number(number) => *number,
+            other => unreachable!("{block:?} is a number, not {other:?}"),
         }
     }
 }

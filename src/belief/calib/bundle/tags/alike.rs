@@ -67,7 +67,7 @@ impl SurveyScore {
         let by_std = |tag: usize| Vector6::from_column_slice(std(tag)).map(f64::recip);
         let motion = |tag: usize| adjoint(&drawn(tag).inverse());
         let score = seen.iter().map(|&(tag, _)| {
-            let departure = log(&drawn(tag).inv_mul(found.solved.state.tag(tag)));
+            let departure = log(&drawn(tag).inv_mul(found.solved.state.pose(Block::Tag(tag))));
             let weight = by_std(tag);
             motion(tag).tr_mul(&departure.component_mul(&weight).component_mul(&weight))
         });

@@ -12,6 +12,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::views::view::{TagObservation, View};
 use crate::measure::WeightedMeasurement;
+use crate::model::blocks::Block;
 use armcal_core::robot::Robot;
 use armcal_core::spatial::Pose;
 use armcal_core::stats::quantile;
@@ -137,8 +138,8 @@ impl Estimate<'_> {
     /// Tags of which no observation fits, with the number of these.
     pub(crate) fn left_out_tags(&self) -> impl Iterator<Item = (usize, usize)> {
         let observations = &self.problem.observations;
-        let n_of = |tag: usize| observations.iter().filter(|observation| observation.tag == tag).count();
-        let is_unused = |tag: &usize| !observations.iter().any(|seen| seen.tag == *tag && seen.is_used);
+        let n_of = |tag: usize| observations.iter().filter(|observation| observation.block == Block::Tag(tag)).count();
+        let is_unused = |tag: &usize| !observations.iter().any(|seen| seen.block == Block::Tag(*tag) && seen.is_used);
         let unused = (0..self.problem.robot.tags.len()).filter(is_unused);
         unused.map(move |tag| (tag, n_of(tag))).filter(|(_, n)| *n >= MIN_OBSERVATIONS)
     }
@@ -152,7 +153,7 @@ impl Estimate<'_> {
 
     /// Share of a tag's observations that are rejected.
     fn rejected_share(&self, tag_idx: usize) -> f64 {
-        let of_tag = || self.problem.observations.iter().filter(|observation| observation.tag == tag_idx);
+        let of_tag = || self.problem.observations.iter().filter(|observation| observation.block == Block::Tag(tag_idx));
         of_tag().filter(|observation| !observation.is_used).count() as f64 / of_tag().count().max(1) as f64
     }
 
@@ -162,14 +163,14 @@ impl Estimate<'_> {
         let mut observations = Vec::new();
         for (view_idx, (data, view)) in problem.views.iter().zip(views).enumerate() {
             let of_view = &problem.observations[data.observations.clone()];
-            let is_placed = of_view.iter().any(|other| other.is_used && other.tag != tag_idx);
+            let is_placed = of_view.iter().any(|other| other.is_used && other.block != Block::Tag(tag_idx));
             let Some(tag) = view.tags.iter().find(|tag| tag.tag_idx == tag_idx).filter(|_| is_placed) else { continue };
             let is_image = of_view.iter().all(|other| matches!(other.data, WeightedMeasurement::Corners(_)));
             if is_image {
                 let state = &self.solved.state;
                 let camera = problem.robot.camera_at(view.camera);
                 let link = *problem.link_poses(view_idx, state).link(camera.mount.n_joints);
-                let base_from_camera = link * state.mount(view.camera) * state.camera_error[view_idx];
+                let base_from_camera = link * state.pose(Block::Mount(view.camera)) * state.camera_error[view_idx];
                 observations.push((base_from_camera, tag.center_in_camera_m));
             }
         }

@@ -8,6 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::calib::views::view::{MeanCorners, TagMeasurement, TagObservation, View};
+use crate::model::blocks::Block;
 use crate::model::estimated::Model;
 use crate::model::parameters::JointParameters;
 use crate::model::scales::Hyperparameters;

@@ -11,6 +11,7 @@ use crate::calib::bundle::tests::score_test::{input, views_of_changed};
 use crate::calib::views::view::View;
 use crate::model::estimated::Model;
 use crate::model::parameters::JointParameters;
+use crate::model::scales::MAX_CAMERAS;
 use armcal_core::joints::JointAngles;
 use armcal_core::kinematics::LinkCorrection;
 use armcal_core::robot::Robot;

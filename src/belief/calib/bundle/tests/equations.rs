@@ -13,6 +13,7 @@ use crate::calib::bundle::tests::data::{
     watched_titan,
 };
 use crate::calib::views::view::{TagMeasurement, View};
+use crate::model::blocks::Block;
 use crate::model::estimated::Model;
 use crate::model::parameters::JointParameters;
 use crate::model::scales::Hyperparameters;
@@ -76,7 +77,7 @@ fn problem(case: &Case) -> BundleProblem<'_> {
         joint_prior: None,
         evidence: HyperparameterMode::Given,
     };
-    BundleProblem::new(&input, prior(&input, &case.scales))
+    BundleProblem::new(&input, input.prior())
 }
 
 /// A state a little off the prior's means, the views' own parameters settled.

@@ -10,6 +10,7 @@ use crate::calib::bundle::tests::score_test::input;
 use crate::calib::finding::FindingKind;
 use crate::calib::views::view::View;
 use crate::calib::{Calibration, CalibrationData, CaptureData, HeldOut, Refusal, Status, calibrate_data};
+use crate::model::blocks::Block;
 use crate::model::estimated::Model;
 use armcal_core::joints::JointAngles;
 use armcal_core::kinematics::Sag;

@@ -13,6 +13,7 @@ use crate::calib::bundle::{GeometryElement, ScoreTestResult};
 use crate::calib::cross_validation::{FOLDS, fold_of};
 use crate::calib::geometry_error::ErrorKind;
 use crate::calib::views::view::View;
+use crate::model::blocks::Block;
 use crate::model::estimated::Model;
 use crate::model::parameters::JointParameters;
 use crate::model::scales::Hyperparameters;

@@ -15,6 +15,7 @@ use crate::calib::bundle::tests::data::{
     Noise, Truth, reference, rng, titan, titan_with_gripper_tag, views, watched_titan,
 };
 use crate::calib::views::view::{TagMeasurement, View};
+use crate::model::blocks::{Block, Value};
 use crate::model::estimated::Model;
 use crate::model::parameters::{JointParameters, Parameter};
 use crate::model::scales::Hyperparameters;
@@ -126,7 +127,7 @@ fn state_of(case: &Case<'_>, found: &Estimate<'_>) -> State {
 /// The Bayesian Cramer-Rao bound (van Trees): the inverse information at the truth, under the true scales.
 fn bound(case: &Case<'_>, found: &Estimate<'_>) -> DMatrix<f64> {
     let given = input(case, &case.views, HyperparameterMode::Given);
-    let problem = BundleProblem::new(&given, prior(&given, &given.scales));
+    let problem = BundleProblem::new(&given, given.prior());
     let mut normal = NormalEquations::new(&problem);
     normal.update(&problem, &state_of(case, found), Loss::Square);
     let n = problem.layout.n_joint();

@@ -11,6 +11,7 @@ use crate::calib::bundle::touch_term::{MIN_TOUCHES, MOUNT_TURN, SURVEY_TURN, TOO
 use crate::calib::refusal::Refusal;
 use crate::calib::reservation::Reservation;
 use crate::calib::views::view::{Touch, View};
+use crate::model::blocks::Block;
 use crate::model::estimated::Model;
 use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::model::scales::Hyperparameters;

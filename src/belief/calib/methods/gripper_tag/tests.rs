@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use nalgebra::{Unit, Vector3};
+use nalgebra::{Matrix3, Unit, Vector3};
 use rand::RngExt;
 
 use crate::calib::methods::gripper_tag::*;
