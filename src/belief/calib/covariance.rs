@@ -9,8 +9,8 @@
 
 use nalgebra::{Const, DMatrix, DVector, Dyn, Matrix3, Matrix6, OMatrix, Vector3, Vector6};
 
-use crate::calib::mount_estimate::MountEstimate;
-use crate::calib::position_problem::PositionProblem;
+use crate::calib::positions::mount_estimate::MountEstimate;
+use crate::calib::positions::position_problem::PositionProblem;
 use crate::calib::result::details::TargetPrediction;
 use crate::calib::views::view::{TagObservation, TaskRests};
 use crate::model::parameters::{JointParameters, Parameter, ParameterKind};

@@ -3,7 +3,7 @@
 use crate::calib::angles_by_camera::set_by_camera;
 use crate::calib::baseline_comparison::BaselineComparison;
 use crate::calib::bundle::baseline::N_BASELINES;
-use crate::calib::position_problem::{PositionProblem, TagResidual};
+use crate::calib::positions::position_problem::{PositionProblem, TagResidual};
 use crate::calib::result::metrics::HeldOutMetrics;
 use crate::calib::views::view::View;
 use crate::model::parameters::JointParameters;

@@ -19,18 +19,15 @@ pub(crate) mod fixture;
 mod geometry_error;
 mod interim;
 mod methods;
-mod mount_estimate;
 pub mod online;
-mod position_problem;
+mod positions;
 mod reading_error;
 mod refusal;
 mod refusal_conditions;
 mod reservation;
 mod result;
-mod solution;
 mod tag_mapping;
 mod tool_error;
-mod unobservable;
 mod views;
 mod wrong_input;
 
@@ -46,8 +43,7 @@ pub use methods::{
     determined_by_variance, fisher_information, fit_stops, free_parameters, least_squares, minimum_distance,
     mount_by_gripper_tag,
 };
-pub use mount_estimate::MountEstimate;
-pub use position_problem::PositionProblem;
+pub use positions::{MountEstimate, PositionProblem, Solution, Unobservable};
 pub use reading_error::{JointZero, MisreadReadings, ReadingError};
 pub use refusal::{InnovationQuantity, Refusal, in_files as refusals_in_files, with_advice};
 pub use refusal_conditions::{MIN_HELD_OUT_VIEWS, MIN_VIEWS_PER_PARAMETER, fewest_views};
@@ -60,8 +56,6 @@ pub use result::{
     Status, SurveyCoverage, TargetPrediction, TermsTable, ValidRange, VerdictTable, ViewContainment, ViewResidual,
     calibration_schema, covariance_file, covariance_schema, metric,
 };
-pub use solution::Solution;
-pub use unobservable::Unobservable;
 pub(crate) use views::dropouts::replace_dropouts;
 pub use views::{
     BoardPoint, BoardPoints, CalibrationData, CaptureData, ConditionHistory, EndStopReading, ExternalContext, HeldOut,

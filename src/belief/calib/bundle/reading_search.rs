@@ -17,7 +17,7 @@ use crate::calib::bundle::failure_detection::{is_suspicious, score};
 use crate::calib::bundle::failures::{Failure, FailureAdjusted};
 use crate::calib::bundle::input::HyperparameterMode;
 use crate::calib::bundle::reading_search::hypothesis::{Hypothesis, SCALE_STD, ZERO_STD_RAD, has_known_mount};
-use crate::calib::position_problem::PositionProblem;
+use crate::calib::positions::position_problem::PositionProblem;
 use crate::calib::reading_error::{JointZero, MisreadReadings, ReadingError};
 use crate::calib::views::view::View;
 use crate::model::parameters::JointParameters;

@@ -3,10 +3,10 @@
 use crate::calib::covariance::{linearity_scale, predict_tool_error};
 use crate::calib::error::CalibError;
 use crate::calib::methods::joint_limits::fit_stops;
-use crate::calib::position_problem::PositionProblem;
+use crate::calib::positions::position_problem::PositionProblem;
+use crate::calib::positions::unobservable::grouped_names;
 use crate::calib::result::assemble::{Evidence, Fit, Provenance, assemble, held_out_metrics};
 use crate::calib::result::calibration::Calibration;
-use crate::calib::unobservable::grouped_names;
 use crate::calib::views::calibration_data::CalibrationData;
 use crate::calib::views::view::EndStopReading;
 use crate::calib::views::view::View;

@@ -13,7 +13,7 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, SMatrix, SVector, Vector2, Vector6};
 
-use crate::calib::mount_estimate::MountEstimate;
+use crate::calib::positions::mount_estimate::MountEstimate;
 use crate::calib::views::view::{MeanCorners, View};
 use crate::measure::ImagePoint;
 use crate::model::parameters::{JointParameters, Parameter, ParameterKind};

@@ -9,8 +9,8 @@
 use nalgebra::{DMatrix, Matrix2, Vector2};
 
 use crate::calib::covariance::ParameterCovariance;
-use crate::calib::solution::Solution;
-use crate::calib::unobservable::Unobservable;
+use crate::calib::positions::solution::Solution;
+use crate::calib::positions::unobservable::Unobservable;
 use crate::calib::views::view::EndStopReading;
 use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
 use armcal_core::numeric::Outcome;

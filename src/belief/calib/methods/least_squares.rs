@@ -6,8 +6,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::calib::position_problem::PositionProblem;
-use crate::calib::solution::Solution;
+use crate::calib::positions::position_problem::PositionProblem;
+use crate::calib::positions::solution::Solution;
 use crate::model::parameters::{JointParameters, Parameter};
 use armcal_core::numeric::{Damping, LeastSquares, Proposal, StopRule, minimize};
 

@@ -2,8 +2,8 @@
 //! BOBYQA.
 
 use crate::calib::methods::{PositionMethod, SearchOptions};
-use crate::calib::position_problem::PositionProblem;
-use crate::calib::solution::Solution;
+use crate::calib::positions::position_problem::PositionProblem;
+use crate::calib::positions::solution::Solution;
 use crate::model::parameters::{JointParameters, Parameter};
 
 /// Minimizes [`PositionProblem::sum_of_distances_m`] over `free`, from `guess`; the other parameters stay there.

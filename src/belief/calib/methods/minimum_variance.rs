@@ -10,8 +10,8 @@
 use nalgebra::{Const, DMatrix, DVector, Dyn, OMatrix, Vector3};
 
 use crate::calib::covariance::{CommonErrors, ParameterCovariance};
-use crate::calib::position_problem::{PositionProblem, TagResidual};
-use crate::calib::unobservable::Unobservable;
+use crate::calib::positions::position_problem::{PositionProblem, TagResidual};
+use crate::calib::positions::unobservable::Unobservable;
 use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
 use armcal_core::robot::Robot;
 

@@ -7,8 +7,8 @@
 
 use nalgebra::DMatrix;
 
-use crate::calib::position_problem::PositionProblem;
-use crate::calib::unobservable::Unobservable;
+use crate::calib::positions::position_problem::PositionProblem;
+use crate::calib::positions::unobservable::Unobservable;
 use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
 
 /// Assumed error of one seen tag position per axis before any residual is known, m: what 0.3 px corners, a mount off by

@@ -3,8 +3,8 @@
 use crate::calib::methods::least_squares::{least_squares, sum_of_squares_m2};
 use crate::calib::methods::minimum_variance::VarianceObjective;
 use crate::calib::methods::search::{self, PositionSearch, SearchOptions};
-use crate::calib::position_problem::PositionProblem;
-use crate::calib::solution::Solution;
+use crate::calib::positions::position_problem::PositionProblem;
+use crate::calib::positions::solution::Solution;
 use crate::model::parameters::{JointParameters, Parameter};
 
 /// An equation over landmark positions in the base frame.

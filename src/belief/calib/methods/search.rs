@@ -7,8 +7,8 @@
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::calib::position_problem::PositionProblem;
-use crate::calib::solution::Solution;
+use crate::calib::positions::position_problem::PositionProblem;
+use crate::calib::positions::solution::Solution;
 use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
 use armcal_core::numeric::Outcome;
 use armcal_core::robot::Robot;

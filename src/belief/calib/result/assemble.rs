@@ -1,7 +1,8 @@
 //! What every method's calibration.toml holds; each method adds its own tables.
 
 use crate::calib::covariance::{ParameterCovariance, ToolErrorPrediction};
-use crate::calib::position_problem::PositionProblem;
+use crate::calib::positions::position_problem::PositionProblem;
+use crate::calib::positions::solution::Solution;
 use crate::calib::refusal::Refusal;
 use crate::calib::refusal_conditions::{AcceptanceData, HeldOutLimit, refusal};
 use crate::calib::result::calibration::{Calibration, JointResult, Status};
@@ -12,7 +13,6 @@ use crate::calib::result::metrics::{FitMetrics, HeldOutMetrics};
 use crate::calib::result::sag_table::SagTable;
 use crate::calib::result::terms_table::{ReferenceTable, TermsTable};
 use crate::calib::result::valid_range::ValidRange;
-use crate::calib::solution::Solution;
 use crate::calib::views::scale_identification::IdentifiedScale;
 use crate::calib::views::view::{CaptureData, EndStopReading, TagMeasurement, View};
 use crate::judge::{TargetError, TargetU95, U95Table};

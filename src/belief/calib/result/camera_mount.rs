@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::calib::mount_estimate::MountEstimate;
+use crate::calib::positions::mount_estimate::MountEstimate;
 use armcal_core::robot::Robot;
 use armcal_core::spatial::{Camera, Link, Pose};
 

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Point3, Vector2};
 
-use crate::calib::position_problem::{PositionProblem, TagResidual};
+use crate::calib::positions::position_problem::{PositionProblem, TagResidual};
 use crate::calib::views::view::View;
 use crate::judge::{ErrorDistribution, TargetError};
 use crate::model::parameters::JointParameters;

@@ -10,7 +10,7 @@ use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::input::HyperparameterMode;
 use crate::calib::bundle::tests::data::{rng, titan};
 use crate::calib::bundle::tests::statistics::{Case, case, input, task, tool, tool_jacobian};
-use crate::calib::position_problem::PositionProblem;
+use crate::calib::positions::position_problem::PositionProblem;
 use crate::calib::result::details::FitDetails;
 use crate::calib::views::view::{TagMeasurement, View};
 use armcal_core::stats::quantile;

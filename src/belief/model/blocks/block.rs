@@ -1,0 +1,132 @@
+//! The list of blocks; the variants stand in the order of their columns.
+
+use crate::model::blocks::{MAX_COLUMNS, Std, Value, clock, gripper_tag, lens, mount, tag};
+use crate::model::scales::Hyperparameters;
+use armcal_core::robot::Robot;
+
+/// A group of parameters that move together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Block {
+    /// Where the camera of that number hangs on its link, about the drawing's place.
+    Mount(usize),
+    /// How much later the joint sensors' stamps are than the camera's.
+    Clock,
+    /// Focal lengths, centre and distortion of the camera of that number, about robot.toml's.
+    Lens(usize),
+    /// Where a tag is, by its index among the robot's, about the survey's place.
+    Tag(usize),
+    /// Where the tag on the gripper is, about the drawing's place.
+    GripperTag,
+}
+
+/// What views show.
+pub(crate) struct Shown<'a> {
+    /// The arm while it moves.
+    pub motion: bool,
+    /// The tag on the gripper, often enough.
+    pub gripper_tag: bool,
+    /// Whether the camera of that number sees tags.
+    pub by_camera: &'a dyn Fn(usize) -> bool,
+}
+
+impl Block {
+    /// All that `robot` has, in the order of their columns.
+    pub fn all(robot: &Robot) -> impl Iterator<Item = Self> + use<> {
+        Self::in_order(1 + robot.further_cameras.len(), robot.tags.len())
+    }
+
+    pub(super) fn in_order(n_cameras: usize, n_tags: usize) -> impl Iterator<Item = Self> {
+        let mounts = (0..n_cameras).map(Self::Mount);
+        let lenses = (0..n_cameras).map(Self::Lens);
+        mounts.chain([Self::Clock]).chain(lenses).chain((0..n_tags).map(Self::Tag)).chain([Self::GripperTag])
+    }
+
+    /// Where it stands in that order.
+    #[inline]
+    pub(super) fn place(self, n_cameras: usize, n_tags: usize) -> usize {
+        match self {
+            Self::Mount(camera) => camera,
+            Self::Clock => n_cameras,
+            Self::Lens(camera) => n_cameras + 1 + camera,
+            Self::Tag(tag) => 2 * n_cameras + 1 + tag,
+            Self::GripperTag => 2 * n_cameras + 1 + n_tags,
+        }
+    }
+
+    /// Those of its tags.
+    pub fn tags(robot: &Robot) -> impl Iterator<Item = Self> + use<> {
+        (0..robot.tags.len()).map(Self::Tag)
+    }
+
+    /// Number of columns.
+    #[inline]
+    pub(crate) fn n_columns(self) -> usize {
+        match self {
+            Self::Mount(_) | Self::Tag(_) | Self::GripperTag => 6,
+            Self::Clock => 1,
+            Self::Lens(_) => MAX_COLUMNS,
+        }
+    }
+
+    /// Whether it is estimated from the start; a lens only where the views call for it.
+    pub(crate) fn is_told(self, robot: &Robot, shown: &Shown<'_>) -> bool {
+        match self {
+            Self::Mount(camera) => mount::is_loose(robot.camera_at(camera)) && (shown.by_camera)(camera),
+            Self::Clock => shown.motion,
+            Self::Lens(_) => false,
+            Self::Tag(_) => true,
+            Self::GripperTag => shown.gripper_tag,
+        }
+    }
+
+    /// What the drawing, robot.toml or the survey says of it.
+    pub(crate) fn drawn(self, robot: &Robot) -> Value {
+        match self {
+            Self::Mount(camera) => mount::drawn(robot, camera),
+            Self::Clock => clock::drawn(),
+            Self::Lens(camera) => lens::drawn(robot, camera),
+            Self::Tag(tag) => tag::drawn(robot, tag),
+            Self::GripperTag => gripper_tag::drawn(robot),
+        }
+    }
+
+    /// One sigma of that, column by column, in the columns' units; infinite where nothing is known.
+    pub(crate) fn drawn_std(self, robot: &Robot, scales: &Hyperparameters) -> Std {
+        match self {
+            Self::Mount(camera) => mount::drawn_std(robot, camera, scales),
+            Self::Clock => clock::drawn_std(),
+            Self::Lens(camera) => lens::drawn_std(robot, camera, scales),
+            Self::Tag(tag) => tag::drawn_std(robot, tag),
+            Self::GripperTag => gripper_tag::drawn_std(robot),
+        }
+    }
+
+    /// One of its columns in words.
+    pub(crate) fn name(self, robot: &Robot, column: usize) -> String {
+        match self {
+            Self::Mount(camera) => mount::name(robot, camera, column),
+            Self::Clock => clock::name(),
+            Self::Lens(camera) => lens::name(robot, camera, column),
+            Self::Tag(tag) => tag::name(robot, tag, column),
+            Self::GripperTag => gripper_tag::name(column),
+        }
+    }
+
+    /// Whether its columns are a place and an attitude: shifts in m, then turns in rad.
+    pub(crate) fn is_pose(self) -> bool {
+        matches!(self, Self::Mount(_) | Self::Tag(_) | Self::GripperTag)
+    }
+
+    /// Index of a tag that stands about the arm.
+    pub(crate) fn tag_about_arm(self) -> Option<usize> {
+        match self {
+            Self::Tag(tag) => Some(tag),
+            _ => None,
+        }
+    }
+
+    /// Whether it is where a tag is that stands about the arm or is on its gripper.
+    pub(crate) fn is_tag(self) -> bool {
+        matches!(self, Self::Tag(_) | Self::GripperTag)
+    }
+}
