@@ -17,18 +17,20 @@ use armcal_core::robot::{CameraSpec, FileIssue, Robot};
 
 const HEAD: &str = "\
 # The cameras of a robot calibrated by armcal: cam0 is [camera] of robot.toml, then each [[further_camera]] with a lens.
-# Lens: robot.toml's; armcal does not change it. T_link_camera: 4 x 4, maps the camera's optical frame to the frame of
+# Lens: the calibration's where it has one, or else robot.toml's. T_link_camera: 4 x 4, maps the camera's optical frame to the frame of
 # `link`; both keys are armcal's own, and Kalibr does not read them.
 # Kalibr's own tools want `rostopic`, the topic of the images, as well.
 ";
 
-/// Writes camchain.yaml with `cam0` and on: model, intrinsics and distortion of robot.toml; `T_link_camera` of the
+/// Writes camchain.yaml with `cam0` and on: model, intrinsics and distortion of the calibration, or of
+/// robot.toml where the calibration has none; `T_link_camera` of the
 /// calibration, or the drawing's without one; `T_cn_cnm1` between cameras of one link. `file`, the calibration's, is
 /// named in messages.
 ///
 /// # Errors
 /// [`FileIssue`]: a mount out of range, or a lens that Kalibr has no model for.
 pub fn camchain(file: &Path, calibration: &Calibration, robot: &Robot) -> Result<String, FileIssue> {
+    let robot = &calibration.with_lenses(robot);
     let mount = calibration.camera_mount.as_ref();
     let place = mount.map(|mount| link_from_camera(file, mount)).transpose()?;
     let mut last = (robot.camera.mount.n_joints, place.unwrap_or(robot.camera.mount.link_from_frame));

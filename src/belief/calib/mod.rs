@@ -51,10 +51,10 @@ pub use reservation::Reservation;
 pub use result::{
     CalibratedArm, Calibration, CalibrationFileError, CalibrationFiles, CameraMount, Check, CompactCalibration,
     CompactError, CompactJoint, CornerResidual, CovarianceTable, FailedJointTable, FitDetails, FitMetrics,
-    FurtherCamera, HeldOutMetrics, JointCompliance, JointResult, LinkResult, LookupTable, MAX_COMPACT_BYTES, MapResult,
-    MapTag, ModelTable, ObservabilityTable, ObservedTag, PredictedToolError, PriorTable, ReferenceTable, SagTable,
-    Status, SurveyCoverage, TargetPrediction, TermsTable, ValidRange, VerdictTable, ViewContainment, ViewResidual,
-    calibration_schema, covariance_file, covariance_schema, metric,
+    FurtherCamera, HeldOutMetrics, JointCompliance, JointResult, LensResult, LinkResult, LookupTable,
+    MAX_COMPACT_BYTES, MapResult, MapTag, ModelTable, ObservabilityTable, ObservedTag, PredictedToolError, PriorTable,
+    ReferenceTable, SagTable, Status, SurveyCoverage, TargetPrediction, TermsTable, ValidRange, VerdictTable,
+    ViewContainment, ViewResidual, calibration_schema, covariance_file, covariance_schema, metric,
 };
 pub(crate) use views::dropouts::replace_dropouts;
 pub use views::{

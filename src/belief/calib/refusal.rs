@@ -159,6 +159,8 @@ pub enum Refusal {
     },
     /// The focal length differs from the stated one by more than a repair may.
     Lens {
+        /// Name of the further camera; `None`: the first.
+        camera: Option<String>,
         /// Estimated focal length over that of robot.toml.
         ratio: f64,
         /// One sigma of `ratio`.

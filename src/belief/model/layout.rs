@@ -76,11 +76,6 @@ impl Layout {
         self.first.tags().iter().enumerate().filter_map(|(tag, at)| Some((tag, (*at)?)))
     }
 
-    /// First column of the tags.
-    pub(crate) fn first_of_tags(&self) -> usize {
-        self.blocks().find(|(block, _)| block.is_tag()).map_or(self.n, |(_, at)| at)
-    }
-
     /// Columns of links and sag.
     pub(crate) fn body(&self) -> Range<usize> {
         self.links.start..self.sag.end

@@ -15,7 +15,8 @@ use crate::calib::bundle::outliers::Outlier;
 use crate::calib::bundle::reading_search::ReadingSearch;
 use crate::calib::bundle::setup::{BundleSetup, Clocks, declared};
 use crate::calib::bundle::tables::{
-    add_clock, camera_mount_table, covariance_with_mount, further_camera_tables, map_table, model_table, prior_table,
+    add_clock, camera_mount_table, covariance_with_mount, further_camera_tables, lens_tables, map_table, model_table,
+    prior_table,
 };
 use crate::calib::bundle::tags::freed::MovedTags;
 use crate::calib::bundle::touch_term::TouchUpdate;
@@ -36,7 +37,6 @@ use crate::calib::views::calibration_data::CalibrationData;
 use crate::calib::views::view::{ObservationRejection, Touch, View};
 use crate::calib::wrong_input::{WrongInput, wrong_input};
 use crate::judge::{TargetError, U95Table};
-use crate::model::blocks::Block;
 use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
 use armcal_core::codes::Code;
 use armcal_core::joints::JointAngles;
@@ -350,10 +350,8 @@ impl<'a> BundleCalibration<'a> {
         let without_failed = setup.without_failed(&estimate.parameters());
         let mut with_steps = setup.with_estimated_angles(estimate, &without_failed);
         let mut datasheet = setup.applied.robot.clone();
-        if estimate.has(Block::Lens(0)) {
-            datasheet.camera.lens = estimate.as_found(robot).camera.lens;
-            with_steps.iter_mut().for_each(|view| view.see_through(&datasheet));
-        }
+        estimate.give_lenses(&mut datasheet);
+        with_steps.iter_mut().for_each(|view| estimate.see_through_found_lens(view, &datasheet));
         let input = BundleInput { views: &with_steps, ..setup.input() };
         let (held_out, innovations) = match self.purpose {
             EstimatePurpose::Final => cross_validated(&input, estimate, &datasheet),
@@ -416,6 +414,7 @@ impl<'a> BundleCalibration<'a> {
             unobservable: grouped_names(&robot, &unobservable(datasheet, setup, estimate)),
             camera_mount: Some(camera_mount_table(datasheet, estimate, &diagnosis.views)),
             further_camera: further_camera_tables(datasheet, estimate, &diagnosis.views),
+            lens: lens_tables(datasheet, estimate),
             model: Some(model),
             map: self.map.clone().map(|map| map_table(map, datasheet, estimate)),
             outliers: estimate.outliers.iter().map(|outlier| named(outlier, &diagnosis.views)).collect(),
@@ -630,9 +629,7 @@ fn cross_validated(
             .collect();
         // Where no sensor tells an angle, the view's own tags tell where to linearize, with nothing of other folds.
         for (_, view) in &mut with_places {
-            if all.model.has(Block::Lens(0)) {
-                view.see_through(&as_found);
-            }
+            all.see_through_found_lens(view, &as_found);
             set_by_camera(&as_found, view, &found.parameters());
         }
         let held_out: Vec<View> = with_places.iter().map(|(_, view)| view.clone()).collect();

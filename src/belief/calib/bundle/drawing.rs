@@ -39,7 +39,8 @@ mod sag_start;
 pub(crate) struct Drawing {
     pub links: Option<LinkStart>,
     pub sag: Option<SagStart>,
-    pub has_lens: bool,
+    /// Numbers of the cameras whose lens is estimated.
+    pub lenses: Vec<usize>,
     pub tags: Vec<TagFault>,
 }
 
@@ -75,8 +76,8 @@ const LENS_SCALE: f64 = 10.0;
 impl Drawing {
     /// Gives `input` the columns of this drawing.
     pub(crate) fn apply(&self, input: &mut BundleInput<'_>) {
-        if self.has_lens {
-            input.model.blocks.insert(Block::Lens(0));
+        if !self.lenses.is_empty() {
+            input.model.blocks.extend(self.lenses.iter().copied().map(Block::Lens));
             input.scales.lens_scale = LENS_SCALE;
         }
         if let Some(start) = &self.sag {
@@ -154,8 +155,9 @@ impl Drawing {
         if self.sag.is_none() && sag_gain > MIN_GAIN_NATS {
             all.push(Self { sag: Some(sag), ..self.clone() });
         }
-        if is_suspicious && !self.has_lens && !found.has_positions() {
-            all.push(Self { has_lens: true, ..self.clone() });
+        if is_suspicious && !found.has_positions() {
+            let others = found.cameras().filter(|camera| !self.lenses.contains(camera));
+            all.extend(others.map(|camera| Self { lenses: [&self.lenses[..], &[camera]].concat(), ..self.clone() }));
         }
         let new = faults.into_iter().filter(|fault| !self.tags.iter().any(|known| known.meets(fault)));
         all.extend(new.map(|fault| self.with_faults([fault])));

@@ -76,12 +76,12 @@ impl Estimate<'_> {
             calibration.refuse_first_for([Refusal::Geometry(base.geometry_error(self.problem.robot))]);
         }
         calibration.refuse_for(found.iter().find_map(Departure::beyond_bound));
-        calibration.refuse_first_for(self.lens_beyond_bound());
+        calibration.refuse_first_for(self.lenses().filter_map(|(number, at)| self.lens_beyond_bound(number, at)));
         calibration.refuse_for(drawing.tags.iter().find_map(|fault| self.size_beyond_bound(fault)));
         let of_tags = drawing.tags.iter().filter_map(|fault| self.tag_finding(fault));
-        let of_lens = self.lens_finding().into_iter();
+        let of_lenses = self.lenses().map(|(number, at)| self.lens_finding(number, at));
         let left_out = self.left_out_tags().map(|(tag, n)| self.left_out_finding(tag, n));
-        for (finding, words) in self.sag_findings(task).into_iter().chain(of_lens).chain(of_tags).chain(left_out) {
+        for (finding, words) in self.sag_findings(task).into_iter().chain(of_lenses).chain(of_tags).chain(left_out) {
             warnings.push(Warning::new(finding.code(), words));
             findings.push(finding);
         }
@@ -161,17 +161,22 @@ impl Estimate<'_> {
         })
     }
 
+    /// Lenses that have columns: the camera's number and the first column.
+    fn lenses(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let blocks = self.problem.layout.blocks();
+        blocks.filter_map(|(block, at)| if let Block::Lens(number) = block { Some((number, at)) } else { None })
+    }
+
     /// A focal length that differs from robot.toml's by more than a repair may.
-    fn lens_beyond_bound(&self) -> Option<Refusal> {
-        let at = self.problem.layout.at(Block::Lens(0))?;
-        let (lens, stated) =
-            (self.solved.state.blocks.lens(Block::Lens(0)), self.problem.prior.mean.lens(Block::Lens(0)));
-        let ([found_px, stated_px], stated_std) =
-            ([lens, stated].map(|lens| lens.focal_px()[0]), self.problem.robot.camera.lens_priors.focal_std);
+    fn lens_beyond_bound(&self, number: usize, at: usize) -> Option<Refusal> {
+        let (lens, camera) = (self.lens(number), self.problem.robot.camera_at(number));
+        let [found_px, stated_px] = [lens, &camera.lens].map(|lens| lens.focal_px()[0]);
+        let stated_std = camera.lens_priors.focal_std;
         let ratio = found_px / stated_px;
         let std = self.posterior.covariance[(at, at)].max(0.0).sqrt() / stated_px;
         let most_sigmas = MAX_REPAIR_SIGMAS;
         ((ratio - 1.0).abs() > most_sigmas * stated_std).then(|| Refusal::Lens {
+            camera: (number > 0).then(|| camera.name.clone()),
             ratio,
             std,
             stated_std,
@@ -180,16 +185,16 @@ impl Estimate<'_> {
         })
     }
 
-    /// The lens, where it has columns.
-    fn lens_finding(&self) -> Option<(Finding, String)> {
-        let at = self.problem.layout.at(Block::Lens(0))?;
-        let (lens, drawn) =
-            (self.solved.state.blocks.lens(Block::Lens(0)), self.problem.prior.mean.lens(Block::Lens(0)));
+    /// A lens that has columns.
+    fn lens_finding(&self, number: usize, at: usize) -> (Finding, String) {
+        let (lens, camera) = (self.lens(number), self.problem.robot.camera_at(number));
+        let drawn = &camera.lens;
         let std = |k: usize| self.posterior.covariance[(at + k, at + k)].max(0.0).sqrt();
         let ratio = lens.focal_px()[0] / drawn.focal_px()[0] - 1.0;
         let shift = [0, 1].map(|k| lens.center_px()[k] - drawn.center_px()[k]);
+        let name = if number == 0 { "camera".to_owned() } else { camera.name.clone() };
         let words = format!(
-            "camera: focal length {:+.2} % from robot.toml (sigma {:.2} %), centre {:.1}, {:.1} px; the estimate \
+            "{name}: focal length {:+.2} % from robot.toml (sigma {:.2} %), centre {:.1}, {:.1} px; the estimate \
              includes it. Measure the intrinsics again",
             100.0 * ratio,
             100.0 * std(0) / drawn.focal_px()[0],
@@ -197,11 +202,8 @@ impl Estimate<'_> {
             shift[1],
         );
         let (size, unit) = (Some(ratio), Some(FindingUnit::One));
-        let name = "camera".to_owned();
-        Some((
-            Finding { kind: FindingKind::Lens, name, size, unit, tool_error_m: None, time_s: None, repaired: true },
-            words,
-        ))
+        let kind = FindingKind::Lens;
+        (Finding { kind, name, size, unit, tool_error_m: None, time_s: None, repaired: true }, words)
     }
 
     /// Of tags that were moved, others tell (module `tags::freed`).

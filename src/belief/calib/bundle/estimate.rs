@@ -10,6 +10,7 @@ use crate::calib::bundle::problem::{BundleProblem, parameters_of};
 use crate::calib::bundle::robust_start::{RobustStart, robust_start, straight_sensor_std};
 use crate::calib::bundle::solve::{LOOSE, Solved, TIGHT, solve, until};
 use crate::calib::result::details::FitDetails;
+use crate::calib::views::view::View;
 use crate::measure::{ObservationTerm, WeightedMeasurement};
 use crate::model::blocks::Block;
 use crate::model::estimated::Model;
@@ -18,6 +19,7 @@ use crate::model::scales::Hyperparameters;
 use crate::model::state::State;
 use armcal_core::joints::JointAngles;
 use armcal_core::numeric::{Loss, Outcome};
+use armcal_core::optics::CameraModel;
 use armcal_core::robot::Robot;
 use armcal_core::spatial::Pose;
 
@@ -277,10 +279,21 @@ impl Estimate<'_> {
         (*self.solved.state.pose(Block::Mount(camera)), covariance)
     }
 
+    /// Numbers of the cameras that have views, in their order.
+    pub(crate) fn cameras(&self) -> impl Iterator<Item = usize> + '_ {
+        let has_views = |camera: &usize| self.problem.views.iter().any(|view| view.camera == *camera);
+        (0..=self.problem.robot.further_cameras.len()).filter(has_views)
+    }
+
     /// Whether a block is estimated.
     #[must_use]
     pub fn has(&self, block: Block) -> bool {
         self.problem.layout.at(block).is_some()
+    }
+
+    /// Of the camera of that number.
+    pub(crate) fn lens(&self, camera: usize) -> &CameraModel {
+        self.solved.state.blocks.lens(Block::Lens(camera))
     }
 
     /// `base_from_tag` of each of the robot's tags, and its covariance (on the right); `None` for tags that were not
@@ -292,18 +305,29 @@ impl Estimate<'_> {
         (*self.solved.state.pose(Block::Tag(tag_idx)), covariance)
     }
 
+    /// Gives `robot` the lenses that were estimated.
+    pub(crate) fn give_lenses(&self, robot: &mut Robot) {
+        let cameras = std::iter::once(&mut robot.camera).chain(&mut robot.further_cameras);
+        for (number, camera) in cameras.enumerate().filter(|(number, _)| self.has(Block::Lens(*number))) {
+            camera.lens = *self.lens(number);
+        }
+    }
+
+    /// Where the lens of a view's camera was estimated, the view's tags are where they are through that of `robot`.
+    pub(crate) fn see_through_found_lens(&self, view: &mut View, robot: &Robot) {
+        if self.has(Block::Lens(view.camera)) {
+            view.see_through(robot);
+        }
+    }
+
     /// `robot` with camera and tags where they were found.
     #[must_use]
     pub fn as_found(&self, robot: &Robot) -> Robot {
         let (mount, covariance) = self.mount(0);
         let mut found = self.parameters().with_links(robot.clone()).with_camera_at(mount, &covariance);
-        let state = &self.solved.state;
-        let cameras = std::iter::once(&mut found.camera).chain(&mut found.further_cameras);
-        for (number, camera) in cameras.enumerate() {
-            camera.mount.link_from_frame = *state.pose(Block::Mount(number));
-            if self.has(Block::Lens(number)) {
-                camera.lens = *state.blocks.lens(Block::Lens(number));
-            }
+        self.give_lenses(&mut found);
+        for (at, camera) in found.further_cameras.iter_mut().enumerate() {
+            camera.mount.link_from_frame = *self.solved.state.pose(Block::Mount(at + 1));
         }
         for (tag_idx, tag) in found.tags.iter_mut().enumerate() {
             let (pose, covariance) = self.tag(tag_idx);

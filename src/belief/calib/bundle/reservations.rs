@@ -83,9 +83,9 @@ impl Estimate<'_> {
         predicted_m: f64,
     ) -> PriorImpact {
         let tool = self.tool_jacobians(task);
-        let lens = self.held_lens();
+        let lenses = self.held_lenses();
         let mut elements = self.held_elements(touches, task, &tool);
-        elements.extend(lens.iter().flat_map(|lens| lens.elements(&tool)));
+        elements.extend(lenses.iter().flat_map(|lens| lens.elements(&tool)));
         // Without a tag on the gripper and without touches nothing watches over what is beyond the camera.
         let is_watched = touches.is_some() || self.has(Block::GripperTag);
         let worth_m = if is_watched { WORTH_SHARE } else { WORTH_SHARE_UNWATCHED } * predicted_m;
@@ -96,7 +96,7 @@ impl Estimate<'_> {
             let unmodelled = elements.iter().filter(|element| !element.is_counted && element.unstated.is_none());
             let by_drawing: Matrix3<f64> =
                 unmodelled.map(|element| element.shifts[at] * element.shifts[at].transpose()).sum();
-            by_drawing + lens.as_ref().map_or_else(Matrix3::zeros, |lens| lens.covariance_m2(&tool[at]))
+            by_drawing + lenses.iter().map(|lens| lens.covariance_m2(&tool[at])).sum::<Matrix3<f64>>()
         };
         let mut reservations: Vec<Reservation> =
             elements.chunk_by(|a, b| a.stem == b.stem).flat_map(|alike| reservations_of(alike, worth_m)).collect();

@@ -8,6 +8,7 @@ use crate::calib::result::calibration::Calibration;
 use crate::calib::result::camera_mount::{CameraMount, FurtherCamera};
 use crate::calib::result::covariance_file::CovarianceTable;
 use crate::calib::result::failed_joint::PriorTable;
+use crate::calib::result::lens_table::LensResult;
 use crate::calib::result::map_table::MapResult;
 use crate::calib::result::model_table::ModelTable;
 use crate::calib::views::view::View;
@@ -84,6 +85,17 @@ pub(crate) fn further_camera_tables(robot: &Robot, found: &Estimate<'_>, views: 
         }
     };
     (1..=robot.further_cameras.len()).filter(|&number| found.has(Block::Mount(number))).map(table).collect()
+}
+
+/// Each lens that was estimated.
+pub(crate) fn lens_tables(robot: &Robot, found: &Estimate<'_>) -> Vec<LensResult> {
+    let table = |number: usize| {
+        let at = found.problem.layout.at(Block::Lens(number))?;
+        let std = std::array::from_fn(|k| found.wide_covariance()[(at + k, at + k)].max(0.0).sqrt());
+        let camera = (number > 0).then(|| robot.camera_at(number).name.clone());
+        Some(LensResult::new(camera, found.lens(number), std))
+    };
+    found.cameras().filter_map(table).collect()
 }
 
 /// The map's tags where `bundle` found them.

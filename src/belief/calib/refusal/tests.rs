@@ -111,7 +111,14 @@ fn measured() -> Vec<Refusal> {
             unit: FindingUnit::Radian,
         },
         Refusal::TargetsNotCovered { targets: vec![4], ranges: vec!["target 4 lies 80 deg beyond".to_owned()] },
-        Refusal::Lens { ratio: 1.333, std: 3e-4, stated_std: 2e-3, most_sigmas: 10.0, focal_px: [900.1, 900.2] },
+        Refusal::Lens {
+            camera: None,
+            ratio: 1.333,
+            std: 3e-4,
+            stated_std: 2e-3,
+            most_sigmas: 10.0,
+            focal_px: [900.1, 900.2],
+        },
         Refusal::SensorLine { joint: joint(), slope: 0.5 },
         Refusal::Outliers { outliers: 40, observations: 100 },
         Refusal::Innovations {

@@ -197,12 +197,14 @@ impl Refusal {
     /// Estimates that differ from their stated sizes by more than is repaired.
     fn fmt_of_size(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Lens { ratio, std, stated_std, most_sigmas, .. } => {
+            Self::Lens { camera, ratio, std, stated_std, most_sigmas, .. } => {
                 let [std, stated] = [std, stated_std].map(|share| 100.0 * share);
+                let of = camera.as_ref().map_or_else(String::new, |name| format!(" of the camera {name}"));
                 write!(
                     f,
-                    "the lens is not that of robot.toml: its focal length is {ratio:.3} times the stated one (sigma "
+                    "the lens{of} is not that of robot.toml: its focal length is {ratio:.3} times the stated one"
                 )?;
+                f.write_str(" (sigma ")?;
                 write!(f, "{std:.2} %; stated sigma {stated:.1} %, at most {most_sigmas:.0} of these are repaired)")?;
                 f.write_str(medium_of_lens(*ratio))
             }

@@ -103,6 +103,7 @@ pub(crate) fn assemble(source: &Provenance<'_>, fit: &Fit<'_>, evidence: Evidenc
         reference: ReferenceTable::of(at, fit.covariance),
         camera_mount: None,
         further_camera: Vec::new(),
+        lens: Vec::new(),
         map: None,
         observability: None,
         verdict: None,

@@ -45,6 +45,7 @@ pub(in crate::calib) fn bare(robot: &str, method: Method) -> Calibration {
         reference: None,
         camera_mount: None,
         further_camera: Vec::new(),
+        lens: Vec::new(),
         map: None,
         model: None,
         outliers: Vec::new(),

@@ -16,6 +16,7 @@ use crate::calib::result::camera_mount::{CameraMount, FurtherCamera};
 use crate::calib::result::covariance_file::CovarianceTable;
 use crate::calib::result::details::FitDetails;
 use crate::calib::result::failed_joint::{FailedJointTable, PriorTable};
+use crate::calib::result::lens_table::LensResult;
 use crate::calib::result::link_table::LinkResult;
 use crate::calib::result::map_table::MapResult;
 use crate::calib::result::metrics::{FitMetrics, HeldOutMetrics};
@@ -93,6 +94,9 @@ pub struct Calibration {
     /// Of `bundle`: the further cameras that have views and whose mounts robot.toml does not call exact.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub further_camera: Vec<FurtherCamera>,
+    /// Of `bundle`: the lenses that the views contradict.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub lens: Vec<LensResult>,
     /// Where the tags were found to be, where no survey said it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub map: Option<MapResult>,

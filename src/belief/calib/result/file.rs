@@ -162,7 +162,7 @@ impl Calibration {
         Ok(views.iter().map(angles_of).collect())
     }
 
-    /// `robot` with its links and the cameras' mounts as calibrated; sensors and tags stay.
+    /// `robot` with its links and the cameras' mounts and lenses as calibrated; sensors and tags stay.
     #[must_use]
     pub fn applied_to(&self, robot: &Robot) -> Robot {
         let mut robot = robot.clone();
@@ -175,6 +175,23 @@ impl Calibration {
             let found = self.further_camera.iter().find(|found| found.name == camera.name);
             if let Some(link_from_camera) = found.and_then(FurtherCamera::link_from_camera) {
                 camera.mount.link_from_frame = link_from_camera;
+            }
+        }
+        self.with_lenses(&robot)
+    }
+
+    /// `robot` with its lenses as calibrated.
+    #[must_use]
+    pub fn with_lenses(&self, robot: &Robot) -> Robot {
+        let mut robot = robot.clone();
+        for found in &self.lens {
+            let mut further = robot.further_cameras.iter_mut();
+            let camera = match &found.camera {
+                None => Some(&mut robot.camera),
+                Some(name) => further.find(|camera| camera.name == *name),
+            };
+            if let Some(camera) = camera.filter(|camera| camera.lens.is_known()) {
+                camera.lens = found.applied_to(&camera.lens);
             }
         }
         robot
@@ -280,6 +297,7 @@ impl Calibration {
         }
         self.reference.map_or(Ok(()), |reference| reference.check(file))?;
         self.sag.as_ref().map_or(Ok(()), |sag| sag.check(file))?;
+        self.lens.iter().try_for_each(|lens| lens.check(file))?;
         let n = self.covariance.parameters.len();
         if self.covariance.rows.len() != n || self.covariance.rows.iter().any(|row| row.len() != n) {
             return Err(FileIssue::new(

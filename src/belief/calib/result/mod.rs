@@ -16,6 +16,7 @@ pub(crate) mod details;
 pub(crate) mod failed_joint;
 mod file;
 mod file_error;
+pub(crate) mod lens_table;
 pub(crate) mod link_table;
 mod lookup;
 pub(crate) mod map_table;
@@ -37,6 +38,7 @@ pub use details::{CornerResidual, FitDetails, ObservedTag, TargetPrediction, Vie
 pub use failed_joint::{FailedJointTable, PriorTable};
 pub use file::CalibrationFiles;
 pub use file_error::CalibrationFileError;
+pub use lens_table::LensResult;
 pub use link_table::LinkResult;
 pub use lookup::LookupTable;
 pub use map_table::{MapResult, MapTag, SurveyCoverage};

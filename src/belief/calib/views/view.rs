@@ -65,13 +65,10 @@ impl View {
 
     /// Places the tags in the first camera's frame by the lens of `robot`; a square that this lens does not show stays.
     pub(crate) fn see_through(&mut self, robot: &Robot) {
-        if self.camera != 0 {
-            return;
-        }
         for tag in &mut self.tags {
             let TagMeasurement::Corners(seen) = &tag.measured else { continue };
             let size_m = robot.tags[tag.tag_idx].size_m;
-            if let Ok(solved) = solve_square(&robot.camera.lens, size_m, &seen.corners_px) {
+            if let Ok(solved) = solve_square(&robot.camera_at(self.camera).lens, size_m, &seen.corners_px) {
                 tag.center_in_camera_m = solved.camera_from_tag.origin().vector();
             }
         }

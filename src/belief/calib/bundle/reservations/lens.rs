@@ -21,6 +21,8 @@ const N: usize = 7;
 
 /// The lens at its priors.
 pub(super) struct HeldLens {
+    /// Which lens, in words.
+    stem: String,
     priors: LensPriors,
     focal_px: f64,
     /// Of each number in its own prior's units.
@@ -32,17 +34,23 @@ pub(super) struct HeldLens {
 }
 
 impl Estimate<'_> {
+    /// Of each camera with views.
+    pub(super) fn held_lenses(&self) -> Vec<HeldLens> {
+        self.cameras().filter_map(|number| self.held_lens(number)).collect()
+    }
+
     /// `None` where the lens is estimated, or where nobody says what it is: then no view holds corners.
-    pub(super) fn held_lens(&self) -> Option<HeldLens> {
-        let (mut problem, at) = (self.problem.clone(), self.problem.layout.first_of_tags());
-        if self.has(Block::Lens(0)) || !problem.robot.camera.lens.is_known() {
+    fn held_lens(&self, number: usize) -> Option<HeldLens> {
+        let (mut problem, block) = (self.problem.clone(), Block::Lens(number));
+        let camera = problem.robot.camera_at(number);
+        if self.has(block) || !camera.lens.is_known() {
             return None;
         }
-        problem.layout = self.problem.layout.with(Block::Lens(0));
-        problem.prior.forget(|block| block == Block::Lens(0));
+        problem.layout = self.problem.layout.with(block);
+        problem.prior.forget(|other| other == block);
+        let at = problem.layout.at(block)?;
         let mut normal = NormalEquations::new(&problem);
         normal.update(&problem, &self.solved.state, Loss::Square);
-        let camera = &problem.robot.camera;
         let units = units(camera);
         // Only the lower triangle is there.
         let cross = DMatrix::from_fn(self.problem.layout.n, 8, |row, k| {
@@ -55,7 +63,9 @@ impl Estimate<'_> {
             + response.tr_mul(&self.solved.normal.right).fixed_rows::<N>(0);
         let left = (information + SMatrix::identity()).try_inverse()?;
         let mean = left * score;
+        let stem = if number == 0 { "camera lens".to_owned() } else { format!("lens of the camera {}", camera.name) };
         Some(HeldLens {
+            stem,
             priors: camera.lens_priors,
             focal_px: camera.lens.focal_px()[0],
             left: left + mean * mean.transpose(),
@@ -102,7 +112,7 @@ impl HeldLens {
             ("centre along y", FindingUnit::Radian, center_rad),
         ];
         first.into_iter().chain(rest).enumerate().map(move |(k, (what, unit, prior_std))| HeldElement {
-            stem: format!("camera lens, {what}"),
+            stem: format!("{}, {what}", self.stem),
             axis: "",
             unit,
             prior_std,

@@ -2,14 +2,16 @@
 
 use std::ops::Range;
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, SVector};
 
 use crate::calib::bundle::estimate::estimate;
 use crate::calib::bundle::input::HyperparameterMode;
 use crate::calib::bundle::tests::corner_outliers::tool_error;
-use crate::calib::bundle::tests::data::{titan_watched_by_two, titan_with_two_cameras};
+use crate::calib::bundle::tests::data::{normal, rng, titan_watched_by_two, titan_with_two_cameras};
 use crate::calib::bundle::tests::statistics::{assert_honest, case, input, tally};
 use crate::calib::views::view::View;
+use crate::model::blocks::Block;
+use crate::model::scales::Hyperparameters;
 use armcal_core::robot::Robot;
 
 #[test]
@@ -73,4 +75,45 @@ fn one_pose_counts_once(n_seeds: u64, limits: Range<f64>, [most_rms, least_more]
         assert!(limits.contains(&both.nees), "{what}: {both:?}");
         assert!(alone.nees > both.nees + least_more, "{what}: {alone:?} {both:?}");
     }
+}
+
+/// The titan with two cameras, the second through a lens that robot.toml knows to its sigmas alone.
+fn with_other_second_lens(known: &Robot, seed: u64) -> Robot {
+    let mut rng = rng(seed, "second lens");
+    let mut robot = known.clone();
+    let std = Block::Lens(1).drawn_std(known, &Hyperparameters::datasheet(known));
+    let lens = &mut robot.further_cameras[0].lens;
+    let drawn = lens.intrinsics();
+    *lens = lens.with_intrinsics(std::array::from_fn(|k| drawn[k] + std[k] * normal(&mut rng)));
+    robot
+}
+
+/// Its eight numbers about the truth: how many of all seeds' are within one and two sigmas, and mean NEES.
+#[test]
+fn the_lens_of_a_second_camera_is_a_block() {
+    const SEEDS: Range<u64> = 5000..5040;
+    let known = titan_with_two_cameras();
+    let (mut within, mut nees) = ([0.0; 2], 0.0);
+    for seed in SEEDS {
+        let real = with_other_second_lens(&known, seed);
+        let mut case = case(&real, seed, 20);
+        case.robot = &known;
+        let mut input = input(&case, &case.views, HyperparameterMode::Fitted);
+        input.model.blocks.insert(Block::Lens(1));
+        let found = estimate(&input).expect("solved");
+        let at = found.problem.layout.at(Block::Lens(1)).expect("it has columns");
+        let covariance = found.posterior.covariance.fixed_view::<8, 8>(at, at).into_owned();
+        let (lens, truth) = (found.lens(1).intrinsics(), real.further_cameras[0].lens.intrinsics());
+        let off = SVector::<f64, 8>::from_fn(|k, _| lens[k] - truth[k]);
+        for (k, sigmas) in [1.0, 2.0].into_iter().enumerate() {
+            within[k] += (0..8).filter(|&n| off[n].abs() < sigmas * covariance[(n, n)].sqrt()).count() as f64;
+        }
+        nees += off.dot(&covariance.cholesky().expect("positive definite").solve(&off));
+    }
+    let n = 8.0 * SEEDS.count() as f64;
+    let [one, two] = within.map(|count| count / n);
+    let nees = 8.0 * nees / n;
+    println!("lens of a second camera: {one:.2} within one sigma, {two:.2} within two, NEES {nees:.2} of 8");
+    // 320 numbers, of which those of one lens are not independent; a chi-square of 8 degrees has a variance of 16.
+    assert!((0.6..0.76).contains(&one) && two > 0.92 && (6.1..9.9).contains(&nees), "{one} {two} {nees}");
 }

@@ -1,0 +1,61 @@
+//! `[[lens]]` of calibration.toml.
+
+use std::path::Path;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use armcal_core::optics::CameraModel;
+use armcal_core::robot::FileIssue;
+
+/// A lens that was estimated, where the views contradict the one that robot.toml states.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LensResult {
+    /// Name of the further camera; absent: `[camera]`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera: Option<String>,
+    /// Along both axes of the image, px.
+    pub focal_px: [f64; 2],
+    /// Optical centre, px.
+    pub center_px: [f64; 2],
+    /// The first four coefficients of distortion of robot.toml's model.
+    pub distortion: [f64; 4],
+    /// One sigma, px.
+    pub focal_std_px: [f64; 2],
+    /// One sigma, px.
+    pub center_std_px: [f64; 2],
+    /// One sigma.
+    pub distortion_std: [f64; 4],
+}
+
+impl LensResult {
+    pub(crate) fn new(camera: Option<String>, lens: &CameraModel, std: [f64; 8]) -> Self {
+        let [fx, fy, cx, cy, a, b, c, d] = lens.intrinsics();
+        Self {
+            camera,
+            focal_px: [fx, fy],
+            center_px: [cx, cy],
+            distortion: [a, b, c, d],
+            focal_std_px: [std[0], std[1]],
+            center_std_px: [std[2], std[3]],
+            distortion_std: [std[4], std[5], std[6], std[7]],
+        }
+    }
+
+    pub(crate) fn check(&self, file: &Path) -> Result<(), FileIssue> {
+        let pixels = self.focal_px.map(|px| ("lens.focal_px", px, 1.0..=1e6)).into_iter();
+        let center = self.center_px.map(|px| ("lens.center_px", px, -1e6..=1e6));
+        let distortion = self.distortion.map(|k| ("lens.distortion", k, -1e3..=1e3));
+        for (key, value, range) in pixels.chain(center).chain(distortion) {
+            FileIssue::check_range(file, key, value, range)?;
+        }
+        Ok(())
+    }
+
+    /// `drawn` with these intrinsics.
+    pub(crate) fn applied_to(&self, drawn: &CameraModel) -> CameraModel {
+        let ([fx, fy], [cx, cy], [a, b, c, d]) = (self.focal_px, self.center_px, self.distortion);
+        drawn.with_intrinsics([fx, fy, cx, cy, a, b, c, d])
+    }
+}
