@@ -65,7 +65,7 @@
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]
 
-pub use armcal_belief::{calib, model, plan, session, tagmap, verify};
+pub use armcal_belief::{calib, judge, model, plan, say, session, tagmap, verify};
 pub use armcal_core::{
     codes, input, joints, kinematics, log, optics, robot, routine, sensor, spatial, stats, streams, time,
 };

@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use armcal::calib::{Calibration, FindingKind, Refusal, Status, calibrate};
+use armcal::calib::{Calibration, Refusal, Status, calibrate};
+use armcal::judge::FindingKind;
 use armcal::log::{Recording, read_recording};
 use armcal::robot::{Robot, load};
 use armcal::routine::Method;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use armcal::calib::FindingKind;
+use armcal::judge::FindingKind;
 use armcal::log::{Recording, read_recording};
 use armcal::report::RunSummary;
 use armcal::streams::{JointCommand, MarkKind, Message, ReachAttempt};

@@ -7,6 +7,7 @@ pub mod judge;
 mod measure;
 pub mod model;
 pub mod plan;
+pub mod say;
 pub mod session;
 #[cfg(test)]
 mod shared;

@@ -7,10 +7,11 @@ use std::fmt::Write as _;
 
 use rand::{Rng, RngExt};
 
+use armcal_belief::calib::View;
 use armcal_belief::calib::online::{
     Fault, Follower, OnlineEvent, OnlineSettings, Oracle, OracleGain, TagSet, ViewStream,
 };
-use armcal_belief::calib::{FindingKind, View};
+use armcal_belief::judge::FindingKind;
 use armcal_belief::model::WornSpot;
 use armcal_core::log::Recording;
 use armcal_core::robot::{FailedJoint, Robot};

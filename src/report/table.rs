@@ -7,7 +7,7 @@ use crate::report::online::online_lines;
 use crate::report::summary::{
     AssertSummary, CalibrationSummary, CaptureSummary, GainChange, HeldJointSummary, RenewalSummary, RunSummary,
 };
-use crate::report::verdict::{attention, beside_refusal, joint_remedy, repairs};
+use crate::report::verdict::{attention, beside_refusal, repairs};
 use crate::score::{ReachScore, ScoreSide};
 use armcal_belief::calib::{
     CameraMount, FailedJointTable, FurtherCamera, MapResult, PriorTable, Status, SurveyCoverage,
@@ -393,7 +393,7 @@ fn known_to(position_std_m: [f64; 3], rotation_std_rad: [f64; 3]) -> String {
 fn failed_line(failed: &FailedJointTable) -> String {
     let FailedJointTable { joint, kind, found, evidence, .. } = failed;
     let colon = if evidence.is_empty() { "" } else { ": " };
-    format!("failed       {joint} {} ({found}){colon}{evidence}; {}", kind.predicate(), joint_remedy(failed))
+    format!("failed       {joint} {} ({found}){colon}{evidence}; {}", kind.predicate(), failed.told().remedy())
 }
 
 fn held_line(held: &HeldJointSummary) -> String {

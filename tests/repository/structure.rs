@@ -14,7 +14,7 @@ const MAX_LINE: usize = 120;
 const MAX_MODULE_ROOT: usize = 60;
 
 /// Rooms of the estimator, and those within `calib`, each of which imports the ones before it alone.
-const ROOMS: [&str; 8] = ["model", "measure", "judge", "tagmap", "calib", "plan", "verify", "session"];
+const ROOMS: [&str; 9] = ["model", "measure", "judge", "say", "tagmap", "calib", "plan", "verify", "session"];
 const ROOMS_OF_CALIB: [&str; 8] =
     ["views", "positions", "wrong_input", "refusal", "result", "bundle", "methods", "online"];
 

@@ -13,7 +13,6 @@ mod calibrate;
 mod covariance;
 mod cross_validation;
 mod error;
-mod finding;
 #[cfg(test)]
 pub(crate) mod fixture;
 mod geometry_error;
@@ -35,7 +34,6 @@ pub use baseline_comparison::{BaselineComparison, SIGNIFICANCE};
 pub use calibrate::{MIN_VIEWS, calibrate, calibrate_data, calibrate_with_survey};
 pub use covariance::{CommonErrors, JointAt, ParameterCovariance, ToolErrorPrediction};
 pub use error::CalibError;
-pub use finding::{Finding, FindingKind, FindingUnit};
 pub use geometry_error::{ErrorKind, GeometryError};
 pub use interim::interim_estimate;
 pub use methods::{

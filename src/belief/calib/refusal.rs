@@ -10,10 +10,10 @@ use armcal_core::robot::FailedKind;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::calib::finding::FindingUnit;
 use crate::calib::geometry_error::GeometryError;
 use crate::calib::reading_error::MisreadReadings;
 use crate::calib::wrong_input::WrongInput;
+use crate::judge::FindingUnit;
 
 mod words;
 

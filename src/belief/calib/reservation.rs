@@ -1,11 +1,11 @@
 //! What a calibration rests on beside the data: elements of the geometry that no view shows.
 
+use crate::judge::FindingUnit;
 use std::fmt;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::calib::finding::FindingUnit;
 use armcal_core::codes::Code;
 
 /// One element that the data do not tell, so that the answer holds only as far as its prior does.

@@ -1,6 +1,6 @@
 //! Works by the online belief, and asks for a calibration pose or two where the next task would miss its tolerance.
 
-use crate::calib::FindingKind;
+use crate::judge::FindingKind;
 use crate::plan::JointErrorBounds;
 use crate::session::SessionError;
 use crate::session::held_joint::{HeldJoint, StandingJoint};

@@ -1,5 +1,6 @@
 //! On two seeds: falsifications are applied, seen, named and scored as they are meant to be.
 
+use armcal_belief::judge::{Finding, FindingKind};
 use std::path::Path;
 use std::sync::LazyLock;
 
@@ -14,7 +15,6 @@ use crate::falsified::oracle::Oracle;
 use crate::falsified::perturbation::{Perturbation, SensorFault, WrongReading};
 use crate::falsified::run::{FalsifiedRow, FalsifiedStudy, RunStatus, check_touches, rows_of, study_of};
 use crate::falsified::{falsified_csv, falsified_markdown};
-use armcal_belief::calib::{Finding, FindingKind};
 use armcal_core::robot::{Robot, Vehicle};
 use armcal_core::routine::Routine;
 

@@ -3,7 +3,8 @@
 use armcal_core::codes::Coded;
 use maud::{Markup, html as markup};
 
-use armcal_belief::calib::{Calibration, CameraMount, Finding, FurtherCamera, LinkResult, ModelTable, SagTable};
+use armcal_belief::calib::{Calibration, CameraMount, FurtherCamera, LinkResult, ModelTable, SagTable};
+use armcal_belief::judge::Finding;
 use armcal_core::units::Unit;
 
 pub(super) fn section(calibration: &Calibration) -> Markup {

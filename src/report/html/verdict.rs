@@ -5,8 +5,9 @@ use maud::{Markup, html as markup};
 use super::Report;
 use crate::report::summary::RunSummary;
 use crate::report::table::{check_lines, labelled, u95_in_words};
-use crate::report::verdict::{sentence, verdict};
+use crate::report::verdict::verdict;
 use armcal_belief::calib::ValidRange;
+use armcal_belief::say::sentence;
 use armcal_core::time::utc;
 use armcal_core::units::Unit;
 

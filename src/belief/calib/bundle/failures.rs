@@ -12,6 +12,7 @@ use crate::calib::views::view::View;
 use crate::model::estimated::Model;
 use crate::model::parameters::{JointParameters, ParameterKind};
 use crate::model::scales::Hyperparameters;
+use crate::say;
 use armcal_core::robot::{FailedJoint, FailedKind, Robot};
 use armcal_core::stats::quantile;
 use armcal_core::units::Unit;
@@ -135,7 +136,7 @@ impl Failure {
 pub(crate) fn slip_in_words(step: String, views: &[View], since: usize) -> String {
     let n_before = views.iter().filter(|view| view.end < views[since].end).count();
     let (n, number) = (views.len(), views[since].pose_idx + 1);
-    format!("the sensor slipped by {step} after {n_before} of {n} views, before view {number}")
+    say::slip(&step, [n_before, n], number)
 }
 
 /// An arm and its views with the failed joints taken care of.

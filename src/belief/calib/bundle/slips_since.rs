@@ -8,8 +8,8 @@
 use nalgebra::DVector;
 
 use crate::calib::bundle::calibration_prior::drift_std_rad_per_sqrt_h;
-use crate::calib::finding::{Finding, FindingKind, FindingUnit};
 use crate::calib::result::calibration::Calibration;
+use crate::judge::{Finding, FindingKind, FindingUnit};
 use crate::model::parameters::{JointParameters, Parameter};
 use armcal_core::robot::Robot;
 use armcal_core::sensor::ConditionChange;

@@ -16,12 +16,12 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Vector3};
 
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::score_test::{GeometryElement, Score, ToolJacobian, columns};
-use crate::calib::finding::{Finding, FindingKind, FindingUnit};
 use crate::calib::geometry_error::ErrorKind;
 use crate::calib::refusal::Refusal;
 use crate::calib::result::calibration::Calibration;
 use crate::calib::result::verdict_tables::Check;
 use crate::calib::views::view::Touch;
+use crate::judge::{Finding, FindingKind, FindingUnit};
 use armcal_core::codes::Code;
 use armcal_core::robot::Robot;
 use armcal_core::stats::chi_square_quantile;

@@ -8,17 +8,18 @@ use crate::calib::bundle::input::BundleInput;
 use crate::calib::bundle::observability::{Observability, observability};
 use crate::calib::bundle::score_test::{GeometryElement, ScoreTestResult};
 use crate::calib::covariance::numbered_task_angles;
-use crate::calib::finding::{Finding, FindingKind, FindingUnit};
 use crate::calib::geometry_error::{BASE, ErrorKind, GeometryError};
 use crate::calib::refusal::{InnovationQuantity, Refusal};
 use crate::calib::result::calibration::Calibration;
 use crate::calib::result::validity::Extrapolation;
 use crate::calib::result::verdict_tables::{Check, ObservabilityTable, VerdictTable};
 use crate::calib::views::view::TaskRests;
+use crate::judge::{Finding, FindingKind, FindingUnit};
 use crate::model::blocks::Block;
 use crate::model::estimated::Walk;
 use crate::model::parameters::{Parameter, ParameterKind};
 use crate::model::scales::Hyperparameters;
+use crate::say;
 use armcal_core::codes::{Code, Warning};
 use armcal_core::input::TagNoise;
 use armcal_core::joints::JointAngles;
@@ -263,12 +264,7 @@ impl VerdictInput<'_> {
                 calibration.findings.push(Finding { kind, repaired: true, ..worn(spec, walked_rad) });
                 table.warnings.push(Warning::new(
                     Code::OffsetWalks,
-                    format!(
-                        "the offset of {} walks at random, by {} (std) during the capture; the predicted tool error \
-                     includes as much again. Calibrate again soon, or follow the estimate online",
-                        spec.joint,
-                        spec.unit().shown(walked_rad, 2)
-                    ),
+                    say::offset_walks(&spec.joint, &spec.unit().shown(walked_rad, 2)),
                 ));
             }
             table.checks.push(check);

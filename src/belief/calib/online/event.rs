@@ -2,9 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::calib::finding::{Finding, FindingKind, FindingUnit};
 use crate::calib::online::diagnosis::Verdict;
 use crate::calib::online::hypothesis::Fault;
+use crate::judge::{Finding, FindingKind, FindingUnit};
+use crate::say;
 use armcal_core::codes::Coded;
 use armcal_core::robot::Robot;
 use armcal_core::time::Stamp;
@@ -73,33 +74,7 @@ impl OnlineEvent {
     /// One line for people.
     #[must_use]
     pub fn to_line(&self) -> String {
-        let Finding { kind, name, size, .. } = &self.finding;
-        let size = size.unwrap_or(f64::NAN);
-        let mut line = match kind {
-            FindingKind::SensorSlip => {
-                format!("the sensor of {name} slipped on its shaft by {:.2} deg", size.to_degrees())
-            }
-            FindingKind::SensorScale => {
-                format!("the sensor of {name} has another scale: the angle is {size:.3} of the datasheet angle")
-            }
-            FindingKind::SensorReversed => {
-                format!("the sensor of {name} is reversed ({size:.3} of the datasheet angle)")
-            }
-            FindingKind::SensorFailed => {
-                format!("the sensor of {name} failed: only views determine its angle")
-            }
-            FindingKind::SensorWorn => {
-                let at_deg = self.at_rad.unwrap_or(f64::NAN).to_degrees();
-                format!(
-                    "the sensor of {name} is worn near {at_deg:.1} deg: it reads {:.2} deg more there",
-                    size.to_degrees()
-                )
-            }
-            FindingKind::TagMoved => format!("tag {name} was moved by {:.1} mm", 1e3 * size),
-            FindingKind::TagsMoved => format!("tags {name} were moved together by {:.1} mm", 1e3 * size),
-            FindingKind::CameraMount => format!("the camera turned on its mount by {:.2} deg", size.to_degrees()),
-            _ => format!("the {name} or all tags moved by {:.1} mm", 1e3 * size),
-        };
+        let mut line = say::event(&self.finding, self.at_rad);
         if let Some(other) = self.or_else.as_ref().filter(|_| self.lead_nats < CLEAR_LEAD_NATS) {
             line += &format!(" (or: {other})");
         }

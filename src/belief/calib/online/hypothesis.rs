@@ -2,10 +2,11 @@
 
 use nalgebra::{DMatrix, Matrix6};
 
-use crate::calib::finding::FindingKind;
 use crate::calib::online::filter::Filter;
 use crate::calib::views::view::View;
+use crate::judge::FindingKind;
 use crate::model::parameters::{Parameter, ParameterKind, WornSpot};
+use crate::say;
 use armcal_core::robot::Robot;
 use armcal_core::spatial::adjoint;
 
@@ -206,17 +207,9 @@ impl Fault {
 
     /// What people read where it is one of several explanations.
     pub(crate) fn phrase(self, robot: &Robot) -> String {
-        let name = self.name(robot);
         match self {
-            Self::Slip(_) => format!("the sensor of {name} slipped on its shaft"),
-            Self::Scale(_) => format!("the sensor of {name} has another scale"),
-            Self::Failed(_) => format!("the sensor of {name} says nothing any more"),
-            Self::Worn(..) => format!("the sensor of {name} is worn at one place"),
-            Self::Tag(_) => format!("tag {name} was moved"),
-            Self::Tags(_) => format!("tags {name} were moved together"),
-            Self::Mount => "the camera has moved on its mount".to_owned(),
-            Self::Base => "the base or all tags have moved".to_owned(),
-            Self::Drift => "all sensors drifted more than expected".to_owned(),
+            Self::Drift => say::drift(),
+            _ => say::explanation(self.kind(), &self.name(robot)),
         }
     }
 

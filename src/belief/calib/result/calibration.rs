@@ -9,7 +9,6 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::calib::finding::Finding;
 use crate::calib::refusal::{Refusal, in_words};
 use crate::calib::reservation::Reservation;
 use crate::calib::result::camera_mount::{CameraMount, FurtherCamera};
@@ -26,7 +25,7 @@ use crate::calib::result::slide_keys::metric;
 use crate::calib::result::terms_table::{ReferenceTable, TermsTable};
 use crate::calib::result::valid_range::ValidRange;
 use crate::calib::result::verdict_tables::{ObservabilityTable, VerdictTable};
-use crate::judge::U95Table;
+use crate::judge::{Finding, U95Table};
 
 /// Whether the answer may be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::say::FailedJoint;
 use armcal_core::kinematics::JointKind;
 use armcal_core::robot::FailedKind;
 use armcal_core::stats::Summary;
@@ -43,6 +44,15 @@ pub struct FailedJointTable {
     /// ... by a sound sensor of the datasheet, nothing calibrated on it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tool_error_by_datasheet_m: Option<Summary>,
+}
+
+impl FailedJointTable {
+    /// What is said of it.
+    #[must_use]
+    pub fn told(&self) -> FailedJoint<'_> {
+        let Self { joint, kind, evidence, since_pose, .. } = self;
+        FailedJoint { joint, kind: *kind, evidence, slipped: since_pose.is_some() }
+    }
 }
 
 /// The prior of a warm calibration, and how well the views agree with it.

@@ -5,7 +5,6 @@ use armcal_core::schema::first_line;
 use std::path::Path;
 
 use crate::calib::covariance::ParameterCovariance;
-use crate::calib::finding::FindingKind;
 use crate::calib::result::calibration::{Calibration, JointResult};
 use crate::calib::result::camera_mount::{CameraMount, FurtherCamera};
 use crate::calib::result::covariance_file::CovarianceTable;
@@ -14,6 +13,7 @@ use crate::calib::result::link_table::LinkResult;
 use crate::calib::result::slide_keys::{SLIDE_HEAD, in_metres, named_as_angles};
 use crate::calib::result::terms_table::TermsTable;
 use crate::calib::views::View;
+use crate::judge::FindingKind;
 use crate::model::parameters::{JointParameters, Parameter};
 use armcal_core::document::parse_file;
 use armcal_core::joints::JointAngles;

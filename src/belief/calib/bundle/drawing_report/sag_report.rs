@@ -3,7 +3,7 @@
 use nalgebra::{Cholesky, DVector};
 
 use crate::calib::bundle::estimate::Estimate;
-use crate::calib::finding::{Finding, FindingKind, FindingUnit};
+use crate::judge::{Finding, FindingKind, FindingUnit};
 use crate::model::parameters::{Parameter, ParameterKind};
 use armcal_core::joints::JointAngles;
 

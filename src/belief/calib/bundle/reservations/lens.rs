@@ -11,7 +11,7 @@ use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::linearize::NormalEquations;
 use crate::calib::bundle::reservations::HeldElement;
 use crate::calib::bundle::score_test::ToolJacobian;
-use crate::calib::finding::FindingUnit;
+use crate::judge::FindingUnit;
 use crate::model::blocks::Block;
 use armcal_core::numeric::Loss;
 use armcal_core::robot::{CameraSpec, LensPriors};

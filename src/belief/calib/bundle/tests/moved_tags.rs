@@ -12,7 +12,7 @@ use crate::calib::bundle::tests::arms::{Built, arm};
 use crate::calib::bundle::tests::data::titan;
 use crate::calib::bundle::tests::failures::case;
 use crate::calib::bundle::tests::score_test::{input, views_of_changed};
-use crate::calib::finding::{Finding, FindingKind};
+use crate::judge::{Finding, FindingKind};
 use armcal_core::codes::{Code, Coded};
 use armcal_core::robot::Robot;
 use armcal_core::spatial::Pose;

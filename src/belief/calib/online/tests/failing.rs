@@ -2,10 +2,10 @@
 //! into.
 
 use crate::calib::bundle::tests::data::titan;
-use crate::calib::finding::FindingKind;
 use crate::calib::online::event::OnlineEvent;
 use crate::calib::online::tests::faults::{Happens, after_an_hour};
 use crate::calib::views::view::{TagMeasurement, View};
+use crate::judge::FindingKind;
 
 fn lines(events: &[OnlineEvent]) -> Vec<String> {
     events.iter().map(OnlineEvent::to_line).collect()

@@ -7,7 +7,6 @@ use std::sync::LazyLock;
 use nalgebra::{Isometry3, Matrix3, Vector3, Vector6};
 
 use crate::calib::bundle::tests::data::titan;
-use crate::calib::finding::FindingKind;
 use crate::calib::online::branch::Step;
 use crate::calib::online::estimator::OnlineEstimator;
 use crate::calib::online::event::OnlineEvent;
@@ -17,6 +16,7 @@ use crate::calib::online::hypothesis::Fault;
 use crate::calib::online::settings::OnlineSettings;
 use crate::calib::online::tests::drifting::Dive;
 use crate::calib::views::view::View;
+use crate::judge::FindingKind;
 use crate::model::parameters::WornSpot;
 use crate::shared::Shared;
 use armcal_core::robot::{FailedJoint, FailedKind, Robot};

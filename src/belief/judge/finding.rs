@@ -104,62 +104,6 @@ impl Coded for Finding {
     }
 }
 
-impl FindingKind {
-    /// In words: `tag moved`.
-    #[must_use]
-    pub fn words(self) -> &'static str {
-        match self {
-            Self::TagMoved => "tag moved",
-            Self::TagsMoved => "tags moved together",
-            Self::TagSize => "tag of another size",
-            Self::TagSwapped => "tags swapped",
-            Self::TagLeftOut => "tag left out",
-            Self::Lens => "lens differs from robot.toml",
-            Self::Link => "link differs from the URDF",
-            Self::Sag => "compliance under weight",
-            Self::CameraMount => "camera mount differs",
-            Self::Base => "base displaced from the survey",
-            Self::Tool => "tool point differs",
-            Self::SensorSlip => "sensor slipped",
-            Self::SensorReversed => "sensor reversed",
-            Self::SensorScale => "sensor scale differs",
-            Self::SensorFailed => "joint or sensor failed",
-            Self::SensorWorn => "sensor worn",
-            Self::OffsetWalks => "offset walks at random",
-            Self::Outliers => "tag observations rejected",
-        }
-    }
-}
-
-impl Finding {
-    /// The size in units that people measure in: `12.0 mm`.
-    #[must_use]
-    pub fn size_in_words(&self) -> Option<String> {
-        Some(self.unit?.in_words(self.size?))
-    }
-}
-
-impl FindingUnit {
-    /// Of a joint's coordinate.
-    #[must_use]
-    pub fn of_joint(kind: JointKind) -> Self {
-        if kind.is_slide() { Self::Metre } else { Self::Radian }
-    }
-
-    /// A value in the unit that people measure in: `12.0 mm`.
-    #[must_use]
-    pub fn in_words(self, value: f64) -> String {
-        match self {
-            Self::Metre => format!("{:.1} mm", value * 1e3),
-            Self::Radian => format!("{:.2} deg", value.to_degrees()),
-            Self::One => format!("{value:.3}"),
-            Self::RadianPerNewtonMetre => format!("{:.3} deg per kN m", 1e3 * value.to_degrees()),
-            Self::MetrePerNewton => format!("{:.3} mm per kN", 1e6 * value),
-            Self::Newton => format!("{value:.0} N"),
-        }
-    }
-}
-
 /// SI, and plain numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum FindingUnit {
@@ -181,4 +125,12 @@ pub enum FindingUnit {
     /// Loads.
     #[serde(rename = "N")]
     Newton,
+}
+
+impl FindingUnit {
+    /// Of a joint's coordinate.
+    #[must_use]
+    pub fn of_joint(kind: JointKind) -> Self {
+        if kind.is_slide() { Self::Metre } else { Self::Radian }
+    }
 }
