@@ -103,14 +103,29 @@ fn refuse_other_roots(tree: &XmlTree) -> Result<(), String> {
     }
     if root.name != "robot" {
         return Err(format!(
-            "{}: the root element is `{}`, and that of a URDF is `robot`. Convert the file to URDF first",
-            root.place, root.name
+            "{}: the root element is `{}`, and that of a URDF is `robot`. {}",
+            root.place,
+            root.name,
+            conversion(&root.name)
         ));
     }
     if has("group") && !has("link") {
         return Err("it is an SRDF, which names groups of joints. Name the URDF that has these joints".to_owned());
     }
     Ok(())
+}
+
+/// The remedy for a robot description with another root element.
+fn conversion(root: &str) -> &'static str {
+    match root {
+        "sdf" => "It is SDF. Convert it with the Python package `rod`: `rod -f ARM.sdf -o ARM.urdf`",
+        "mujoco" => {
+            "It is MJCF. Convert it with the Python package `mjcf-urdf-simple-converter`: \
+             `from mjcf_urdf_simple_converter import convert; convert(\"ARM.xml\", \"ARM.urdf\")`. It makes slides \
+             fixed joints: correct these in the URDF"
+        }
+        _ => "Convert the file to URDF first",
+    }
 }
 
 /// Refuses a file that only xacro can expand. What an expanded file has left over, such as unused definitions and calls
@@ -178,6 +193,8 @@ mod tests {
             "<!DOCTYPE html>\n<html><body>Not found</body></html>",
             "<robot name=\"a\"><group name=\"arm\"><chain base_link=\"b\" tip_link=\"t\"/></group></robot>",
             "<sdf version=\"1.7\"><model name=\"arm\"/></sdf>",
+            "<?xml version=\"1.0\"?>\n<!-- arm -->\n<mujoco model=\"arm\"><worldbody/></mujoco>",
+            "<COLLADA version=\"1.4.1\"/>",
         ];
         let told = texts.map(|text| UrdfFile::parse(text).expect_err("no URDF"));
         insta::assert_snapshot!("other_kinds", told.join("\n"));
@@ -219,7 +236,10 @@ mod tests {
 
     #[test]
     fn another_format_is_named() {
-        let problem = UrdfFile::parse("<sdf version=\"1.6\"><model name=\"a\"/></sdf>").expect_err("refused");
-        assert!(problem.contains("`sdf`"), "{problem}");
+        let tools = [("sdf", "`rod -f"), ("mujoco", "mjcf_urdf_simple_converter"), ("model", "`model`")];
+        for (root, tool) in tools {
+            let problem = UrdfFile::parse(&format!("<{root}><robot name=\"a\"/></{root}>")).expect_err("refused");
+            assert!(problem.contains(&format!("`{root}`")) && problem.contains(tool), "{problem}");
+        }
     }
 }
