@@ -139,6 +139,47 @@ fn tables_are_described_and_a_map_is_proposed() {
     assert!(map.contains("rows = \"samples\"") && map.contains("tracking.translation.x"), "{map}");
 }
 
+/// As pandas and ROS tools write times; a column of another name, and one of numbers next to it.
+#[test]
+fn dates_are_proposed_as_times_and_read() {
+    let folder = temp();
+    let titan_folder = root().join("robots/titan4");
+    let titan = load(&titan_folder).expect("it reads");
+    let of_titan = poses(&titan, 8, 4);
+    let forms: [(&str, &dyn Fn(usize) -> String); 3] = [
+        ("stamp", &|k| format!("2026-02-28T23:59:{:02}.250000001Z", 50 + k)),
+        ("captured at", &|k| format!("2026-03-01 00:59:{:02},250000001+01:00", 50 + k)),
+        ("time [UTC]", &|k| format!("2026-02-28 23:59:{:02}.250000001", 50 + k)),
+    ];
+    for (k, (column, date)) in forms.into_iter().enumerate() {
+        let mut text = format!("{column};{};tag_x;tag_y;tag_z;qx;qy;qz;qw\n", titan.joint_names().join(";"));
+        for (row, (angles, board)) in of_titan.iter().enumerate() {
+            let [x, y, z]: [f64; 3] = board.translation.vector.into();
+            let q = board.rotation;
+            let joints: Vec<String> = angles.iter().map(f64::to_string).collect();
+            let cells = joints.join(";");
+            writeln!(text, "{};{cells};{x};{y};{z};{};{};{};{}", date(row), q.i, q.j, q.k, q.w).expect("text");
+        }
+        let table = place(folder.path(), &format!("dated{k}.csv"));
+        write(&table, &text);
+        let said = inspect(&table, Some(&titan_folder), None);
+        said.expect("dates", 0, &["2026-02-28T23:59:50.250Z", "2026-02-28T23:59:57.250Z"]);
+        let map = expect_proposal(&table, (&titan, &titan_folder), &of_titan);
+        assert!(map.contains(&format!("time = {{ column = \"{column}\", unit = \"iso8601\" }}")), "{map}");
+        let parsed = parse_input_map(&table, &map).expect("it reads");
+        let found = read_external(&table, &parsed, &titan).expect(column);
+        let first = found.readings[0].stamp;
+        assert_eq!(first.nanos, 1_772_323_190_250_000_001);
+        assert!(found.readings.iter().zip(0_u8..).all(|(reading, k)| reading.stamp.since_s(first) == f64::from(k)));
+        let mut command = program();
+        command.arg("calibrate").arg(&table).arg("--robot").arg(&titan_folder);
+        command.arg("--input").arg(table.with_extension("map.toml")).arg("--out").arg(folder.path().join("out"));
+        write(&table, &text.replace(&date(5), "2026-02-30T23:59:55Z"));
+        let shown = ["row 6", column, "2026-02-30T23:59:55Z", "[table_invalid]"];
+        answer(&mut command).expect("no such day", 2, &shown);
+    }
+}
+
 #[test]
 fn what_a_table_lacks_is_named() {
     let _texts = Texts::of("what_a_table_lacks_is_named");

@@ -169,6 +169,21 @@ fn tables_next_to_each_other_are_joined_by_time() {
     rig.calibrate("corners.txt").expect("the other one", 2, &["`tags.table`", "[table_invalid]"]);
 }
 
+/// Dates in another zone in one table, nanoseconds in the other.
+#[test]
+fn dates_and_nanoseconds_are_joined_by_time() {
+    let rig = Rig::new("kraft-predator", 36, 2);
+    let date = |k: usize| format!("2026-03-01T13:{:02}:{:02}.030+01:00", k / 60, k % 60);
+    let nanos = |k: usize| (1_772_366_400_000_000_000 + 1_000_000_000 * k as u64).to_string();
+    rig.write_joints("joints.csv", &[("t", &nanos)], |_| true);
+    rig.write_corners("corners.txt", ("stamp", &date), APRILTAG);
+    rig.inspect(&["corners.txt"]).expect("the tags", 0, &["joints.csv", "written"]);
+    let keys = [&["table", "time", "column"][..], &["table", "time", "unit"]];
+    assert_eq!(keys.map(|keys| rig.tags(keys)), ["stamp", "iso8601"].map(toml::Value::from));
+    assert!(!read(&rig.file("map.toml")).contains("clock_offset_s"), "the dates are those of the joints");
+    rig.expect_accepted("joints.csv");
+}
+
 /// A camera with a clock of its own: the message's line, added to the map, makes the tables fit.
 #[test]
 fn clocks_of_tables_that_differ_are_named_and_the_advice_works() {

@@ -47,7 +47,7 @@ use serde::Deserialize;
 
 pub use self::table::{
     CornerOrder, Direction, PoseColumns, RotationColumns, RotationForm, SeenColumns, TableFormat, TableJoin,
-    TableLayout, TagTable, TimeColumn,
+    TableLayout, TagTable, TimeColumn, TimeUnit,
 };
 use self::table::{TableToml, TagColumnsToml, TagTableToml, TagsOfTable};
 pub use self::units::{JointUnit, SlideUnit};

@@ -6,5 +6,5 @@
 mod calendar;
 mod stamp;
 
-pub use calendar::utc;
+pub use calendar::{stamp_of_date, utc};
 pub use stamp::{SIMULATION_EPOCH, Stamp};

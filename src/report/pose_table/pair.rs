@@ -90,7 +90,8 @@ fn join([joints, tags]: [&LookedAt; 2], [of_joints, of_tags]: [&Roles; 2]) -> Op
     }
     let is_whole = |of: &LookedAt, roles: &Roles| {
         let column = roles.time.as_ref().and_then(|name| of.contents.columns.iter().find(|c| c.name == *name));
-        column.is_some_and(|column| column.n_numbers == of.contents.n_rows && column.range.is_some_and(|r| r[0] >= 0.0))
+        column
+            .is_some_and(|column| column.n_values() == of.contents.n_rows && column.range.is_some_and(|r| r[0] >= 0.0))
     };
     match &of_tags.time {
         Some(time) if is_whole(joints, of_joints) && is_whole(tags, of_tags) && is_rising(joints, of_joints) => {

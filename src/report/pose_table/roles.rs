@@ -53,11 +53,7 @@ impl Roles {
         let numbers: Vec<&TableColumn> = table.columns.iter().filter(|column| column.n_numbers > 0).collect();
         let names: Vec<String> = numbers.iter().map(|column| column.name.clone()).collect();
         let mut roles = Self::default();
-        let is_time = |name: &&String| {
-            let name = name.to_lowercase();
-            TIMES.contains(&name.as_str()) || name.starts_with("time") || name.starts_with("stamp")
-        };
-        roles.time = names.iter().find(is_time).cloned();
+        roles.time = time(&table.columns);
         let called = |words: &[&str]| names.iter().find(|name| words.contains(&last_part(name).as_str())).cloned();
         roles.corner = called(&CORNERS);
         let is_id = |column: &&TableColumn| is_of_tags(column) && IDS.contains(&last_part(&column.name).as_str());
@@ -147,6 +143,16 @@ impl Roles {
     }
 }
 
+/// The column that is called as one of times, of numbers or dates; without one the first column of dates.
+fn time(columns: &[TableColumn]) -> Option<String> {
+    let is_called = |column: &&TableColumn| {
+        let name = column.name.to_lowercase();
+        TIMES.contains(&name.as_str()) || name.starts_with("time") || name.starts_with("stamp")
+    };
+    let called = columns.iter().filter(|column| column.n_values() > 0).find(is_called);
+    called.or_else(|| columns.iter().find(|column| column.n_dates > 0)).map(|column| column.name.clone())
+}
+
 /// Cells such as `tag36h11:3` instead of numbers.
 pub(super) fn is_of_tags(column: &TableColumn) -> bool {
     column.n_numbers == 0 && column.first_other.as_deref().and_then(tag_number).is_some()
@@ -159,14 +165,17 @@ fn last_part(name: &str) -> String {
     last.to_lowercase().replace([' ', '-'], "_")
 }
 
-/// The unit of a column of times, and its seconds. Times since 1970 are about 2e9 s; others are a few minutes apart at
-/// most.
+/// The unit of a column of times, and its seconds; a date counts as seconds. Times since 1970 are about 2e9 s; others
+/// are a few minutes apart at most.
 pub(super) fn unit_of_time(column: &TableColumn) -> (&'static str, f64) {
     const UNITS: [(&str, f64); 4] = [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)];
     const NAMES: [(&str, usize); 8] =
         [("nano", 3), ("nsec", 3), ("micro", 2), ("usec", 2), ("milli", 1), ("msec", 1), ("_ns", 3), ("_ms", 1)];
     const SINCE_1970_S: f64 = 1e9;
     const APART_S: f64 = 600.0;
+    if column.n_dates > 0 {
+        return ("iso8601", 1.0);
+    }
     let name = column.name.to_lowercase();
     if let Some((_, unit)) = NAMES.iter().find(|(word, _)| name.contains(word)) {
         return UNITS[*unit];

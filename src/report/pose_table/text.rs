@@ -10,18 +10,22 @@ use super::roles::{Roles, is_of_tags};
 use armcal_core::input::{TableColumn, TableContents, TableFormat};
 use armcal_core::robot::Robot;
 use armcal_core::text::printable;
+use armcal_core::time::utc;
 
 /// One column as `inspect --json` has it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ColumnInspection {
     name: String,
     numbers: usize,
+    /// Dates instead of numbers; the range is their seconds since 1970.
+    #[serde(skip_serializing_if = "is_zero")]
+    dates: usize,
     empty: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
     range: Option<[f64; 2]>,
     #[serde(skip_serializing_if = "str::is_empty")]
     may_be: &'static str,
-    /// The first cell that is no number.
+    /// The first cell that is neither.
     #[serde(skip_serializing_if = "Option::is_none")]
     other: Option<String>,
 }
@@ -39,6 +43,11 @@ pub struct TableInspection {
     missing: Vec<String>,
 }
 
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands a reference")]
+fn is_zero(n: &usize) -> bool {
+    *n == 0
+}
+
 /// Columns that are printed.
 const MOST_COLUMNS: usize = 60;
 
@@ -49,6 +58,7 @@ pub fn inspect_table(path: &Path, table: &TableContents, robot: Option<&Robot>) 
     let column = |column: &TableColumn| ColumnInspection {
         name: column.name.clone(),
         numbers: column.n_numbers,
+        dates: column.n_dates,
         empty: column.n_empty,
         range: column.range,
         may_be: roles.of_column(&column.name),
@@ -75,6 +85,11 @@ fn missing(table: &TableContents, roles: &Roles) -> Vec<String> {
         missing.push(format!("numbers in {n} of {} rows of the column `{}`{other}", table.n_rows, column.name));
     }
     missing
+}
+
+/// A value of a column as its cells have it: the number, or the date of these seconds since 1970.
+pub(super) fn cell_of(is_date: bool, value: f64) -> String {
+    if is_date { utc((1e3 * value).round() as u64 * 1_000_000) } else { value.to_string() }
 }
 
 /// Columns of joints that a map would need.
@@ -135,6 +150,7 @@ impl TableInspection {
             return Some("time         no column; rows count as 1 s apart".to_owned());
         };
         let [first, last] = column.range?;
+        let [first, last] = [first, last].map(|value| cell_of(column.dates > 0, value));
         Some(format!("time         column `{}`: {first} to {last}", column.name))
     }
 
@@ -142,14 +158,18 @@ impl TableInspection {
         let mut table = Table::new();
         table.load_preset(NOTHING);
         table.set_header(["column", "numbers", "missing", "smallest", "largest", "may be"]);
-        let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:.6}"));
+        let bound = |column: &ColumnInspection, at: usize| match column.range {
+            None => "-".to_owned(),
+            Some(range) if column.dates > 0 => cell_of(true, range[at]),
+            Some(range) => format!("{:.6}", range[at]),
+        };
         for column in self.columns.iter().take(MOST_COLUMNS) {
             table.add_row([
                 column.name.clone(),
                 column.numbers.to_string(),
-                (self.rows - column.numbers.min(self.rows)).to_string(),
-                number(column.range.map(|range| range[0])),
-                number(column.range.map(|range| range[1])),
+                (self.rows - (column.numbers + column.dates).min(self.rows)).to_string(),
+                bound(column, 0),
+                bound(column, 1),
                 column.may_be.to_owned(),
             ]);
         }

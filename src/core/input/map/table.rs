@@ -105,8 +105,8 @@ pub struct RotationColumns {
 pub struct TimeColumn {
     /// Name of the column.
     pub column: String,
-    /// Nanoseconds of one unit of the column.
-    pub unit_nanos: f64,
+    /// What its cells are.
+    pub unit: TimeUnit,
 }
 
 /// Columns of a CSV or YAML file in which each row is a pose at rest.
@@ -117,7 +117,7 @@ pub struct TimeColumn {
 /// [table]
 /// format = "csv"                           # optional: "csv" or "yaml"; absent: by the end of the file's name
 /// rows = "poses"                           # optional, YAML alone: where the rows are, keys joined by dots
-/// time = { column = "t", unit = "s" }      # optional: "s" | "ms" | "us" | "ns"; absent: rows are 1 s apart
+/// time = { column = "t", unit = "s" }      # optional: "s", "ms", "us", "ns", "iso8601"; absent: rows are 1 s apart
 /// [joint_sensors]
 /// names = { elbow = "q3" }                 # columns that are not called as the robot's joint
 /// unit = "rad"                             # optional: "counts" | "rad" | "deg"
@@ -246,9 +246,10 @@ pub struct PoseColumns {
     pub rotation: Option<RotationColumns>,
 }
 
-#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]
+/// Unit of a column of times, or `iso8601` for dates.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-enum TimeUnit {
+pub enum TimeUnit {
     /// Seconds.
     #[default]
     S,
@@ -258,6 +259,22 @@ enum TimeUnit {
     Us,
     /// Nanoseconds.
     Ns,
+    /// A date and time such as `2026-03-01T12:00:00.250+01:00`; without an offset it is UTC.
+    Iso8601,
+}
+
+impl TimeUnit {
+    /// Nanoseconds of one unit; `None` for dates.
+    #[must_use]
+    pub fn nanos(self) -> Option<f64> {
+        match self {
+            Self::S => Some(1e9),
+            Self::Ms => Some(1e6),
+            Self::Us => Some(1e3),
+            Self::Ns => Some(1.0),
+            Self::Iso8601 => None,
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]
@@ -284,7 +301,7 @@ enum AngleUnit {
 struct TimeToml {
     /// Name of the column.
     column: String,
-    /// Unit of its numbers.
+    /// Unit of its numbers; `iso8601` for dates such as `2026-03-01T12:00:00.250Z`, which are UTC without an offset.
     #[serde(default)]
     unit: TimeUnit,
 }
@@ -417,14 +434,8 @@ fn tag_table(map: &Path, raw: TagTableToml, clock_offset_s: f64) -> Result<TagTa
     Ok(TagTable { file, format: raw.format, rows: path_of_rows(raw.rows), join })
 }
 
-fn time_column(time: TimeToml) -> TimeColumn {
-    let unit_nanos = match time.unit {
-        TimeUnit::S => 1e9,
-        TimeUnit::Ms => 1e6,
-        TimeUnit::Us => 1e3,
-        TimeUnit::Ns => 1.0,
-    };
-    TimeColumn { column: time.column, unit_nanos }
+fn time_column(TimeToml { column, unit }: TimeToml) -> TimeColumn {
+    TimeColumn { column, unit }
 }
 
 /// Refuses keys that belong to another `tags.use`.
@@ -519,7 +530,7 @@ fn rotation(file: &Path, raw: &TagColumnsToml) -> Result<Option<RotationColumns>
 #[cfg(test)]
 mod tests {
     use crate::input::map::tests::{parse, told};
-    use crate::input::map::{CornerOrder, SeenColumns, Source, TableJoin};
+    use crate::input::map::{CornerOrder, SeenColumns, Source, TableJoin, TimeUnit};
 
     const GOOD: &str = "version = 1\nkind = \"input\"\n\
         [table]\n[joint_sensors]\n[tags]\nchild_frame = \"board\"\nuse = \"pose\"\n\
@@ -594,7 +605,11 @@ mod tests {
         let Source::Table(layout) = parse(TWO).expect("good").source else { panic!("a table") };
         let tags = layout.tags.expect("a table of its own");
         let TableJoin::Time { time, clock_offset_s } = tags.join else { panic!("by time") };
-        assert_eq!((time.unit_nanos, clock_offset_s), (1.0, 2.5));
+        assert_eq!((time.unit.nanos(), clock_offset_s), (Some(1.0), 2.5));
+        let dated = TWO.replace("\"ns\"", "\"iso8601\"");
+        let Source::Table(layout) = parse(&dated).expect("good").source else { panic!("a table") };
+        let TableJoin::Time { time, .. } = layout.tags.expect("a table of its own").join else { panic!("by time") };
+        assert_eq!((time.unit, time.unit.nanos()), (TimeUnit::Iso8601, None));
         let by_key = TWO.replace("time = { column = \"s\", unit = \"ns\" }", "key = \"image\"");
         let Source::Table(layout) = parse(&by_key).expect("good").source else { panic!("a table") };
         let join = TableJoin::Key { tags: "image".to_owned(), joints: "image".to_owned() };

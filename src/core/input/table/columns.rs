@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::rows::{Rows, Wanted};
 use crate::input::error::InputError;
-use crate::input::map::{InputMap, SeenColumns, TableJoin, TableLayout};
+use crate::input::map::{InputMap, SeenColumns, TableJoin, TableLayout, TimeUnit};
 use crate::robot::Robot;
 
 /// Names of columns that an error lists.
@@ -17,8 +17,7 @@ pub(super) struct Columns {
     pub place: Range<usize>,
     /// As many as the form has; none without a rotation.
     pub rotation: Range<usize>,
-    /// With the nanoseconds of its unit.
-    pub time: Option<(usize, f64)>,
+    pub time: Option<(usize, TimeUnit)>,
     pub id: Option<usize>,
     /// Number of a tag's corner.
     pub corner: Option<usize>,
@@ -59,7 +58,7 @@ impl Columns {
             (Part::Tags, _) => None,
             _ => layout.time.as_ref(),
         };
-        let time = time.map(|time| (add(std::slice::from_ref(&time.column)).start, time.unit_nanos));
+        let time = time.map(|time| (add(std::slice::from_ref(&time.column)).start, time.unit));
         let seen = (part != Part::Joints).then_some(layout);
         let id = seen.and_then(|layout| layout.id.as_ref()).map(|id| add(std::slice::from_ref(id)).start);
         let corner = match seen.map(|layout| &layout.seen) {
@@ -75,7 +74,7 @@ impl Columns {
     }
 
     pub fn wanted(&self) -> Wanted<'_> {
-        Wanted { names: &self.names, id: self.id, key: self.key.as_ref() }
+        Wanted { names: &self.names, time: self.time, id: self.id, key: self.key.as_ref() }
     }
 
     /// Columns of joints come first.

@@ -1,6 +1,7 @@
 //! What the cells of each column are, added row by row; those of the first rows are kept.
 
 use super::rows::is_missing;
+use crate::time::{Stamp, stamp_of_date};
 
 /// One column.
 #[derive(Clone, Debug, PartialEq)]
@@ -9,13 +10,15 @@ pub struct TableColumn {
     pub name: String,
     /// Cells with a finite number.
     pub n_numbers: usize,
+    /// Cells with a date and time of ISO 8601, in a column that begins with one; zero in columns of numbers.
+    pub n_dates: usize,
     /// Cells that are empty, or say that they have nothing.
     pub n_empty: usize,
     /// Cells with something else; the first of them.
     pub n_others: usize,
-    /// The first cell that is no finite number.
+    /// The first cell that is neither.
     pub first_other: Option<String>,
-    /// Lowest and highest number; `None` without one.
+    /// Lowest and highest number; `None` without one. A date counts as its seconds since 1970.
     pub range: Option<[f64; 2]>,
     /// All numbers are whole.
     pub is_whole: bool,
@@ -45,6 +48,7 @@ impl ColumnsSeen {
         let empty = |name: &str| TableColumn {
             name: name.to_owned(),
             n_numbers: 0,
+            n_dates: 0,
             n_empty: 0,
             n_others: 0,
             first_other: None,
@@ -73,9 +77,12 @@ impl ColumnsSeen {
 
 impl TableColumn {
     fn add(&mut self, cell: &str, last: &mut f64) {
-        match cell.parse::<f64>() {
-            Ok(value) if value.is_finite() => {
-                self.n_numbers += 1;
+        let number = cell.parse::<f64>().ok().filter(|value| value.is_finite() && self.n_dates == 0);
+        let date = if self.n_numbers == 0 && number.is_none() { stamp_of_date(cell) } else { None };
+        match number.or(date.map(|date| date.since_s(Stamp::default()))) {
+            Some(value) => {
+                self.n_numbers += usize::from(number.is_some());
+                self.n_dates += usize::from(date.is_some());
                 let [low, high] = self.range.unwrap_or([value; 2]);
                 self.range = Some([low.min(value), high.max(value)]);
                 self.is_whole &= value.fract() == 0.0;
@@ -83,11 +90,17 @@ impl TableColumn {
                 self.is_rising &= value >= *last;
                 *last = value;
             }
-            _ if is_missing(cell) => self.n_empty += 1,
-            _ => {
+            None if is_missing(cell) => self.n_empty += 1,
+            None => {
                 self.n_others += 1;
                 self.first_other.get_or_insert_with(|| cell.chars().take(40).collect());
             }
         }
+    }
+
+    /// Cells with what the column has: numbers, or dates.
+    #[must_use]
+    pub fn n_values(&self) -> usize {
+        self.n_numbers + self.n_dates
     }
 }

@@ -90,6 +90,17 @@ mod tests {
     }
 
     #[test]
+    fn dates_are_counted_where_a_column_begins_with_one() {
+        let text = "at,q,n\n2026-03-01T12:00:00Z,1,a\n2026-03-01T12:00:02.5Z,2026-03-01T12:00:00Z,b\n7,2,c\n,3,d\n";
+        let columns = read("a.csv", text).unwrap().columns;
+        let counts = |k: usize| (columns[k].n_numbers, columns[k].n_dates, columns[k].n_empty, columns[k].n_others);
+        assert_eq!([0, 1, 2].map(counts), [(0, 2, 1, 1), (3, 0, 0, 1), (0, 0, 0, 4)]);
+        assert_eq!(columns[0].range, Some([1_772_366_400.0, 1_772_366_402.5]));
+        assert!(columns[0].is_rising && columns[0].n_steps == 2);
+        assert_eq!(columns[0].first_other.as_deref(), Some("7"));
+    }
+
+    #[test]
     fn rows_of_yaml_and_json_are_found_by_themselves() {
         let nested =
             "rate: 2\nsamples:\n- robot: {x: 1.0, y: 2}\n  hand: [1, 2]\n- robot: {x: 3, y: 1}\n  hand: [4, 5]\n";

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use super::columns_seen::ColumnsSeen;
-use super::rows::{MAX_COLUMNS, Rows, Wanted, check_count, is_missing};
+use super::rows::{MAX_COLUMNS, Rows, Wanted, check_count, is_missing, is_value};
 use crate::input::error::InputError;
 
 /// Marks of lines that are no rows.
@@ -52,12 +52,12 @@ impl CsvTable {
         let n_before = first.iter().position(|line| 2 * count(line, delimiter) > most).unwrap_or_default();
         let Some(mut names) = lines.nth(n_before) else { return bad(file, "it has no lines".to_owned()) };
         let mut rows = String::with_capacity(text.len());
-        if cells(names, delimiter).iter().all(|cell| plain(cell, delimiter).parse::<f64>().is_ok()) {
+        if cells(names, delimiter).iter().all(|cell| is_value(&plain(cell, delimiter))) {
             let before = text.lines().filter(is_used).take_while(|line| *line != names);
             let comment = before.last().and_then(comment_of).filter(|comment| count(comment, delimiter) == most);
             let Some(comment) = comment else {
-                let problem = "its first line has only numbers, so that no column has a name; write a line with the \
-                               columns' names above it";
+                let problem = "its first line has only numbers or dates, so that no column has a name; write a line \
+                               with the columns' names above it";
                 return bad(file, problem.to_owned());
             };
             rows.push_str(&separated(names, delimiter));
@@ -84,7 +84,7 @@ impl CsvTable {
         let mut number = 0;
         while reader.read_record(&mut record).map_err(|error| no_csv(file, &error))? {
             let cells: Vec<Cow<'_, str>> = record.iter().map(|cell| plain(cell, self.delimiter)).collect();
-            if number == 0 && cells.iter().all(|cell| cell.parse::<f64>().is_err()) && self.is_of_units(&cells) {
+            if number == 0 && !cells.iter().any(|cell| is_value(cell)) && self.is_of_units(&cells) {
                 continue;
             }
             number += 1;

@@ -130,7 +130,8 @@ impl RowReader<'_> {
 
     /// The row's time; `None` where the input map names no column.
     pub fn time(&self, row: &Row, values: &[f64]) -> Result<Option<Stamp>, InputError> {
-        let Some((at, unit_nanos)) = self.columns.time else { return Ok(None) };
+        let Some((at, unit)) = self.columns.time else { return Ok(None) };
+        let Some(unit_nanos) = unit.nanos() else { return Ok(row.date) };
         let nanos = values[at] * unit_nanos;
         if !(0.0..=MAX_NANOS).contains(&nanos) {
             return self.problem(row, format!("the time {} is no time after 1970", values[at]));

@@ -3,6 +3,8 @@
 use std::collections::BTreeSet;
 
 use crate::input::error::{BadPlace, InputError};
+use crate::input::map::TimeUnit;
+use crate::time::{Stamp, stamp_of_date};
 
 /// Poses at rest: eleven days of one every ten seconds.
 pub const MAX_ROWS: usize = 100_000;
@@ -14,6 +16,8 @@ pub(super) const MAX_COLUMNS: usize = 1000;
 pub(super) struct Wanted<'a> {
     /// Columns of numbers.
     pub names: &'a [String],
+    /// Which of them has the times, which may be dates.
+    pub time: Option<(usize, TimeUnit)>,
     /// Which of them has the tags' numbers, which may stand behind a name.
     pub id: Option<usize>,
     /// A column of texts.
@@ -24,8 +28,10 @@ pub(super) struct Wanted<'a> {
 pub(super) struct Row {
     /// From 1, in the order of the file.
     pub number: u64,
-    /// In the order of the wanted columns; `None` where the row has no such value.
+    /// In the order of the wanted columns; `None` where the row has no such value. A date is seconds since 1970.
     pub values: Vec<Option<f64>>,
+    /// The time to the nanosecond, where it is a date.
+    pub date: Option<Stamp>,
     /// The text in the key's column; empty without one.
     pub key: String,
 }
@@ -44,23 +50,46 @@ impl Wanted<'_> {
         (file, number): (&str, u64),
         cell: impl Fn(&String) -> Option<&'c str>,
     ) -> Result<Row, InputError> {
+        let mut date = None;
         let value = |(k, name): (usize, &String)| {
             let text = cell(name).unwrap_or_default().trim();
-            let found = if is_missing(text) { Some(None) } else { text.parse().ok().map(Some) };
-            let found =
-                found.or_else(|| (self.id == Some(k)).then(|| tag_number(text).map(|id| Some(f64::from(id))))?);
+            let found = if is_missing(text) {
+                Some(None)
+            } else if self.time == Some((k, TimeUnit::Iso8601)) {
+                date = stamp_of_date(text);
+                date.map(|date| Some(date.since_s(Stamp::default())))
+            } else {
+                let of_tag = || (self.id == Some(k)).then(|| tag_number(text).map(f64::from))?;
+                text.parse().ok().or_else(of_tag).map(Some)
+            };
             found.ok_or_else(|| {
-                let remedy = match text.starts_with(['[', '(', '{']) {
-                    true => "give each number of a list its column",
-                    false => "correct it, or empty the cell and set not_finite = \"leave_out\" in the input map",
-                };
-                let problem = format!("`{name}` is {text:?}, not a number; {remedy}");
+                let problem = format!("`{name}` is {text:?}, {}", self.no_value(k, text));
                 InputError::Row { file: file.to_owned(), place: BadPlace::Row(number), problem }
             })
         };
         let values = self.names.iter().enumerate().map(value).collect::<Result<_, _>>()?;
         let key = self.key.and_then(cell).map(plain_key).unwrap_or_default();
-        Ok(Row { number, values, key })
+        Ok(Row { number, values, date, key })
+    }
+
+    /// Text of an error: what the cell of the column `k` should be, and the remedy.
+    fn no_value(&self, k: usize, cell: &str) -> String {
+        let correct = "correct it, or empty the cell and set not_finite = \"leave_out\" in the input map";
+        let unit = self.time.filter(|(at, _)| *at == k).map(|(_, unit)| unit);
+        match unit {
+            Some(TimeUnit::Iso8601) if cell.parse::<f64>().is_ok() => {
+                "not a date; set the unit of this column of times in the input map to \"s\", \"ms\", \"us\" or \"ns\""
+                    .to_owned()
+            }
+            Some(TimeUnit::Iso8601) => {
+                format!("not a date and time from 1970 to 2262 such as 2026-03-01T12:00:00.250Z (ISO 8601); {correct}")
+            }
+            Some(_) if stamp_of_date(cell).is_some() => {
+                "not a number; set unit = \"iso8601\" for this column of times in the input map".to_owned()
+            }
+            _ if cell.starts_with(['[', '(', '{']) => "not a number; give each number of a list its column".to_owned(),
+            _ => format!("not a number; {correct}"),
+        }
     }
 }
 
@@ -76,6 +105,11 @@ pub(super) fn check_count(file: &str, n: usize) -> Result<(), InputError> {
 /// An empty cell, or one of the words that programs write for none.
 pub(super) fn is_missing(cell: &str) -> bool {
     ["", "-", "na", "n/a", "null", "none"].iter().any(|word| cell.eq_ignore_ascii_case(word))
+}
+
+/// A number or a date.
+pub(super) fn is_value(cell: &str) -> bool {
+    cell.parse::<f64>().is_ok() || stamp_of_date(cell).is_some()
 }
 
 /// The tag's number of a cell such as `tag36h11:3`, `tag_3` or `id 3`: the digits behind a name.

@@ -401,3 +401,72 @@ fn lists_of_tags_make_a_row_each() {
     let at = map.replace("[table]\n", "[table]\nrows = \"poses\"\n");
     assert_eq!(read_with(&at, "a.yaml", &(shared + &rows)).expect("anchors").frames.len(), 150);
 }
+
+/// Two tagged poses at dates, to the nanosecond.
+const DATED: &str = "2026-03-01T12:00:00.000000001Z,1.5,2,3,4,5,6,3,0,0.25,1\n\
+    2026-03-01T12:00:01.500000003Z,2.5,2,3,4,5,6,7,0,0.5,2\n";
+
+#[test]
+fn times_may_be_dates() {
+    let map = PLACES.replace("[table]", "[table]\ntime = { column = \"when\", unit = \"iso8601\" }");
+    let names = format!("when,{JOINTS},tag,x,y,z");
+    let text = format!("{names}\n{DATED}");
+    let decimal = |text: &str| text.replace(',', ";").replace('.', ",");
+    let entries: Vec<String> = DATED
+        .lines()
+        .map(|row| {
+            let cells = names.split(',').zip(row.split(',')).enumerate();
+            let cell = |(k, (name, cell)): (usize, (&str, &str))| {
+                if k == 0 { format!("\"{name}\": \"{cell}\"") } else { format!("\"{name}\": {cell}") }
+            };
+            format!("{{{}}}", cells.map(cell).collect::<Vec<_>>().join(", "))
+        })
+        .collect();
+    let texts = [
+        ("a.csv", text.clone()),
+        ("a.csv", text.replace("01T12", "01 12").replace('Z', "")),
+        ("a.csv", text.replace("T12", "t13").replace('Z', "+01:00")),
+        ("a.csv", text.replace("2026-03-01T12:00:00.000000001Z", "\"2026-03-01T12:00:00,000000001Z\"")),
+        ("a.csv", decimal(&text)),
+        ("a.tsv", text.replace(',', "\t")),
+        ("a.txt", text.replace(',', "  ")),
+        ("a.csv", format!("# {names}\n{DATED}")),
+        ("a.csv", text.replace("z\n", "z\nUTC,rad,rad,rad,rad,rad,rad,-,m,m,m\n")),
+        ("a.jsonl", entries.join("\n")),
+        ("a.yaml", entries.iter().map(|entry| format!("- {}\n", entry.replace('"', ""))).collect()),
+    ];
+    let start = 1_772_366_400_000_000_000;
+    for (name, text) in texts {
+        let found = read_with(&map, name, &text).unwrap_or_else(|error| panic!("{error}: {text}"));
+        let nanos: Vec<i64> = found.readings.iter().map(|reading| reading.stamp.nanos - start).collect();
+        assert_eq!(nanos, [1, 1_500_000_003], "{text}");
+        assert_eq!(found.frames.len(), 2);
+    }
+}
+
+#[test]
+fn what_is_wrong_with_a_date_is_named() {
+    let map = PLACES.replace("[table]", "[table]\ntime = { column = \"when\", unit = \"iso8601\" }");
+    let text = format!("when,{JOINTS},tag,x,y,z\n{DATED}");
+    let second = "2026-03-01T12:00:01.500000003Z";
+    let faults = [
+        "12:00:01",
+        "2026-03-01",
+        "2026-13-01T12:00:01Z",
+        "2026-02-29T12:00:01Z",
+        "2026-03-01T24:00:00Z",
+        "1969-12-31T23:59:59Z",
+        "99999-03-01T12:00:01Z",
+        "\u{5348}\u{5f8c} 12:00",
+        "1772366401.5",
+        "",
+        "2026-03-01T12:00:00.200Z",
+    ];
+    let mut told = faults.map(|fault| problem(&map, "a.csv", &text.replace(second, fault))).concat();
+    told += &problem(&map.replace("iso8601", "s"), "a.csv", &text);
+    told += &problem(&map, "a.csv", DATED);
+    insta::assert_snapshot!("dates", told);
+    let lenient = map.replace("[table]", "not_finite = \"leave_out\"\n[table]");
+    let found = read_with(&lenient, "a.csv", &text.replace(second, "n/a")).expect("one row is left");
+    assert_eq!((found.frames.len(), found.left_out.values().sum::<u64>()), (1, 1));
+}
