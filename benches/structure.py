@@ -9,7 +9,7 @@ names knows less than a compiler: where a design renames what the tables below n
 lines        lines of src/belief and src/paper with product code: not blank, not comment alone, not of a `use` statement.
 constants    numbers that decide in belief: constants with a number, numbers in comparisons other than ORDINARY, numbers of defaults.
 block        files of belief that list blocks of parameters by hand: the mounts of further cameras beside the others, or three
-             variants of `Block`.
+             variants of `Block` in one function.
 corner       files of src/core and src/belief that name the pixels of a tag's four corners.
 carriers     structs and enums of those folders that hold these pixels, formats of messages aside.
 projections  functions of belief that ask a lens for the Jacobian of its projection, or difference its pixels.
@@ -174,9 +174,13 @@ def files_naming(name, sources, pattern):
 
 
 def listing_blocks(sources):
-    found = {s.name: sorted(set(BLOCK.findall(s.body)) | set(BLOCK_FIELD.findall(s.body))) for s in sources}
-    places = [f"{name}: {', '.join(kinds)}" for name, kinds in found.items() if len(kinds) > 2 or "further_mounts" in kinds]
-    return "block", len(places), places
+    found = {}
+    for source in sources:
+        lists = [sorted(set(BLOCK.findall(source.body[start:end]))) for _, start, end in source.functions()]
+        longest = max(lists, key=len, default=[]) + BLOCK_FIELD.findall(source.body)[:1]
+        if len(longest) > 2 or "further_mounts" in longest:
+            found[source.name] = ", ".join(longest)
+    return "block", len(found), [f"{name}: {kinds}" for name, kinds in found.items()]
 
 
 def carriers(sources):

@@ -148,7 +148,7 @@ fn dates_are_proposed_as_times_and_read() {
     let of_titan = poses(&titan, 8, 4);
     let forms: [(&str, &dyn Fn(usize) -> String); 3] = [
         ("stamp", &|k| format!("2026-02-28T23:59:{:02}.250000001Z", 50 + k)),
-        ("captured at", &|k| format!("2026-03-01 00:59:{:02},250000001+01:00", 50 + k)),
+        ("captured_at", &|k| format!("2026-03-01 00:59:{:02},250000001+01:00", 50 + k)),
         ("time [UTC]", &|k| format!("2026-02-28 23:59:{:02}.250000001", 50 + k)),
     ];
     for (k, (column, date)) in forms.into_iter().enumerate() {

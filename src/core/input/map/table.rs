@@ -105,7 +105,7 @@ pub struct RotationColumns {
 pub struct TimeColumn {
     /// Name of the column.
     pub column: String,
-    /// What its cells are.
+    /// Unit of its cells.
     pub unit: TimeUnit,
 }
 
