@@ -75,6 +75,13 @@ pub(crate) struct BundleCalibration<'a> {
     as_read: Vec<View>,
 }
 
+/// What a round of the calibration came to.
+enum Round {
+    /// Clock, survey or drawing are taken otherwise from now on: the views for the next round.
+    Revised(Vec<View>),
+    Done(Box<Calibration>),
+}
+
 /// Is told of an estimate and what it was made from.
 pub(crate) type EstimateListener<'a> = dyn FnMut(&BundleInput<'_>, &Estimate<'_>) + 'a;
 
@@ -167,6 +174,17 @@ impl<'a> BundleCalibration<'a> {
     /// [`CalibError`] where the views determine nothing, or an interim estimate contradicts itself.
     pub(crate) fn calibrate(mut self) -> Result<Calibration, CalibError> {
         let mut views = std::mem::take(&mut self.data.data.fit);
+        loop {
+            match self.round(views)? {
+                Round::Revised(otherwise) => views = otherwise,
+                Round::Done(calibration) => return Ok(*calibration),
+            }
+        }
+    }
+
+    /// One estimate by `views`: failures, then the clock, then survey and drawing; where one of the last two is to be
+    /// taken otherwise, everything begins again with that.
+    fn round(&mut self, mut views: Vec<View>) -> Result<Round, CalibError> {
         let sizes_m: Vec<f64> = self.data.robot.tags.iter().map(|tag| tag.size_m).collect();
         let declared = declared(&self.data.robot, &views);
         let clocks = if self.clock.is_some() { Clocks::Aligned } else { Clocks::AsStamped };
@@ -197,8 +215,7 @@ impl<'a> BundleCalibration<'a> {
         {
             drop(estimated);
             views.iter_mut().for_each(|view| view.read_later(offset_s));
-            self.data.data.fit = views;
-            return self.calibrate();
+            return Ok(Round::Revised(views));
         }
         if self.purpose == EstimatePurpose::Final
             && let Some((estimate, _)) = &estimated
@@ -206,8 +223,7 @@ impl<'a> BundleCalibration<'a> {
         {
             drop(estimated);
             rescale(&mut views, &sizes_m, &self.data.robot);
-            self.data.data.fit = views;
-            return self.calibrate();
+            return Ok(Round::Revised(views));
         }
         let (mut estimate, mut selections) = estimated.ok_or_else(|| self.nothing_observable())?;
         if self.purpose == EstimatePurpose::Final {
@@ -222,10 +238,10 @@ impl<'a> BundleCalibration<'a> {
         };
         let estimated = estimated.with_touches(touches, &self.data.robot);
         self.as_read = views;
-        self.finish(estimated)
+        self.finish(estimated).map(|calibration| Round::Done(Box::new(calibration)))
     }
 
-    fn finish(mut self, mut estimated: Estimated<'_>) -> Result<Calibration, CalibError> {
+    fn finish(&mut self, mut estimated: Estimated<'_>) -> Result<Calibration, CalibError> {
         if let Some(listener) = self.listener.take() {
             listener(&estimated.setup.input(), estimated.by_views());
         }
@@ -242,7 +258,7 @@ impl<'a> BundleCalibration<'a> {
         match self.purpose {
             EstimatePurpose::Interim if !estimated.estimate.is_consistent() => {
                 let problem = "the views contradict each other or the prior".to_owned();
-                return Err(CalibError::NoInterimEstimate { recording: self.data.name, problem });
+                return Err(CalibError::NoInterimEstimate { recording: self.data.name.clone(), problem });
             }
             EstimatePurpose::Interim => {}
             EstimatePurpose::Final => {
