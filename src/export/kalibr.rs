@@ -17,7 +17,7 @@ use armcal_core::robot::{CameraSpec, FileIssue, Robot};
 
 const HEAD: &str = "\
 # The cameras of a robot calibrated by armcal: cam0 is [camera] of robot.toml, then each [[further_camera]] with a lens.
-# Lens: the calibration's where it has one, or else robot.toml's. T_link_camera: 4 x 4, maps the camera's optical frame to the frame of
+# Lens: as found, or else robot.toml's. T_link_camera: 4 x 4, maps the camera's optical frame to the frame of
 # `link`; both keys are armcal's own, and Kalibr does not read them.
 # Kalibr's own tools want `rostopic`, the topic of the images, as well.
 ";

@@ -23,6 +23,10 @@ pub(crate) const TIGHT: StopRule = until(100, 1e-15);
 /// While scales or weights still change.
 pub(crate) const LOOSE: StopRule = until(20, 1e-6);
 
+/// Where every observation is rejected the priors alone are left, whose least cost is zero: no step ever saves too
+/// small a share of it. Below this cost, a sum of squares in standard deviations, all is within 1e-6 of the priors.
+const COST_AT_PRIORS: f64 = 1e-12;
+
 /// Until one more step would save less than `predicted_gain` of the cost.
 pub(crate) const fn until(max_iterations: usize, predicted_gain: f64) -> StopRule {
     StopRule { predicted_gain, slack: SLACK, rounding: ROUNDING, ..StopRule::after(max_iterations) }
@@ -116,8 +120,11 @@ impl LeastSquares for Solver<'_, '_> {
     }
 }
 
-/// Minimizes the problem's cost from `state`.
+/// Minimizes the problem's cost from `state`. Where every observation is rejected it stalls at the priors.
 pub(crate) fn solve(problem: &BundleProblem<'_>, state: State, loss: Loss, stop: StopRule) -> Solved {
+    let mut observations = problem.observations.iter();
+    let is_without_data = !problem.observations.is_empty() && observations.all(|observation| !observation.is_used);
+    let stop = if is_without_data { StopRule { cost: COST_AT_PRIORS, ..stop } } else { stop };
     let mut normal = NormalEquations::new(problem);
     normal.update(problem, &state, loss);
     let cost_initial = normal.cost;
@@ -137,7 +144,8 @@ pub(crate) fn solve(problem: &BundleProblem<'_>, state: State, loss: Loss, stop:
     };
     let report = minimize(&mut solver, &DAMPING, &stop);
     let Solver { state, normal, .. } = solver;
-    Solved { state, normal, iterations: report.iterations, outcome: report.outcome(), cost_initial }
+    let outcome = if is_without_data { Outcome::Stalled } else { report.outcome() };
+    Solved { state, normal, iterations: report.iterations, outcome, cost_initial }
 }
 
 /// The step by the matrix with its diagonal raised, factored in `room`; `None` where it has no Cholesky factor.

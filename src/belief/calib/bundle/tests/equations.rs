@@ -7,7 +7,7 @@ use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::bundle::linearize::NormalEquations;
 use crate::calib::bundle::model::model_for;
 use crate::calib::bundle::problem::BundleProblem;
-use crate::calib::bundle::solve::{LOOSE, solve, stepped, until};
+use crate::calib::bundle::solve::{LOOSE, TIGHT, solve, stepped, until};
 use crate::calib::bundle::tests::data::{
     Noise, Truth, normal, reference, rng, titan_watched_by_two, titan_with_gripper_tag, titan_with_two_cameras, views,
     watched_titan,
@@ -19,7 +19,7 @@ use crate::model::parameters::JointParameters;
 use crate::model::scales::Hyperparameters;
 use crate::model::state::State;
 use armcal_core::joints::MAX_JOINTS;
-use armcal_core::numeric::Loss;
+use armcal_core::numeric::{Loss, Outcome};
 use armcal_core::robot::Robot;
 
 struct Case {
@@ -94,6 +94,19 @@ fn settled(problem: &BundleProblem<'_>, seed: u64) -> State {
         state = stepped(problem, &state, &normal, &still);
     }
     state
+}
+
+/// Nothing but the priors is left, whose least cost is zero: a share of it stops no search.
+#[test]
+fn where_every_observation_is_rejected_the_search_ends_at_the_priors() {
+    let case = case(titan_with_gripper_tag(), 0);
+    let mut problem = problem(&case);
+    let state = settled(&problem, 0);
+    problem.observations.iter_mut().for_each(|observation| observation.is_used = false);
+    let solved = solve(&problem, state, Loss::Square, TIGHT);
+    assert!(solved.normal.cost < 1e-12 && solved.cost_initial > 1.0, "{} {}", solved.cost_initial, solved.normal.cost);
+    assert!(solved.iterations < 20, "{} steps", solved.iterations);
+    assert_eq!(solved.outcome, Outcome::Stalled);
 }
 
 fn cost(problem: &BundleProblem<'_>, state: &State) -> f64 {
