@@ -171,12 +171,10 @@ fn dates_are_proposed_as_times_and_read() {
         let first = found.readings[0].stamp;
         assert_eq!(first.nanos, 1_772_323_190_250_000_001);
         assert!(found.readings.iter().zip(0_u8..).all(|(reading, k)| reading.stamp.since_s(first) == f64::from(k)));
-        let mut command = program();
-        command.arg("calibrate").arg(&table).arg("--robot").arg(&titan_folder);
-        command.arg("--input").arg(table.with_extension("map.toml")).arg("--out").arg(folder.path().join("out"));
         write(&table, &text.replace(&date(5), "2026-02-30T23:59:55Z"));
-        let shown = ["row 6", column, "2026-02-30T23:59:55Z", "[table_invalid]"];
-        answer(&mut command).expect("no such day", 2, &shown);
+        let refused = read_external(&table, &parsed, &titan).expect_err("no such day").to_string();
+        let shown = ["row 6", column, "2026-02-30T23:59:55Z", "not a date and time"];
+        assert!(shown.iter().all(|words| refused.contains(words)), "{refused}");
     }
 }
 
