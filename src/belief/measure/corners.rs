@@ -17,7 +17,7 @@ pub(crate) struct WeightedCorners {
     pub used: [bool; 4],
 }
 
-/// With `info` in place of the corners' own.
+/// With `info` instead of the corners' own.
 pub(super) fn information(
     seen: &WeightedCorners,
     camera_from_tag: &Isometry3<f64>,

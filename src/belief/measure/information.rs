@@ -5,11 +5,7 @@
 //! `xi = Ad(X) xi_T`. So one 6x6 matrix in the camera's frame carries all: `H = sum J^T W J`, `g = sum J^T W r`, J =
 //! d(prediction)/d(xi), r = measured - predicted.
 
-use nalgebra::{Isometry3, Matrix6, SMatrix, SVector, Vector6};
-
-use crate::measure::observation::WeightedMeasurement;
-use crate::measure::{board, corners, pose, position};
-use armcal_core::optics::CameraModel;
+use nalgebra::{Matrix6, SMatrix, SVector, Vector6};
 
 /// An observation linearized, in the camera's frame.
 #[derive(Clone, Debug)]
@@ -80,47 +76,7 @@ impl TwistSums {
     }
 }
 
-/// An observation that the lens cannot have seen counts as this many sigma off in each coordinate.
-const UNSEEN_SIGMAS: f64 = 1e3;
-
-/// What it costs that the lens cannot have seen `seen`.
-pub(crate) fn unseen_chi2(seen: &WeightedMeasurement) -> f64 {
-    seen.n_coordinates() as f64 * UNSEEN_SIGMAS * UNSEEN_SIGMAS
-}
-
 impl PoseInformation {
-    /// Linearizes; `noise` multiplies the corners' standard deviations. Adds the lens's part to `by_lens` where that is
-    /// wanted. `None` where a corner is beyond the lens's view.
-    pub(crate) fn of(
-        seen: &WeightedMeasurement,
-        camera_from_tag: &Isometry3<f64>,
-        lens: &CameraModel,
-        noise: f64,
-        by_lens: Option<&mut LensInformation>,
-    ) -> Option<Self> {
-        let scale = noise.powi(-2);
-        match seen {
-            WeightedMeasurement::Corners(seen) => {
-                corners::information(seen, camera_from_tag, lens, (seen.info * scale, by_lens))
-            }
-            WeightedMeasurement::Board { points } => {
-                board::information(points, camera_from_tag, lens, (scale, by_lens))
-            }
-            WeightedMeasurement::Position { in_camera_m, info } => {
-                Some(position::information(in_camera_m, *info, camera_from_tag))
-            }
-            WeightedMeasurement::Pose { tag_from_camera, info_position, info_rotation } => {
-                Some(pose::information(tag_from_camera, [*info_position, *info_rotation], camera_from_tag))
-            }
-        }
-    }
-
-    /// An observation that is not possible: it pulls nowhere and costs much.
-    pub(crate) fn unseen(seen: &WeightedMeasurement) -> Self {
-        let (chi2, corner_chi2) = (unseen_chi2(seen), [UNSEEN_SIGMAS * UNSEEN_SIGMAS; 4]);
-        Self { h: Matrix6::zeros(), g: Vector6::zeros(), adjoint: Matrix6::identity(), chi2, corner_chi2 }
-    }
-
     pub(crate) fn weighted(&mut self, weight: f64) {
         self.h *= weight;
         self.g *= weight;

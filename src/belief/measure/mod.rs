@@ -1,4 +1,4 @@
-//! What was measured: one file a kind, each with what it says of the camera's pose.
+//! Measurements: one file a kind, each with its information on the camera's pose.
 //!
 //! `corners` of a tag, points of a `board`, a tag's `position` or `pose`; `observation` is any of them, `information`
 //! its linearization in the camera's twist. `point` is the only place that linearizes a projection.
@@ -13,7 +13,7 @@ mod position;
 
 pub(crate) use board::WeightedPoint;
 pub(crate) use corners::WeightedCorners;
-pub(crate) use information::{LensInformation, PoseInformation, TwistSums, unseen_chi2};
+pub(crate) use information::{LensInformation, PoseInformation, TwistSums};
 pub(crate) use observation::{ObservationTerm, WeightedMeasurement};
 pub(crate) use point::ImagePoint;
 pub(crate) use pose::right_jacobian_inverse;

@@ -2,11 +2,14 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
 
-use crate::measure::board::WeightedPoint;
-use crate::measure::corners::WeightedCorners;
+use crate::measure::board::{self, WeightedPoint};
+use crate::measure::corners::{self, WeightedCorners};
+use crate::measure::information::{LensInformation, PoseInformation};
+use crate::measure::{pose, position};
 use crate::model::blocks::Block;
+use armcal_core::optics::CameraModel;
 
 /// One tag in one view.
 #[derive(Clone, Debug)]
@@ -45,7 +48,41 @@ pub(crate) enum WeightedMeasurement {
     Pose { tag_from_camera: Isometry3<f64>, info_position: f64, info_rotation: f64 },
 }
 
+/// An observation that the lens cannot have seen counts as this many sigma off in each coordinate.
+const UNSEEN_SIGMAS: f64 = 1e3;
+
 impl WeightedMeasurement {
+    /// Linearizes; `noise` multiplies the corners' standard deviations. Adds the lens's part to `by_lens` where that is
+    /// wanted. `None` where a corner is beyond the lens's view.
+    pub(crate) fn information(
+        &self,
+        camera_from_tag: &Isometry3<f64>,
+        lens: &CameraModel,
+        noise: f64,
+        by_lens: Option<&mut LensInformation>,
+    ) -> Option<PoseInformation> {
+        let scale = noise.powi(-2);
+        match self {
+            Self::Corners(seen) => corners::information(seen, camera_from_tag, lens, (seen.info * scale, by_lens)),
+            Self::Board { points } => board::information(points, camera_from_tag, lens, (scale, by_lens)),
+            Self::Position { in_camera_m, info } => Some(position::information(in_camera_m, *info, camera_from_tag)),
+            Self::Pose { tag_from_camera, info_position, info_rotation } => {
+                Some(pose::information(tag_from_camera, [*info_position, *info_rotation], camera_from_tag))
+            }
+        }
+    }
+
+    /// Cost of an observation that the lens cannot have seen.
+    pub(crate) fn unseen_chi2(&self) -> f64 {
+        self.n_coordinates() as f64 * UNSEEN_SIGMAS * UNSEEN_SIGMAS
+    }
+
+    /// An observation that is not possible: it pulls nowhere and costs much.
+    pub(crate) fn unseen(&self) -> PoseInformation {
+        let (chi2, corner_chi2) = (self.unseen_chi2(), [UNSEEN_SIGMAS * UNSEEN_SIGMAS; 4]);
+        PoseInformation { h: Matrix6::zeros(), g: Vector6::zeros(), adjoint: Matrix6::identity(), chi2, corner_chi2 }
+    }
+
     /// Of the corners that are used.
     pub(crate) fn n_coordinates(&self) -> usize {
         match self {
@@ -56,7 +93,7 @@ impl WeightedMeasurement {
         }
     }
 
-    /// Whether it is of pixels, whose noise is that of corners.
+    /// Returns true for pixels, whose noise is that of corners.
     pub(crate) fn is_in_pixels(&self) -> bool {
         matches!(self, Self::Corners(_) | Self::Board { .. })
     }

@@ -1,4 +1,4 @@
-//! What is estimated.
+//! The choice of the estimated quantities.
 
 use std::collections::BTreeSet;
 
@@ -17,7 +17,7 @@ pub struct Model {
     /// How many joints, base first, have a column of their compliance, with the base's and a load at the tool; 0: none
     /// of these.
     pub n_compliant: usize,
-    /// Groups of parameters beside these; of the tags, those that no view shows have no columns all the same.
+    /// Groups of parameters next to these; tags that no view shows have no columns all the same.
     pub blocks: BTreeSet<Block>,
     /// Random walk of the offsets during the views; `None`: they do not walk.
     pub walk: Option<Walk>,
@@ -36,14 +36,14 @@ pub struct Walk {
 }
 
 impl Model {
-    /// Of an arm of `n_joints` whose sensors are as they are believed.
+    /// A model of an arm of `n_joints` whose sensors are not estimated.
     #[must_use]
     pub fn of_blocks(n_joints: usize, blocks: impl IntoIterator<Item = Block>) -> Self {
         let joints = vec![Vec::new(); n_joints];
         Self { joints, n_links: 0, n_compliant: 0, blocks: blocks.into_iter().collect(), walk: None }
     }
 
-    /// Whether a block is estimated.
+    /// Returns true for a block that is estimated.
     #[must_use]
     pub fn has(&self, block: Block) -> bool {
         self.blocks.contains(&block)

@@ -43,7 +43,7 @@ impl Layout {
         Self { parameters, of_joint, links, sag, first, n }
     }
 
-    /// The same with one more block.
+    /// A layout with one more block.
     pub(crate) fn with(&self, block: Block) -> Self {
         let mut n = self.n_joint();
         let mut first = self.first.clone();

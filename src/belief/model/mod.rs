@@ -1,4 +1,4 @@
-//! What is estimated: parameters of the joints, blocks beside them, and what is known of both before.
+//! The estimated quantities: parameters of the joints, blocks next to them, and the priors of both.
 //!
 //! `parameters` are those of a joint's sensor, its link and how the arm bends; `blocks` what else moves together
 //! (mounts, lenses, clock, tags). `estimated` says which have columns, `layout` where these are, `state` holds the

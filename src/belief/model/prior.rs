@@ -1,4 +1,4 @@
-//! What is known of the common parameters before.
+//! Priors of the common parameters.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -36,7 +36,7 @@ pub struct Information {
     pub(crate) covers: Covers,
 }
 
-/// What an earlier calibration knows of the joints' parameters, and of the first camera's mount with them.
+/// An earlier calibration's prior of the joints' parameters, and of the first camera's mount with them.
 #[derive(Clone, Debug)]
 pub struct JointPrior {
     pub(crate) mean: DVector<f64>,
@@ -44,13 +44,13 @@ pub struct JointPrior {
 }
 
 impl JointPrior {
-    /// Of the parameters alone.
+    /// A prior of the parameters alone.
     #[must_use]
     pub fn of_parameters(mean: DVector<f64>, information: DMatrix<f64>) -> Self {
         Self { mean, information: Information { matrix: information, covers: Covers::Parameters } }
     }
 
-    /// Of the parameters and the six columns of the mount, about where the robot has it.
+    /// A prior of the parameters and the six columns of the mount, about where the robot has it.
     #[must_use]
     pub fn with_mount(mean: DVector<f64>, information: DMatrix<f64>) -> Self {
         Self { mean, information: Information { matrix: information, covers: Covers::ParametersAndMount } }
@@ -69,7 +69,7 @@ pub(crate) struct Prior {
 }
 
 impl Prior {
-    /// By datasheet, drawing and survey.
+    /// The prior by datasheet, drawing and survey.
     pub(crate) fn drawn(robot: &Robot, parameters: &[Parameter], scales: &Hyperparameters) -> Self {
         let nominal = JointParameters::default();
         let mean = parameters.iter().map(|p| nominal.get(*p));
@@ -98,7 +98,7 @@ impl Prior {
         blocks.for_each(|(_, std)| *std = [f64::INFINITY; MAX_COLUMNS]);
     }
 
-    /// Whether `information` covers all columns.
+    /// Returns true where `information` covers all columns.
     pub(crate) fn is_full(&self) -> bool {
         self.information.covers == Covers::All
     }
@@ -114,13 +114,13 @@ impl Prior {
         blocks.map(|(block, at)| (block, at, &self.std[block][..block.n_columns()]))
     }
 
-    /// How far the columns that `information` covers are from their means.
+    /// Deviations of the columns that `information` covers from their means.
     pub(crate) fn off(&self, layout: &Layout, state: &State) -> DVector<f64> {
         off_by(layout, (&self.joint_mean, &self.mean), state, self.n_covered())
     }
 }
 
-/// How far the first `n` columns of `state` are from the means of the joints' parameters and of the blocks.
+/// Deviations of the first `n` columns of `state` from the means of the joints' parameters and of the blocks.
 pub(crate) fn off_by(
     layout: &Layout,
     (joint, mean): (&DVector<f64>, &PerBlock<Value>),

@@ -26,7 +26,7 @@ impl State {
         self.camera_error.copy_from_slice(&other.camera_error);
     }
 
-    /// The same parameters with `n_views` views that have no errors of their own.
+    /// A state with `n_views` views that have no errors of their own.
     pub(crate) fn with_views(&self, n_views: usize) -> Self {
         Self {
             joint: self.joint.clone(),
@@ -44,7 +44,7 @@ impl State {
         }
     }
 
-    /// Of a block that is a pose.
+    /// The pose of a block.
     #[inline]
     pub(crate) fn pose(&self, block: Block) -> &Isometry3<f64> {
         self.blocks.pose(block)

@@ -52,7 +52,7 @@ impl FindingUnit {
     }
 }
 
-/// What happened, as the online belief tells it; `at_rad`: of a worn spot the joint's angle at its middle.
+/// An event of the online estimate; `at_rad`: of a worn spot the joint's angle at its middle.
 pub(crate) fn event(finding: &Finding, at_rad: Option<f64>) -> String {
     let Finding { kind, name, size, .. } = finding;
     let size = size.unwrap_or(f64::NAN);
@@ -107,10 +107,10 @@ pub(crate) fn slip(step: &str, [n_before, n]: [usize; 2], number: u32) -> String
     format!("the sensor slipped by {step} after {n_before} of {n} views, before view {number}")
 }
 
-/// What a walk of an offset, so large over the views (std), does to the result.
+/// A walk of an offset, so large over the views (std), and its effect.
 pub(crate) fn offset_walks(joint: &str, walked: &str) -> String {
     format!(
-        "the offset of {joint} walks at random, by {walked} (std) during the capture; the predicted tool error includes \
-         as much again. Calibrate again soon, or follow the estimate online"
+        "the offset of {joint} walks at random, by {walked} (std) during the capture; the predicted tool error \
+         includes as much again. Calibrate again soon, or follow the estimate online"
     )
 }

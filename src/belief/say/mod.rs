@@ -1,4 +1,4 @@
-//! What people read of findings and events: terminal, report, replay and files say the same.
+//! Findings and events in words: the same in terminal, report, replay and files.
 //!
 //! `finding` words a finding, or an event as the online belief tells it; `repair` says what to do about it.
 

@@ -1,4 +1,4 @@
-//! What was wrong with the arm or its survey, and what to do about it.
+//! Errors of the arm or its survey, and their remedies.
 
 use crate::judge::{Finding, FindingKind};
 use armcal_core::codes::{Code, Coded};
@@ -9,29 +9,29 @@ use armcal_core::robot::FailedKind;
 pub struct FailedJoint<'a> {
     /// Name of the joint in the URDF.
     pub joint: &'a str,
-    /// What is wrong with it.
+    /// Failure.
     pub kind: FailedKind,
-    /// What shows it.
+    /// Evidence.
     pub evidence: &'a str,
     /// Its sensor slipped, and is calibrated as it is since then.
     pub slipped: bool,
 }
 
-/// What was wrong with the arm or its survey, and is taken as it was found.
+/// An error of the arm or its survey that the result corrects.
 #[derive(Clone, Debug)]
 pub struct Repair {
     /// For scripts.
     pub code: Code,
-    /// What is wrong.
+    /// Cause.
     pub cause: String,
-    /// What to do.
+    /// Remedy.
     pub remedy: String,
-    /// What the result has in its place; empty where the remedy says it.
+    /// Value that the result uses; empty where the remedy says it.
     taken: &'static str,
 }
 
 impl Repair {
-    /// What to do, and what an accepted result has meanwhile.
+    /// Remedy, and what an accepted result has meanwhile.
     #[must_use]
     pub fn remedy_and_result(&self) -> String {
         let colon = if self.taken.is_empty() { "" } else { ": " };
@@ -39,7 +39,7 @@ impl Repair {
     }
 }
 
-/// What a user can act on, joints first; `since`: end of the sentence of a slip.
+/// Errors that a user can act on, joints first; `since`: end of the sentence of a slip.
 #[must_use]
 pub fn repairs(findings: &[Finding], failed: &[FailedJoint<'_>], since: &str) -> Vec<Repair> {
     let is_told = |found: &&Finding| {
@@ -183,7 +183,7 @@ fn of_joint(failed: &FailedJoint<'_>) -> Repair {
 }
 
 impl FailedJoint<'_> {
-    /// What to do about it.
+    /// Remedy.
     #[must_use]
     pub fn remedy(&self) -> String {
         let joint = self.joint;

@@ -108,7 +108,7 @@ fn step(
     normal.cholesky().map(|normal| normal.solve(&right))
 }
 
-/// Of one tag in one image on the camera's pose, under the comparing loss.
+/// Information of one tag in one image on the camera's pose, under the comparing loss.
 fn information(
     camera: &CameraModel,
     seen: &Observation,

@@ -75,7 +75,7 @@ pub(crate) struct BundleCalibration<'a> {
     as_read: Vec<View>,
 }
 
-/// What a round of the calibration came to.
+/// Result of a round of the calibration.
 enum Round {
     /// Clock, survey or drawing are taken otherwise from now on: the views for the next round.
     Revised(Vec<View>),

@@ -285,13 +285,13 @@ impl Estimate<'_> {
         (0..=self.problem.robot.further_cameras.len()).filter(has_views)
     }
 
-    /// Whether a block is estimated.
+    /// Returns true for a block that is estimated.
     #[must_use]
     pub fn has(&self, block: Block) -> bool {
         self.problem.layout.at(block).is_some()
     }
 
-    /// Of the camera of that number.
+    /// Lens of the camera of that number.
     pub(crate) fn lens(&self, camera: usize) -> &CameraModel {
         self.solved.state.blocks.lens(Block::Lens(camera))
     }

@@ -16,7 +16,7 @@ use crate::calib::bundle::outliers::Outlier;
 use crate::calib::bundle::problem::BundleProblem;
 use crate::calib::result::metrics::ViewContainment;
 use crate::calib::views::view::View;
-use crate::measure::{ObservationTerm, WeightedMeasurement, unseen_chi2};
+use crate::measure::{ObservationTerm, WeightedMeasurement};
 use crate::model::state::State;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::numeric::Loss;
@@ -91,7 +91,7 @@ impl Estimate<'_> {
         let mut normal = NormalEquations::new(&problem);
         normal.update(&problem, &state, Loss::Square);
         for (observation, chi2) in problem.observations.iter_mut().zip(&normal.chi2) {
-            observation.is_used &= *chi2 < unseen_chi2(&observation.data);
+            observation.is_used &= *chi2 < observation.data.unseen_chi2();
         }
         let (foretold, chi2) = self.with_data(&problem, &state)?;
         let joints = foretold.joints(&problem, left_out);

@@ -34,8 +34,8 @@ impl BundleInput<'_> {
         Layout::new(self.robot, &self.model, is_seen)
     }
 
-    /// By datasheet, drawing and survey, with these scales; of the joints' parameters the earlier calibration's, if
-    /// there is one.
+    /// The prior by datasheet, drawing and survey with these scales; of the joints' parameters the earlier
+    /// calibration's, if there is one.
     pub(crate) fn prior(&self) -> Prior {
         let mut prior = Prior::drawn(self.robot, &self.model.parameters(), &self.scales);
         if let Some(known) = &self.joint_prior {

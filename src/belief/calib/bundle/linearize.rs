@@ -212,8 +212,8 @@ impl NormalEquations {
                 self.lens_infos.push(LensInformation::zeros());
             }
             let (by_lens, lens) = (self.lens_infos.last_mut(), state.blocks.lens(Block::Lens(group.camera)));
-            let of = PoseInformation::of(&observation.data, &camera_from_tag, lens, problem.scales.noise, by_lens);
-            self.infos.push(of.unwrap_or_else(|| PoseInformation::unseen(&observation.data)));
+            let of = observation.data.information(&camera_from_tag, lens, problem.scales.noise, by_lens);
+            self.infos.push(of.unwrap_or_else(|| observation.data.unseen()));
             let Some(info) = self.infos.last_mut() else { continue };
             (self.chi2[at], self.corner_chi2[at]) = (info.chi2, info.corner_chi2);
             self.by_tag[at].1 = problem.layout.at(observation.block);

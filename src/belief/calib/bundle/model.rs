@@ -32,7 +32,7 @@ pub fn model_for(robot: &Robot, views: &[View]) -> Model {
     model_of(robot, &Scope { warmed, dived, from_both_sides: &from_both_sides, shown })
 }
 
-/// Whether the camera of that number shows tags, as the first one always does.
+/// Returns true where the camera of that number shows tags, as the first one always does.
 pub(crate) fn has_views(views: &[View], camera: usize) -> bool {
     camera == 0 || views.iter().any(|view| view.camera == camera && !view.tags.is_empty())
 }

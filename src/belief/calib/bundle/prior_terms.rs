@@ -63,7 +63,7 @@ impl NormalEquations {
         self.cost += info * off * off;
     }
 
-    /// Of a pose that is `d` off its mean.
+    /// Prior of a pose that is `d` off its mean.
     fn add_pose_prior(&mut self, at: usize, d: &Vector6<f64>, std: &[f64]) {
         let info = Vector6::from_fn(|k, _| if std[k].is_finite() { at_least(std[k]).powi(-2) } else { 0.0 });
         let jacobian = right_jacobian_inverse(d);

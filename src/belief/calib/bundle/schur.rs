@@ -62,7 +62,7 @@ pub(crate) struct Group<'a> {
     pub observations: Range<usize>,
     pub poses: &'a LinkPoses,
     pub base_from_camera: Isometry3<f64>,
-    /// What carries the tags; `None`: they stand in the frame of the poses.
+    /// Carrier of the tags; `None`: they stand in the frame of the poses.
     pub carrier: Option<Isometry3<f64>>,
 }
 

@@ -14,7 +14,6 @@ use crate::calib::bundle::problem::N_VIEW_PARAMETERS;
 use crate::calib::bundle::schur::Group;
 use crate::calib::geometry_error::ErrorKind;
 use crate::calib::views::view::View;
-use crate::measure::{PoseInformation, WeightedMeasurement};
 use crate::model::blocks::Block;
 use crate::model::parameters::{JointParameters, Parameter};
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
@@ -172,9 +171,8 @@ impl Estimate<'_> {
             problem.observations[group.observations.clone()].iter().filter(|observation| observation.is_used)
         {
             let camera_from_tag = group.camera_from_tag(state, observation.block);
-            let data: &WeightedMeasurement = &observation.data;
             let lens = state.blocks.lens(Block::Lens(group.camera));
-            if let Some(info) = PoseInformation::of(data, &camera_from_tag, lens, problem.scales.noise, None) {
+            if let Some(info) = observation.data.information(&camera_from_tag, lens, problem.scales.noise, None) {
                 h += info.h;
                 g += info.g;
             }

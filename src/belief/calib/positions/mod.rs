@@ -1,7 +1,7 @@
 //! Landmarks by their positions: what the paper's methods and `bundle` share.
 //!
 //! `position_problem` has residuals and Jacobians; `solution` is what a solver found, `unobservable` what the data
-//! leave open, `mount_estimate` where the camera hangs by a tag on the gripper.
+//! leave open, `mount_estimate` the camera mount by a tag on the gripper.
 
 pub(crate) mod mount_estimate;
 pub(crate) mod position_problem;

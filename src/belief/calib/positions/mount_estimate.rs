@@ -1,4 +1,4 @@
-//! Where the camera hangs, by a tag on the gripper alone.
+//! The camera mount by a tag on the gripper alone.
 
 use std::ops::Range;
 

@@ -47,7 +47,7 @@ pub struct FailedJointTable {
 }
 
 impl FailedJointTable {
-    /// What is said of it.
+    /// The same, for sentences.
     #[must_use]
     pub fn told(&self) -> FailedJoint<'_> {
         let Self { joint, kind, evidence, since_pose, .. } = self;

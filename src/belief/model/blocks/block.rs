@@ -7,7 +7,7 @@ use armcal_core::robot::Robot;
 /// A group of parameters that move together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Block {
-    /// Where the camera of that number hangs on its link, about the drawing's place.
+    /// Mount of the camera of that number on its link, about the drawing's place.
     Mount(usize),
     /// How much later the joint sensors' stamps are than the camera's.
     Clock,
@@ -19,13 +19,13 @@ pub enum Block {
     GripperTag,
 }
 
-/// What views show.
+/// Contents of views.
 pub(crate) struct Shown<'a> {
     /// The arm while it moves.
     pub motion: bool,
     /// The tag on the gripper, often enough.
     pub gripper_tag: bool,
-    /// Whether the camera of that number sees tags.
+    /// True for the number of a camera that sees tags.
     pub by_camera: &'a dyn Fn(usize) -> bool,
 }
 
@@ -68,7 +68,7 @@ impl Block {
         }
     }
 
-    /// Whether it is estimated from the start; a lens only where the views call for it.
+    /// Returns true where it is estimated from the start; a lens only where the views call for it.
     pub(crate) fn is_told(self, robot: &Robot, shown: &Shown<'_>) -> bool {
         match self {
             Self::Mount(camera) => mount::is_loose(robot.camera_at(camera)) && (shown.by_camera)(camera),
@@ -79,7 +79,7 @@ impl Block {
         }
     }
 
-    /// What the drawing, robot.toml or the survey says of it.
+    /// Value by the drawing, robot.toml or the survey.
     pub(crate) fn drawn(self, robot: &Robot) -> Value {
         match self {
             Self::Mount(camera) => mount::drawn(robot, camera),
@@ -112,7 +112,7 @@ impl Block {
         }
     }
 
-    /// Whether its columns are a place and an attitude: shifts in m, then turns in rad.
+    /// Returns true where its columns are a position and an attitude: shifts in m, then turns in rad.
     pub(crate) fn is_pose(self) -> bool {
         matches!(self, Self::Mount(_) | Self::Tag(_) | Self::GripperTag)
     }
@@ -125,7 +125,7 @@ impl Block {
         }
     }
 
-    /// Whether it is where a tag is that stands about the arm or is on its gripper.
+    /// Returns true for a tag about the arm or on its gripper.
     pub(crate) fn is_tag(self) -> bool {
         matches!(self, Self::Tag(_) | Self::GripperTag)
     }

@@ -2,7 +2,7 @@
 
 use crate::model::blocks::{MAX_COLUMNS, Std, Value};
 
-/// One sigma, s. Assumed: clocks of one vehicle that nobody set beside each other.
+/// One sigma, s. Assumed: clocks of one vehicle that nobody synchronized.
 const CLOCK_STD_S: f64 = 0.05;
 
 pub(super) fn drawn() -> Value {

@@ -1,4 +1,4 @@
-//! Blocks: parameters that move together, beside those of the joints.
+//! Blocks: parameters that move together, next to those of the joints.
 //!
 //! Each has a file with what the drawing says of it, how well, and its name; `value` is what a step does to it. A new
 //! block is a file, and in `block` a variant and a line in each function; everything else iterates.

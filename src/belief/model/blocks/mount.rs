@@ -1,4 +1,4 @@
-//! Where a camera hangs on its link.
+//! A camera's mount on its link.
 
 use crate::model::blocks::value::pose_column;
 use crate::model::blocks::{Std, Value, six};
@@ -22,7 +22,7 @@ pub(super) fn name(robot: &Robot, camera: usize, column: usize) -> String {
     }
 }
 
-/// Whether the drawing leaves anything of a camera's mount open.
+/// Returns true where the drawing leaves anything of a camera's mount open.
 pub(super) fn is_loose(camera: &CameraSpec) -> bool {
     camera.mount_std_m > 0.0 || camera.mount_std_rad > 0.0
 }

@@ -31,7 +31,7 @@ impl<T> PerBlock<T> {
         self.blocks().zip(&mut self.all)
     }
 
-    /// What belongs to each tag about the arm.
+    /// Those of the tags about the arm.
     pub(crate) fn tags(&self) -> &[T] {
         let first = self.place(Block::Tag(0));
         &self.all[first..first + self.n_tags]
@@ -78,7 +78,7 @@ impl<T> std::ops::IndexMut<Block> for PerBlock<T> {
 }
 
 impl PerBlock<Value> {
-    /// Of a block that is a pose.
+    /// The pose of a block.
     #[inline]
     pub(crate) fn pose(&self, block: Block) -> &Isometry3<f64> {
         match &self[block] {
@@ -87,7 +87,7 @@ impl PerBlock<Value> {
         }
     }
 
-    /// Of a block that is a lens.
+    /// The lens of a block.
     #[inline]
     pub(crate) fn lens(&self, block: Block) -> &CameraModel {
         match &self[block] {
@@ -96,7 +96,7 @@ impl PerBlock<Value> {
         }
     }
 
-    /// Of a block that is a number.
+    /// The number of a block.
     #[inline]
     pub(crate) fn number(&self, block: Block) -> f64 {
         match &self[block] {

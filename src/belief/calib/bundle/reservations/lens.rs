@@ -34,7 +34,7 @@ pub(super) struct HeldLens {
 }
 
 impl Estimate<'_> {
-    /// Of each camera with views.
+    /// Lenses of the cameras with views.
     pub(super) fn held_lenses(&self) -> Vec<HeldLens> {
         self.cameras().filter_map(|number| self.held_lens(number)).collect()
     }
