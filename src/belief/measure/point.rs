@@ -1,6 +1,6 @@
 //! The one linearization of a projection.
 
-use nalgebra::{Matrix2x3, Matrix2x6, Vector2, Vector3, Vector6};
+use nalgebra::{Matrix2x3, Matrix2x6, Vector2, Vector3};
 
 use armcal_core::optics::{CameraModel, image_jacobian};
 
@@ -29,7 +29,9 @@ impl ImagePoint {
     }
 
     /// [`Self::by_twist`] as a matrix.
+    #[inline]
     pub(crate) fn jacobian(&self) -> Matrix2x6<f64> {
-        Matrix2x6::from_rows(&self.by_twist.map(|row| Vector6::from(row).transpose()))
+        let [x, y] = self.by_twist;
+        Matrix2x6::from_rows(&[x.into(), y.into()])
     }
 }

@@ -75,14 +75,14 @@ impl CornerModel {
     ) -> Option<Matrix6<f64>> {
         let lens = &robot.camera.lens;
         let points = square_corners(size_m).map(|corner| (camera_from_tag * corner).coords);
-        let mut images = [None; 4];
-        for (image, point) in images.iter_mut().zip(&points) {
-            *image = Some(ImagePoint::of(lens, point)?);
+        let mut corners_px = [[0.0; 2]; 4];
+        let mut rows = [SMatrix::<f64, 2, 6>::zeros(); 4];
+        for ((pixel_px, row), point) in corners_px.iter_mut().zip(&mut rows).zip(&points) {
+            let image = ImagePoint::of(lens, point)?;
+            (*pixel_px, *row) = (image.pixel.into(), image.jacobian());
         }
-        let corners_px = images.map(|image| image.map_or([0.0; 2], |image| image.pixel.into()));
         let weights = self.weights(robot, &corners_px, camera_from_tag.translation.vector.norm(), size_m);
-        let rows = images.iter().flatten().map(ImagePoint::jacobian);
-        Some(rows.zip(weights).map(|(row, weight)| row.tr_mul(&row) * weight).sum())
+        Some(rows.iter().zip(weights).map(|(row, weight)| row.tr_mul(row) * weight).sum())
     }
 
     /// Inverse variance of each corner's coordinates, px^-2: robot.toml's at the reference range, and by the model of
