@@ -34,10 +34,7 @@ pub(super) fn information(
             sums.add(row, r, info);
         }
         if let Some(by_lens) = &mut by_lens {
-            let columns = lens.by_intrinsics(&in_camera)?;
-            for axis in 0..2 {
-                by_lens.add(&image.by_twist[axis], &columns.row(axis).transpose(), residual[axis], info);
-            }
+            by_lens.add(&image, &lens.by_intrinsics(&in_camera)?, residual, info);
         }
     }
     let (h, g) = sums.weighted(1.0);

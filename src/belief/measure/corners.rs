@@ -46,10 +46,7 @@ pub(super) fn information(
             sums.add(row, r, 1.0);
         }
         if let Some(by_lens) = &mut by_lens {
-            let columns = lens.by_intrinsics(point)?;
-            for axis in 0..2 {
-                by_lens.add(&image.by_twist[axis], &columns.row(axis).transpose(), residual[axis], 1.0);
-            }
+            by_lens.add(image, &lens.by_intrinsics(point)?, residual, 1.0);
         }
     }
     if let Some(by_lens) = by_lens {

@@ -7,6 +7,8 @@
 
 use nalgebra::{Matrix6, SMatrix, SVector, Vector6};
 
+use crate::measure::point::ImagePoint;
+
 /// An observation linearized, in the camera's frame.
 #[derive(Clone, Debug)]
 pub(crate) struct PoseInformation {
@@ -39,12 +41,22 @@ impl LensInformation {
         self.g *= weight;
     }
 
-    /// Adds a coordinate of a point: its rows by the twist and by the intrinsics, its residual, its weight.
-    pub(crate) fn add(&mut self, row: &[f64; 6], by_intrinsics: &SVector<f64, 8>, residual: f64, weight: f64) {
-        let weighted = by_intrinsics * weight;
-        self.cross += Vector6::from(*row) * weighted.transpose();
-        self.h += by_intrinsics * weighted.transpose();
-        self.g += weighted * residual;
+    /// Adds a point: its pixel's derivatives by the intrinsics, its residual, its weight.
+    pub(crate) fn add(
+        &mut self,
+        image: &ImagePoint,
+        by_intrinsics: &SMatrix<f64, 2, 8>,
+        residual_px: [f64; 2],
+        weight: f64,
+    ) {
+        let rows = image.by_twist.iter().zip(by_intrinsics.row_iter());
+        for ((row, by_intrinsics), residual) in rows.zip(residual_px) {
+            let column = by_intrinsics.transpose();
+            let weighted = column * weight;
+            self.cross += Vector6::from(*row) * weighted.transpose();
+            self.h += column * weighted.transpose();
+            self.g += weighted * residual;
+        }
     }
 }
 
@@ -63,9 +75,7 @@ impl TwistSums {
         for i in 0..6 {
             let by = weight * row[i];
             self.g[i] += by * residual;
-            for k in 0..=i {
-                self.h[i][k] += by * row[k];
-            }
+            self.h[i].iter_mut().zip(&row[..=i]).for_each(|(h, other)| *h += by * other);
         }
     }
 

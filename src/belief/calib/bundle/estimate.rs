@@ -82,7 +82,10 @@ pub fn estimate<'a>(input: &BundleInput<'a>) -> Option<Estimate<'a>> {
             let next = updated(&problem, &solved.state, &solved.normal, &posterior, &ScaleTarget::fitted(&first));
             settled &= change(&next, &problem.scales) < CONVERGED_CHANGE;
             if !settled {
-                problem.take_scales(next, input.joint_prior.is_none());
+                problem.set_scales(next);
+                if input.joint_prior.is_none() {
+                    problem.rescale_priors();
+                }
             }
         }
         round += 1;

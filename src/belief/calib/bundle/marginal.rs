@@ -29,7 +29,10 @@ impl Estimate<'_> {
         let mut problem = self.problem.clone();
         let target = ScaleTarget::mean(first);
         let scales = updated(&problem, &self.solved.state, &self.solved.normal, &self.posterior, &target);
-        problem.take_scales(scales, self.has_own_priors);
+        problem.set_scales(scales);
+        if self.has_own_priors {
+            problem.rescale_priors();
+        }
         let mut normal = NormalEquations::new(&problem);
         normal.update(&problem, &self.solved.state, Loss::Square);
         let factor = chi2 / (n - 2.0);
@@ -46,7 +49,10 @@ impl Estimate<'_> {
         let problem = &mut self.problem;
         let target = ScaleTarget::mean(first);
         let scales = updated(problem, &self.solved.state, &self.solved.normal, &self.posterior, &target);
-        problem.take_scales(scales, self.has_own_priors);
+        problem.set_scales(scales);
+        if self.has_own_priors {
+            problem.rescale_priors();
+        }
         self.solved.normal.update(problem, &self.solved.state, Loss::Square);
     }
 

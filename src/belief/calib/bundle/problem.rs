@@ -113,12 +113,9 @@ impl<'a> BundleProblem<'a> {
         Self { robot, layout, views: data, observations, prior, scales, guess_links, n_seen_joints }
     }
 
-    /// Takes `scales` over, with the weights and, where they are the datasheet's, the priors that depend on them.
-    pub(crate) fn take_scales(&mut self, scales: Hyperparameters, has_own_priors: bool) {
-        self.set_scales(scales);
-        if has_own_priors {
-            self.prior.rescale(self.robot, &self.layout.parameters, &self.scales);
-        }
+    /// Makes the datasheet's priors those of the scales.
+    pub(crate) fn rescale_priors(&mut self) {
+        self.prior.rescale(self.robot, &self.layout.parameters, &self.scales);
     }
 
     /// Takes `scales` over, with the weights that depend on them.

@@ -27,7 +27,7 @@ impl Estimate<'_> {
         let mut problem = self.problem.clone();
         problem.scales = at_most_stated(&problem.scales, input);
         if input.joint_prior.is_none() {
-            problem.prior.rescale(problem.robot, &problem.layout.parameters, &problem.scales);
+            problem.rescale_priors();
         }
         let mut normal = NormalEquations::new(&problem);
         normal.update(&problem, &self.solved.state, Loss::Square);
