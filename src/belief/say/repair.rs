@@ -203,16 +203,20 @@ mod tests {
     use super::*;
     use crate::judge::FindingUnit;
 
-    fn failed<'a>(kind: FailedKind, evidence: &'a str, slipped: bool) -> FailedJoint<'a> {
-        FailedJoint { joint: "elbow", kind, evidence, slipped }
+    fn failed(kind: FailedKind, evidence: &str) -> FailedJoint<'_> {
+        FailedJoint { joint: "elbow", kind, evidence, slipped: false }
+    }
+
+    fn slipped(evidence: &str) -> FailedJoint<'_> {
+        FailedJoint { slipped: true, ..failed(FailedKind::Jumps, evidence) }
     }
 
     #[test]
     fn a_repair_says_cause_joint_and_remedy() {
         let told = [
-            failed(FailedKind::Jumps, "the sensor slipped by 1.00 deg", true),
-            failed(FailedKind::Dead, "it follows nothing", false),
-            failed(FailedKind::Locked, "", false),
+            slipped("the sensor slipped by 1.00 deg"),
+            failed(FailedKind::Dead, "it follows nothing"),
+            failed(FailedKind::Locked, ""),
         ];
         let told = told.map(|failed| of_joint(&failed)).map(|one| format!("{}\n  {}\n", one.cause, one.remedy));
         insta::assert_snapshot!("failed_joints", told.concat());
@@ -250,7 +254,7 @@ mod tests {
         // Of a joint that is told of already nothing is said twice; what was not repaired is a refusal's.
         findings[1].name = "elbow".to_owned();
         findings[0].repaired = false;
-        let told = failed(FailedKind::Jumps, "the sensor slipped by 1.74 deg", true);
+        let told = slipped("the sensor slipped by 1.74 deg");
         let once = causes(&findings, &[told]);
         assert_eq!([slipped.len(), others.len(), once.len()], [2, 6, 1]);
         insta::assert_snapshot!("repairs", [slipped, others, once].concat().join("\n"));
