@@ -207,14 +207,14 @@ mod tests {
         FailedJoint { joint: "elbow", kind, evidence, slipped: false }
     }
 
-    fn slipped(evidence: &str) -> FailedJoint<'_> {
+    fn after_slip(evidence: &str) -> FailedJoint<'_> {
         FailedJoint { slipped: true, ..failed(FailedKind::Jumps, evidence) }
     }
 
     #[test]
     fn a_repair_says_cause_joint_and_remedy() {
         let told = [
-            slipped("the sensor slipped by 1.00 deg"),
+            after_slip("the sensor slipped by 1.00 deg"),
             failed(FailedKind::Dead, "it follows nothing"),
             failed(FailedKind::Locked, ""),
         ];
@@ -254,7 +254,7 @@ mod tests {
         // Of a joint that is told of already nothing is said twice; what was not repaired is a refusal's.
         findings[1].name = "elbow".to_owned();
         findings[0].repaired = false;
-        let told = slipped("the sensor slipped by 1.74 deg");
+        let told = after_slip("the sensor slipped by 1.74 deg");
         let once = causes(&findings, &[told]);
         assert_eq!([slipped.len(), others.len(), once.len()], [2, 6, 1]);
         insta::assert_snapshot!("repairs", [slipped, others, once].concat().join("\n"));
