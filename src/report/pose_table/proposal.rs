@@ -161,7 +161,7 @@ fn largest<'a>(table: &TableContents, names: impl IntoIterator<Item = &'a String
 fn time(table: &TableContents, roles: &Roles) -> String {
     let Some(name) = &roles.time else { return "# time: no column of times; rows count as 1 s apart\n".to_owned() };
     let Some(found) = column_of(table, name) else { return String::new() };
-    let largest = found.range.map_or_else(String::new, |[_, high]| cell_of(found.n_dates > 0, high));
+    let largest = found.range.map_or_else(String::new, |[_, high]| cell_of(found.n_dates, high));
     let unit = unit_of_time(found).0;
     let line = format!("time = {{ column = {}, unit = \"{unit}\" }}   # up to {largest}\n", quoted(name));
     if found.is_rising && found.n_empty + found.n_others == 0 {

@@ -52,8 +52,7 @@ impl Roles {
     pub fn of(table: &TableContents, robot: Option<&Robot>) -> Self {
         let numbers: Vec<&TableColumn> = table.columns.iter().filter(|column| column.n_numbers > 0).collect();
         let names: Vec<String> = numbers.iter().map(|column| column.name.clone()).collect();
-        let mut roles = Self::default();
-        roles.time = time(&table.columns);
+        let mut roles = Self { time: time(&table.columns), ..Self::default() };
         let called = |words: &[&str]| names.iter().find(|name| words.contains(&last_part(name).as_str())).cloned();
         roles.corner = called(&CORNERS);
         let is_id = |column: &&TableColumn| is_of_tags(column) && IDS.contains(&last_part(&column.name).as_str());

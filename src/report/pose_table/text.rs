@@ -87,9 +87,10 @@ fn missing(table: &TableContents, roles: &Roles) -> Vec<String> {
     missing
 }
 
-/// A value of a column as its cells have it: the number, or the date of these seconds since 1970.
-pub(super) fn cell_of(is_date: bool, value: f64) -> String {
-    if is_date { utc((1e3 * value).round() as u64 * 1_000_000) } else { value.to_string() }
+/// A value of a column that holds `n_dates` dates, as its cells have it: the number, or the date of these seconds since
+/// 1970.
+pub(super) fn cell_of(n_dates: usize, value: f64) -> String {
+    if n_dates > 0 { utc((1e3 * value).round() as u64 * 1_000_000) } else { value.to_string() }
 }
 
 /// Columns of joints that a map would need.
@@ -150,7 +151,7 @@ impl TableInspection {
             return Some("time         no column; rows count as 1 s apart".to_owned());
         };
         let [first, last] = column.range?;
-        let [first, last] = [first, last].map(|value| cell_of(column.dates > 0, value));
+        let [first, last] = [first, last].map(|value| cell_of(column.dates, value));
         Some(format!("time         column `{}`: {first} to {last}", column.name))
     }
 
@@ -160,7 +161,7 @@ impl TableInspection {
         table.set_header(["column", "numbers", "missing", "smallest", "largest", "may be"]);
         let bound = |column: &ColumnInspection, at: usize| match column.range {
             None => "-".to_owned(),
-            Some(range) if column.dates > 0 => cell_of(true, range[at]),
+            Some(range) if column.dates > 0 => cell_of(column.dates, range[at]),
             Some(range) => format!("{:.6}", range[at]),
         };
         for column in self.columns.iter().take(MOST_COLUMNS) {
