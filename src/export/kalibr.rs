@@ -22,10 +22,8 @@ const HEAD: &str = "\
 # Kalibr's own tools want `rostopic`, the topic of the images, as well.
 ";
 
-/// Writes camchain.yaml with `cam0` and on: model, intrinsics and distortion of the calibration, or of
-/// robot.toml where the calibration has none; `T_link_camera` of the
-/// calibration, or the drawing's without one; `T_cn_cnm1` between cameras of one link. `file`, the calibration's, is
-/// named in messages.
+/// Writes camchain.yaml with `cam0` and on: lens and `T_link_camera` of the calibration, or of robot.toml where it has
+/// none; `T_cn_cnm1` between cameras of one link. `file`, the calibration's, is named in messages.
 ///
 /// # Errors
 /// [`FileIssue`]: a mount out of range, or a lens that Kalibr has no model for.

@@ -247,7 +247,7 @@ impl Estimate<'_> {
 enum Loosened {
     /// Shift (0) or turn (1) of a joint's place.
     Joint(usize, usize),
-    /// The same of the mount of the camera of that number.
+    /// Shift (0) or turn (1) of a camera's mount, by the camera's number.
     Mount(usize, usize),
     AllLinks,
 }

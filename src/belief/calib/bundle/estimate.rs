@@ -279,7 +279,7 @@ impl Estimate<'_> {
                 Matrix6::from_diagonal(&std.component_mul(&std))
             }
         };
-        (*self.solved.state.pose(Block::Mount(camera)), covariance)
+        (*self.solved.state.pose(block), covariance)
     }
 
     /// Numbers of the cameras that have views, in their order.

@@ -1,4 +1,4 @@
-//! What a recording can tell, and is estimated for that.
+//! The choice of the estimated quantities, by the contents of a recording.
 
 use crate::calib::views::view::View;
 use crate::model::blocks::{Block, Shown};

@@ -59,3 +59,35 @@ impl LensResult {
         drawn.with_intrinsics([fx, fy, cx, cy, a, b, c, d])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use armcal_core::optics::Radtan;
+
+    use super::*;
+
+    fn lens(focal_px: f64) -> CameraModel {
+        let distortion = [-0.12, 0.03, 5e-4, -3e-4, 0.01];
+        Radtan::new([focal_px, focal_px + 1.0], [610.0, 515.0], distortion, [1224, 1024]).into()
+    }
+
+    #[test]
+    fn a_lens_is_the_same_after_its_table() {
+        let (nominal, found) = (lens(500.0), lens(510.0));
+        let table = LensResult::new(Some("elbow".to_owned()), &found, [0.1; 8]);
+        let read: LensResult = toml::from_str(&toml::to_string(&table).expect("it writes")).expect("it reads");
+        assert_eq!(read, table);
+        // How far the lens sees stays the nominal one's, as in the estimate.
+        assert_eq!(read.applied_to(&nominal).intrinsics(), found.intrinsics());
+    }
+
+    #[test]
+    fn a_focal_length_that_no_lens_has_is_refused() {
+        let table = LensResult::new(None, &lens(500.0), [0.1; 8]);
+        assert!(table.check(Path::new("calibration.toml")).is_ok());
+        for spoilt in [0.0, -500.0, 1e9, f64::NAN, f64::INFINITY] {
+            let wrong = LensResult { focal_px: [500.0, spoilt], ..table.clone() };
+            assert!(wrong.check(Path::new("calibration.toml")).is_err(), "{spoilt}");
+        }
+    }
+}

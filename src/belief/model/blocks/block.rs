@@ -7,15 +7,15 @@ use armcal_core::robot::Robot;
 /// A group of parameters that move together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Block {
-    /// Mount of the camera of that number on its link, about the drawing's place.
+    /// Mount of a camera on its link, by the camera's number, about the nominal one.
     Mount(usize),
-    /// How much later the joint sensors' stamps are than the camera's.
+    /// Delay of the joint sensors' stamps after the camera's.
     Clock,
-    /// Focal lengths, centre and distortion of the camera of that number, about robot.toml's.
+    /// Focal lengths, centre and distortion of a camera, by its number, about robot.toml's.
     Lens(usize),
-    /// Where a tag is, by its index among the robot's, about the survey's place.
+    /// Pose of a tag, by its index among the robot's, about its survey.
     Tag(usize),
-    /// Where the tag on the gripper is, about the drawing's place.
+    /// Pose of the tag on the gripper, about the nominal one.
     GripperTag,
 }
 
