@@ -14,7 +14,7 @@ corner       files of src/core and src/belief that name the pixels of a tag's fo
 carriers     structs and enums of those folders that hold these pixels, formats of messages aside.
 projections  functions of belief that ask a lens for the Jacobian of its projection, or difference its pixels.
 events       rooms of the product with a text that says that a sensor, camera or tag slipped, moved or failed, or an offset walks.
-circles      groups of rooms of belief, or of folders of belief/calib, that import each other.
+circles      groups of rooms of belief that import each other.
 """
 
 import argparse
@@ -38,7 +38,7 @@ JACOBIAN = re.compile(r"\b(?:project\w*_with_jacobian|image_jacobian)\s*\(")
 PROJECT = re.compile(r"\.project\w*\(")
 STEP = re.compile(r"\b(?:step|eps|epsilon|delta)\w*\b")
 EVENT = re.compile(r"\b(?<!no )(?:sensor|camera|tags?|offset)\b[^.,;:?]{0,40}\b(?:slipped|moved|failed|walks|walked)\b")
-NOT_THE_PRODUCT = ("src/lab/", "src/sim/")  # They make the events.
+NOT_THE_PRODUCT = ("src/lab/", "src/sim/", "src/replay/fault_words.rs")  # They make the events, or word the truth of one.
 ORDINARY = (0.0, 1.0, 2.0, 0.5)
 NUMBER = re.compile(r"(?<![\w.])(\d[\d_]*(?:\.(?!\.)[\d_]*)?(?:e[+-]?\d+)?)(?:_?[fiu](?:8|16|32|64|size))?(?![\w.])")
 COMPARISON = re.compile(r"\s(?:<|>|<=|>=|==|!=)\s")
@@ -109,9 +109,9 @@ class Source:
         return [(m[1], m.start(), end_of_item(self.code, m.start())) for m in re.finditer(r"\bfn\s+(\w+)", self.code)]
 
     def room(self):
-        """Folder that the file belongs to: the first of belief, the second of belief/calib, of other crates the crate."""
+        """Folder that the file belongs to: the first of belief, of other crates the crate."""
         parts = self.name.split("/")[1:-1] or ["(root)"]
-        return "/".join(parts[: 1 if parts[0] != "belief" else 3 if parts[1:2] == ["calib"] else 2])
+        return "/".join(parts[: 2 if parts[0] == "belief" else 1])
 
 
 def product(root):
@@ -246,15 +246,15 @@ def handed_on(sources, folder):
     return {re.split(r"::| as ", path)[-1]: path.removeprefix("self::").split("::")[0] for path in paths}
 
 
-def edges(sources, folder, folders_alone):
-    """{(from, to): lines} among the modules below `folder`."""
-    depth, found, exports = len(folder), defaultdict(set), handed_on(sources, folder)
-    inside = [s for s in sources if s.place[:depth] == folder and len(s.place) > depth]
-    rooms = {s.place[depth] for s in inside if not folders_alone or s.name.count("/") > depth + 2}
+def edges(sources, folders_alone):
+    """{(from, to): lines} among the rooms."""
+    found, exports = defaultdict(set), handed_on(sources, [])
+    inside = [s for s in sources if s.place]
+    rooms = {s.place[0] for s in inside if not folders_alone or s.name.count("/") > 2}
     for source in inside:
         for at, path in imports(source):
-            if path[:depth] == folder and len(path) > depth:
-                ends = source.place[depth], exports.get(path[depth], path[depth])
+            if path:
+                ends = source.place[0], exports.get(path[0], path[0])
                 if ends[0] != ends[1] and rooms.issuperset(ends):
                     found[ends].add(source.line(at))
     return found
@@ -270,15 +270,13 @@ def circles_of(pairs):
 
 
 def circles(name, sources, folders_alone):
-    places, n = [], 0
-    for folder in ([], ["calib"]):
-        found = edges(sources, folder, folders_alone)
-        for group in sorted(circles_of(found), key=sorted):
-            n += 1
-            places.append(f"{'/'.join(['belief', *folder])}: {', '.join(sorted(group))}")
-            within = sorted((ends, sorted(at)) for ends, at in found.items() if group.issuperset(ends))
-            places += [f"  {a} -> {b}: {len(at)}, {' '.join(at[:6])}" for (a, b), at in within]
-    return name, n, places
+    places, found = [], edges(sources, folders_alone)
+    groups = sorted(circles_of(found), key=sorted)
+    for group in groups:
+        places.append(", ".join(sorted(group)))
+        within = sorted((ends, sorted(at)) for ends, at in found.items() if group.issuperset(ends))
+        places += [f"  {a} -> {b}: {len(at)}, {' '.join(at[:6])}" for (a, b), at in within]
+    return name, len(groups), places
 
 
 def main():

@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use armcal::calib::{Calibration, Refusal, Status, calibrate};
-use armcal::judge::FindingKind;
 use armcal::log::{Recording, read_recording};
 use armcal::robot::{Robot, load};
 use armcal::routine::Method;
+use armcal::say::FindingKind;
 use armcal::sim::truth::{Truth, read_truth};
 use armcal::streams::{Message, ToolTouch};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use armcal::judge::FindingKind;
 use armcal::log::{Recording, read_recording};
 use armcal::report::RunSummary;
+use armcal::say::FindingKind;
 use armcal::streams::{JointCommand, MarkKind, Message, ReachAttempt};
 use armcal::time::Stamp;
 

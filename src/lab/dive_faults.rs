@@ -11,8 +11,8 @@ use armcal_belief::calib::View;
 use armcal_belief::calib::online::{
     Fault, Follower, OnlineEvent, OnlineSettings, Oracle, OracleGain, TagSet, ViewStream,
 };
-use armcal_belief::judge::FindingKind;
 use armcal_belief::model::WornSpot;
+use armcal_belief::say::FindingKind;
 use armcal_core::log::Recording;
 use armcal_core::robot::{FailedJoint, Robot};
 use armcal_core::stats::{chi_square_above, stream_rng};

@@ -10,7 +10,8 @@ use armcal_belief::calib::{
     BaselineComparison, Calibration, CameraMount, FailedJointTable, FurtherCamera, JointResult, MapResult,
     ObservabilityTable, PriorTable, Refusal, Reservation, Status, VerdictTable, ViewContainment,
 };
-use armcal_belief::judge::{Finding, FindingUnit, TargetU95, U95Table};
+use armcal_belief::judge::{TargetU95, U95Table};
+use armcal_belief::say::{Finding, FindingUnit};
 use armcal_belief::session::{AskedPoses, OnlineOutcome, SkippedTarget, StillReachable};
 use armcal_core::codes::Code;
 use armcal_core::numeric::Outcome;

@@ -1,13 +1,14 @@
 //! May the result be used for its task?
 //!
 //! `coverage` says how far the tool may be off with a stated probability, `decision` holds that against the task's
-//! tolerance, target by target. One covariance gives both figures. `finding` is what was found to be other than stated.
+//! tolerance, target by target. One covariance gives both figures. `baseline_comparison` tests whether held-out views
+//! fit better than without joints.
 
-mod coverage;
-mod decision;
-mod finding;
+pub(crate) mod baseline_comparison;
+pub(crate) mod coverage;
+pub(crate) mod decision;
 
+pub use baseline_comparison::{BaselineComparison, SIGNIFICANCE};
 pub use coverage::{COVERAGE, ErrorDistribution};
 pub(crate) use decision::TargetError;
 pub use decision::{MAX_RISK, RULE, TargetU95, U95Table};
-pub use finding::{Finding, FindingKind, FindingUnit};

@@ -6,7 +6,8 @@
 use armcal_core::codes::{Code, Coded, Warning};
 use rand_chacha::ChaCha8Rng;
 
-use crate::calib::{Calibration, CalibrationFileError};
+use crate::file::calibration::Calibration;
+use crate::file::file_error::CalibrationFileError;
 use crate::plan::bounds::joint_bounds::JointErrorBounds;
 use crate::plan::clearance::{ClearanceModel, ClosestPair};
 use crate::plan::motion::edge::{Edge, Path};

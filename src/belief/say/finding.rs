@@ -1,116 +1,136 @@
-//! Findings and events in words.
+//! What a calibration found to be other than robot.toml, survey and drawing say.
 
-use crate::judge::{Finding, FindingKind, FindingUnit};
+use armcal_core::codes::{Code, Coded};
+use armcal_core::kinematics::JointKind;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
-impl FindingKind {
-    /// In words: `tag moved`.
-    #[must_use]
-    pub fn words(self) -> &'static str {
+/// One finding; a repaired one does not refuse.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Finding {
+    /// Cause; its code in files.
+    #[serde(rename = "code")]
+    pub kind: FindingKind,
+    /// Joint, tag id or link.
+    pub name: String,
+    /// In `unit`; absent where the finding has no size.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub size: Option<f64>,
+    /// Absent where the finding has no size.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit: Option<FindingUnit>,
+    /// Root mean square over the task, where it was predicted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tool_error_m: Option<f64>,
+    /// When it happened, s since the first view.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_s: Option<f64>,
+    /// Whether the estimate takes account of it.
+    pub repaired: bool,
+}
+
+/// What may be other than it was said to be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FindingKind {
+    /// A surveyed tag; the size is its distance from the survey.
+    TagMoved,
+    /// Tags that were moved together; the size is their median distance from the survey.
+    TagsMoved,
+    /// A tag of another size than the survey's; the size is the relative difference.
+    TagSize,
+    /// Tags with one another's ids: two, or more in a ring.
+    TagSwapped,
+    /// A tag of which no observation fits the others; the size is their number.
+    TagLeftOut,
+    /// The lens against robot.toml; the size is the relative error of its focal length.
+    Lens,
+    /// A link's length or twist against the drawing.
+    Link,
+    /// A joint or the base's mount that gives under the arm's weight, or a load at the tool: the size is its compliance
+    /// or the load.
+    Sag,
+    /// The camera's mount against the drawing, beyond its prior.
+    CameraMount,
+    /// The base against the survey, or all tags together.
+    Base,
+    /// The tool point or links beyond the camera, by touches of surveyed surfaces.
+    Tool,
+    /// A sensor that slipped on its shaft; the size is the step.
+    SensorSlip,
+    /// A sensor that reads the other way; the size is the slope of the angle by the reading.
+    SensorReversed,
+    /// A sensor of another scale than its datasheet's; the size is the slope of the angle by the reading.
+    SensorScale,
+    /// A joint or sensor that failed otherwise.
+    SensorFailed,
+    /// A sensor with more error from view to view than its datasheet allows; the size is one sigma.
+    SensorWorn,
+    /// A sensor whose offset walks at random; the size is one sigma over the views.
+    OffsetWalks,
+    /// Tag observations that the fit rejected; the size is their number.
+    Outliers,
+}
+
+impl Coded for FindingKind {
+    fn code(&self) -> Code {
         match self {
-            Self::TagMoved => "tag moved",
-            Self::TagsMoved => "tags moved together",
-            Self::TagSize => "tag of another size",
-            Self::TagSwapped => "tags swapped",
-            Self::TagLeftOut => "tag left out",
-            Self::Lens => "lens differs from robot.toml",
-            Self::Link => "link differs from the URDF",
-            Self::Sag => "compliance under weight",
-            Self::CameraMount => "camera mount differs",
-            Self::Base => "base displaced from the survey",
-            Self::Tool => "tool point differs",
-            Self::SensorSlip => "sensor slipped",
-            Self::SensorReversed => "sensor reversed",
-            Self::SensorScale => "sensor scale differs",
-            Self::SensorFailed => "joint or sensor failed",
-            Self::SensorWorn => "sensor worn",
-            Self::OffsetWalks => "offset walks at random",
-            Self::Outliers => "tag observations rejected",
+            Self::TagMoved => Code::TagMoved,
+            Self::TagsMoved => Code::TagsMoved,
+            Self::TagSize => Code::TagSize,
+            Self::TagSwapped => Code::TagSwapped,
+            Self::TagLeftOut => Code::TagLeftOut,
+            Self::Lens => Code::Lens,
+            Self::Link => Code::Link,
+            Self::Sag => Code::Sag,
+            Self::CameraMount => Code::CameraMount,
+            Self::Base => Code::Base,
+            Self::Tool => Code::Tool,
+            Self::SensorSlip => Code::SensorSlip,
+            Self::SensorReversed => Code::SensorReversed,
+            Self::SensorScale => Code::SensorScale,
+            Self::SensorFailed => Code::SensorFailed,
+            Self::SensorWorn => Code::SensorWorn,
+            Self::OffsetWalks => Code::OffsetWalks,
+            Self::Outliers => Code::Outliers,
         }
     }
 }
 
-impl Finding {
-    /// The size in units that people measure in: `12.0 mm`.
-    #[must_use]
-    pub fn size_in_words(&self) -> Option<String> {
-        Some(self.unit?.in_words(self.size?))
+impl Coded for Finding {
+    fn code(&self) -> Code {
+        self.kind.code()
     }
+}
+
+/// SI, and plain numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub enum FindingUnit {
+    /// Lengths.
+    #[serde(rename = "m")]
+    Metre,
+    /// Angles.
+    #[serde(rename = "rad")]
+    Radian,
+    /// Counts.
+    #[serde(rename = "1")]
+    One,
+    /// Compliances.
+    #[serde(rename = "rad/(N m)")]
+    RadianPerNewtonMetre,
+    /// Compliances of slides.
+    #[serde(rename = "m/N")]
+    MetrePerNewton,
+    /// Loads.
+    #[serde(rename = "N")]
+    Newton,
 }
 
 impl FindingUnit {
-    /// A value in the unit that people measure in: `12.0 mm`.
+    /// Of a joint's coordinate.
     #[must_use]
-    pub fn in_words(self, value: f64) -> String {
-        match self {
-            Self::Metre => format!("{:.1} mm", value * 1e3),
-            Self::Radian => format!("{:.2} deg", value.to_degrees()),
-            Self::One => format!("{value:.3}"),
-            Self::RadianPerNewtonMetre => format!("{:.3} deg per kN m", 1e3 * value.to_degrees()),
-            Self::MetrePerNewton => format!("{:.3} mm per kN", 1e6 * value),
-            Self::Newton => format!("{value:.0} N"),
-        }
+    pub fn of_joint(kind: JointKind) -> Self {
+        if kind.is_slide() { Self::Metre } else { Self::Radian }
     }
-}
-
-/// An event of the online estimate; `at_rad`: of a worn spot the joint's angle at its middle.
-pub(crate) fn event(finding: &Finding, at_rad: Option<f64>) -> String {
-    let Finding { kind, name, size, .. } = finding;
-    let size = size.unwrap_or(f64::NAN);
-    match kind {
-        FindingKind::SensorSlip => {
-            format!("the sensor of {name} slipped on its shaft by {:.2} deg", size.to_degrees())
-        }
-        FindingKind::SensorScale => {
-            format!("the sensor of {name} has another scale: the angle is {size:.3} of the datasheet angle")
-        }
-        FindingKind::SensorReversed => {
-            format!("the sensor of {name} is reversed ({size:.3} of the datasheet angle)")
-        }
-        FindingKind::SensorFailed => {
-            format!("the sensor of {name} failed: only views determine its angle")
-        }
-        FindingKind::SensorWorn => {
-            let at_deg = at_rad.unwrap_or(f64::NAN).to_degrees();
-            format!(
-                "the sensor of {name} is worn near {at_deg:.1} deg: it reads {:.2} deg more there",
-                size.to_degrees()
-            )
-        }
-        FindingKind::TagMoved => format!("tag {name} was moved by {:.1} mm", 1e3 * size),
-        FindingKind::TagsMoved => format!("tags {name} were moved together by {:.1} mm", 1e3 * size),
-        FindingKind::CameraMount => format!("the camera turned on its mount by {:.2} deg", size.to_degrees()),
-        _ => format!("the {name} or all tags moved by {:.1} mm", 1e3 * size),
-    }
-}
-
-/// One of several explanations: `the sensor of elbow slipped on its shaft`.
-pub(crate) fn explanation(kind: FindingKind, name: &str) -> String {
-    match kind {
-        FindingKind::SensorSlip => format!("the sensor of {name} slipped on its shaft"),
-        FindingKind::SensorScale => format!("the sensor of {name} has another scale"),
-        FindingKind::SensorFailed => format!("the sensor of {name} says nothing any more"),
-        FindingKind::SensorWorn => format!("the sensor of {name} is worn at one place"),
-        FindingKind::TagMoved => format!("tag {name} was moved"),
-        FindingKind::TagsMoved => format!("tags {name} were moved together"),
-        FindingKind::CameraMount => "the camera has moved on its mount".to_owned(),
-        _ => "the base or all tags have moved".to_owned(),
-    }
-}
-
-/// The explanation that no joint alone has.
-pub(crate) fn drift() -> String {
-    "all sensors drifted more than expected".to_owned()
-}
-
-/// `the sensor slipped by 1.00 deg after 9 of 20 views, before view 10`.
-pub(crate) fn slip(step: &str, [n_before, n]: [usize; 2], number: u32) -> String {
-    format!("the sensor slipped by {step} after {n_before} of {n} views, before view {number}")
-}
-
-/// A walk of an offset, so large over the views (std), and its effect.
-pub(crate) fn offset_walks(joint: &str, walked: &str) -> String {
-    format!(
-        "the offset of {joint} walks at random, by {walked} (std) during the capture; the predicted tool error \
-         includes as much again. Calibrate again soon, or follow the estimate online"
-    )
 }

@@ -1,11 +1,26 @@
-//! Findings and events in words: the same in terminal, report, replay and files.
+//! What is said of a calibration, and its words: the same in terminal, report, replay and files.
 //!
-//! `finding` words a finding, or an event as the online belief tells it; `repair` says what to do about it.
+//! `finding` is what was found to be other than stated, `refusal` why a result must not be used (`wrong_input`,
+//! `reading_error`, `geometry_error` are causes), `reservation` what it rests on. `repair` says what to do about a
+//! finding. Each kind has its words in a file beside it, and nowhere else.
 
-mod finding;
-mod repair;
-mod sentence;
+pub(crate) mod finding;
+pub(crate) mod finding_words;
+pub(crate) mod geometry_error;
+pub(crate) mod reading_error;
+pub(crate) mod refusal;
+pub(crate) mod repair;
+pub(crate) mod reservation;
+pub(crate) mod sentence;
+pub(crate) mod wrong_input;
+pub(crate) mod wrong_input_words;
 
-pub(crate) use finding::{drift, event, explanation, offset_walks, slip};
+pub use finding::{Finding, FindingKind, FindingUnit};
+pub(crate) use finding_words::{drift, event, explanation, offset_walks, slip};
+pub use geometry_error::{ErrorKind, GeometryError};
+pub use reading_error::{JointZero, MisreadReadings, ReadingError};
+pub use refusal::{InnovationQuantity, Refusal, in_files as refusals_in_files, with_advice};
 pub use repair::{FailedJoint, Repair, repairs};
+pub use reservation::Reservation;
 pub use sentence::sentence;
+pub use wrong_input::{WrongInput, WrongInputKind};

@@ -1,6 +1,6 @@
 //! Errors of the arm or its survey, and their remedies.
 
-use crate::judge::{Finding, FindingKind};
+use crate::say::finding::{Finding, FindingKind};
 use armcal_core::codes::{Code, Coded};
 use armcal_core::robot::FailedKind;
 
@@ -201,7 +201,7 @@ impl FailedJoint<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::judge::FindingUnit;
+    use crate::say::finding::FindingUnit;
 
     fn failed(kind: FailedKind, evidence: &str) -> FailedJoint<'_> {
         FailedJoint { joint: "elbow", kind, evidence, slipped: false }

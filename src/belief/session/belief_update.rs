@@ -3,7 +3,8 @@
 //! After every few views the recording so far is estimated. Set-points, margins and the remaining poses then follow the
 //! interim estimate. The final calibration replaces it; if that is refused, the belief before the capture returns.
 
-use crate::calib::{Calibration, interim_estimate};
+use crate::batch::interim::interim_estimate;
+use crate::file::calibration::Calibration;
 use crate::plan::JointErrorBounds;
 use crate::session::SessionError;
 use crate::session::runner::{SavedBelief, ScriptRunner};

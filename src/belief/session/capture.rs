@@ -1,6 +1,7 @@
 //! Plans views and visits them, and plans anew as they come in.
 
-use crate::calib::{Calibration, fewest_views};
+use crate::checks::refusal_conditions::fewest_views;
+use crate::file::calibration::Calibration;
 use crate::plan::{
     ArmEnsemble, CaptureState, CapturedView, PlanError, PlannedPose, PosePlan, PoseRequest, StopReason,
     VisibilityModel, choose_poses,

@@ -1,7 +1,7 @@
 //! Errors of a session.
 
-use crate::calib::CalibError;
 use crate::plan::PlanError;
+use crate::views::error::CalibError;
 use armcal_core::codes::{Code, Coded};
 use armcal_core::log::LogError;
 use armcal_core::streams::ArmError;

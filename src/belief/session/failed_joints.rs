@@ -1,7 +1,8 @@
 //! Goes on with an arm some of whose joints have failed: belief, bounds and plans without them, and what is still
 //! reachable.
 
-use crate::calib::{Calibration, FailedJointTable};
+use crate::file::calibration::Calibration;
+use crate::file::failed_joint::FailedJointTable;
 use crate::plan::{JointErrorBounds, PlanError, TargetRequest, plan_targets};
 use crate::session::SessionError;
 use crate::session::held_joint::{HeldJoint, hold_in, holding_bounds};

@@ -174,7 +174,7 @@ mod tests {
 
     /// What becomes of an edge of 0.5 rad at 0.25 rad/s after a rest; `word` makes the word of the exact one.
     fn told(seed: u64, mut word: impl FnMut(f64, f64) -> f64) -> (Option<(f64, FailedKind)>, bool) {
-        let robot = crate::calib::fixture::titan();
+        let robot = crate::fixture::titan();
         let spec = &robot.sensors[JOINT];
         let mut watch = FollowWatch::new(&robot, PERIOD_S);
         let mut rng = stream_rng(seed, "following");

@@ -1,7 +1,7 @@
 //! Works by the online belief, and asks for a calibration pose or two where the next task would miss its tolerance.
 
-use crate::judge::FindingKind;
 use crate::plan::JointErrorBounds;
+use crate::say::finding::FindingKind;
 use crate::session::SessionError;
 use crate::session::held_joint::{HeldJoint, StandingJoint};
 use crate::session::online_belief::{AskedPoses, OnlineBelief, OnlineOutcome};

@@ -2,8 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::calib::ParameterCovariance;
-use crate::calib::online::{BeliefLog, Follower, OnlineEvent, OnlineSettings};
+use crate::follow::belief_log::BeliefLog;
+use crate::follow::event::OnlineEvent;
+use crate::follow::follower::Follower;
+use crate::follow::settings::OnlineSettings;
+use crate::solve::covariance::ParameterCovariance;
 use armcal_core::log::Recording;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::ArmSensors;

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::calib::{Calibration, Status};
+use crate::file::calibration::{Calibration, Status};
 use crate::session::held_joint::HeldJoint;
 use crate::session::online_belief::OnlineOutcome;
 use crate::session::tool_belief::{Certainty, ToolBelief};

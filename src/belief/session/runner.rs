@@ -5,13 +5,14 @@ use std::rc::Rc;
 use nalgebra::Vector3;
 use rand_chacha::ChaCha8Rng;
 
-use crate::calib::{Calibration, ParameterCovariance};
+use crate::file::calibration::Calibration;
 use crate::plan::{ClearanceModel, JointErrorBounds, PosePlan};
 use crate::session::held_joint::StandingJoint;
 use crate::session::inputs::SessionInputs;
 use crate::session::motion::Driver;
 use crate::session::online_belief::AskedPoses;
 use crate::session::outcome::{AssertResult, Epoch, EstimateUpdate, ReachStep, SkippedTarget, StillReachable, Visit};
+use crate::solve::covariance::ParameterCovariance;
 use armcal_core::kinematics::Chain;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::ArmSensors;

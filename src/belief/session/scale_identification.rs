@@ -1,11 +1,12 @@
 //! Measures how many counts a radian has, for a sensor of which nobody knows: a small excursion that is safe for every
 //! scale, then a larger one that is safe for the scales that are left.
 
-use crate::calib::{IdentifiedScale, associate, identify_scales};
 use crate::plan::{JointErrorBounds, Path, UnknownScale};
 use crate::session::SessionError;
 use crate::session::motion::MotionOutcome;
 use crate::session::runner::ScriptRunner;
+use crate::views::association::associate;
+use crate::views::scale_identification::{IdentifiedScale, identify_scales};
 use armcal_core::robot::Robot;
 use armcal_core::routine::IdentifySettings;
 use armcal_core::sensor::ArmSensors;

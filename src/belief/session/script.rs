@@ -2,7 +2,9 @@
 
 use std::rc::Rc;
 
-use crate::calib::{Calibration, CalibrationFileError, Status, calibrate};
+use crate::batch::calibrate::calibrate;
+use crate::file::calibration::{Calibration, Status};
+use crate::file::file_error::CalibrationFileError;
 use crate::plan::{ClearanceModel, Elapsed, JointErrorBounds, LeastClearance, PathError, PathPlanner};
 use crate::session::held_joint::with_held;
 use crate::session::inputs::SessionInputs;

@@ -2,7 +2,8 @@
 
 use nalgebra::{DMatrix, Matrix3};
 
-use crate::calib::{Calibration, ParameterCovariance};
+use crate::file::calibration::Calibration;
+use crate::solve::covariance::ParameterCovariance;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::{ArmSensors, Conditions};
 use armcal_core::streams::JointAngles;

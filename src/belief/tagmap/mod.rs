@@ -2,7 +2,8 @@
 //!
 //! `screen` validates detections and solves each square; `vote`, `initial_guess` and `incremental_layout` lay out
 //! groups of tags; `linearize`, `normal_equations`, `sparse` and `adjust` are the bundle adjustment on corner pixels
-//! (Triggs et al. 2000); `result` is the map with its accuracy; `scale` finds wrong tag sizes. `files` reads and writes
+//! (Triggs et al. 2000); `result` is the map with its accuracy; `scale` finds wrong tag sizes. `tag_mapping` maps the tags of a
+//! calibration; `files` reads and writes
 //! files of tags and cameras, `recording` gets views from recordings.
 
 mod adjust;
@@ -21,6 +22,7 @@ mod scale;
 mod screen;
 mod solve;
 mod sparse;
+pub(crate) mod tag_mapping;
 mod tag_pairs;
 mod types;
 mod vote;

@@ -2,7 +2,8 @@
 //!
 //! Conditions and readings are averaged over each mark; the sensors are those believed at its start.
 
-use crate::calib::{ConditionHistory, replace_dropouts};
+use crate::views::conditions::ConditionHistory;
+use crate::views::dropouts::replace_dropouts;
 use armcal_core::kinematics::LinkCorrections;
 use armcal_core::log::Recording;
 use armcal_core::robot::Robot;
@@ -140,7 +141,7 @@ mod tests {
         let rests = reaches(&recording, &robot, &[belief]);
         let off = rests[0].believed.iter().zip(robot.stowed.iter()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(off < 1e-9, "{off} rad");
-        let data = crate::calib::associate(&recording, &robot);
+        let data = crate::views::association::associate(&recording, &robot);
         let rest = data.rests.get(&0).expect("a rest");
         assert!((rest[0] - robot.stowed[0]).abs() < 1e-9, "{rest:?}");
     }

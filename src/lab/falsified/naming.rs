@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::falsified::cases::{Case, CaseKind, Element};
 use armcal_belief::calib::{Calibration, Refusal};
-use armcal_belief::judge::{Finding, FindingKind};
+use armcal_belief::say::{Finding, FindingKind};
 use armcal_core::robot::Robot;
 
 /// Causes that a result names first: those of its first finding, or else of its first refusal. None for a result

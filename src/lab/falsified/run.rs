@@ -10,7 +10,7 @@ use crate::falsified::naming::{causes_of_finding, first_causes, right_causes};
 use crate::falsified::oracle::{Oracle, OracleEffect};
 use crate::falsified::perturbation::{Perturbation, falsified_robot};
 use armcal_belief::calib::{Calibration, Status, calibrate_with_survey};
-use armcal_belief::judge::{Finding, FindingKind};
+use armcal_belief::say::{Finding, FindingKind};
 use armcal_belief::verify::{Belief, reaches};
 use armcal_core::kinematics::LinkCorrections;
 use armcal_core::log::Recording;

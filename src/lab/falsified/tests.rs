@@ -1,6 +1,6 @@
 //! On two seeds: falsifications are applied, seen, named and scored as they are meant to be.
 
-use armcal_belief::judge::{Finding, FindingKind};
+use armcal_belief::say::{Finding, FindingKind};
 use std::path::Path;
 use std::sync::LazyLock;
 

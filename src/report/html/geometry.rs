@@ -4,7 +4,7 @@ use armcal_core::codes::Coded;
 use maud::{Markup, html as markup};
 
 use armcal_belief::calib::{Calibration, CameraMount, FurtherCamera, LinkResult, ModelTable, SagTable};
-use armcal_belief::judge::Finding;
+use armcal_belief::say::Finding;
 use armcal_core::units::Unit;
 
 pub(super) fn section(calibration: &Calibration) -> Markup {

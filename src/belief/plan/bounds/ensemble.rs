@@ -9,7 +9,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::calib::Calibration;
+use crate::file::calibration::Calibration;
 use crate::model::{Parameter, ParameterKind};
 use armcal_core::kinematics::LinkPoses;
 use armcal_core::robot::{JointSensorSpec, Robot};
@@ -265,7 +265,7 @@ fn root_of(matrix: &nalgebra::DMatrix<f64>) -> Option<nalgebra::DMatrix<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calib::fixture::{estimate, titan, with_terms};
+    use crate::fixture::{estimate, titan, with_terms};
     use crate::plan::JointErrorBounds;
     use armcal_core::stats::stream_rng;
 

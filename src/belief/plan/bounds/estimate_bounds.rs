@@ -7,9 +7,10 @@
 //! worst gain allows; there the bound is what the worst gain makes of the way from the angle that is known. The least
 //! `a + k |angle - pivot|` above the lesser of the two is the bound.
 
-use crate::calib::{Calibration, JointAt, ParameterCovariance};
+use crate::file::calibration::Calibration;
 use crate::model::ParameterKind;
 use crate::plan::bounds::joint_bounds::{JointBound, JointErrorBounds};
+use crate::solve::covariance::{JointAt, ParameterCovariance};
 use armcal_core::robot::Robot;
 use armcal_core::sensor::{ArmSensors, ConditionChange, SensorModel};
 

@@ -7,11 +7,11 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::calib::{MeanCorners, TagMeasurement, TagObservation, View};
 use crate::model::{Hyperparameters, JointParameters};
 use crate::plan::view_planning::parameter_prior::columns;
 use crate::plan::view_planning::{PosePlan, PosePool, PoseRequest};
 use crate::plan::{ClearanceModel, JointErrorBounds, PlanError, VisibilityModel};
+use crate::views::view::{MeanCorners, TagMeasurement, TagObservation, View};
 use armcal_core::optics::square_corners;
 use armcal_core::robot::{Robot, Vehicle, load, load_vehicle};
 use armcal_core::routine::{CaptureSettings, PoseCriterion, Scene};

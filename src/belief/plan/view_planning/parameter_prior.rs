@@ -7,10 +7,11 @@
 
 use nalgebra::{DMatrix, Matrix6, Vector6};
 
-use crate::calib::bundle::MOUNT_ROWS;
-use crate::calib::{Calibration, ParameterCovariance};
+use crate::explain::calibration_prior::MOUNT_ROWS;
+use crate::file::calibration::Calibration;
 use crate::model::{Hyperparameters, Parameter, ParameterKind};
 use crate::plan::view_planning::request::PoseRequest;
+use crate::solve::covariance::ParameterCovariance;
 use armcal_core::robot::{FailedKind, Robot};
 use armcal_core::sensor::{N_SHAPE, nonlinearity_basis};
 use armcal_core::spatial::adjoint;

@@ -1,9 +1,10 @@
 //! Request and result of view planning.
 
-use crate::calib::{Calibration, ParameterCovariance};
+use crate::file::calibration::Calibration;
 use crate::plan::bounds::joint_bounds::JointErrorBounds;
 use crate::plan::clearance::ClearanceModel;
 use crate::plan::visibility::VisibilityModel;
+use crate::solve::covariance::ParameterCovariance;
 use armcal_core::robot::Robot;
 use armcal_core::routine::CaptureSettings;
 use armcal_core::streams::{CaptureSet, JointAngles};

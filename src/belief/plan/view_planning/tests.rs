@@ -3,8 +3,6 @@
 use nalgebra::{Cholesky, DMatrix, Vector6};
 use rand_chacha::ChaCha8Rng;
 
-use crate::calib::ParameterCovariance;
-use crate::calib::bundle::{BundleInput, HyperparameterMode, estimate, model_for};
 use crate::model::{Hyperparameters, JointParameters, ParameterKind};
 use crate::plan::PlanError;
 use crate::plan::view_planning::candidates::Candidate;
@@ -15,6 +13,10 @@ use crate::plan::view_planning::parameter_prior::{N_COMMON, ParameterPrior, WIDT
 use crate::plan::view_planning::pool::{DesignInputs, PosePool};
 use crate::plan::view_planning::view_information::{CornerModel, ViewJacobian};
 use crate::plan::view_planning::{CapturedView, PlannedPose, PosePlan};
+use crate::solve::covariance::ParameterCovariance;
+use crate::solve::estimate::estimate;
+use crate::solve::input::{BundleInput, HyperparameterMode};
+use crate::solve::model_for_views::model_for;
 use armcal_core::optics::square_corners;
 use armcal_core::robot::Robot;
 use armcal_core::routine::PoseCriterion;

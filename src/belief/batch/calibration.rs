@@ -1,0 +1,669 @@
+//! One calibration by `bundle`, step by step: estimate, diagnose, report, judge.
+
+use crate::batch::failure_impact::FailureImpact;
+use crate::batch::tables::{
+    add_clock, camera_mount_table, covariance_with_mount, further_camera_tables, lens_tables, map_table, model_table,
+    prior_table,
+};
+use crate::checks::assemble::{Evidence, Fit, Provenance, assemble, is_near, noise_dof, refusal_by_priors};
+use crate::checks::cross_validation::{FOLDS, Fold, FoldSums, fold_of};
+use crate::checks::innovations::Innovations;
+use crate::checks::touch_term::TouchUpdate;
+use crate::checks::verdict::{MAX_OUTLIERS, VerdictInput};
+use crate::explain::angles_by_camera::set_by_camera;
+use crate::explain::baseline::Baseline;
+use crate::explain::calibration_prior::PriorConsistency;
+use crate::explain::drawing::Drawing;
+use crate::explain::failure_detection::FailureSearch;
+use crate::explain::failures::Failure;
+use crate::explain::model_selection::{OptionalTerm, Selection};
+use crate::explain::reading_search::ReadingSearch;
+use crate::explain::setup::{BundleSetup, Clocks, declared};
+use crate::explain::tags::freed::MovedTags;
+use crate::explain::wrong_input::wrong_input;
+use crate::file::calibration::{Calibration, Status};
+use crate::file::map_table::MapResult;
+use crate::file::metrics::{HeldOutMetrics, ViewContainment};
+use crate::judge::{TargetError, U95Table};
+use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
+use crate::positions::position_problem::PositionProblem;
+use crate::positions::solution::Solution;
+use crate::positions::unobservable::{Unobservable, grouped_names};
+use crate::say::refusal::Refusal;
+use crate::say::wrong_input::WrongInput;
+use crate::solve::covariance::{ParameterCovariance, task_angles};
+use crate::solve::estimate::{Estimate, estimate};
+use crate::solve::input::{BundleInput, HyperparameterMode};
+use crate::solve::outliers::Outlier;
+use crate::tagmap::tag_mapping::map_unknown_tags;
+use crate::views::calibration_data::CalibrationData;
+use crate::views::error::CalibError;
+use crate::views::view::{ObservationRejection, Touch, View};
+use armcal_core::codes::Code;
+use armcal_core::joints::JointAngles;
+use armcal_core::robot::{JointSensorSpec, Robot, SurveyedTag};
+use armcal_core::routine::Method;
+use armcal_core::stats::Summary;
+use nalgebra::Matrix3;
+
+/// What an estimate is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum EstimatePurpose {
+    /// With all that a verdict needs.
+    Final,
+    /// The estimate and its covariance, to go on by while views are still being captured.
+    Interim,
+}
+
+/// A calibration by `bundle` before it is made.
+pub(crate) struct BundleCalibration<'a> {
+    /// All views are fitted; the held-out ones, too.
+    data: CalibrationData,
+    prior: Option<&'a Calibration>,
+    map: Option<MapResult>,
+    /// As they were given.
+    surveyed: Vec<SurveyedTag>,
+    purpose: EstimatePurpose,
+    /// Tags that were freed of their survey.
+    moved: MovedTags,
+    /// What of the drawing is estimated.
+    drawing: Drawing,
+    /// By what the readings of moving joints were moved to the camera's clock, s, and what decided it.
+    clock: Option<(f64, Selection)>,
+    /// Who is told of the last estimate by the views.
+    listener: Option<&'a mut EstimateListener<'a>>,
+    /// The views with the readings as they were read.
+    as_read: Vec<View>,
+}
+
+/// Result of a round of the calibration.
+enum Round {
+    /// Clock, survey or drawing are taken otherwise from now on: the views for the next round.
+    Revised(Vec<View>),
+    Done(Box<Calibration>),
+}
+
+/// Is told of an estimate and what it was made from.
+pub(crate) type EstimateListener<'a> = dyn FnMut(&BundleInput<'_>, &Estimate<'_>) + 'a;
+
+/// Fewer views do not determine how large noise and nonlinearity are: the datasheet's figures stand.
+const MIN_VIEWS_FOR_EVIDENCE: usize = 12;
+
+/// An estimate, and the setup and failures that it was made under.
+struct Estimated<'a> {
+    setup: &'a BundleSetup,
+    failures: &'a [Failure],
+    estimate: Estimate<'a>,
+    selections: Vec<Selection>,
+    touches: Option<Touched<'a>>,
+}
+
+/// What touches added to an estimate.
+struct Touched<'a> {
+    /// By the views alone.
+    before: Estimate<'a>,
+    update: TouchUpdate,
+}
+
+impl<'a> Estimated<'a> {
+    /// Takes the touches in, if there are enough and every joint up to the tool has a sensor.
+    fn with_touches(mut self, touches: &[Touch], robot: &Robot) -> Self {
+        let has_sensors = (0..robot.tool.mount.n_joints).all(|joint| !self.setup.has_no_sensor(joint));
+        if let Some(update) = self.estimate.touch_update(touches).filter(|_| has_sensors) {
+            let updated = self.estimate.with_touches(&update);
+            let before = std::mem::replace(&mut self.estimate, updated);
+            self.touches = Some(Touched { before, update });
+        }
+        self
+    }
+
+    fn by_views(&self) -> &Estimate<'a> {
+        self.touches.as_ref().map_or(&self.estimate, |touched| &touched.before)
+    }
+}
+
+/// What an estimate means, before it is judged.
+struct Diagnosis {
+    /// With the estimated angles where no sensor tells them.
+    views: Vec<View>,
+    held_out: HeldOutMetrics,
+    innovations: Vec<Innovations>,
+    /// The arm with camera, tags and sensors as estimated.
+    robot: Robot,
+    covariance: ParameterCovariance,
+}
+
+impl<'a> BundleCalibration<'a> {
+    /// Maps the tags whose place nobody surveyed.
+    ///
+    /// # Errors
+    /// [`CalibError::Map`] where the views make no map.
+    pub(crate) fn new(
+        mut data: CalibrationData,
+        prior: Option<&'a Calibration>,
+        purpose: EstimatePurpose,
+    ) -> Result<Self, CalibError> {
+        let surveyed = data.robot.tags.clone();
+        // `bundle` moves the tags itself: the map is where it starts.
+        let mapped = map_unknown_tags(&data.name, &mut data.data, &data.robot)?;
+        let map = mapped.map(|mapped| {
+            data.robot = mapped.start(&data.robot);
+            mapped.result
+        });
+        let held_out = std::mem::take(&mut data.data.held_out);
+        data.data.fit.extend(held_out);
+        let moved = MovedTags::new(&data.robot);
+        Ok(Self {
+            data,
+            prior,
+            map,
+            surveyed,
+            purpose,
+            moved,
+            drawing: Drawing::default(),
+            clock: None,
+            listener: None,
+            as_read: Vec::new(),
+        })
+    }
+
+    pub(crate) fn with_listener(self, listener: &'a mut EstimateListener<'a>) -> Self {
+        Self { listener: Some(listener), ..self }
+    }
+
+    /// # Errors
+    /// [`CalibError`] where the views determine nothing, or an interim estimate contradicts itself.
+    pub(crate) fn calibrate(mut self) -> Result<Calibration, CalibError> {
+        let mut views = std::mem::take(&mut self.data.data.fit);
+        loop {
+            match self.round(views)? {
+                Round::Revised(otherwise) => views = otherwise,
+                Round::Done(calibration) => return Ok(*calibration),
+            }
+        }
+    }
+
+    /// One estimate by `views`: failures, then the clock, then survey and drawing; where one of the last two is to be
+    /// taken otherwise, everything begins again with that.
+    fn round(&mut self, mut views: Vec<View>) -> Result<Round, CalibError> {
+        let sizes_m: Vec<f64> = self.data.robot.tags.iter().map(|tag| tag.size_m).collect();
+        let declared = declared(&self.data.robot, &views);
+        let clocks = if self.clock.is_some() { Clocks::Aligned } else { Clocks::AsStamped };
+        let setup = |robot: &Robot, failures: &[Failure]| {
+            BundleSetup::new(robot, &views, failures, self.prior).with_drawing(&self.drawing).with_clocks(clocks)
+        };
+        let first = setup(&self.data.robot, &declared);
+        self.check_observable(&first, &declared)?;
+        let estimated = self.first_estimate(&first);
+        let failures = match self.purpose {
+            EstimatePurpose::Final => {
+                let (robot, prior, drawing) = (&self.data.robot, self.prior, &self.drawing);
+                let search = FailureSearch { robot, views: &views, prior, drawing };
+                search.failures(&declared, estimated.as_ref().map(|(estimate, _)| estimate))
+            }
+            EstimatePurpose::Interim => declared.clone(),
+        };
+        let second;
+        let (setup, estimated) = if failures == declared {
+            (&first, estimated)
+        } else {
+            second = setup(&self.data.robot, &failures);
+            (&second, second.estimate())
+        };
+        if self.purpose == EstimatePurpose::Final
+            && let Some((estimate, selections)) = &estimated
+            && let Some((offset_s, _)) = self.clock_of(estimate, selections)
+        {
+            drop(estimated);
+            views.iter_mut().for_each(|view| view.read_later(offset_s));
+            return Ok(Round::Revised(views));
+        }
+        if self.purpose == EstimatePurpose::Final
+            && let Some((estimate, _)) = &estimated
+            && self.revise(setup, estimate)
+        {
+            drop(estimated);
+            rescale(&mut views, &sizes_m, &self.data.robot);
+            return Ok(Round::Revised(views));
+        }
+        let (mut estimate, mut selections) = estimated.ok_or_else(|| self.nothing_observable())?;
+        if self.purpose == EstimatePurpose::Final {
+            let walks;
+            (estimate, walks) = estimate.with_walks(&setup.input(), |joint| !setup.has_no_sensor(joint));
+            selections.extend(walks);
+        }
+        let estimated = Estimated { setup, failures: &failures, estimate, selections, touches: None };
+        let touches: &[Touch] = match self.purpose {
+            EstimatePurpose::Final => &self.data.data.touches,
+            EstimatePurpose::Interim => &[],
+        };
+        let estimated = estimated.with_touches(touches, &self.data.robot);
+        self.as_read = views;
+        self.finish(estimated).map(|calibration| Round::Done(Box::new(calibration)))
+    }
+
+    fn finish(&mut self, mut estimated: Estimated<'_>) -> Result<Calibration, CalibError> {
+        if let Some(listener) = self.listener.take() {
+            listener(&estimated.setup.input(), estimated.by_views());
+        }
+        // What no sensor told at a rest stays as it was stowed.
+        for failure in estimated.failures.iter().filter(|failure| failure.leaves_no_sensor()) {
+            let stowed_rad = self.data.robot.stowed[failure.joint];
+            self.data.data.rests.values_mut().for_each(|rest| rest[failure.joint] = stowed_rad);
+        }
+        let diagnosis = self.diagnose(&mut estimated);
+        let estimated = &estimated;
+        self.data.data.fit.clone_from(&diagnosis.views);
+        let mut calibration = self.report(estimated, &diagnosis);
+        self.judge_failures_and_prior(estimated, &diagnosis, &mut calibration);
+        match self.purpose {
+            EstimatePurpose::Interim if !estimated.estimate.is_consistent() => {
+                let problem = "the views contradict each other or the prior".to_owned();
+                return Err(CalibError::NoInterimEstimate { recording: self.data.name.clone(), problem });
+            }
+            EstimatePurpose::Interim => {}
+            EstimatePurpose::Final => {
+                let input = &BundleInput { views: &diagnosis.views, ..estimated.setup.input() };
+                let (found, innovations) = (estimated.by_views(), &diagnosis.innovations[..]);
+                let task = self.data.data.task_rests();
+                let tag_noise = self.data.data.tag_noise;
+                VerdictInput { input, found, innovations, task, tag_noise }.judge(&mut calibration);
+                if let Some(touched) = &estimated.touches {
+                    touched.update.judge(&self.data.robot, &mut calibration);
+                }
+                self.state_reservations(estimated, &diagnosis, &mut calibration);
+                self.moved.report(&estimated.estimate, &mut calibration);
+                let targets = task.map(|task| task_angles(&diagnosis.robot, task)).unwrap_or_default();
+                let at = if targets.is_empty() { found.view_angles() } else { targets };
+                found.report_drawing(&self.drawing, &at, &mut calibration);
+                self.blame_input(estimated.failures, &mut calibration);
+            }
+        }
+        Ok(calibration)
+    }
+
+    /// Where the calibration is refused and the images contradict a file, or the readings mean something else than the
+    /// input map says, that comes first. Several repaired tags are refused, too, where one other reading of the whole
+    /// map or of the lens explains them.
+    fn blame_input(&self, failures: &[Failure], calibration: &mut Calibration) {
+        if calibration.status != Status::Refused {
+            let has_moved_tags = self.moved.n_moved() > 1;
+            let wrong =
+                has_moved_tags.then(|| wrong_input(&self.data.data, &self.surveyed, &self.data.robot)).flatten();
+            if let Some(wrong) = wrong.filter(WrongInput::is_of_all_tags) {
+                calibration.refuse_first_for([Refusal::WrongInput(wrong)]);
+            }
+            return;
+        }
+        let is_of_lens = calibration.refusals.iter().any(|refusal| matches!(refusal, Refusal::Lens { .. }));
+        if is_of_lens {
+            return;
+        }
+        if let Some(wrong) = wrong_input(&self.data.data, &self.surveyed, &self.data.robot) {
+            calibration.refuse_first_for([Refusal::WrongInput(wrong)]);
+            return;
+        }
+        // A scale or unit has been named, and explains all.
+        let is_of_line = |refusal: &Refusal| matches!(refusal, Refusal::SensorLine { .. } | Refusal::SensorUnit { .. });
+        let is_of_scale = |refusal: &Refusal| is_of_line(refusal) || matches!(refusal, Refusal::BeyondDatasheet { .. });
+        if calibration.refusals.iter().any(is_of_line) && calibration.refusals.iter().all(is_of_scale) {
+            return;
+        }
+        // A repair beyond its bound explains nothing.
+        let is_unbounded = |refusal: &Refusal| matches!(refusal, Refusal::RepairTooLarge { .. });
+        let nominal = Drawing::default();
+        let drawing = if calibration.refusals.iter().any(is_unbounded) { &nominal } else { &self.drawing };
+        let search = ReadingSearch { robot: &self.data.robot, views: &self.as_read, failures, drawing };
+        calibration.refuse_first_for(search.find().map(Refusal::MisreadReadings));
+    }
+
+    /// The offset between the clocks, where it is found for the first time; from then on the readings are at the times
+    /// of the images, for all that is made of the views.
+    fn clock_of(&mut self, estimate: &Estimate<'_>, selections: &[Selection]) -> Option<(f64, Selection)> {
+        if self.clock.is_some() {
+            return None;
+        }
+        let [offset_s, _] = estimate.time_offset_s()?;
+        let decided = selections.iter().find(|selection| selection.term == OptionalTerm::TimeOffset)?;
+        self.clock = Some((offset_s, *decided));
+        self.clock
+    }
+
+    /// Whether survey or drawing are to be taken otherwise than so far.
+    fn revise(&mut self, setup: &BundleSetup, estimate: &Estimate<'_>) -> bool {
+        let by_moved_tag = self.moved.gain_nats(estimate);
+        if let Some(better) = self.drawing.better(&setup.input(), estimate, by_moved_tag) {
+            self.drawing.apply_new_faults(&better, &mut self.data.robot);
+            self.moved.resurveyed(&mut self.data.robot, &better);
+            self.drawing = better;
+            return true;
+        }
+        self.moved.revise(estimate, setup.input().views, &mut self.data.robot)
+    }
+
+    fn nothing_observable(&self) -> CalibError {
+        CalibError::NothingObservable { recording: self.data.name.clone() }
+    }
+
+    fn check_observable(&self, setup: &BundleSetup, declared: &[Failure]) -> Result<(), CalibError> {
+        let n = self.data.robot.n_seen_joints();
+        let has_columns = setup.input().model.joints.iter().take(n).any(|kinds| !kinds.is_empty());
+        if has_columns || !declared.is_empty() { Ok(()) } else { Err(self.nothing_observable()) }
+    }
+
+    fn first_estimate<'b>(&self, setup: &'b BundleSetup) -> Option<(Estimate<'b>, Vec<Selection>)> {
+        if self.purpose == EstimatePurpose::Final {
+            return setup.estimate();
+        }
+        let has_evidence = setup.applied.views.len() >= MIN_VIEWS_FOR_EVIDENCE;
+        let evidence = if has_evidence { HyperparameterMode::Fitted } else { HyperparameterMode::Given };
+        estimate(&BundleInput { evidence, ..setup.input() }).map(|estimate| (estimate, Vec::new()))
+    }
+
+    /// Held-out figures, the arm as estimated, and the covariance of its sensors.
+    fn diagnose(&self, estimated: &mut Estimated<'_>) -> Diagnosis {
+        let Estimated { setup, estimate, .. } = estimated;
+        let robot = &self.data.robot;
+        let without_failed = setup.without_failed(&estimate.parameters());
+        let mut with_steps = setup.with_estimated_angles(estimate, &without_failed);
+        let mut datasheet = setup.applied.robot.clone();
+        estimate.give_lenses(&mut datasheet);
+        with_steps.iter_mut().for_each(|view| estimate.see_through_found_lens(view, &datasheet));
+        let input = BundleInput { views: &with_steps, ..setup.input() };
+        let (held_out, innovations) = match self.purpose {
+            EstimatePurpose::Final => cross_validated(&input, estimate, &datasheet),
+            EstimatePurpose::Interim => (FoldSums::default().metrics(), Vec::new()),
+        };
+        let views = estimate.as_read_now(&with_steps);
+        estimate.widen(&innovations, &setup.input().scales);
+        let parameters = estimate.joint_parameters().to_vec();
+        let residual_std_rad = std::array::from_fn(|joint| match robot.sensors.get(joint) {
+            // Nothing is known of a joint distal to the camera but its datasheet.
+            Some(spec) if parameters.iter().all(|p| p.joint != joint) => spec.linearity_std_rad,
+            _ => estimate.residual_std_rad(joint),
+        });
+        let matrix = estimate.joint_covariance();
+        let all = ParameterCovariance { parameters, matrix, residual_std_rad: Some(residual_std_rad) };
+        let covariance = all.without(|parameter| parameter.is_past());
+        Diagnosis { robot: estimate.as_found(&setup.applied.robot), views, held_out, innovations, covariance }
+    }
+
+    /// The result's tables, and the verdict by what all methods have.
+    fn report(&mut self, estimated: &Estimated<'_>, diagnosis: &Diagnosis) -> Calibration {
+        let Estimated { setup, estimate, selections, .. } = estimated;
+        for outlier in &estimate.outliers {
+            if outlier.corner.is_none() {
+                self.data.data.reject(ObservationRejection::Outlier, 1);
+            }
+            tracing::debug!("view {}: tag {} rejected, corner {:?}", outlier.view_idx, outlier.tag_id, outlier.corner);
+        }
+        let datasheet = &self.data.robot;
+        let robot = Robot { sensors: with_datasheets(&diagnosis.robot, datasheet, setup), ..diagnosis.robot.clone() };
+        let solution = Solution {
+            parameters: setup.without_failed(&estimate.parameters()),
+            outcome: estimate.outcome(),
+            evaluations: estimate.iterations,
+            cost_initial: estimate.cost_initial,
+            cost_final: estimate.cost_final,
+        };
+        let covariance = setup.without_failed_rows(&diagnosis.covariance);
+        let problem = PositionProblem::new(&robot, &diagnosis.views);
+        let source = self.provenance(&robot);
+        let fit = Fit { problem: &problem, solution: &solution, covariance: &covariance, linearity_scale: 1.0 };
+        let parameters = estimate.parameters();
+        let evidence = Evidence {
+            held_out: diagnosis.held_out.clone(),
+            predicted: self.impact(estimated, diagnosis, &parameters).prediction(),
+            n_parameters: setup.n_wanted(datasheet),
+            has_failed_joint: !estimated.failures.is_empty(),
+        };
+        let mut model = model_table(datasheet, estimate, selections);
+        if let Some((offset_s, decided)) = &self.clock {
+            add_clock(&mut model, *offset_s, decided);
+        }
+        let mut calibration = assemble(&source, &fit, evidence);
+        let n_corners = estimate.outliers.iter().filter(|outlier| outlier.corner.is_some()).count();
+        calibration.fit.rejected_corners = (n_corners > 0).then_some(n_corners);
+        estimate.complete(&mut calibration.details);
+        let kept = &calibration.covariance.parameters;
+        let with_mount = covariance_with_mount(&robot, estimate, kept);
+        Calibration {
+            unobservable: grouped_names(&robot, &unobservable(datasheet, setup, estimate)),
+            camera_mount: Some(camera_mount_table(datasheet, estimate, &diagnosis.views)),
+            further_camera: further_camera_tables(datasheet, estimate, &diagnosis.views),
+            lens: lens_tables(datasheet, estimate),
+            model: Some(model),
+            map: self.map.clone().map(|map| map_table(map, datasheet, estimate)),
+            outliers: estimate.outliers.iter().map(|outlier| named(outlier, &diagnosis.views)).collect(),
+            covariance: with_mount.unwrap_or_else(|| calibration.covariance.clone()),
+            ..calibration
+        }
+    }
+
+    fn provenance<'b>(&'b self, robot: &'b Robot) -> Provenance<'b> {
+        Provenance {
+            messages_hash: &self.data.messages_hash,
+            robot,
+            method: Method::Bundle,
+            data: &self.data.data,
+            prior: self.prior,
+            identified: &self.data.identified,
+        }
+    }
+
+    fn impact<'b>(
+        &'b self,
+        estimated: &'b Estimated<'_>,
+        diagnosis: &'b Diagnosis,
+        parameters: &'b JointParameters,
+    ) -> FailureImpact<'b> {
+        FailureImpact {
+            datasheet: &self.data.robot,
+            robot: &diagnosis.robot,
+            views: &diagnosis.views,
+            failures: estimated.failures,
+            found: &estimated.estimate,
+            parameters,
+            covariance: &diagnosis.covariance,
+            task: self.data.data.task_rests(),
+        }
+    }
+
+    /// Writes failed joints and prior to the result, and refuses it where they ask for it.
+    fn judge_failures_and_prior(
+        &self,
+        estimated: &Estimated<'_>,
+        diagnosis: &Diagnosis,
+        calibration: &mut Calibration,
+    ) {
+        let parameters = estimated.estimate.parameters();
+        let impact = self.impact(estimated, diagnosis, &parameters);
+        calibration.failed_joint = impact.tables();
+        calibration.findings.extend(impact.findings());
+        estimated.setup.forget_failed(calibration, &self.data.robot);
+        let (consistency, mut refusals) = self.prior_consistency(estimated.setup);
+        calibration.prior = self.prior.zip(consistency).map(|(prior, consistency)| {
+            prior_table(prior, estimated.setup.elapsed_h(), &consistency, &self.data.robot)
+        });
+        refusals.extend(impact.refusals());
+        calibration.refuse_first_for(refusals);
+    }
+
+    /// Writes what rests on priors alone to the result, and refuses it where that may be more than the task allows.
+    fn state_reservations(&self, estimated: &Estimated<'_>, diagnosis: &Diagnosis, calibration: &mut Calibration) {
+        let parameters = estimated.estimate.parameters();
+        let touches = estimated.touches.as_ref().map(|touched| &touched.update);
+        let dof = noise_dof(&diagnosis.views, estimated.setup.n_wanted(&self.data.robot));
+        let by_priors =
+            |at: &[JointAngles], median_m: f64| estimated.by_views().prior_impact_with(touches, at, median_m);
+        let Some(by_data) = self.impact(estimated, diagnosis, &parameters).prediction() else {
+            if self.data.data.task.is_some() {
+                // No target is within reach: all are named.
+                return;
+            }
+            // Without a task the views' own configurations stand for it, and there is no limit.
+            let views = estimated.estimate.view_angles();
+            let sensors = parameters.sensors(&diagnosis.robot);
+            let by_data = views.iter().map(|at| diagnosis.covariance.tool_position_m2(&diagnosis.robot, &sensors, at));
+            let by_data: Vec<Matrix3<f64>> = by_data.collect();
+            let errors: Vec<f64> = by_data.iter().map(|m2| m2.trace().max(0.0).sqrt()).collect();
+            let median_m = Summary::of(&errors).map_or(0.0, |summary| summary.median);
+            let by_priors = by_priors(&views, median_m);
+            let both = by_data.into_iter().zip(&by_priors.covariances_m2).enumerate();
+            let errors = both.map(|(index, (by_data_m2, by_priors_m2))| TargetError {
+                index,
+                by_data_m2,
+                by_priors_m2: *by_priors_m2,
+            });
+            calibration.u95 =
+                U95Table::of_configurations(&errors.collect::<Vec<_>>(), dof).without(&by_priors.not_included);
+            calibration.reservations = by_priors.told();
+            return;
+        };
+        let targets: Vec<JointAngles> = by_data.targets.iter().map(|target| target.angles).collect();
+        let by_priors = by_priors(&targets, by_data.error_m.median);
+        let both = by_data.targets.iter().zip(&by_priors.covariances_m2);
+        let errors = both.map(|(at, by_priors_m2)| TargetError {
+            index: at.target_idx,
+            by_data_m2: at.covariance_m2,
+            by_priors_m2: *by_priors_m2,
+        });
+        let errors: Vec<TargetError> = errors.collect();
+        let not_included = by_priors.not_included.clone();
+        calibration.predicted_tool_error_with_priors_m = calibration.details.keep_with_priors(&errors, dof);
+        calibration.reservations = by_priors.told();
+        let Some(task) = &self.data.data.task else { return };
+        let by_data_alone = std::mem::replace(
+            &mut calibration.u95,
+            U95Table::of_task(task.targets_m.len(), task.tolerance_m, (&errors, dof), |index| {
+                let is_kept = !estimated.failures.is_empty() && is_near(&diagnosis.robot, &task.targets_m[index]);
+                if is_kept { Code::SensorFailed } else { Code::TargetOutOfReach }
+            })
+            .without(&not_included),
+        );
+        let most = calibration.reservations.first().map(|reservation| reservation.what.clone());
+        calibration.refuse_for(refusal_by_priors(&by_data_alone, &calibration.u95, most));
+        calibration.restate_risk();
+    }
+
+    /// Whether the views agree with the prior, and what that refuses for.
+    fn prior_consistency(&self, setup: &BundleSetup) -> (Option<PriorConsistency>, Vec<Refusal>) {
+        // The same views by another path, as from several recordings, have another hash and end at the same time.
+        let last = self.data.data.fit.iter().map(|view| view.end.nanos).max();
+        let is_reused = self.prior.is_some_and(|prior| {
+            prior.messages_hash == self.data.messages_hash || Some(prior.valid.time_nanos) == last
+        });
+        let mut refusals: Vec<Refusal> = is_reused.then_some(Refusal::PriorReused).into_iter().collect();
+        let consistency = match setup.prior() {
+            None => None,
+            Some(Err(refusal)) => {
+                refusals.push(refusal.clone());
+                None
+            }
+            Some(Ok(prior)) => {
+                let consistency = prior.consistency(&setup.applied.views);
+                match &consistency {
+                    None => refusals.push(Refusal::PriorUntested),
+                    Some(consistency) => refusals.extend(consistency.refusal(&self.data.robot)),
+                }
+                consistency
+            }
+        };
+        (consistency, refusals)
+    }
+}
+
+/// Moves the centres of tags in the camera's frame to where tags of their present size are; `sizes_m` were before.
+fn rescale(views: &mut [View], sizes_m: &[f64], robot: &Robot) {
+    for seen in views.iter_mut().flat_map(|view| &mut view.tags).filter(|seen| seen.corners().is_some()) {
+        seen.center_in_camera_m *= robot.tags[seen.tag_idx].size_m / sizes_m[seen.tag_idx];
+    }
+}
+
+/// The sensors as estimated, those of joints without one as their datasheets say.
+fn with_datasheets(estimated: &Robot, datasheet: &Robot, setup: &BundleSetup) -> Vec<JointSensorSpec> {
+    let pairs = estimated.sensors.iter().zip(&datasheet.sensors).enumerate();
+    pairs.map(|(joint, (own, nominal))| if setup.has_no_sensor(joint) { nominal } else { own }.clone()).collect()
+}
+
+/// `view 12: tag 3: 45 sigma`, or `view 12: tag 3, corner 0: 45 sigma`; views count from 1.
+fn named(outlier: &Outlier, views: &[View]) -> String {
+    let number = views.get(outlier.view_idx).map_or(0, |view| view.pose_idx) + 1;
+    let corner = outlier.corner.map_or(String::new(), |corner| format!(", corner {corner}"));
+    format!("view {number}: tag {}{corner}: {:.0} sigma", outlier.tag_id, outlier.sigmas)
+}
+
+/// Gains and offsets that keep the datasheet's value: of joints distal to the camera, and of failed ones.
+fn unobservable(robot: &Robot, setup: &BundleSetup, estimate: &Estimate<'_>) -> Vec<Unobservable> {
+    let all = (0..robot.n_joints())
+        .flat_map(|joint| [ParameterKind::Gain, ParameterKind::Offset].map(|kind| Parameter { joint, kind }));
+    let missing = all.filter(|p| {
+        p.prior_std(robot) > 0.0 && !estimate.joint_parameters().contains(p) && !setup.has_no_sensor(p.joint)
+    });
+    missing.map(Unobservable::distal).chain(setup.unobservable()).collect()
+}
+
+/// Observations that the held-out figures leave out: those that were rejected, where they are no more than good
+/// recordings have. Where they are more, it may be the arm that is wrong, and not they.
+fn left_out<'b>(all: &'b Estimate<'_>) -> &'b [Outlier] {
+    let share = all.outliers.len() as f64 / all.problem.observations.len().max(1) as f64;
+    if share <= MAX_OUTLIERS { &all.outliers } else { &[] }
+}
+
+/// A view without the observations that were rejected as a whole; `None` if it shows no other.
+fn without_rejected(view_idx: usize, mut view: View, outliers: &[Outlier]) -> Option<View> {
+    let is_rejected =
+        |id: u32| outliers.iter().any(|out| out.view_idx == view_idx && out.tag_id == id && out.corner.is_none());
+    view.tags.retain(|tag| !is_rejected(tag.id));
+    (!view.tags.is_empty()).then_some(view)
+}
+
+/// Held-out views by what was estimated from the other folds, with the hyperparameters of all; and by mount and map
+/// alone about `datasheet`. Observations that the fit of all views rejected are in neither: what a tag of another id
+/// is off by says nothing of the arm.
+fn cross_validated(
+    input: &BundleInput<'_>,
+    all: &Estimate<'_>,
+    datasheet: &Robot,
+) -> (HeldOutMetrics, Vec<Innovations>) {
+    let mut sums = FoldSums::default();
+    let baseline = Baseline::new(datasheet, input.views);
+    let mut innovations = Vec::new();
+    for fold in 0..FOLDS {
+        let (fitted, held_out) = fold_of(input.views, fold);
+        let part = BundleInput {
+            views: &fitted,
+            model: all.model.clone(),
+            scales: all.scales().clone(),
+            evidence: HyperparameterMode::Given,
+            ..input.clone()
+        };
+        let Some(found) = estimate(&part) else { continue };
+        let as_found = found.as_found(input.robot);
+        let places = held_out.into_iter().enumerate().map(|(n, view)| (n * FOLDS + fold, view));
+        let mut with_places: Vec<(usize, View)> = places
+            .filter_map(|(view_idx, view)| Some((view_idx, without_rejected(view_idx, view, left_out(all))?)))
+            .collect();
+        // Where no sensor tells an angle, the view's own tags tell where to linearize, with nothing of other folds.
+        for (_, view) in &mut with_places {
+            all.see_through_found_lens(view, &as_found);
+            set_by_camera(&as_found, view, &found.parameters());
+        }
+        let held_out: Vec<View> = with_places.iter().map(|(_, view)| view.clone()).collect();
+        innovations.extend(found.innovations(&part, &with_places, &all.outliers));
+        sums.add(&Fold {
+            views: &found.as_read_now(&held_out),
+            as_found: &as_found,
+            at: &found.parameters(),
+            nominal: datasheet,
+            baselines: &baseline.as_ref().map(|baseline| baseline.fit(datasheet, &fitted)).unwrap_or_default(),
+        });
+    }
+    let mut within = ViewContainment::default();
+    for fold in &innovations {
+        within.views += fold.within_95.views;
+        within.within += fold.within_95.within;
+    }
+    let within_95 = (within.views > 0).then_some(within);
+    (HeldOutMetrics { within_95, ..sums.metrics() }, innovations)
+}

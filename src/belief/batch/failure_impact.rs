@@ -1,0 +1,256 @@
+//! What failed joints cost at the tool, and whether the task can do with them.
+
+use crate::explain::failure_detection::is_suspicious;
+use crate::explain::failures::{Failure, FailureSource, slip_in_words};
+use crate::file::failed_joint::FailedJointTable;
+use crate::model::parameters::JointParameters;
+use crate::say::finding::{Finding, FindingKind, FindingUnit};
+use crate::say::refusal::Refusal;
+use crate::solve::covariance::{ParameterCovariance, ToolErrorPrediction, predict_tool_error};
+use crate::solve::estimate::Estimate;
+use crate::views::view::{TaskRests, View};
+use armcal_core::kinematics::JointKind;
+use armcal_core::robot::{FailedJoint, FailedKind, Robot};
+use armcal_core::stats::Summary;
+
+/// Fewer views do not tell where a sensor stands since it slipped from views in which it jumped.
+const MIN_VIEWS_SINCE: usize = 3;
+
+/// An estimate with failed joints, on the way to the tool.
+pub(crate) struct FailureImpact<'a> {
+    pub datasheet: &'a Robot,
+    /// As the estimate has it, camera and tags where they were found.
+    pub robot: &'a Robot,
+    pub views: &'a [View],
+    pub failures: &'a [Failure],
+    pub found: &'a Estimate<'a>,
+    pub parameters: &'a JointParameters,
+    /// With the locked joints' rows.
+    pub covariance: &'a ParameterCovariance,
+    pub task: Option<TaskRests<'a>>,
+}
+
+/// How a failed joint's angle is known.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum AngleSource {
+    AsItIs,
+    ByCamera,
+    ByDatasheet,
+}
+
+impl FailureImpact<'_> {
+    /// The tool error that is to be expected as things are.
+    pub(crate) fn tool_error_m(&self) -> Option<Summary> {
+        self.prediction().map(|predicted| predicted.error_m)
+    }
+
+    /// The same at each target.
+    pub(crate) fn prediction(&self) -> Option<ToolErrorPrediction> {
+        self.prediction_where(usize::MAX, AngleSource::AsItIs)
+    }
+
+    /// Of those that have a place in the result: reversed sensors and other scales are findings alone.
+    pub(crate) fn tables(&self) -> Vec<FailedJointTable> {
+        let tabled = self.failures.iter().filter(|failure| failure.line.is_none());
+        tabled.map(|failure| self.table(failure)).collect()
+    }
+
+    fn table(&self, failure: &Failure) -> FailedJointTable {
+        let joint = failure.joint;
+        let pose = |&view_idx: &usize| self.views[view_idx].pose_idx;
+        let is_locked = failure.kind.stands_still();
+        let has_no_sensor = failure.leaves_no_sensor();
+        let angle = self.locked_angle(failure);
+        FailedJointTable {
+            joint: self.robot.sensors[joint].joint.clone(),
+            kind: failure.kind,
+            found: match failure.found {
+                FailureSource::Declared => "declared",
+                FailureSource::Detected => "detected",
+            }
+            .to_owned(),
+            evidence: self.evidence(failure),
+            poses: failure.views.iter().map(pose).collect(),
+            since_pose: failure.since.as_ref().map(pose),
+            angle_rad: angle.map(|(angle_rad, _)| angle_rad),
+            angle_std_rad: angle.map(|(_, std_rad)| std_rad),
+            camera_std_rad: self.camera_std_rad(failure),
+            tool_error_m: self.tool_error_m(),
+            tool_error_by_camera_m: (has_no_sensor && !is_locked)
+                .then(|| self.tool_error_where(joint, AngleSource::ByCamera))
+                .flatten(),
+            tool_error_by_datasheet_m: has_no_sensor
+                .then(|| self.tool_error_where(joint, AngleSource::ByDatasheet))
+                .flatten(),
+        }
+    }
+
+    /// What shows it; a slip with its size as estimated in the end, with all else.
+    fn evidence(&self, failure: &Failure) -> String {
+        let step =
+            failure.since.and_then(|since| Some((since, self.found.step(failure.joint, self.views[since].end)?)));
+        let unit = self.robot.sensors[failure.joint].unit();
+        match step {
+            Some((since, (step_rad, _))) => slip_in_words(unit.shown(step_rad, 2), self.views, since),
+            None => failure.evidence.clone(),
+        }
+    }
+
+    /// Where a locked joint stands and one sigma, rad: the mean over the views, which all show one angle.
+    fn locked_angle(&self, failure: &Failure) -> Option<(f64, f64)> {
+        if !failure.kind.stands_still() {
+            return None;
+        }
+        let joint = failure.joint;
+        let seen: Vec<usize> = (0..self.views.len()).filter(|&k| self.found.uses(k)).collect();
+        let n = seen.len().max(1) as f64;
+        let angle_rad = seen.iter().map(|&k| self.found.angle(k, joint).0).sum::<f64>() / n;
+        let std_rad = self.found.mean_angle_std_rad(joint);
+        Some((angle_rad, std_rad))
+    }
+
+    /// Root mean square over the views in which the camera alone told the angle.
+    fn camera_std_rad(&self, failure: &Failure) -> Option<f64> {
+        let freed: Vec<f64> = failure
+            .views
+            .iter()
+            .filter(|&&k| !failure.kind.stands_still() && self.found.uses(k))
+            .map(|&k| self.found.angle(k, failure.joint).1.powi(2))
+            .collect();
+        (!freed.is_empty()).then(|| (freed.iter().sum::<f64>() / freed.len() as f64).sqrt())
+    }
+
+    /// With the angle of `joint` known in that way, those of the other failed joints as they are.
+    fn tool_error_where(&self, joint: usize, known: AngleSource) -> Option<Summary> {
+        self.prediction_where(joint, known).map(|predicted| predicted.error_m)
+    }
+
+    fn prediction_where(&self, joint: usize, known: AngleSource) -> Option<ToolErrorPrediction> {
+        let mut robot = self.robot.clone();
+        let mut covariance = self.covariance.clone();
+        let mut residual_std_rad = covariance.residual_std_rad?;
+        for failure in self.failures {
+            let j = failure.joint;
+            let known = if j == joint { known } else { AngleSource::AsItIs };
+            let spec = &mut robot.sensors[j];
+            match known {
+                AngleSource::AsItIs if failure.kind.stands_still() => {
+                    let declared = FailedJoint { joint: j, kind: FailedKind::Locked };
+                    if let Some((angle_rad, _)) = self.locked_angle(failure) {
+                        robot.stowed[j] = angle_rad;
+                    }
+                    robot = robot.with_failed(&[declared]);
+                }
+                AngleSource::AsItIs if failure.leaves_no_sensor() => {
+                    // Uniform over the range.
+                    (spec.offset_std_rad, spec.gain_std) = (0.0, 0.0);
+                    residual_std_rad[j] = spec.half_range_rad / 3.0_f64.sqrt();
+                }
+                AngleSource::AsItIs => {}
+                AngleSource::ByCamera => {
+                    (spec.offset_std_rad, spec.gain_std) = (0.0, 0.0);
+                    residual_std_rad[j] = self.camera_std_rad(failure)?;
+                }
+                AngleSource::ByDatasheet => {
+                    *spec = self.datasheet.sensors[j].clone();
+                    residual_std_rad[j] = spec.linearity_std_rad;
+                    covariance = covariance.without_joint(j);
+                    robot.failed.retain(|declared| declared.joint != j);
+                }
+            }
+        }
+        covariance.residual_std_rad = Some(residual_std_rad);
+        predict_tool_error(&robot, self.parameters, &covariance, self.task)
+    }
+
+    /// Each failed joint as a finding: the estimate takes account of it.
+    pub(crate) fn findings(&self) -> Vec<Finding> {
+        self.failures.iter().map(|failure| self.finding(failure)).collect()
+    }
+
+    fn finding(&self, failure: &Failure) -> Finding {
+        let joint = failure.joint;
+        let step = failure.since.and_then(|since| self.found.step(joint, self.views[since].end));
+        let (kind, size, unit) = match (failure.line, step) {
+            (Some(line), _) if failure.leaves_no_sensor() => {
+                (FindingKind::SensorReversed, Some(line.slope), Some(FindingUnit::One))
+            }
+            (Some(_), _) => (FindingKind::SensorScale, Some(self.parameters.gain[joint]), Some(FindingUnit::One)),
+            (None, Some((size_rad, _))) => {
+                let unit = FindingUnit::of_joint(self.robot.sensors[joint].moves);
+                (FindingKind::SensorSlip, Some(size_rad), Some(unit))
+            }
+            (None, None) => (FindingKind::SensorFailed, None, None),
+        };
+        let is_repaired = failure.line.is_none() || self.is_calibrated_anew(failure);
+        Finding {
+            kind,
+            name: self.robot.sensors[joint].joint.clone(),
+            size,
+            unit,
+            tool_error_m: None,
+            time_s: failure.since.and_then(|view_idx| self.since_first_view_s(view_idx)),
+            repaired: is_repaired,
+        }
+    }
+
+    /// Whether a sensor of another scale is estimated with the rest, and the rest fits.
+    fn is_calibrated_anew(&self, failure: &Failure) -> bool {
+        !failure.leaves_no_sensor() && !is_suspicious(self.found)
+    }
+
+    fn since_first_view_s(&self, view_idx: usize) -> Option<f64> {
+        let first = self.views.iter().map(|view| view.end).min()?;
+        Some(self.views[view_idx].end.since_s(first))
+    }
+
+    /// Why the calibration cannot be used for its task, or at all.
+    pub(crate) fn refusals(&self) -> Vec<Refusal> {
+        self.failures.iter().filter_map(|failure| self.refusal(failure)).collect()
+    }
+
+    fn refusal(&self, failure: &Failure) -> Option<Refusal> {
+        let joint = self.robot.sensors[failure.joint].joint.clone();
+        if let Some(line) = failure.line.filter(|_| !self.is_calibrated_anew(failure)) {
+            return Some(Refusal::SensorLine { joint, slope: line.slope });
+        }
+        let gain = self.parameters.gain[failure.joint];
+        if failure.line.is_some() && is_of_another_unit(self.robot.sensors[failure.joint].moves, gain) {
+            return Some(Refusal::SensorUnit { joint, gain, moves: self.robot.sensors[failure.joint].moves });
+        }
+        if failure.line.is_some() {
+            return Some(Refusal::SensorLine { joint, slope: gain });
+        }
+        if let Some(views) = failure.n_views_since(self.views)
+            && views < MIN_VIEWS_SINCE
+        {
+            return Some(Refusal::TooFewViewsSinceSlip { joint, evidence: self.evidence(failure), views });
+        }
+        let is_needed = failure.joint < self.robot.tool.mount.n_joints;
+        if !failure.leaves_no_sensor() || failure.kind.stands_still() || !is_needed {
+            return None;
+        }
+        let tolerance_m = self.task.map(|task| task.task.tolerance_m);
+        // Without a task every joint is needed, but for those that the user declares.
+        if tolerance_m.is_none() && failure.found == FailureSource::Declared {
+            return None;
+        }
+        let table = self.table(failure);
+        Some(Refusal::SensorFailed {
+            joint,
+            kind: failure.kind,
+            tool_error_m: table.tool_error_m.map(|s| s.p95),
+            tool_error_by_camera_m: table.tool_error_by_camera_m.map(|s| s.p95),
+            tolerance_m,
+        })
+    }
+}
+
+/// A gain this close to a ratio of units is that ratio: no sensor of these units differs by so much.
+const UNIT_SHARE: f64 = 0.15;
+
+/// Returns true where the gain is the ratio of degrees and radians, or of millimetres and metres.
+fn is_of_another_unit(moves: JointKind, gain: f64) -> bool {
+    let ratio = if moves.is_slide() { 1e-3 } else { 1f64.to_radians() };
+    [ratio, ratio.recip()].iter().any(|unit| (gain / unit - 1.0).abs() < UNIT_SHARE)
+}

@@ -1,0 +1,87 @@
+//! Arms with other cameras: a pinhole with distortion, a lens behind a flat port.
+
+use crate::batch::tests::corner_outliers::tool_error;
+use crate::batch::tests::data::titan;
+use crate::batch::tests::statistics::{case, input};
+use crate::solve::estimate::estimate;
+use crate::solve::input::HyperparameterMode;
+use armcal_core::numeric::Outcome;
+use armcal_core::optics::{CameraModel, Fisheye, FlatPort, LensModel, Radtan};
+use armcal_core::robot::Robot;
+use armcal_core::stats::quantile;
+
+const N_VIEWS: usize = 25;
+const SEEDS: std::ops::Range<u64> = 4000..4016;
+const PORT: FlatPort = FlatPort { distance_m: 0.02, thickness_m: 0.01, glass_index: 1.49, water_index: 1.333 };
+
+fn with_camera(lens: CameraModel) -> Robot {
+    let mut robot = titan();
+    robot.camera.lens = lens;
+    robot
+}
+
+fn pinhole() -> CameraModel {
+    Radtan::new([500.0, 501.0], [610.0, 515.0], [-0.12, 0.03, 5e-4, -3e-4, 0.0], [1224, 1024]).into()
+}
+
+/// The wrist camera's lens in air, behind a window.
+fn ported() -> CameraModel {
+    let lens = titan().camera.lens;
+    let [fx, fy, cx, cy, k1, k2, k3, k4] = lens.intrinsics();
+    CameraModel { port: Some(PORT), ..lens.with_intrinsics([fx / 1.333, fy / 1.333, cx, cy, k1, k2, k3, k4]) }
+}
+
+/// Median tool error over the seeds, m, and mean NEES, where the views are through `real` and the estimate has `known`.
+fn errors(real: CameraModel, known: CameraModel) -> [f64; 2] {
+    let (robot, believed) = (with_camera(real), with_camera(known));
+    let of_seed = |seed| {
+        let mut case = case(&robot, seed, N_VIEWS);
+        case.robot = &believed;
+        let found = estimate(&input(&case, &case.views, HyperparameterMode::Fitted)).expect("solved");
+        let [square_m2, nees] = tool_error(&case, &found, seed);
+        [square_m2.sqrt(), nees]
+    };
+    let all: Vec<[f64; 2]> = SEEDS.map(of_seed).collect();
+    let median_m = quantile(&all.iter().map(|of| of[0]).collect::<Vec<f64>>(), 0.5).expect("seeds");
+    [median_m, all.iter().map(|of| of[1]).sum::<f64>() / all.len() as f64]
+}
+
+#[test]
+fn a_pinhole_with_distortion_serves_an_arm() {
+    let [median_m, nees] = errors(pinhole(), pinhole());
+    println!("pinhole with distortion: tool error {:.2} mm median, NEES {nees:.2}", 1e3 * median_m);
+    assert!(median_m < 2e-3 && (1.8..4.5).contains(&nees), "{median_m} {nees}");
+}
+
+/// A lens measured in water takes the window's effect for its focal length, which is right near the axis alone.
+#[test]
+fn a_flat_port_is_no_bias_where_it_is_in_the_model() {
+    let without = titan().camera.lens;
+    let [with_m, nees] = errors(ported(), ported());
+    let [without_m, biased] = errors(ported(), without);
+    println!(
+        "behind a flat port: tool error {:.2} mm median, NEES {nees:.2}; without it in the model {:.2} mm, {biased:.2}",
+        1e3 * with_m,
+        1e3 * without_m
+    );
+    assert!(with_m < 2e-3 && (1.8..4.5).contains(&nees), "{with_m} {nees}");
+    assert!(without_m > 3.0 * with_m, "{without_m} {with_m}");
+}
+
+/// The farthest corner of all views lies a little beyond the edge of the field of view as robot.toml has it.
+#[test]
+fn a_corner_at_the_edge_of_the_field_of_view_is_no_wall() {
+    for seed in 4000..4010 {
+        let robot = titan();
+        let mut case = case(&robot, seed, N_VIEWS);
+        let corners = case.views.iter().flat_map(|view| &view.tags).filter_map(|tag| tag.corners());
+        let angles = corners.flat_map(|seen| seen.corners_px).filter_map(|px| robot.camera.lens.unproject(&px.into()));
+        let farthest_rad = angles.map(|bearing| bearing.z.acos()).fold(0.0, f64::max);
+        let LensModel::Equidistant(lens) = robot.camera.lens.lens else { panic!("a fisheye") };
+        let narrow = with_camera(Fisheye { max_view_angle_rad: farthest_rad - 1e-3, ..lens }.into());
+        case.robot = &narrow;
+        let found = estimate(&input(&case, &case.views, HyperparameterMode::Fitted)).expect("solved");
+        assert!(found.outliers.is_empty(), "seed {seed}: {:?}", found.outliers);
+        assert_eq!(found.solved.outcome, Outcome::Converged, "seed {seed}");
+    }
+}

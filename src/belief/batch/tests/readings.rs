@@ -1,0 +1,178 @@
+//! Joint readings that mean something else than robot.toml says: named, with the joints concerned.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use nalgebra::{Quaternion, UnitQuaternion};
+
+use crate::batch::tests::failures::{Case, case};
+use crate::say::reading_error::ReadingError;
+use crate::say::refusal::Refusal;
+use crate::say::wrong_input::{WrongInput, WrongInputKind};
+use armcal_core::robot::Robot;
+use armcal_core::streams::JointAngles;
+
+/// Changes what robot.toml reads as angles, view by view.
+fn changed(case: &mut Case, change: impl Fn(&Robot, &JointAngles, &mut JointAngles)) {
+    for view in &mut case.views {
+        let center = |joint: usize| case.robot.sensors[joint].center_rad;
+        let angles = JointAngles::from_fn(view.travel_rad.len(), |joint| center(joint) + view.travel_rad[joint]);
+        let mut read = angles;
+        change(&case.robot, &angles, &mut read);
+        view.travel_rad = JointAngles::from_fn(view.travel_rad.len(), |joint| read[joint] - center(joint));
+    }
+}
+
+/// Angle that joint `a` reads where its input gets the counts of joint `b`.
+fn counts_as(robot: &Robot, a: usize, b: usize, angle_rad: f64) -> f64 {
+    let (own, other) = (&robot.sensors[a], &robot.sensors[b]);
+    (other.offset_counts + other.counts_per_rad * angle_rad - own.offset_counts) / own.counts_per_rad
+}
+
+fn found(case: Case) -> ReadingError {
+    let name = |refusal: Option<&Refusal>| format!("{refusal:?}");
+    let calibration = case.calibrated();
+    match calibration.refusals.first() {
+        Some(Refusal::MisreadReadings(misread)) => misread.found.clone(),
+        other => panic!("{}", name(other)),
+    }
+}
+
+#[test]
+fn exchanged_readings_are_named() {
+    for (seed, [a, b]) in [(0, [0, 1]), (1, [1, 3]), (2, [3, 4]), (3, [0, 4])] {
+        let mut case = case(seed, None);
+        changed(&mut case, |robot, angles, read| {
+            (read[a], read[b]) = (counts_as(robot, a, b, angles[b]), counts_as(robot, b, a, angles[a]));
+        });
+        let names = [a, b].map(|joint| case.robot.sensors[joint].joint.clone());
+        assert_eq!(found(case), ReadingError::Exchanged { joints: names }, "seed {seed}");
+    }
+}
+
+#[test]
+fn a_reading_that_contains_the_angle_of_a_neighbour_is_named() {
+    for (seed, [of, with], of_sign) in [(4, [2, 1], 1.0), (5, [1, 2], -1.0), (6, [4, 3], 1.0)] {
+        let mut case = case(seed, None);
+        changed(&mut case, |_, angles, read| read[of] += of_sign * angles[with]);
+        match found(case) {
+            ReadingError::Coupled { joint, with: other, sign } => {
+                let names = crate::batch::tests::data::titan().joint_names();
+                assert_eq!((joint, other, sign), (names[of].clone(), names[with].clone(), of_sign), "seed {seed}");
+            }
+            other => panic!("seed {seed}: {other:?}"),
+        }
+    }
+}
+
+#[test]
+fn zeros_by_another_convention_are_named_with_their_size() {
+    for (seed, joint, by_rad) in [(7, 1, FRAC_PI_2), (8, 3, -FRAC_PI_2), (9, 2, 0.6), (10, 0, PI)] {
+        let mut case = case(seed, None);
+        changed(&mut case, |_, _, read| read[joint] += by_rad);
+        let name = case.robot.sensors[joint].joint.clone();
+        let ReadingError::Zeros { joints } = found(case) else { panic!("seed {seed}: no zeros") };
+        let [zero] = &joints[..] else { panic!("seed {seed}: {joints:?}") };
+        let off_rad = armcal_core::sensor::wrap_symmetric(zero.off_rad + by_rad, 2.0 * PI);
+        // The sensor's own offset is part of it.
+        assert!(zero.joint == name && off_rad.abs() < 0.15, "seed {seed}: {zero:?}");
+    }
+}
+
+/// So far off that nothing fits, and the sensor's line is not found.
+#[test]
+fn a_scale_that_is_far_off_is_named_with_its_size() {
+    for (seed, joint, scale) in [(23, 1, 0.01), (24, 3, 0.004), (25, 2, 0.02), (26, 0, 70.0)] {
+        let mut case = case(seed, None);
+        changed(&mut case, |_, angles, read| read[joint] = scale * angles[joint]);
+        let name = case.robot.sensors[joint].joint.clone();
+        let calibration = case.calibrated();
+        let (of, factor) = match calibration.refusals.first() {
+            Some(Refusal::MisreadReadings(misread)) => match &misread.found {
+                ReadingError::Scaled { joint, factor } => (joint.clone(), *factor),
+                other => panic!("seed {seed}: {other:?}"),
+            },
+            Some(Refusal::SensorLine { joint, slope }) => (joint.clone(), *slope),
+            Some(Refusal::SensorUnit { joint, gain, .. }) => (joint.clone(), *gain),
+            other => panic!("seed {seed}: {other:?}"),
+        };
+        assert!(of == name && (factor * scale - 1.0).abs() < 0.2, "seed {seed}: {of} {factor}");
+    }
+}
+
+#[test]
+fn readings_of_the_next_or_the_previous_view_are_named() {
+    for (seed, by) in [(27, 1), (28, -1), (29, 1)] {
+        let mut case = case(seed, None);
+        let read: Vec<JointAngles> = case.views.iter().map(|view| view.travel_rad).collect();
+        let n = read.len() as isize;
+        for (k, view) in case.views.iter_mut().enumerate() {
+            // Put right, the readings are those of the view `by` later.
+            view.travel_rad = read[(k as isize - by).rem_euclid(n) as usize];
+        }
+        assert_eq!(found(case), ReadingError::Shifted { views: by as i32 }, "seed {seed}");
+    }
+}
+
+/// A link before or after the stated one, and the axes of a body's frame instead of an optical one.
+#[test]
+fn a_camera_on_another_link_or_with_other_axes_is_named() {
+    let optical = UnitQuaternion::new_normalize(Quaternion::new(0.5, -0.5, 0.5, -0.5));
+    for (seed, less, turn) in [(30, 1, UnitQuaternion::identity()), (31, 0, optical), (32, 2, optical)] {
+        let mut case = case(seed, None);
+        let mount = &mut case.robot.camera.mount;
+        let (carrier, stated) = (mount.n_joints, mount.link_from_frame.rotation);
+        mount.n_joints -= less;
+        mount.link_from_frame.rotation = stated * turn.inverse();
+        let link = case.robot.chain.joints()[carrier - 1].child_link.clone();
+        let ReadingError::Camera { link: on, turn: by } = found(case) else { panic!("seed {seed}: no camera") };
+        let by = UnitQuaternion::new_normalize(Quaternion::new(by[0], by[1], by[2], by[3]));
+        assert!(on == (less > 0).then_some(link) && by.angle_to(&turn) < 1e-6, "seed {seed}: {on:?} {by}");
+    }
+}
+
+#[test]
+fn readings_of_0_to_360_deg_are_named() {
+    for (seed, joint) in [(18, 0), (19, 3)] {
+        let mut case = case(seed, None);
+        changed(&mut case, |_, _, read| read[joint] = read[joint].rem_euclid(2.0 * PI));
+        match found(case) {
+            ReadingError::OtherTurns { joints, .. } => assert_eq!(joints.len(), 1, "seed {seed}: {joints:?}"),
+            other => panic!("seed {seed}: {other:?}"),
+        }
+    }
+}
+
+/// A lens measured in air and used in water, one used in air that was measured in water, and another lens.
+#[test]
+fn a_lens_of_another_focal_length_is_named() {
+    for (seed, ratio) in [(20, 1.333), (21, 0.75), (22, 1.1)] {
+        let mut case = case(seed, None);
+        let [fx, fy, rest @ ..] = case.robot.camera.lens.intrinsics();
+        let [cx, cy, k1, k2, k3, k4] = rest;
+        let stated = [fx / ratio, fy / ratio, cx, cy, k1, k2, k3, k4];
+        case.robot.camera.lens = case.robot.camera.lens.with_intrinsics(stated);
+        let calibration = case.calibrated();
+        let found = match calibration.refusals.first() {
+            Some(Refusal::Lens { ratio, .. }) => *ratio,
+            Some(Refusal::WrongInput(WrongInput { input: WrongInputKind::FocalLength(ratio), .. })) => *ratio,
+            other => panic!("seed {seed}: {other:?}"),
+        };
+        assert!((found / ratio - 1.0).abs() < 0.03, "seed {seed}: {found}");
+    }
+}
+
+/// Arms that are read as they should be, with faults that have other names.
+#[test]
+fn other_faults_are_not_called_misread() {
+    for seed in 11..17 {
+        let mut case = case(seed, None);
+        if seed % 2 == 0 {
+            let joint = (seed % 5) as usize;
+            let first_rad = case.views[0].travel_rad[joint];
+            case.views.iter_mut().for_each(|view| view.travel_rad[joint] = first_rad);
+        }
+        let calibration = case.calibrated();
+        let misread = calibration.refusals.iter().find(|refusal| matches!(refusal, Refusal::MisreadReadings(_)));
+        assert_eq!(misread, None, "seed {seed}");
+    }
+}

@@ -1,0 +1,208 @@
+//! k-fold cross-validation (Stone 1974), by views: all tags of one view share errors.
+
+use crate::explain::angles_by_camera::set_by_camera;
+use crate::explain::baseline::N_BASELINES;
+use crate::file::metrics::HeldOutMetrics;
+use crate::judge::baseline_comparison::BaselineComparison;
+use crate::model::parameters::JointParameters;
+use crate::positions::position_problem::{PositionProblem, TagResidual};
+use crate::views::view::View;
+use armcal_core::robot::Robot;
+
+/// Every fifth view in the order of time is one fold.
+pub(crate) const FOLDS: usize = 5;
+
+/// The views that a fold fits, and those that it holds out.
+pub(crate) fn fold_of(views: &[View], fold: usize) -> (Vec<View>, Vec<View>) {
+    let of = |wanted: bool| -> Vec<View> {
+        let views = views.iter().enumerate();
+        views.filter(|(k, _)| (k % FOLDS == fold) == wanted).map(|(_, view)| view.clone()).collect()
+    };
+    (of(false), of(true))
+}
+
+/// Each view by the parameters that `fit` and the arms that `baselines` estimate from the views of the other folds; a
+/// fold without an estimate does not count.
+pub(crate) fn cross_validate(
+    robot: &Robot,
+    views: &[View],
+    fit: impl Fn(&[View]) -> Option<JointParameters>,
+    baselines: impl Fn(&[View]) -> [Option<Robot>; N_BASELINES],
+) -> HeldOutMetrics {
+    let mut sums = FoldSums::default();
+    for fold in 0..FOLDS {
+        let (fitted, views) = fold_of(views, fold);
+        if fitted.is_empty() || views.is_empty() {
+            continue;
+        }
+        if let Some(at) = fit(&fitted) {
+            let baselines = &baselines(&fitted);
+            sums.add(&Fold { views: &views, as_found: robot, at: &at, nominal: robot, baselines });
+        }
+    }
+    sums.metrics()
+}
+
+/// The held-out views of a fold, and what was found without them.
+pub(crate) struct Fold<'a> {
+    pub views: &'a [View],
+    /// The arm as found, and its parameters.
+    pub as_found: &'a Robot,
+    pub at: &'a JointParameters,
+    /// The drawing.
+    pub nominal: &'a Robot,
+    /// With the joints at the datasheet.
+    pub baselines: &'a [Option<Robot>; N_BASELINES],
+}
+
+/// Sums over the folds.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct FoldSums {
+    n_views: usize,
+    /// Landmarks seen, and squares and sizes of their distances.
+    n: usize,
+    sum_m2: f64,
+    sum_m: f64,
+    nominal_m2: f64,
+    baselines: [BaselineSums; N_BASELINES],
+    /// Of those, the ones with corners.
+    n_corners: usize,
+    sum_px2: f64,
+    /// And the ones with poses.
+    n_poses: usize,
+    camera_sum_m: f64,
+}
+
+/// Sums over the folds of one baseline.
+#[derive(Clone, Debug, Default)]
+struct BaselineSums {
+    /// Landmarks seen, and squares of their distances.
+    n: usize,
+    sum_m2: f64,
+    /// Mean logarithm of each view's distances over the calibration's.
+    log_ratios: Vec<f64>,
+}
+
+impl BaselineSums {
+    fn add(&mut self, by_calibration: &ViewDistances, by_baseline: &ViewDistances) {
+        self.n += by_baseline.n.iter().sum::<usize>();
+        self.sum_m2 += by_baseline.sum_m2;
+        self.log_ratios.extend(by_calibration.log_ratios(by_baseline));
+    }
+
+    fn mean_m2(&self) -> f64 {
+        self.sum_m2 / self.n as f64
+    }
+}
+
+/// Compares the calibration with the baseline of the smallest error among those that predict the most landmarks.
+fn best_comparison(all: &[BaselineSums]) -> Option<BaselineComparison> {
+    let n = all.iter().map(|sums| sums.n).max().filter(|n| *n > 0)?;
+    let complete = all.iter().filter(|sums| sums.n == n);
+    let best = complete.min_by(|a, b| a.mean_m2().total_cmp(&b.mean_m2()))?;
+    BaselineComparison::new(best.mean_m2().sqrt(), &best.log_ratios)
+}
+
+/// The views with the angles that their tags show where a sensor says nothing.
+fn by_camera(views: &[View], robot: &Robot, at: &JointParameters) -> Vec<View> {
+    let mut views = views.to_vec();
+    for view in &mut views {
+        set_by_camera(robot, view, at);
+    }
+    views
+}
+
+impl FoldSums {
+    pub fn add(&mut self, fold: &Fold<'_>) {
+        let Fold { views, as_found, at, nominal, baselines } = *fold;
+        let datasheet = JointParameters::default();
+        let (by_found, by_drawing) = (by_camera(views, as_found, at), by_camera(views, nominal, &datasheet));
+        let problem = PositionProblem::new(as_found, &by_found);
+        let mut distances = ViewDistances::new(views.len());
+        problem.each(at, |o| {
+            distances.add(o);
+            self.n += 1;
+            self.sum_m2 += o.residual_m.norm_squared();
+            self.sum_m += o.residual_m.norm();
+            self.n_corners += usize::from(o.tag.is_in_pixels());
+            if let Some(off_m) = problem.camera_off_m(o) {
+                self.n_poses += 1;
+                self.camera_sum_m += off_m;
+            }
+        });
+        let seen = views.iter().flat_map(|view| &view.tags).filter(|tag| tag.is_in_pixels()).count() as f64;
+        self.sum_px2 += problem.reprojection_rms_px(at).map_or(0.0, |rms_px| rms_px * rms_px * seen);
+        PositionProblem::new(nominal, &by_drawing).each(&datasheet, |o| self.nominal_m2 += o.residual_m.norm_squared());
+        self.n_views += views.iter().filter(|view| !view.tags.is_empty()).count();
+        for (sums, baseline) in self.baselines.iter_mut().zip(baselines) {
+            let Some(baseline) = baseline else { continue };
+            let by_baseline = by_camera(views, baseline, &datasheet);
+            let mut of_baseline = ViewDistances::new(views.len());
+            PositionProblem::new(baseline, &by_baseline).each(&datasheet, |o| of_baseline.add(o));
+            sums.add(&distances, &of_baseline);
+        }
+    }
+
+    pub fn metrics(&self) -> HeldOutMetrics {
+        let mean = |sum: f64, n: usize| (n > 0).then(|| sum / n as f64);
+        HeldOutMetrics {
+            views: self.n_views,
+            cross_validated: true,
+            rms_m: mean(self.sum_m2, self.n).map(f64::sqrt),
+            mean_m: mean(self.sum_m, self.n),
+            camera_mean_m: mean(self.camera_sum_m, self.n_poses),
+            rms_px: mean(self.sum_px2, self.n_corners).map(f64::sqrt),
+            nominal_rms_m: mean(self.nominal_m2, self.n).map(f64::sqrt),
+            baseline: best_comparison(&self.baselines),
+            within_95: None,
+        }
+    }
+}
+
+/// Compares a calibration on `problem`'s views, which were not fitted, with the best of `baselines`; `None` below two
+/// views.
+pub(crate) fn compared(
+    problem: &PositionProblem<'_>,
+    at: &JointParameters,
+    baselines: &[Option<Robot>; N_BASELINES],
+) -> Option<BaselineComparison> {
+    let mut by_calibration = ViewDistances::new(problem.views.len());
+    problem.each(at, |o| by_calibration.add(o));
+    let sums = baselines.iter().flatten().map(|robot| {
+        let mut by_baseline = ViewDistances::new(problem.views.len());
+        PositionProblem::new(robot, problem.views).each(&JointParameters::default(), |o| by_baseline.add(o));
+        let mut sums = BaselineSums::default();
+        sums.add(&by_calibration, &by_baseline);
+        sums
+    });
+    best_comparison(&sums.collect::<Vec<_>>())
+}
+
+/// Distances between seen and surveyed landmarks, view by view.
+struct ViewDistances {
+    n: Vec<usize>,
+    sum_ln: Vec<f64>,
+    sum_m2: f64,
+}
+
+/// Smaller distances are rounding, m.
+const LEAST_DISTANCE_M: f64 = 1e-9;
+
+impl ViewDistances {
+    fn new(n_views: usize) -> Self {
+        Self { n: vec![0; n_views], sum_ln: vec![0.0; n_views], sum_m2: 0.0 }
+    }
+
+    fn add(&mut self, o: &TagResidual<'_>) {
+        let distance_m = o.residual_m.norm();
+        self.n[o.view_idx] += 1;
+        self.sum_ln[o.view_idx] += distance_m.max(LEAST_DISTANCE_M).ln();
+        self.sum_m2 += distance_m * distance_m;
+    }
+
+    /// Mean logarithm of `others` over these, of each view with landmarks.
+    fn log_ratios(&self, others: &Self) -> Vec<f64> {
+        let views = self.n.iter().zip(self.sum_ln.iter().zip(&others.sum_ln)).filter(|(n, _)| **n > 0);
+        views.map(|(n, (own, other))| (other - own) / *n as f64).collect()
+    }
+}

@@ -1,0 +1,215 @@
+//! Views that were left out, by what was learnt from the others: the innovations, with the covariance that they should
+//! have.
+//!
+//! All left-out views of a fold at once: with the fold's normal equations `N` (its priors among them) and those of the
+//! left-out views `N_o y = r_o`, their own parameters eliminated, `chi2 = sum |r|^2 - own - r_o^T (N + N_o)^-1 r_o`:
+//! the innovations' squares under measurement noise, joint errors and the parameters' covariance together. With the
+//! camera of each view free, what is left is the noise within the views; the difference is chi-square with six numbers
+//! a view: how well cameras are foretold.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use crate::file::metrics::ViewContainment;
+use crate::measure::{ObservationTerm, WeightedMeasurement};
+use crate::model::state::State;
+use crate::solve::estimate::Estimate;
+use crate::solve::input::BundleInput;
+use crate::solve::linearize::NormalEquations;
+use crate::solve::outliers::Outlier;
+use crate::solve::problem::BundleProblem;
+use crate::views::view::View;
+use armcal_core::joints::MAX_JOINTS;
+use armcal_core::numeric::Loss;
+use armcal_core::stats::chi_square_quantile;
+
+/// Innovations of one fold's left-out views.
+#[derive(Clone, Debug)]
+pub struct Innovations {
+    /// Of all coordinates.
+    pub chi2: f64,
+    /// Number of those coordinates, less one for each joint of a view whose sensor says nothing.
+    pub dof: usize,
+    /// Of the cameras' poses alone.
+    pub camera_chi2: f64,
+    /// Six per view that shows enough, less one for each joint whose sensor says nothing.
+    pub camera_dof: usize,
+    /// Each view on its own.
+    pub within_95: ViewContainment,
+    /// Those that the views tell enough of.
+    pub joints: Vec<JointInnovation>,
+}
+
+/// What a joint was off in a view that was left out.
+#[derive(Clone, Copy, Debug)]
+pub struct JointInnovation {
+    /// Index of the joint, base first.
+    pub joint: usize,
+    /// Among all views.
+    pub view_idx: usize,
+    /// Travel from the middle of its range by the datasheet.
+    pub travel_rad: f64,
+    /// Over the standard deviation that it should have: of unit variance under the model.
+    pub normalised: f64,
+}
+
+/// Probability of the region that a view is compared with; U95 has the same.
+const CONTAINED: f64 = 0.95;
+/// Size of a camera's error that says nothing of its pose, m and rad.
+const FREE_CAMERA: f64 = 100.0;
+/// The share of its prior variance that a view must tell of a joint's error, for it to be looked at.
+const TOLD: f64 = 0.3;
+
+impl Estimate<'_> {
+    /// Of `left_out`, views with their places among all; `outliers` of all views do not count. `None` if there is no
+    /// factor.
+    #[must_use]
+    pub fn innovations(
+        &self,
+        input: &BundleInput<'_>,
+        left_out: &[(usize, View)],
+        outliers: &[Outlier],
+    ) -> Option<Innovations> {
+        let views: Vec<View> = left_out.iter().map(|(_, view)| view.clone()).collect();
+        let mut problem = self.data_only(input, &views);
+        for (at, (view_idx, view)) in left_out.iter().enumerate() {
+            let observations = problem.views[at].observations.clone();
+            for (observation, tag) in problem.observations[observations].iter_mut().zip(&view.tags) {
+                let layout = &problem.layout;
+                let is_known = layout.tags().next().is_none() || layout.at(observation.block).is_some();
+                let mut used = [is_known; 4];
+                for out in outliers.iter().filter(|out| out.view_idx == *view_idx && out.tag_id == tag.id) {
+                    match out.corner {
+                        Some(corner) => used[corner] = false,
+                        None => used = [false; 4],
+                    }
+                }
+                observation.set_used(used);
+            }
+        }
+        let state = self.solved.state.with_views(views.len());
+        // A tag at the border may be foretold to lie beyond it.
+        let mut normal = NormalEquations::new(&problem);
+        normal.update(&problem, &state, Loss::Square);
+        for (observation, chi2) in problem.observations.iter_mut().zip(&normal.chi2) {
+            observation.is_used &= *chi2 < observation.data.unseen_chi2();
+        }
+        let (foretold, chi2) = self.with_data(&problem, &state)?;
+        let joints = foretold.joints(&problem, left_out);
+        // A joint without a sensor takes up one number of its view, whatever it is.
+        let taken = |view_idx: usize| problem.views[view_idx].is_free.iter().filter(|is_free| **is_free).count();
+        let told = |view_idx: usize| {
+            let used = observations_of(&problem, view_idx).filter(|s| s.is_used);
+            used.map(|s| s.data.n_coordinates()).sum::<usize>()
+        };
+        let numbers = |of: &dyn Fn(usize) -> usize| -> usize {
+            (0..views.len()).map(|view_idx| of(view_idx).saturating_sub(taken(view_idx))).sum()
+        };
+        let dof = numbers(&told);
+        let camera_dof = numbers(&|view_idx| camera_numbers(&problem, view_idx));
+        let mut within_95 = ViewContainment::default();
+        for view_idx in 0..views.len() {
+            let dof = told(view_idx).saturating_sub(taken(view_idx));
+            if dof > 0 {
+                within_95.views += 1;
+                let observations = observations_of(&problem, view_idx).cloned().collect();
+                let chi2 = self.chi2_of_view(input, &views[view_idx..=view_idx], observations)?;
+                within_95.within += usize::from(chi2 <= chi_square_quantile(CONTAINED, dof));
+            }
+        }
+        problem.scales.camera_error_std = Some([FREE_CAMERA; 2]);
+        let (_, free_chi2) = self.with_data(&problem, &state)?;
+        Some(Innovations { chi2, dof, camera_chi2: (chi2 - free_chi2).max(0.0), camera_dof, within_95, joints })
+    }
+
+    /// Chi-square of one view's innovations, with its observations as they are used, the gripper's tag last.
+    fn chi2_of_view(&self, input: &BundleInput<'_>, view: &[View], observations: Vec<ObservationTerm>) -> Option<f64> {
+        let mut problem = self.data_only(input, view);
+        problem.observations = observations;
+        let state = self.solved.state.with_views(1);
+        self.with_data(&problem, &state).map(|(_, chi2)| chi2)
+    }
+
+    /// `views` in this estimate's columns, without any prior but the views' own.
+    fn data_only<'a>(&self, input: &BundleInput<'a>, views: &'a [View]) -> BundleProblem<'a> {
+        let mut prior = self.problem.prior.clone();
+        prior.information.matrix.fill(0.0);
+        prior.forget(|_| true);
+        let scales = self.problem.scales.clone();
+        let input = BundleInput { views, scales, ..input.clone() };
+        BundleProblem::with_layout(&input, self.problem.layout.clone(), prior)
+    }
+
+    /// The data of `problem` linearized at `state` and joined to this estimate; and chi-square of their innovations.
+    fn with_data(&self, problem: &BundleProblem<'_>, state: &State) -> Option<(Joined, f64)> {
+        let mut normal = NormalEquations::new(problem);
+        normal.update(problem, state, Loss::Square);
+        let factor = Cholesky::new(&self.solved.normal.matrix + &normal.matrix)?;
+        let step = factor.solve(&normal.right);
+        let own: f64 = normal.eliminated.iter().map(|own| own.gradient.dot(&(own.inverse * own.gradient))).sum();
+        let chi2 = normal.cost - own - step.dot(&normal.right);
+        Some((Joined { normal, factor, step }, chi2))
+    }
+}
+
+/// Left-out data joined to an estimate.
+struct Joined {
+    normal: NormalEquations,
+    factor: Cholesky<f64, Dyn>,
+    /// Of the common parameters.
+    step: DVector<f64>,
+}
+
+impl Joined {
+    fn joints(&self, problem: &BundleProblem<'_>, left_out: &[(usize, View)]) -> Vec<JointInnovation> {
+        let mut out = Vec::new();
+        let mut groups = self.normal.eliminated.iter();
+        for (at, view) in problem.views.iter().enumerate() {
+            for own in groups.by_ref().take(1 + usize::from(view.gripper.is_some())) {
+                let by_columns = own.own_by_columns(problem, &self.normal.by_tag, at);
+                let value = own.inverse * (own.gradient - &by_columns * &self.step);
+                let followed = own.inverse * by_columns;
+                for joint in (0..MAX_JOINTS).filter(|&j| !view.is_free[j] && own.twists.column(j).norm() > 0.0) {
+                    let mut row = DMatrix::from_fn(problem.layout.n, 1, |k, _| followed[(joint, k)]);
+                    self.factor.l_dirty().solve_lower_triangular_mut(&mut row);
+                    let prior_var = problem.joint_error_var(view, joint);
+                    let told_var = prior_var - own.inverse[(joint, joint)] - row.norm_squared();
+                    if told_var > TOLD * prior_var {
+                        out.push(JointInnovation {
+                            joint,
+                            view_idx: left_out[at].0,
+                            travel_rad: left_out[at].1.travel_rad[joint],
+                            normalised: value[joint] / told_var.sqrt(),
+                        });
+                    }
+                }
+            }
+        }
+        out
+    }
+}
+
+/// A view's observations, that of the gripper's tag last.
+fn observations_of<'p>(problem: &'p BundleProblem<'_>, view_idx: usize) -> impl Iterator<Item = &'p ObservationTerm> {
+    let view = &problem.views[view_idx];
+    problem.observations[view.observations.clone()].iter().chain(view.gripper.map(|at| &problem.observations[at]))
+}
+
+/// How many numbers of the camera's pose a view tells.
+fn camera_numbers(problem: &BundleProblem<'_>, view_idx: usize) -> usize {
+    let used = problem.observations[problem.views[view_idx].observations.clone()].iter().filter(|s| s.is_used);
+    let (mut points, mut poses) = (0, 0);
+    for observation in used {
+        match observation.data {
+            WeightedMeasurement::Position { .. } => points += 1,
+            WeightedMeasurement::Corners(_) | WeightedMeasurement::Pose { .. } | WeightedMeasurement::Board { .. } => {
+                poses += 1
+            }
+        }
+    }
+    match (poses, points) {
+        (0, 0) => 0,
+        (0, 1) => 3,
+        (0, 2) => 5,
+        _ => 6,
+    }
+}

@@ -1,0 +1,96 @@
+//! Checks of the fitted noise of corners, rotations and all other sizes against what is stated for them.
+
+use crate::checks::verdict::{MAX_SIGMAS_OFF, VerdictInput};
+use crate::explain::model_selection::CAMERA_ERROR_STD;
+use crate::file::verdict_tables::{Check, VerdictTable};
+use crate::say::refusal::Refusal;
+use crate::solve::evidence::{NOISE_BOUNDS, POSITION_BOUNDS, SCALE_BOUNDS};
+use armcal_core::codes::{Code, Warning};
+
+/// Noise over the stated one above which something is not as stated: a warning.
+const NOISY: f64 = 2.0;
+/// Corners averaged over a view may be off by so many times what robot.toml says of one frame: averages are better than
+/// one frame, and what lenses and printed tags lack stays below it.
+const MAX_OVER_CORNER_NOISE: f64 = 3.0;
+/// Noise of rotations, where none is stated, above which they are of another form: boards and tags are read to 0.05 rad
+/// or better. Assumed.
+const MAX_ROTATION_NOISE_RAD: f64 = 0.1;
+
+impl VerdictInput<'_> {
+    /// Returns the refusal of corners with a larger error than robot.toml says: their fitted noise hides other errors.
+    pub(crate) fn corner_noise(&self, table: &mut VerdictTable) -> Option<Refusal> {
+        let stated_px = self.input.robot.camera.corner_std_px;
+        let mean_px = self.found.mean_corner_std_px()?;
+        let noise = self.found.scales().noise;
+        let check = Check::at_most("corners: noise over what frames and robot.toml say", noise, NOISY);
+        if !check.holds {
+            table.warnings.push(Warning::new(
+                Code::CornersNoisy,
+                format!(
+                    "corner noise is {noise:.1} times the stated {stated_px:.2} px: check lens, tag sizes, map and \
+                 corner_std_px"
+                ),
+            ));
+        }
+        table.checks.push(check);
+        let limit_px = MAX_OVER_CORNER_NOISE * stated_px;
+        let check = Check::at_most("corners averaged over a view: residual, px", noise * mean_px, limit_px);
+        let residual_px = check.value;
+        let refusal = (!check.holds).then_some(Refusal::CornerNoise { residual_px, stated_px, limit_px });
+        table.checks.push(check);
+        refusal
+    }
+
+    /// Returns the refusal of poses whose rotations contradict their positions: another form or direction fits so.
+    pub(crate) fn rotation_noise(&self, table: &mut VerdictTable) -> Option<Refusal> {
+        if !self.found.has_poses() {
+            return None;
+        }
+        let stated_rad = self.tag_noise.map(|noise| noise.rotation_std_rad);
+        let limit_rad = stated_rad.map_or(MAX_ROTATION_NOISE_RAD, |stated_rad| MAX_SIGMAS_OFF * stated_rad);
+        let rotation_rad = self.found.scales().rotation_std_rad;
+        let check = Check::at_most("noise of rotations, rad", rotation_rad, limit_rad);
+        let refusal = (!check.holds).then_some(Refusal::RotationNoise { rotation_rad, limit_rad, stated_rad });
+        table.checks.push(check);
+        refusal
+    }
+
+    /// Warns of fitted sizes that are at a bound.
+    pub(crate) fn scales_at_bounds(&self) -> Vec<Warning> {
+        const NEAR: f64 = 1e-6;
+        let (robot, now, first) = (self.input.robot, self.found.scales(), &self.input.scales);
+        let mut all = vec![("noise of corners".to_owned(), now.noise, 1.0, NOISE_BOUNDS)];
+        if self.found.has_positions() {
+            all[0] = ("noise of positions, m".to_owned(), now.position_std_m, first.position_std_m, POSITION_BOUNDS);
+        }
+        if self.found.has_poses() {
+            let (now, first) = (now.rotation_std_rad, first.rotation_std_rad);
+            all.push(("noise of rotations, rad".to_owned(), now, first, POSITION_BOUNDS));
+        }
+        // Small sizes are harmless: what is not there needs none.
+        let above = [0.0, SCALE_BOUNDS[1]];
+        for (joint, spec) in robot.sensors.iter().enumerate().take(robot.n_seen_joints()) {
+            let (now_rad, first_rad) = (now.joint_std_rad[joint], first.joint_std_rad[joint]);
+            all.push((
+                format!("{}: error from view to view, {}", spec.joint, spec.moves.si()),
+                now_rad,
+                first_rad,
+                above,
+            ));
+            let (now_rad, first_rad) = (now.shape_std_rad[joint], first.shape_std_rad[joint]);
+            all.push((format!("{}: nonlinearity, rad", spec.joint), now_rad, first_rad, above));
+        }
+        for (k, name) in ["m", "rad"].into_iter().enumerate() {
+            if let Some(now) = now.camera_error_std {
+                let first = first.camera_error_std.unwrap_or(CAMERA_ERROR_STD);
+                all.push((format!("camera error shared by a view, {name}"), now[k], first[k], above));
+            }
+        }
+        let is_at_bound = |(_, now, first, [low, high]): &(String, f64, f64, [f64; 2])| {
+            *now <= first * low * (1.0 + NEAR) || *now >= first * high * (1.0 - NEAR)
+        };
+        let beyond = all.into_iter().filter(is_at_bound);
+        let text = |what, now| format!("{what}: the fitted {now:.2e} is at its bound");
+        beyond.map(|(what, now, ..)| Warning::new(Code::ScaleAtBound, text(what, now))).collect()
+    }
+}

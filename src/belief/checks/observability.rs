@@ -1,0 +1,230 @@
+//! What the data determine, before anything is solved.
+//!
+//! The normal equations at the robust start without the priors of joints, mount, gripper tag and clock; the tags' poses
+//! (about their survey) and the sensors' nonlinearity (a process of its prior's size) are eliminated with what the
+//! views have of their own. Scaled by the prior's sigmas, an eigenvalue below 1 is a direction that the prior tells
+//! more of than the data; the others count for the indices.
+//!
+//! Indices of observability, of the singular values s_1 >= .. >= s_L of the scaled, whitened Jacobian (roots of those
+//! eigenvalues) and m views: O1 = (prod s)^(1/L) / sqrt(m) (Borm and Menq 1991), O2 = s_L / s_1 (Driels and Pathre
+//! 1990), O3 = s_L and O4 = s_L^2 / s_1 (Nahvi, Hollerbach and Hayward 1994; Nahvi and Hollerbach 1996), O5 = 1 / sum(1
+//! / s) (Sun and Hollerbach 2008).
+
+use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
+
+use crate::model::blocks::Block;
+use crate::model::layout::Layout;
+use crate::model::parameters::ParameterKind;
+use crate::model::prior::{Prior, at_least};
+use crate::solve::input::BundleInput;
+use crate::solve::linearize::NormalEquations;
+use crate::solve::problem::BundleProblem;
+use crate::solve::robust_start::robust_start;
+use armcal_core::numeric::Loss;
+use armcal_core::robot::Robot;
+
+/// Before solving.
+#[derive(Clone, Debug)]
+pub struct Observability {
+    /// Directions that the data tell more of than the prior, of as many as there are parameters.
+    pub rank: usize,
+    /// Number of tested parameters: joints without nonlinearity, mount, gripper tag, clock and lens, where estimated.
+    pub n_parameters: usize,
+    /// Largest over smallest singular value, of the directions that the data tell more of; so are the indices.
+    pub condition_number: f64,
+    /// O1 to O5, see the module; all 0 where the rank is 0.
+    pub o: [f64; 5],
+    /// Directions that are held by the prior, in words.
+    pub null_space: Vec<NullDirection>,
+}
+
+/// A direction that the data tell less of than the prior.
+#[derive(Clone, Debug)]
+pub struct NullDirection {
+    pub words: String,
+    /// Whether it is of the sensors' terms alone: temperature, pressure, drift, play.
+    pub is_of_terms: bool,
+}
+
+/// A column as it is spoken of.
+struct Name {
+    text: String,
+    /// The prior's, in the parameter's unit.
+    sigma: f64,
+    is_term: bool,
+    /// An offset or a turn, rad.
+    is_angle: bool,
+}
+
+/// Size of a parameter of which nothing is known, in its unit.
+const UNKNOWN: f64 = 1.0;
+/// Information on what is eliminated (m, rad or prior sigmas) that keeps an unseen one from having no factor.
+const WALL: f64 = 1e-9;
+/// Entries of a null direction below this share of the largest are not named.
+const NAMED: f64 = 0.3;
+
+/// At the robust start of `input`; `None` where nothing has a column.
+#[must_use]
+pub fn observability(input: &BundleInput<'_>) -> Option<Observability> {
+    let start = robust_start(input);
+    let (mut prior, layout) = (input.prior(), input.layout());
+    let kept = |column: usize| {
+        layout.parameters.get(column).map_or_else(
+            || !layout.block_of(column).is_some_and(|(block, _)| matches!(block, Block::Tag(_))),
+            |p| !matches!(p.kind, ParameterKind::Shape(_)) && !p.is_past() && !p.kind.is_of_body(),
+        )
+    };
+    let wanted: Vec<usize> = (0..layout.n).filter(|&column| kept(column)).collect();
+    if wanted.is_empty() {
+        return None;
+    }
+    let sigma = sigmas(&layout, input, &prior);
+    // A warm start's prior holds the mount, too.
+    let with_mount = layout.n_joint()..prior.n_covered();
+    for column in (0..layout.n_joint()).filter(|&column| kept(column)).chain(with_mount) {
+        prior.information.matrix.row_mut(column).fill(0.0);
+        prior.information.matrix.column_mut(column).fill(0.0);
+    }
+    prior.forget(|block| !matches!(block, Block::Tag(_)));
+    let problem = BundleProblem::new(input, prior);
+    let mut normal = NormalEquations::new(&problem);
+    let mut state = problem.start(&start.parameters);
+    problem.set_steps(&mut state, &start.steps);
+    normal.update(&problem, &state, Loss::Square);
+    let information = information(&problem, &normal, &wanted, &sigma)?;
+    let is_term = |column: usize| {
+        let kind = layout.parameters.get(column).map(|p| p.kind);
+        kind.is_some_and(|kind| !matches!(kind, ParameterKind::Gain | ParameterKind::Offset))
+    };
+    let is_angle = |column: usize| match layout.parameters.get(column) {
+        Some(p) => p.kind == ParameterKind::Offset,
+        None => layout.block_of(column).is_some_and(|(block, k)| block.is_pose() && k >= 3),
+    };
+    let named = |&column: &usize| Name {
+        text: name(input.robot, &layout, column),
+        sigma: sigma[column],
+        is_term: is_term(column),
+        is_angle: is_angle(column),
+    };
+    let names: Vec<Name> = wanted.iter().map(named).collect();
+    (!names.is_empty()).then(|| summarized(information, &names, input.views.len()))
+}
+
+/// One prior sigma of each column.
+fn sigmas(layout: &Layout, input: &BundleInput<'_>, prior: &Prior) -> Vec<f64> {
+    let mut sigma = vec![1.0; layout.n];
+    for (column, p) in layout.parameters.iter().enumerate() {
+        sigma[column] = input.scales.prior_std(&input.robot.sensors[p.joint], p.joint, p.kind);
+    }
+    for (block, at) in layout.blocks().filter(|(block, _)| !matches!(block, Block::Tag(_))) {
+        let n = block.n_columns();
+        sigma[at..at + n].copy_from_slice(&prior.std[block][..n]);
+    }
+    for std in &mut sigma {
+        *std = if std.is_finite() { at_least(*std) } else { UNKNOWN };
+    }
+    sigma
+}
+
+/// Of the wanted columns in units of `sigma`, the others eliminated.
+fn information(
+    problem: &BundleProblem<'_>,
+    normal: &NormalEquations,
+    wanted: &[usize],
+    sigma: &[f64],
+) -> Option<DMatrix<f64>> {
+    let n = problem.layout.n;
+    let at = |i: usize, k: usize| normal.matrix[(i.max(k), i.min(k))] * sigma[i] * sigma[k];
+    let others: Vec<usize> = (0..n).filter(|column| !wanted.contains(column)).collect();
+    let mut block = DMatrix::from_fn(wanted.len(), wanted.len(), |i, k| at(wanted[i], wanted[k]));
+    if !others.is_empty() {
+        let wall = |i: usize, k: usize| if i == k { WALL } else { 0.0 };
+        let rest = DMatrix::from_fn(others.len(), others.len(), |i, k| at(others[i], others[k]) + wall(i, k));
+        let cross = DMatrix::from_fn(others.len(), wanted.len(), |i, k| at(others[i], wanted[k]));
+        block -= cross.tr_mul(&Cholesky::new(rest)?.solve(&cross));
+    }
+    Some(block)
+}
+
+fn summarized(information: DMatrix<f64>, names: &[Name], n_views: usize) -> Observability {
+    let n = names.len();
+    let eigen = SymmetricEigen::new(information);
+    let (null, told): (Vec<usize>, Vec<usize>) = (0..n).partition(|&k| eigen.eigenvalues[k] < 1.0);
+    let singular: Vec<f64> = told.iter().map(|&k| eigen.eigenvalues[k].sqrt()).collect();
+    let (most, least) = singular.iter().fold((0.0_f64, f64::INFINITY), |(high, low), s| (high.max(*s), low.min(*s)));
+    let product = (singular.iter().map(|s| s.ln()).sum::<f64>() / told.len().max(1) as f64).exp();
+    let o5 = 1.0 / singular.iter().map(|s| 1.0 / s).sum::<f64>();
+    let mut space = DMatrix::from_fn(n, null.len(), |row, k| eigen.eigenvectors[(row, null[k])]);
+    let o = [product / (n_views.max(1) as f64).sqrt(), least / most, least, least * least / most, o5];
+    Observability {
+        rank: told.len(),
+        n_parameters: n,
+        condition_number: most / least,
+        o: if told.is_empty() { [0.0; 5] } else { o },
+        null_space: in_words(&mut space, names),
+    }
+}
+
+/// Directions of the space that the columns of `space` span, each with as few parameters as elimination with the
+/// largest pivots leaves.
+fn in_words(space: &mut DMatrix<f64>, names: &[Name]) -> Vec<NullDirection> {
+    let n = space.ncols();
+    for k in 0..n {
+        let (row, column) = largest_entry(space, k);
+        space.swap_columns(k, column);
+        let pivot = space[(row, k)];
+        space.column_mut(k).unscale_mut(pivot);
+        for other in (0..n).filter(|&other| other != k) {
+            let factor = space[(row, other)];
+            let by = space.column(k) * factor;
+            let mut column = space.column_mut(other);
+            column -= by;
+        }
+    }
+    let mut all: Vec<NullDirection> =
+        space.column_iter().map(|direction| spoken(&direction.into_owned(), names)).collect();
+    all.sort_by(|a, b| a.words.cmp(&b.words));
+    all
+}
+
+/// What counts in a direction: what is large in units of its prior. An angle among the largest counts angles by
+/// themselves, too: a turn of a mount that is well known and an offset that is not move the camera alike.
+fn spoken(direction: &DVector<f64>, names: &[Name]) -> NullDirection {
+    let own = DVector::from_fn(names.len(), |k, _| direction[k] * names[k].sigma);
+    let first = direction.iamax();
+    let goes_along = |k: usize| {
+        let is_alike = names[first].is_angle && names[k].is_angle && own[k].abs() > NAMED * own[first].abs();
+        direction[k].abs() > NAMED * direction[first].abs() || is_alike
+    };
+    let named: Vec<usize> = (0..names.len()).filter(|&k| goes_along(k)).collect();
+    let list: Vec<&str> = named.iter().map(|&k| names[k].text.as_str()).collect();
+    let words = match named.as_slice() {
+        [one] => format!("{}: not determined", names[*one].text),
+        [a, b] => {
+            let how = if own[*a] * own[*b] < 0.0 { "sum" } else { "difference" };
+            format!("{}: only their {how}", list.join(" and "))
+        }
+        _ => format!("{}: not each by itself", list.join(", ")),
+    };
+    NullDirection { words, is_of_terms: named.iter().all(|&k| names[k].is_term) }
+}
+
+/// Row and column of the largest entry from column `from` on.
+fn largest_entry(space: &DMatrix<f64>, from: usize) -> (usize, usize) {
+    let mut best = (0, from);
+    for column in from..space.ncols() {
+        for row in 0..space.nrows() {
+            if space[(row, column)].abs() > space[best].abs() {
+                best = (row, column);
+            }
+        }
+    }
+    best
+}
+
+fn name(robot: &Robot, layout: &Layout, column: usize) -> String {
+    if let Some(parameter) = layout.parameters.get(column) {
+        return parameter.name(robot);
+    }
+    layout.block_of(column).map_or_else(String::new, |(block, k)| block.name(robot, k))
+}

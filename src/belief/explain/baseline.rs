@@ -1,0 +1,100 @@
+//! Mount and map alone: what a calibration of joints has to beat.
+//!
+//! The joints stay at the datasheet; camera mount and tags are estimated about their priors from the same views. What
+//! the joints are off is an error of each view, whose size the evidence fits: first about the datasheet's own gain and
+//! offset, then about what the fit before found, until that stays, so that the datasheet does not hold it up.
+//!
+//! Plain least squares stands next to it: sensors as good as their datasheets, and an error of each view, or noise of
+//! the positions, that takes up all else, equal in all directions. The datasheet's arm itself is the third.
+
+use crate::explain::model_selection::CAMERA_ERROR_STD;
+use crate::model::blocks::{Block, Shown};
+use crate::model::estimated::Model;
+use crate::model::parameters::JointParameters;
+use crate::model::scales::Hyperparameters;
+use crate::solve::estimate::{Estimate, estimate};
+use crate::solve::input::{BundleInput, HyperparameterMode};
+use crate::solve::model_for_views::{has_views, reference};
+use crate::views::view::{TagObservation, View};
+use armcal_core::robot::Robot;
+
+/// Ways to do without a calibration of joints: the datasheet's arm, least squares, and joint errors by the evidence.
+pub(crate) const N_BASELINES: usize = 3;
+
+/// Mount and map alone, with the sizes of errors that all views tell.
+pub(crate) struct Baseline {
+    model: Model,
+    /// Sizes for which the evidence fits the joints' errors.
+    scales: Hyperparameters,
+    /// Sizes for plain least squares.
+    plain: Hyperparameters,
+}
+
+/// Passes over the sizes of errors; each brings exact sensors down by a factor of three.
+const MAX_PASSES: usize = 8;
+/// A size that stays above this share of the one before has settled.
+const SETTLED: f64 = 0.8;
+
+impl Baseline {
+    /// `None` where the views determine nothing.
+    pub(crate) fn new(robot: &Robot, views: &[View]) -> Option<Self> {
+        let (mut baseline, usual) = (Self::start(robot, views), Hyperparameters::datasheet(robot));
+        for _ in 0..MAX_PASSES {
+            let fitted = baseline.estimate(robot, views, &baseline.scales, HyperparameterMode::Fitted)?;
+            let mut next = fitted.scales().clone();
+            for (std_rad, usual_rad) in next.joint_std_rad.iter_mut().zip(&usual.joint_std_rad) {
+                *std_rad = std_rad.max(*usual_rad);
+            }
+            let mut joints = next.joint_std_rad.iter().zip(&baseline.scales.joint_std_rad).take(robot.n_joints());
+            let has_settled = joints.all(|(now, before)| *now > SETTLED * before);
+            baseline.scales = next;
+            if has_settled {
+                break;
+            }
+        }
+        if let Some(plain) = baseline.estimate(robot, views, &baseline.plain, HyperparameterMode::Fitted) {
+            baseline.plain = plain.scales().clone();
+            baseline.plain.joint_std_rad = usual.joint_std_rad;
+        }
+        Some(baseline)
+    }
+
+    /// Before any view.
+    fn start(robot: &Robot, views: &[View]) -> Self {
+        let shown = Shown { motion: false, gripper_tag: false, by_camera: &|camera| has_views(views, camera) };
+        let blocks = Block::all(robot).filter(|block| block.is_told(robot, &shown));
+        let model = Model::of_blocks(robot.n_joints(), blocks);
+        let mut scales = Hyperparameters::datasheet(robot);
+        let has_corners = views.iter().flat_map(|view| &view.tags).any(TagObservation::is_in_pixels);
+        let camera_error_std = has_corners.then_some(CAMERA_ERROR_STD);
+        let plain = Hyperparameters { camera_error_std, ..scales.clone() };
+        for (std_rad, spec) in scales.joint_std_rad.iter_mut().zip(&robot.sensors) {
+            *std_rad = std_rad.max(spec.offset_std_rad.hypot(spec.gain_std * spec.half_range_rad));
+        }
+        Self { model, scales, plain }
+    }
+
+    /// The arm by `views` under each of the baselines that determine it.
+    pub(crate) fn fit(&self, robot: &Robot, views: &[View]) -> [Option<Robot>; N_BASELINES] {
+        let by = |scales| Some(self.estimate(robot, views, scales, HyperparameterMode::Given)?.as_found(robot));
+        [Some(robot.clone()), by(&self.plain), by(&self.scales)]
+    }
+
+    fn estimate<'a>(
+        &self,
+        robot: &'a Robot,
+        views: &'a [View],
+        scales: &Hyperparameters,
+        evidence: HyperparameterMode,
+    ) -> Option<Estimate<'a>> {
+        estimate(&BundleInput {
+            robot,
+            views,
+            model: self.model.clone(),
+            scales: scales.clone(),
+            guess: JointParameters { reference: reference(views), ..JointParameters::default() },
+            joint_prior: None,
+            evidence,
+        })
+    }
+}

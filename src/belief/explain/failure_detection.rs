@@ -1,0 +1,340 @@
+//! Which joint failed, and how: one joint at a time is freed in all views, and the angles that the camera then shows
+//! are held against its readings.
+//!
+//! A hypothesis must explain the data better than a sound arm by far: with the datasheet's scales, the sum of the
+//! observations' chi-squares (each cut where a observation would be rejected), plus the joints' own and their
+//! parameters' prior, plus `2 ln(prior std / posterior std)` for each reading that is given up (Laplace's approximation
+//! of the evidence, MacKay 1992, with a round figure), must fall by `MARGIN`.
+
+use crate::explain::drawing::Drawing;
+use crate::explain::failure_pattern::{FailurePattern, MIN_STILL_VIEWS, Readings, n_still};
+use crate::explain::failures::{FAR_RAD, FAR_SIGMAS, Failure, FailureAdjusted, FailureSource, MIN_VIEWS, SensorUse};
+use crate::explain::model_selection::log_evidence_of_all;
+use crate::explain::setup::BundleSetup;
+use crate::file::calibration::Calibration;
+use crate::measure::ObservationTerm;
+use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
+use crate::solve::estimate::{Estimate, estimate};
+use crate::solve::input::HyperparameterMode;
+use crate::solve::outliers::rejected;
+use crate::views::view::View;
+use armcal_core::robot::{FailedKind, Robot};
+use armcal_core::stats::quantile;
+
+/// A joint whose errors over all views are larger than this and than twice the datasheet's linearity is looked at, rad.
+const LARGE_STD_RAD: f64 = 0.15 * std::f64::consts::PI / 180.0;
+/// A share of rejected observations that wrong ids alone do not make.
+const MANY_REJECTED: f64 = 0.1;
+/// What giving up one reading costs: 2 ln(1 rad / 1 mrad).
+const PER_READING: f64 = 14.0;
+/// What a step costs: 2 ln(0.1 rad / 1 mrad).
+const PER_STEP: f64 = 9.0;
+/// A observation costs no more than this per coordinate: beyond it, it is rejected.
+const MAX_PER_COORDINATE: f64 = 7.5;
+/// The evidence that a failure needs: odds of e^15 to one.
+const MARGIN: f64 = 30.0;
+/// At most this many failures are looked for beyond those that the readings alone show.
+const MAX_FOUND: usize = 2;
+
+/// An arm and its views, in which failures are looked for.
+pub(crate) struct FailureSearch<'a> {
+    pub robot: &'a Robot,
+    pub views: &'a [View],
+    /// What the estimates rest on beside the datasheet.
+    pub prior: Option<&'a Calibration>,
+    /// What of the drawing is estimated, too.
+    pub drawing: &'a Drawing,
+}
+
+impl FailureSearch<'_> {
+    /// The failures that the views show beside the `declared` ones, which come first and with what was found of them;
+    /// `found` is the estimate under the declared ones alone.
+    pub(crate) fn failures(&self, declared: &[Failure], found: Option<&Estimate<'_>>) -> Vec<Failure> {
+        let mut known = declared.to_vec();
+        let shown = self.views.iter().filter(|view| !view.tags.is_empty()).count();
+        if shown < MIN_VIEWS {
+            return known;
+        }
+        let unclear: Vec<usize> = known.iter().filter(|f| f.kind == FailedKind::Jumps).map(|f| f.joint).collect();
+        self.look_into_jumps(&mut known, &unclear);
+        let n_before = self.robot.n_seen_joints();
+        let still: Vec<usize> = (0..n_before).filter(|&j| !is_failed(&known, j) && self.is_still(j)).collect();
+        if still.len() < n_before {
+            self.classify_still(&mut known, &still);
+        }
+        if known == declared {
+            return self.failures_beside(known, found);
+        }
+        self.failures_beside(known.clone(), self.setup(&known).estimate().as_ref().map(|(found, _)| found))
+    }
+
+    /// `known` and what the estimate under them shows beside: slips, then sensors that say nothing, one at a time, then
+    /// two at once.
+    fn failures_beside(&self, known: Vec<Failure>, found: Option<&Estimate<'_>>) -> Vec<Failure> {
+        let is_sound = found.is_some_and(|found| !is_suspicious(found));
+        let slips = found.map_or_else(|| known.clone(), |found| self.with_slips(known.clone(), found));
+        if slips == known && is_sound || slips != known && !self.is_suspicious_under(&slips) {
+            return slips;
+        }
+        let mut best = self.one_by_one(&known);
+        if slips != known {
+            best = self.likelier(best, self.one_by_one(&slips));
+        }
+        if self.is_suspicious_under(&best)
+            && let Some(both) = self.two_at_once(&known)
+        {
+            best = self.likelier(best, both);
+        }
+        if best == known {
+            return known;
+        }
+        let setup = self.setup(&best);
+        let Some((better, _)) = setup.estimate() else { return known };
+        if found.is_some_and(|found| !explains_most(found, &better)) {
+            return known;
+        }
+        self.with_slips(best, &better)
+    }
+
+    pub(crate) fn setup(&self, known: &[Failure]) -> BundleSetup {
+        BundleSetup::new(self.robot, self.views, known, self.prior).with_drawing(self.drawing)
+    }
+
+    fn is_suspicious_under(&self, known: &[Failure]) -> bool {
+        self.setup(known).estimate().is_none_or(|(found, _)| is_suspicious(&found))
+    }
+
+    fn likelier(&self, a: Vec<Failure>, b: Vec<Failure>) -> Vec<Failure> {
+        if a == b || self.score(&a) <= self.score(&b) { a } else { b }
+    }
+
+    fn one_by_one(&self, known: &[Failure]) -> Vec<Failure> {
+        let mut known = known.to_vec();
+        for _ in 0..MAX_FOUND {
+            let without = self.score(&known);
+            let candidates = (0..self.robot.n_seen_joints()).filter(|&joint| !is_failed(&known, joint));
+            let mut best: Option<(f64, Failure)> = None;
+            for failure in candidates.filter_map(|joint| self.hypothesis(&known, joint, FailureSource::Detected)) {
+                let with: Vec<Failure> = known.iter().cloned().chain([failure.clone()]).collect();
+                let score = self.score(&with);
+                if best.as_ref().is_none_or(|(least, _)| score < *least) {
+                    best = Some((score, failure));
+                }
+            }
+            match best {
+                Some((score, failure)) if without - score > MARGIN => known.push(failure),
+                _ => break,
+            }
+        }
+        known
+    }
+
+    /// The two sensors whose failures explain the most together, each by the angles that the camera shows with both
+    /// ignored.
+    fn two_at_once(&self, known: &[Failure]) -> Option<Vec<Failure>> {
+        let free: Vec<usize> = (0..self.robot.n_seen_joints()).filter(|&joint| !is_failed(known, joint)).collect();
+        let pairs = free.iter().enumerate().flat_map(|(k, &a)| free[k + 1..].iter().map(move |&b| [a, b]));
+        let both = pairs.filter_map(|pair| {
+            let mut with = known.to_vec();
+            with.extend(self.hypotheses(known, pair)?);
+            Some((self.score(&with), with))
+        });
+        let (score, with) = both.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        (self.score(known) - score > 2.0 * MARGIN).then_some(with)
+    }
+
+    /// Failures of both joints.
+    fn hypotheses(&self, known: &[Failure], pair: [usize; 2]) -> Option<[Failure; 2]> {
+        let ignored = pair
+            .map(|joint| Failure::without_sensor(joint, FailedKind::Dead, FailureSource::Detected, self.views.len()));
+        let mut freed = known.to_vec();
+        freed.extend(ignored);
+        let applied = self.applied(&freed);
+        let found = self.estimate(&applied)?;
+        let [a, b] = pair.map(|joint| self.failure_of(joint, &found, FailureSource::Detected));
+        Some([a?, b?])
+    }
+
+    fn applied(&self, failures: &[Failure]) -> FailureAdjusted {
+        FailureAdjusted::new(self.robot, self.views, failures, &JointParameters::default())
+    }
+
+    /// Under the datasheet's scales.
+    fn estimate<'b>(&self, applied: &'b FailureAdjusted) -> Option<Estimate<'b>> {
+        let mut input = applied.input(HyperparameterMode::Given);
+        self.drawing.apply(&mut input);
+        estimate(&input)
+    }
+
+    /// Whether the reading stands still over all views, or since one of them.
+    fn is_still(&self, joint: usize) -> bool {
+        let mut shown: Vec<&View> = self.views.iter().filter(|view| !view.tags.is_empty()).collect();
+        shown.sort_by_key(|view| view.end);
+        let travel_rad: Vec<f64> = shown.iter().map(|view| view.travel_rad[joint]).collect();
+        n_still(&travel_rad, &self.robot.sensors[joint]) >= MIN_STILL_VIEWS.min(travel_rad.len())
+    }
+
+    /// What is wrong with a joint's sensor under the `known` failures and this sensor ignored.
+    fn hypothesis(&self, known: &[Failure], joint: usize, source: FailureSource) -> Option<Failure> {
+        let mut freed: Vec<Failure> = known.iter().filter(|failure| failure.joint != joint).cloned().collect();
+        freed.push(Failure::without_sensor(joint, FailedKind::Dead, FailureSource::Detected, self.views.len()));
+        let applied = self.applied(&freed);
+        let found = self.estimate(&applied)?;
+        self.failure_of(joint, &found, source)
+    }
+
+    /// The same, by an estimate in which the joint is free.
+    fn failure_of(&self, joint: usize, found: &Estimate<'_>, source: FailureSource) -> Option<Failure> {
+        let readings = Readings::new(self.robot, self.views, joint, found);
+        if readings.len() < MIN_VIEWS {
+            return None;
+        }
+        let pattern = readings.pattern(self.robot)?;
+        Some(self.failure(joint, &pattern, source, &readings))
+    }
+
+    fn failure(&self, joint: usize, pattern: &FailurePattern, found: FailureSource, readings: &Readings) -> Failure {
+        let all = Failure::without_sensor(joint, FailedKind::Dead, found, self.views.len());
+        let evidence = readings.in_words(&self.robot.sensors[joint], pattern, self.views);
+        match pattern {
+            FailurePattern::Still(kind, SensorUse::Used) => {
+                Failure { kind: *kind, reading: SensorUse::Used, views: Vec::new(), evidence, ..all }
+            }
+            FailurePattern::Still(kind, SensorUse::Ignored) => Failure { kind: *kind, evidence, ..all },
+            FailurePattern::Reversed(line) => Failure { line: Some(*line), evidence, ..all },
+            FailurePattern::Scaled(line) => {
+                Failure { line: Some(*line), reading: SensorUse::Used, views: Vec::new(), evidence, ..all }
+            }
+            FailurePattern::Stuck(_) => Failure { kind: FailedKind::Stuck, evidence, ..all },
+            FailurePattern::Dead => Failure { evidence, ..all },
+            FailurePattern::Single(views) => {
+                let (kind, reading, views) = (FailedKind::Jumps, SensorUse::Used, views.clone());
+                Failure { kind, reading, views, evidence, ..all }
+            }
+            FailurePattern::Lasting { since, step_rad } => Failure {
+                found,
+                ..Failure::slip((joint, self.robot.sensors[joint].unit()), *step_rad, self.views, *since)
+            },
+        }
+    }
+
+    /// Declared jumps: when they were, where the views show it.
+    fn look_into_jumps(&self, known: &mut [Failure], joints: &[usize]) {
+        for &joint in joints {
+            let found = self.hypothesis(known, joint, FailureSource::Declared);
+            let Some(failure) = known.iter_mut().find(|failure| failure.joint == joint) else { continue };
+            match found {
+                Some(found) if found.kind == FailedKind::Jumps => *failure = found,
+                _ => "no view shows a jump".clone_into(&mut failure.evidence),
+            }
+        }
+    }
+
+    /// Joints whose readings stand still: all sensors ignored first, then each by what the camera shows.
+    fn classify_still(&self, known: &mut Vec<Failure>, joints: &[usize]) {
+        let ignored = |&joint: &usize| {
+            Failure::without_sensor(joint, FailedKind::Dead, FailureSource::Detected, self.views.len())
+        };
+        let mut all = known.clone();
+        all.extend(joints.iter().map(ignored));
+        for &joint in joints {
+            if let Some(failure) = self.hypothesis(&all, joint, FailureSource::Detected) {
+                known.push(failure);
+            }
+        }
+    }
+
+    fn score(&self, failures: &[Failure]) -> f64 {
+        let applied = self.applied(failures);
+        self.estimate(&applied).map_or(f64::MAX, |found| score(&found))
+    }
+}
+
+fn is_failed(known: &[Failure], joint: usize) -> bool {
+    known.iter().any(|failure| failure.joint == joint)
+}
+
+/// Whether `better` is likelier than `without` by more than other links, mounts or tags would be.
+fn explains_most(without: &Estimate<'_>, better: &Estimate<'_>) -> bool {
+    2.0 * (log_evidence_of_all(better) - log_evidence_of_all(without)) > MARGIN.max(without.largest_other_chi2())
+}
+
+/// What the data cost under an estimate, see the module.
+pub(crate) fn score(found: &Estimate<'_>) -> f64 {
+    let problem = &found.problem;
+    let observations = problem.observations.iter().zip(&found.solved.normal.chi2);
+    let of_observation = |(seen, chi2): (&ObservationTerm, &f64)| {
+        let of_corners = if seen.is_used { rejected(seen).chi2 } else { 0.0 };
+        chi2.min(MAX_PER_COORDINATE * seen.data.n_coordinates() as f64) + of_corners
+    };
+    let mut sum: f64 = observations.map(of_observation).sum();
+    let off = &found.solved.state.joint - &problem.prior.joint_mean;
+    sum += (&problem.prior.information.matrix * &off).dot(&off);
+    sum += PER_STEP * problem.layout.parameters.iter().filter(|p| p.is_step()).count() as f64;
+    for (view, errors) in problem.views.iter().zip(&found.solved.state.joint_error) {
+        for (joint, error) in errors.iter().enumerate().take(problem.n_seen_joints) {
+            let by_sensor = error.powi(2) / problem.joint_error_var(view, joint);
+            sum += if view.is_free[joint] { PER_READING } else { by_sensor };
+        }
+    }
+    sum
+}
+
+/// A gain or offset that no sensor of the datasheet has: a locked joint looks like one of gain zero.
+fn is_beyond_datasheet(robot: &Robot, found: &Estimate<'_>) -> bool {
+    let (sound, at) = (JointParameters::default(), found.parameters());
+    found.joint_parameters().iter().enumerate().any(|(column, p)| {
+        let is_known = matches!(p.kind, ParameterKind::Gain | ParameterKind::Offset) && p.prior_std(robot) > 0.0;
+        let limit = FAR_SIGMAS * p.prior_std(robot);
+        // What the gain does not take up may have gone to the nonlinearity.
+        let slope_off = if p.kind == ParameterKind::Gain { (found.slope(*p, column) - 1.0).abs() } else { 0.0 };
+        is_known && ((at.get(*p) - sound.get(*p)).abs() > limit || slope_off > limit)
+    })
+}
+
+impl Estimate<'_> {
+    /// Of the joint's estimated angles by its readings; one where they do not move.
+    fn slope(&self, gain: Parameter, column: usize) -> f64 {
+        let problem = &self.problem;
+        let views = (0..problem.views.len()).filter(|&view_idx| self.uses(view_idx));
+        let points: Vec<[f64; 2]> = views
+            .map(|k| [problem.views[k].basis[column], problem.angles(k, &self.solved.state)[gain.joint]])
+            .collect();
+        let n = points.len().max(1) as f64;
+        let mean = [0, 1].map(|axis| points.iter().map(|point| point[axis]).sum::<f64>() / n);
+        let sum = |axis: usize| points.iter().map(|p| (p[0] - mean[0]) * (p[axis] - mean[axis])).sum::<f64>();
+        let squares = sum(0);
+        if squares > 0.0 { sum(1) / squares } else { 1.0 }
+    }
+}
+
+/// Whether an estimate looks as if some sensor did not belong.
+pub(crate) fn is_suspicious(found: &Estimate<'_>) -> bool {
+    let (problem, robot) = (&found.problem, found.problem.robot);
+    let used = |observations: &std::ops::Range<usize>| {
+        problem.observations[observations.clone()].iter().filter(|observation| observation.is_used).count()
+    };
+    let (mut n, mut n_used) = (0, 0);
+    for view in problem.views.iter().filter(|view| !view.observations.is_empty()) {
+        let n_here = used(&view.observations);
+        if n_here == 0 {
+            return true;
+        }
+        (n, n_used) = (n + view.observations.len(), n_used + n_here);
+    }
+    if (n - n_used) as f64 > MANY_REJECTED * n as f64 {
+        return true;
+    }
+    is_beyond_datasheet(robot, found)
+        || (0..problem.n_seen_joints).any(|joint| {
+            let large = LARGE_STD_RAD.max(2.0 * robot.sensors[joint].linearity_std_rad);
+            if found.scales().joint_std_rad[joint] > large {
+                return true;
+            }
+            let views = problem.views.iter().zip(&found.solved.state.joint_error);
+            let errors: Vec<f64> =
+                views.filter(|(view, _)| !view.is_free[joint]).map(|(_, errors)| errors[joint].abs()).collect();
+            let sigma = 1.4826 * quantile(&errors, 0.5).unwrap_or(0.0);
+            errors.iter().any(|error| *error > FAR_RAD.max(FAR_SIGMAS * sigma))
+        })
+}

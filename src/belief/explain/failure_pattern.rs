@@ -1,0 +1,291 @@
+//! A joint's readings against the angles that the camera shows.
+
+use std::f64::consts::{PI, TAU};
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::explain::failures::{FAR_RAD, FAR_SIGMAS, SensorLine, SensorUse, slip_in_words};
+use crate::solve::estimate::Estimate;
+use crate::views::view::View;
+use armcal_core::robot::{FailedKind, JointSensorSpec, Robot};
+use armcal_core::sensor::wrap_symmetric;
+use armcal_core::stats::quantile;
+
+/// One joint over the views that show tags, in the order of time.
+pub(crate) struct Readings {
+    joint: usize,
+    view_idx: Vec<usize>,
+    travel_rad: Vec<f64>,
+    /// By the camera, with one sigma.
+    angle_rad: Vec<f64>,
+    std_rad: Vec<f64>,
+}
+
+/// How the readings go with the angles.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum FailurePattern {
+    /// The angle is always the same: the joint is locked where its reading moves, and was not moved otherwise.
+    Still(FailedKind, SensorUse),
+    /// The reading is the same in so many views up to the last, the angle is not.
+    Stuck(usize),
+    /// They have nothing to do with each other.
+    Dead,
+    /// They go the other way, along a line.
+    Reversed(SensorLine),
+    /// They go along a line of a slope that no sensor of the datasheet has.
+    Scaled(SensorLine),
+    /// The readings of these views are off.
+    Single(Vec<usize>),
+    /// The readings are off against each other before and since a view, by so much, rad.
+    Lasting { since: usize, step_rad: f64 },
+}
+
+/// An angle that is spread by less than this many of its own sigma, or than `LOCKED_RAD`, does not change.
+const LOCKED_SIGMAS: f64 = 3.0;
+const LOCKED_RAD: f64 = 0.2 * std::f64::consts::PI / 180.0;
+/// A sensor that says something follows the angle to this share of the angle's spread, with about the datasheet's
+/// slope.
+const FOLLOWS: f64 = 0.3;
+/// Distances from a straight line, as a share of the angle's spread, and the least uncertainty of a gain.
+const STRAIGHT: f64 = 0.05;
+const LEAST_GAIN_STD: f64 = 0.01;
+/// A step that lasts leaves this share of the squares that a straight line leaves.
+const STEP_LEAVES: f64 = 1.0 / 6.0;
+const MIN_SIDE: usize = 2;
+/// More single jumps than this share of the views are no exceptions.
+const MAX_SINGLE: f64 = 0.4;
+/// A locked joint's sensor is right if it is off by less than this many of the datasheet's sigma.
+const RIGHT_SIGMAS: f64 = 4.0;
+
+/// A reading moved if it spans more sigma of its noise than this.
+const STILL_SIGMAS: f64 = 8.0;
+/// Fewer views with the same reading are chance.
+pub(crate) const MIN_STILL_VIEWS: usize = 4;
+/// A range that lacks no more than twice this to a whole turn holds some angles twice.
+const WHOLE_TURN_RAD: f64 = 0.05;
+/// Motion that the camera must show meanwhile, over its sigma or [`LOCKED_RAD`].
+const STUCK_SIGMAS: f64 = 5.0;
+
+/// How many of the last readings are the same but for noise.
+pub(crate) fn n_still(travel_rad: &[f64], spec: &JointSensorSpec) -> usize {
+    let span_rad = STILL_SIGMAS * spec.noise_std_counts / spec.counts_per_rad.abs();
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    let is_same = |travel_rad: &&f64| {
+        (low, high) = (low.min(**travel_rad), high.max(**travel_rad));
+        high - low <= span_rad
+    };
+    travel_rad.iter().rev().take_while(is_same).count()
+}
+
+impl Readings {
+    /// Of an estimate in which the joint is free in all views.
+    pub(crate) fn new(robot: &Robot, views: &[View], joint: usize, found: &Estimate<'_>) -> Self {
+        let mut seen: Vec<usize> = (0..views.len()).filter(|&k| found.uses(k)).collect();
+        seen.sort_by_key(|&k| (views[k].end, k));
+        let angles: Vec<(f64, f64)> = seen.iter().map(|&k| found.angle(k, joint)).collect();
+        debug_assert!(joint < robot.n_joints());
+        let travel_rad: Vec<f64> = seen.iter().map(|&k| views[k].travel_rad[joint]).collect();
+        let mut angle_rad: Vec<f64> = angles.iter().map(|(angle, _)| *angle).collect();
+        let spec = &robot.sensors[joint];
+        if !spec.moves.is_slide() && spec.half_range_rad > PI - WHOLE_TURN_RAD {
+            on_one_turn(&mut angle_rad[travel_rad.len() - n_still(&travel_rad, spec)..]);
+        }
+        Self { joint, travel_rad, angle_rad, std_rad: angles.iter().map(|(_, std)| *std).collect(), view_idx: seen }
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.view_idx.len()
+    }
+
+    /// `None` where the readings follow the angles as they should.
+    pub(crate) fn pattern(&self, robot: &Robot) -> Option<FailurePattern> {
+        let spec = &robot.sensors[self.joint];
+        let noise_rad = FAR_SIGMAS * spec.noise_std_counts / spec.counts_per_rad.abs();
+        let spread_rad = deviation(&self.angle_rad);
+        let own_rad = rms(&self.std_rad);
+        if spread_rad < LOCKED_RAD.max(LOCKED_SIGMAS * own_rad) {
+            let moves = deviation(&self.travel_rad) > noise_rad;
+            let kind = if moves { FailedKind::Locked } else { FailedKind::NotMoved };
+            let is_right = !moves && self.is_as_stated(robot);
+            return Some(FailurePattern::Still(kind, if is_right { SensorUse::Used } else { SensorUse::Ignored }));
+        }
+        let n_still = n_still(&self.travel_rad, spec);
+        let shown_rad = deviation(&self.angle_rad[self.len() - n_still..]);
+        if n_still >= MIN_STILL_VIEWS && n_still < self.len() && shown_rad > STUCK_SIGMAS * own_rad.max(LOCKED_RAD) {
+            return Some(FailurePattern::Stuck(n_still));
+        }
+        if deviation(&self.travel_rad) < noise_rad {
+            let counts = (spec.offset_counts
+                + spec.counts_per_rad * (spec.center_rad + quantile(&self.travel_rad, 0.5)?))
+            .rem_euclid(spec.wrap_counts);
+            // A broken wire reads nothing but noise about zero.
+            let near_zero = counts.min(spec.wrap_counts - counts) < FAR_SIGMAS * spec.noise_std_counts.max(1.0);
+            return Some(if near_zero { FailurePattern::Dead } else { FailurePattern::Stuck(self.len()) });
+        }
+        let (off_rad, line) = self.off_line(spec.center_rad);
+        let slope = line.slope;
+        let sizes: Vec<f64> = off_rad.iter().map(|off| off.abs()).collect();
+        let is_straight = 1.4826 * quantile(&sizes, 0.5)? < STRAIGHT * spread_rad;
+        if is_straight && (slope - 1.0).abs() > FAR_SIGMAS * spec.gain_std.max(LEAST_GAIN_STD) {
+            return Some(if slope < 0.0 { FailurePattern::Reversed(line) } else { FailurePattern::Scaled(line) });
+        }
+        if let Some(step) = self.step() {
+            return Some(step);
+        }
+        let sigma_rad = (1.4826 * quantile(&sizes, 0.5)?).max(own_rad);
+        if 1.4826 * quantile(&sizes, 0.5)? > FOLLOWS * spread_rad || !(0.7..1.3).contains(&slope) {
+            return Some(FailurePattern::Dead);
+        }
+        let far = |(_, off): &(&usize, &f64)| off.abs() > FAR_RAD.max(FAR_SIGMAS * sigma_rad);
+        let single: Vec<usize> = self.view_idx.iter().zip(&off_rad).filter(far).map(|(k, _)| *k).collect();
+        let n = single.len();
+        let mut single = single;
+        single.sort_unstable();
+        (n > 0 && n as f64 <= MAX_SINGLE * self.len() as f64).then_some(FailurePattern::Single(single))
+    }
+
+    /// Returns true where the sensor of a joint that stands still reads an angle that its datasheet allows.
+    fn is_as_stated(&self, robot: &Robot) -> bool {
+        let spec = &robot.sensors[self.joint];
+        let travel_rad = quantile(&self.travel_rad, 0.5).unwrap_or(0.0);
+        let off_rad = quantile(&self.angle_rad, 0.5).unwrap_or(0.0) - spec.center_rad - travel_rad;
+        let allowed_rad = RIGHT_SIGMAS * spec.offset_std_rad.hypot(spec.gain_std * travel_rad);
+        off_rad.abs() < allowed_rad
+    }
+
+    /// The slip that explains the most, if it explains nearly all (least squares of 1, reading and a step).
+    fn step(&self) -> Option<FailurePattern> {
+        let n = self.len();
+        let without = self.squares_with_step(n)?.0;
+        let best = (MIN_SIDE..=n.checked_sub(MIN_SIDE)?)
+            .filter_map(|at| Some((at, self.squares_with_step(at)?)))
+            .min_by(|(_, a), (_, b)| a.0.total_cmp(&b.0))?;
+        let (at, (squares, step_rad)) = best;
+        let sigma_rad = (squares / n.saturating_sub(3).max(1) as f64).sqrt();
+        let is_clear = squares < STEP_LEAVES * without
+            && step_rad.abs() > FAR_RAD.max(3.0 * sigma_rad)
+            && sigma_rad < FOLLOWS * deviation(&self.angle_rad);
+        is_clear.then(|| FailurePattern::Lasting { since: self.view_idx[at], step_rad })
+    }
+
+    /// Sum of squares about a straight line with a step at the `at`-th view, and the step; at the end there is none.
+    fn squares_with_step(&self, at: usize) -> Option<(f64, f64)> {
+        let row = |k: usize| Vector3::new(1.0, self.travel_rad[k], if k >= at { 1.0 } else { 0.0 });
+        let (mut matrix, mut right) = (Matrix3::<f64>::identity() * 1e-9, Vector3::zeros());
+        for k in 0..self.len() {
+            matrix += row(k) * row(k).transpose();
+            right += row(k) * self.angle_rad[k];
+        }
+        let x = matrix.cholesky()?.solve(&right);
+        // Which way the reading went off: against the angle.
+        Some(((0..self.len()).map(|k| (self.angle_rad[k] - row(k).dot(&x)).powi(2)).sum(), -x[2]))
+    }
+
+    /// Distances from the line of least absolute deviations, and the line (iteratively reweighted least squares).
+    fn off_line(&self, center_rad: f64) -> (Vec<f64>, SensorLine) {
+        const ROUNDS: usize = 60;
+        const FLOOR_RAD: f64 = 1e-5;
+        let differences: Vec<f64> = self.angle_rad.iter().zip(&self.travel_rad).map(|(a, t)| a - t).collect();
+        let (mut offset, mut slope) = (quantile(&differences, 0.5).unwrap_or(0.0), 1.0);
+        let off = |offset: f64, slope: f64| -> Vec<f64> {
+            self.angle_rad.iter().zip(&self.travel_rad).map(|(a, t)| a - offset - slope * t).collect()
+        };
+        for _ in 0..ROUNDS {
+            let weights: Vec<f64> = off(offset, slope).iter().map(|r| 1.0 / r.abs().max(FLOOR_RAD)).collect();
+            let sum = |f: &dyn Fn(usize) -> f64| (0..self.len()).map(|k| weights[k] * f(k)).sum::<f64>();
+            let (w, t, tt) = (sum(&|_| 1.0), sum(&|k| self.travel_rad[k]), sum(&|k| self.travel_rad[k].powi(2)));
+            let (a, at) = (sum(&|k| self.angle_rad[k]), sum(&|k| self.angle_rad[k] * self.travel_rad[k]));
+            let determinant = w * tt - t * t;
+            if determinant <= 1e-12 * w * tt {
+                break;
+            }
+            slope = (w * at - t * a) / determinant;
+            offset = (a - slope * t) / w;
+        }
+        (off(offset, slope), SensorLine { slope, offset_rad: offset - center_rad })
+    }
+
+    /// What shows the pattern.
+    pub(crate) fn in_words(&self, spec: &JointSensorSpec, pattern: &FailurePattern, views: &[View]) -> String {
+        let unit = spec.unit();
+        let range = |values: &[f64], digits: usize| {
+            let (low, high) =
+                values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+            unit.shown(high - low, digits)
+        };
+        let read = |digits: usize| range(&self.travel_rad, digits);
+        let shown = |digits: usize| range(&self.angle_rad, digits);
+        let n = self.len();
+        let number = |k: usize| views[k].pose_idx + 1;
+        match pattern {
+            FailurePattern::Still(_, SensorUse::Used) => {
+                format!("the camera shows one angle in {n} views (within {}), as the sensor says", shown(2))
+            }
+            FailurePattern::Still(_, SensorUse::Ignored) => {
+                format!(
+                    "the camera shows one angle in {n} views (within {}); the sensor reads {} apart, or elsewhere",
+                    shown(2),
+                    read(2)
+                )
+            }
+            FailurePattern::Stuck(n_still) => {
+                let shown = range(&self.angle_rad[n - n_still..], 1);
+                let since = if *n_still < n { "the last " } else { "" };
+                format!("the reading stands still over {since}{n_still} views while the camera shows {shown} of motion")
+            }
+            FailurePattern::Dead => {
+                format!("the reading spans {} and does not follow the {} that the camera shows", read(1), shown(1))
+            }
+            FailurePattern::Reversed(SensorLine { slope, .. }) => format!(
+                "the reading goes the other way: over {n} views the {} that the camera shows follow it with a \
+                 slope of {slope:.2}",
+                shown(1)
+            ),
+            FailurePattern::Scaled(SensorLine { slope, .. }) => format!(
+                "the {} that the camera shows in {n} views follow the {} of the reading along a line of slope \
+                 {slope:.2}",
+                shown(1),
+                read(1)
+            ),
+            FailurePattern::Single(of) => {
+                let numbers: Vec<String> = of.iter().map(|&k| number(k).to_string()).collect();
+                format!("the reading is off in {} of {n} views ({})", of.len(), numbers.join(", "))
+            }
+            FailurePattern::Lasting { since, step_rad } => slip_in_words(unit.shown(*step_rad, 2), views, *since),
+        }
+    }
+}
+
+fn rms(values: &[f64]) -> f64 {
+    (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
+}
+
+/// The camera shows an angle but for whole turns, and a reading that stands still does not tell which: the first one's.
+fn on_one_turn(angles_rad: &mut [f64]) {
+    let Some(first_rad) = angles_rad.first().copied() else { return };
+    for angle_rad in angles_rad {
+        *angle_rad = first_rad + wrap_symmetric(*angle_rad - first_rad, TAU);
+    }
+}
+
+/// Root mean square about the mean.
+fn deviation(values: &[f64]) -> f64 {
+    let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len().max(1) as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles_that_are_one_but_for_whole_turns_become_one() {
+        let mut angles = [PI - 0.01, -PI + 0.005, PI - 0.02, 3.0 * PI + 0.01];
+        on_one_turn(&mut angles);
+        assert!(deviation(&angles) < 0.02, "{angles:?}");
+        assert!((angles[1] - (PI + 0.005)).abs() < 1e-12, "{angles:?}");
+        let mut apart = [0.0, 1.0, -1.5];
+        on_one_turn(&mut apart);
+        assert_eq!(apart, [0.0, 1.0, -1.5]);
+    }
+}

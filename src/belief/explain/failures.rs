@@ -1,0 +1,242 @@
+//! Joints whose sensor says nothing, in all views or in some: how they look to the estimator.
+//!
+//! A reading that says nothing is replaced by the angle that the tags show (found by search, so that the solver starts
+//! near), and the joint's error in that view gets a standard deviation that leaves it open ([`View::is_free`]). A
+//! locked joint is a sensor that always reads the same and whose offset nobody knows: one column for all views.
+
+use crate::explain::angles_by_camera::set_by_camera;
+use crate::model::estimated::Model;
+use crate::model::parameters::{JointParameters, ParameterKind};
+use crate::model::scales::Hyperparameters;
+use crate::say;
+use crate::solve::estimate::{Estimate, estimate};
+use crate::solve::input::{BundleInput, HyperparameterMode};
+use crate::solve::model_for_views::{model_for, reference};
+use crate::views::view::View;
+use armcal_core::robot::{FailedJoint, FailedKind, Robot};
+use armcal_core::stats::quantile;
+use armcal_core::units::Unit;
+
+/// A joint's error in one view that stands out: times the spread of the others (a robust sigma), and at all, rad.
+pub(crate) const FAR_SIGMAS: f64 = 6.0;
+pub(crate) const FAR_RAD: f64 = 0.3 * std::f64::consts::PI / 180.0;
+/// Fewer views show nothing of a joint's history.
+pub(crate) const MIN_VIEWS: usize = 5;
+
+/// Who says that a joint failed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FailureSource {
+    /// An operator, by a mark of the recording or in the routine.
+    Declared,
+    /// The estimator, by what the tags show.
+    Detected,
+}
+
+/// What the sensor of a locked joint is worth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SensorUse {
+    /// It reads where the joint stands, or it is used in the views that are not named.
+    Used,
+    /// It is not looked at.
+    Ignored,
+}
+
+/// How a joint's angle goes with its reading where that is not as its datasheet has it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SensorLine {
+    /// Of the angle by the datasheet's travel; below zero the sensor is reversed.
+    pub slope: f64,
+    /// Angle at no travel, from the middle of the range.
+    pub offset_rad: f64,
+}
+
+/// Priors of a sensor of another scale than its datasheet's: gain, and offset in rad. Wide.
+const OTHER_GAIN_STD: f64 = 1.0;
+const OTHER_OFFSET_STD_RAD: f64 = 0.5;
+
+/// One failed joint, and what is not used of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Failure {
+    /// Index of the joint, base first.
+    pub joint: usize,
+    /// What is wrong with it.
+    pub kind: FailedKind,
+    /// Who says so.
+    pub found: FailureSource,
+    /// Whether any of the sensor's readings are used.
+    pub reading: SensorUse,
+    /// Views whose reading says nothing, ascending.
+    pub views: Vec<usize>,
+    /// Of a slip that lasts: the first view after it in the order of time; before it the sensor had another offset.
+    pub since: Option<usize>,
+    /// By how much more it reads since, rad.
+    pub step_rad: Option<f64>,
+    /// Of a reversed sensor, whose reading is not used, and of one of another scale, whose gain is estimated.
+    pub line: Option<SensorLine>,
+    /// What shows it, in words.
+    pub evidence: String,
+}
+
+impl Failure {
+    /// Nothing that the sensor says in any of `n_views` is used.
+    pub fn without_sensor(joint: usize, kind: FailedKind, found: FailureSource, n_views: usize) -> Self {
+        let views = (0..n_views).collect();
+        Self {
+            joint,
+            kind,
+            found,
+            reading: SensorUse::Ignored,
+            views,
+            since: None,
+            step_rad: None,
+            line: None,
+            evidence: String::new(),
+        }
+    }
+
+    /// What somebody declared; when a sensor jumped is still to be found.
+    pub fn declared(declared: FailedJoint, n_views: usize) -> Self {
+        let FailedJoint { joint, kind } = declared;
+        let all = Self::without_sensor(joint, kind, FailureSource::Declared, n_views);
+        match kind {
+            FailedKind::Jumps => Self { reading: SensorUse::Used, views: Vec::new(), ..all },
+            FailedKind::Locked | FailedKind::NotMoved | FailedKind::Dead | FailedKind::Stuck => all,
+        }
+    }
+
+    /// A sensor that slipped by `step_rad`, shown in `unit`, before the view `since`.
+    pub fn slip((joint, unit): (usize, Unit), step_rad: f64, views: &[View], since: usize) -> Self {
+        Self {
+            reading: SensorUse::Used,
+            since: Some(since),
+            step_rad: Some(step_rad),
+            evidence: slip_in_words(unit.shown(step_rad, 2), views, since),
+            ..Self::without_sensor(joint, FailedKind::Jumps, FailureSource::Detected, 0)
+        }
+    }
+
+    /// Whether the sensor slipped once for good.
+    pub fn is_step(&self) -> bool {
+        self.since.is_some()
+    }
+
+    /// How many of `views` show the sensor as it is since it slipped.
+    pub fn n_views_since(&self, views: &[View]) -> Option<usize> {
+        let since = views[self.since?].end;
+        Some(views.iter().filter(|view| view.end >= since && !view.tags.is_empty()).count())
+    }
+
+    /// Whether the joint's parameters have no data at all.
+    pub fn leaves_no_sensor(&self) -> bool {
+        self.reading == SensorUse::Ignored
+    }
+}
+
+/// `the sensor slipped by 1.00 deg after 9 of 20 views, before view 10`.
+pub(crate) fn slip_in_words(step: String, views: &[View], since: usize) -> String {
+    let n_before = views.iter().filter(|view| view.end < views[since].end).count();
+    let (n, number) = (views.len(), views[since].pose_idx + 1);
+    say::slip(&step, [n_before, n], number)
+}
+
+/// An arm and its views with the failed joints taken care of.
+pub struct FailureAdjusted {
+    /// A locked joint has a sensor of unknown offset.
+    pub robot: Robot,
+    /// Unused readings replaced by what the camera shows.
+    pub views: Vec<View>,
+    /// The failed joints.
+    pub failures: Vec<Failure>,
+}
+
+impl FailureAdjusted {
+    /// `at`: what is believed of the other joints' sensors.
+    pub fn new(robot: &Robot, views: &[View], failures: &[Failure], at: &JointParameters) -> Self {
+        let mut applied = Self { robot: robot.clone(), views: views.to_vec(), failures: failures.to_vec() };
+        for failure in failures {
+            for &view_idx in &failure.views {
+                let view = &mut applied.views[view_idx];
+                view.is_free[failure.joint] = true;
+                view.rate_rad_s[failure.joint] = 0.0;
+                view.approach[failure.joint] = 0.0;
+            }
+        }
+        for view in &mut applied.views {
+            set_by_camera(robot, view, at);
+        }
+        for failure in failures.iter().filter(|f| f.kind.stands_still() && f.leaves_no_sensor()) {
+            applied.lock(failure.joint);
+        }
+        for failure in failures.iter().filter(|failure| failure.line.is_some() && !failure.leaves_no_sensor()) {
+            let spec = &mut applied.robot.sensors[failure.joint];
+            spec.gain_std = spec.gain_std.max(OTHER_GAIN_STD);
+            spec.offset_std_rad = spec.offset_std_rad.max(OTHER_OFFSET_STD_RAD);
+        }
+        applied
+    }
+
+    /// One angle in all views, which starts at the middle one of those that the camera showed.
+    fn lock(&mut self, joint: usize) {
+        let seen: Vec<f64> =
+            self.views.iter().filter(|view| !view.tags.is_empty()).map(|view| view.travel_rad[joint]).collect();
+        let travel_rad = quantile(&seen, 0.5).unwrap_or(0.0);
+        for view in &mut self.views {
+            view.travel_rad[joint] = travel_rad;
+            view.is_free[joint] = false;
+        }
+        let spec = &mut self.robot.sensors[joint];
+        // It gives and swings as it did; only its sensor is gone.
+        (spec.offset_std_rad, spec.gain_std, spec.noise_std_counts) = (spec.half_range_rad, 0.0, 0.0);
+    }
+
+    /// What these views tell, without columns for sensors that say nothing.
+    pub fn model(&self) -> Model {
+        let mut model = model_for(&self.robot, &self.views);
+        self.restrict(&mut model);
+        model
+    }
+
+    /// Takes the columns of sensors that say nothing from `model`.
+    pub fn restrict(&self, model: &mut Model) {
+        for failure in self.failures.iter().filter(|failure| failure.leaves_no_sensor()) {
+            let is_locked = failure.kind.stands_still();
+            model.joints[failure.joint] = if is_locked { vec![ParameterKind::Offset] } else { Vec::new() };
+        }
+        for (failure, since) in self.failures.iter().filter_map(|failure| Some((failure, failure.since?))) {
+            let kinds = &mut model.joints[failure.joint];
+            // Without a column of its own the sensor is exact.
+            if !kinds.is_empty() {
+                kinds.push(ParameterKind::StepBefore(self.views[since].end));
+            }
+        }
+    }
+
+    /// From the datasheet.
+    pub fn input(&self, evidence: HyperparameterMode) -> BundleInput<'_> {
+        BundleInput {
+            robot: &self.robot,
+            views: &self.views,
+            model: self.model(),
+            scales: Hyperparameters::datasheet(&self.robot),
+            guess: self.guess(),
+            joint_prior: None,
+            evidence,
+        }
+    }
+
+    /// The estimate from the datasheet; `None` where the views determine nothing.
+    fn guess(&self) -> JointParameters {
+        let mut guess = JointParameters { reference: reference(&self.views), ..JointParameters::default() };
+        for (joint, line) in self.failures.iter().filter_map(|failure| Some((failure.joint, failure.line?))) {
+            if !self.failures.iter().any(|failure| failure.joint == joint && failure.leaves_no_sensor()) {
+                (guess.gain[joint], guess.offset_rad[joint]) = (line.slope, line.offset_rad);
+            }
+        }
+        guess
+    }
+
+    /// The estimate from the datasheet.
+    pub fn estimate(&self, evidence: HyperparameterMode) -> Option<Estimate<'_>> {
+        estimate(&self.input(evidence))
+    }
+}

@@ -1,0 +1,247 @@
+//! Searches for a way to read the joints, or to carry the camera, that explains views which no arm of this URDF
+//! explains as they are read.
+//!
+//! Each [`Hypothesis`] changes the readings of all views alike, or the nominal mount; the joints are then estimated by
+//! the datasheet's scales. The score is that of
+//! [`failure_detection`](crate::explain::failure_detection). A hypothesis is named if it is likelier than the
+//! readings as they are by [`MARGIN`], and if its estimate leaves no sensor suspicious.
+
+mod hypothesis;
+
+use std::f64::consts::TAU;
+
+use crate::explain::angles_by_camera::distance_cost;
+use crate::explain::drawing::Drawing;
+use crate::explain::failure_detection::{is_suspicious, score};
+use crate::explain::failures::{Failure, FailureAdjusted};
+use crate::explain::reading_search::hypothesis::{Hypothesis, SCALE_STD, ZERO_STD_RAD, has_known_mount};
+use crate::model::parameters::JointParameters;
+use crate::positions::position_problem::PositionProblem;
+use crate::say::reading_error::{JointZero, MisreadReadings, ReadingError};
+use crate::solve::estimate::{Estimate, estimate};
+use crate::solve::input::HyperparameterMode;
+use crate::views::view::View;
+use armcal_core::joints::JointAngles;
+use armcal_core::robot::Robot;
+use armcal_core::sensor::wrap_symmetric;
+
+/// Evidence that a reading error needs, twice the logarithm of the odds: e^30, as about 500 are tried.
+const MARGIN: f64 = 60.0;
+/// Hypotheses within this of the best one are printed with it, in the same unit: odds of e^5.
+const ALTERNATIVE: f64 = 10.0;
+/// Added to the score of a camera hypothesis, in the same unit (assumed): where it explains the views as well as a
+/// sensor's zero does, the zero is named first.
+const CAMERA_HANDICAP: f64 = 5.0;
+const MAX_ALTERNATIVES: usize = 2;
+/// More views do not change the answer; they would cost time.
+const MAX_VIEWS: usize = 40;
+/// Hypotheses that are estimated: those under which the nominal arm places the tags nearest to their survey.
+const MAX_ESTIMATED: usize = 36;
+/// Hypotheses among them that move or turn the camera.
+const MAX_OF_CAMERA: usize = 6;
+/// A zero error in stated sigmas below which a sensor is as stated.
+const MIN_SIGMAS: f64 = 4.0;
+
+/// A hypothesis and what it explains.
+struct Tried {
+    hypothesis: Hypothesis,
+    score: f64,
+    fits: bool,
+    sensors: JointParameters,
+    tag_error_m: Option<f64>,
+}
+
+/// An arm whose views no calibration explains.
+pub(crate) struct ReadingSearch<'a> {
+    pub robot: &'a Robot,
+    /// As they were read.
+    pub views: &'a [View],
+    /// Failed sensors as detected: the alternative that a reading error must beat.
+    pub failures: &'a [Failure],
+    /// Repaired geometry, another alternative.
+    pub drawing: &'a Drawing,
+}
+
+impl ReadingSearch<'_> {
+    /// The reading error, if one explains the views and the readings as they are do not.
+    pub(crate) fn find(&self) -> Option<MisreadReadings> {
+        let stride = self.stride();
+        let views: Vec<View> = self.views.iter().step_by(stride).cloned().collect();
+        let before_m = PositionProblem::new(self.robot, &views).rms_m(&JointParameters::default())?;
+        let as_read = self.score_as_read(&views, stride);
+        let turned = Hypothesis::other_turns(self.robot, self.views).and_then(|hypothesis| self.attempt(hypothesis));
+        if let Some(turned) = turned.filter(|turned| turned.fits && turned.score < as_read) {
+            let (found, alternatives) = (self.named(&turned), Vec::new());
+            return Some(MisreadReadings {
+                found,
+                alternatives,
+                tag_error_m: before_m,
+                corrected_m: turned.tag_error_m,
+            });
+        }
+        let tried = self.likely().into_iter().filter_map(|hypothesis| self.attempt(hypothesis));
+        let mut tried: Vec<Tried> =
+            tried.filter(|tried| tried.fits && as_read - tried.score > MARGIN && self.is_large(tried)).collect();
+        tried.sort_by(|a, b| a.score.total_cmp(&b.score));
+        let best = tried.first()?;
+        let found = self.named(best);
+        let mut alternatives: Vec<ReadingError> = Vec::new();
+        for other in tried.iter().take_while(|other| other.score - best.score < ALTERNATIVE) {
+            let error = self.named(other);
+            let is_new = !concerns_same(&error, &found) && !alternatives.iter().any(|one| concerns_same(one, &error));
+            if is_new && alternatives.len() < MAX_ALTERNATIVES {
+                alternatives.push(error);
+            }
+        }
+        Some(MisreadReadings { found, alternatives, tag_error_m: before_m, corrected_m: best.tag_error_m })
+    }
+
+    /// One view of so many is looked at.
+    fn stride(&self) -> usize {
+        self.views.len().div_ceil(MAX_VIEWS).max(1)
+    }
+
+    /// Some of the views, read that way.
+    fn views_by(&self, hypothesis: &Hypothesis) -> Vec<View> {
+        // Only readings of another view need all of them.
+        if matches!(hypothesis, Hypothesis::Shifted(_)) {
+            return hypothesis.applied(self.robot, self.views).into_iter().step_by(self.stride()).collect();
+        }
+        let views: Vec<View> = self.views.iter().step_by(self.stride()).cloned().collect();
+        hypothesis.applied(self.robot, &views)
+    }
+
+    /// The least that the readings as they are cost, failed sensors and repaired geometry included.
+    fn score_as_read(&self, views: &[View], stride: usize) -> f64 {
+        let of_views = |failure: &Failure| {
+            let views = failure.views.iter().filter(|view| view.is_multiple_of(stride)).map(|view| view / stride);
+            Failure { views: views.collect(), since: failure.since.map(|since| since / stride), ..failure.clone() }
+        };
+        let failures: Vec<Failure> = self.failures.iter().map(of_views).collect();
+        let with = |failures: &[Failure]| {
+            let adjusted = FailureAdjusted::new(self.robot, views, failures, &JointParameters::default());
+            let mut input = adjusted.input(HyperparameterMode::Given);
+            self.drawing.apply(&mut input);
+            estimate(&input).map_or(f64::INFINITY, |found| score(&found))
+        };
+        with(&[]).min(with(&failures))
+    }
+
+    /// The hypotheses that are worth an estimate.
+    fn likely(&self) -> Vec<Hypothesis> {
+        let all = Hypothesis::all(self.robot);
+        if !has_known_mount(self.robot) {
+            return all;
+        }
+        let cost = |hypothesis: &Hypothesis| -> f64 {
+            let robot = hypothesis.robot(self.robot);
+            let of_view = |view: &View| {
+                let angle_rad = |joint: usize| robot.sensors[joint].center_rad + view.travel_rad[joint];
+                distance_cost(&robot, view, &JointAngles::from_fn(view.travel_rad.len(), angle_rad))
+            };
+            let views = self.views_by(hypothesis);
+            views.iter().map(of_view).sum::<f64>() / views.len().max(1) as f64
+        };
+        let mut with_costs: Vec<(f64, Hypothesis)> = all.into_iter().map(|one| (cost(&one), one)).collect();
+        with_costs.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let likely = with_costs.into_iter().map(|(_, hypothesis)| hypothesis);
+        let (of_camera, of_readings): (Vec<_>, Vec<_>) = likely.partition(Hypothesis::is_of_camera);
+        let n_readings = MAX_ESTIMATED - MAX_OF_CAMERA;
+        of_readings.into_iter().take(n_readings).chain(of_camera.into_iter().take(MAX_OF_CAMERA)).collect()
+    }
+
+    fn name(&self, joint: usize) -> String {
+        self.robot.sensors[joint].joint.clone()
+    }
+
+    fn attempt(&self, hypothesis: Hypothesis) -> Option<Tried> {
+        let mut robot = hypothesis.robot(self.robot).into_owned();
+        match &hypothesis {
+            Hypothesis::Zeros(zeros) => {
+                for (joint, _) in zeros {
+                    robot.sensors[*joint].offset_std_rad = robot.sensors[*joint].offset_std_rad.max(ZERO_STD_RAD);
+                }
+            }
+            Hypothesis::Scaled { joint, .. } => robot.sensors[*joint].gain_std = SCALE_STD,
+            _ => {}
+        }
+        let views = self.views_by(&hypothesis);
+        let adjusted = FailureAdjusted::new(&robot, &views, &[], &JointParameters::default());
+        let found = estimate(&adjusted.input(HyperparameterMode::Given))?;
+        let handicap = if hypothesis.is_of_camera() { CAMERA_HANDICAP } else { 0.0 };
+        Some(Tried {
+            hypothesis,
+            score: score(&found) + handicap,
+            fits: !is_suspicious(&found),
+            sensors: found.parameters(),
+            tag_error_m: tag_error_m(&found, &views),
+        })
+    }
+
+    /// Zeros as they were found, beyond what the sensors are stated to be off; other errors have no size.
+    fn is_large(&self, tried: &Tried) -> bool {
+        let Hypothesis::Zeros(zeros) = &tried.hypothesis else { return true };
+        zeros.iter().all(|(joint, off_rad)| {
+            let off_rad = wrap_symmetric(off_rad + tried.sensors.offset_rad[*joint], TAU);
+            off_rad.abs() > MIN_SIGMAS * self.robot.sensors[*joint].offset_std_rad
+        })
+    }
+
+    fn named(&self, tried: &Tried) -> ReadingError {
+        let name = |joint: usize| self.name(joint);
+        match &tried.hypothesis {
+            Hypothesis::Order(order) => {
+                let moved: Vec<usize> = (0..order.len()).filter(|&joint| order[joint] != joint).collect();
+                match moved[..] {
+                    [a, b] => ReadingError::Exchanged { joints: [a, b].map(name) },
+                    _ => ReadingError::Reversed { joints: (0..order.len()).map(name).collect() },
+                }
+            }
+            Hypothesis::Coupled { joint, with, sign } => {
+                ReadingError::Coupled { joint: name(*joint), with: name(*with), sign: *sign }
+            }
+            Hypothesis::OtherTurns(joints) => {
+                let turn_counts = |joint: &usize| (TAU * self.robot.sensors[*joint].counts_per_rad).abs();
+                let wrap_counts = joints.first().map_or(0.0, turn_counts);
+                ReadingError::OtherTurns { joints: joints.iter().map(|&joint| name(joint)).collect(), wrap_counts }
+            }
+            Hypothesis::Zeros(zeros) => {
+                let zero = |(joint, off_rad): &(usize, f64)| {
+                    let spec = &self.robot.sensors[*joint];
+                    let off_rad = wrap_symmetric(off_rad + tried.sensors.offset_rad[*joint], TAU);
+                    let offset_counts = spec.offset_counts - spec.counts_per_rad * off_rad;
+                    JointZero { joint: name(*joint), off_rad, moves: spec.moves, offset_counts }
+                };
+                ReadingError::Zeros { joints: zeros.iter().map(zero).collect() }
+            }
+            Hypothesis::Scaled { joint, factor } => {
+                ReadingError::Scaled { joint: name(*joint), factor: factor * tried.sensors.gain[*joint] }
+            }
+            Hypothesis::Shifted(views) => ReadingError::Shifted { views: *views as i32 },
+            Hypothesis::Camera { n_joints, turn } => {
+                let is_here = *n_joints == self.robot.camera.mount.n_joints;
+                let link = || self.robot.chain.joints()[n_joints - 1].child_link.clone();
+                ReadingError::Camera { link: (!is_here).then(link), turn: [turn.w, turn.i, turn.j, turn.k] }
+            }
+        }
+    }
+}
+
+/// Root mean square distance between predicted and surveyed tags.
+fn tag_error_m(found: &Estimate<'_>, views: &[View]) -> Option<f64> {
+    let robot = found.as_found(found.problem.robot);
+    PositionProblem::new(&robot, views).rms_m(&found.parameters())
+}
+
+/// Two names for the same joints.
+fn concerns_same(a: &ReadingError, b: &ReadingError) -> bool {
+    let joints = |error: &ReadingError| match error {
+        ReadingError::Exchanged { joints } => joints.to_vec(),
+        ReadingError::Reversed { joints } | ReadingError::OtherTurns { joints, .. } => joints.clone(),
+        ReadingError::Coupled { joint, with, .. } => vec![joint.clone(), with.clone()],
+        ReadingError::Zeros { joints } => joints.iter().map(|zero| zero.joint.clone()).collect(),
+        ReadingError::Scaled { joint, .. } => vec![joint.clone()],
+        ReadingError::Shifted { .. } | ReadingError::Camera { .. } => Vec::new(),
+    };
+    std::mem::discriminant(a) == std::mem::discriminant(b) && joints(a) == joints(b)
+}

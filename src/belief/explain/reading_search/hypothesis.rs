@@ -1,0 +1,215 @@
+//! Ways in which the readings of all joints may be meant and the camera be carried, and how a view is read in each.
+
+use std::borrow::Cow;
+use std::f64::consts::{FRAC_PI_6, PI, TAU};
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+use crate::explain::wrong_input::map::quarter_turns;
+use crate::views::view::View;
+use armcal_core::robot::Robot;
+use armcal_core::sensor::wrap_symmetric;
+
+/// A camera mount with larger stated sigmas does not place the tags, m and rad.
+const KNOWN_MOUNT: [f64; 2] = [0.05, 0.2];
+/// Excess over the half range from which a reading is on another turn, rad.
+const NEXT_TURN_RAD: f64 = 0.1;
+/// Zeros are tried at these steps; one sigma of what is left, rad.
+const ZERO_STEP_RAD: f64 = FRAC_PI_6;
+pub(crate) const ZERO_STD_RAD: f64 = 0.2;
+/// Scales are tried at these steps, up to about a thousandth and a thousand; one sigma of what is left.
+const SCALE_STEP: f64 = 1.6;
+const SCALE_STEPS: i32 = 15;
+pub(crate) const SCALE_STD: f64 = 0.2;
+/// A scale that is off by fewer steps shows in the sensor's line.
+const LEAST_SCALE_STEPS: i32 = 4;
+/// Axes within this angle are parallel, rad.
+const PARALLEL_RAD: f64 = 0.02;
+/// One way to read the joints, or to carry the camera.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Hypothesis {
+    /// Joint `k` has the reading of `order[k]`.
+    Order(Vec<usize>),
+    Coupled {
+        joint: usize,
+        with: usize,
+        sign: f64,
+    },
+    /// A turn less or more, where that is within the limits.
+    OtherTurns(Vec<usize>),
+    /// Added to the angles.
+    Zeros(Vec<(usize, f64)>),
+    /// The angle over the reading.
+    Scaled {
+        joint: usize,
+        factor: f64,
+    },
+    /// Each view has its own readings at the view so many later.
+    Shifted(isize),
+    /// The camera is behind so many joints, and its frame is turned.
+    Camera {
+        n_joints: usize,
+        turn: UnitQuaternion<f64>,
+    },
+}
+
+/// True where the stated sigmas of the camera mount are within [`KNOWN_MOUNT`].
+pub(crate) fn has_known_mount(robot: &Robot) -> bool {
+    robot.camera.mount_std_m <= KNOWN_MOUNT[0] && robot.camera.mount_std_rad <= KNOWN_MOUNT[1]
+}
+
+impl Hypothesis {
+    /// Joints with readings of 0 to 360 deg, where their range is one about zero: some beyond their limits, all within
+    /// them but for a turn.
+    pub(crate) fn other_turns(robot: &Robot, views: &[View]) -> Option<Self> {
+        let is_turned = |&joint: &usize| {
+            let spec = &robot.sensors[joint];
+            let travel_rad = || views.iter().map(|view| view.travel_rad[joint]);
+            let limit_rad = spec.half_range_rad + NEXT_TURN_RAD;
+            let is_possible = spec.is_limited() && !spec.moves.is_slide();
+            is_possible
+                && travel_rad().any(|travel_rad| travel_rad.abs() > limit_rad)
+                && travel_rad().all(|travel_rad| wrap_symmetric(travel_rad, TAU).abs() < limit_rad)
+        };
+        let joints: Vec<usize> = (0..robot.n_seen_joints()).filter(is_turned).collect();
+        (!joints.is_empty()).then_some(Self::OtherTurns(joints))
+    }
+
+    /// All but readings of 0 to 360 deg.
+    pub(crate) fn all(robot: &Robot) -> Vec<Self> {
+        let n = robot.n_seen_joints();
+        let order: Vec<usize> = (0..robot.n_joints()).collect();
+        let pairs = || (0..n).flat_map(|a| (a + 1..n).map(move |b| [a, b]));
+        let exchanged = pairs().map(|[a, b]| {
+            let mut order = order.clone();
+            order.swap(a, b);
+            Self::Order(order)
+        });
+        let reversed = Self::Order(order.iter().rev().copied().collect());
+        let neighbours = (1..n).flat_map(|k| [[k, k - 1], [k - 1, k]]);
+        let coupled = neighbours.flat_map(|[joint, with]| [1.0, -1.0].map(|sign| Self::Coupled { joint, with, sign }));
+        let turning: Vec<usize> = (0..n).filter(|&joint| !robot.sensors[joint].moves.is_slide()).collect();
+        let steps: Vec<f64> = (0..12).map(|k| wrap_symmetric(f64::from(k) * ZERO_STEP_RAD, TAU)).collect();
+        let single = turning.iter().flat_map(|&joint| steps.iter().map(move |off| Self::Zeros(vec![(joint, *off)])));
+        let parallel = pairs().filter_map(|pair| Some((pair, parallel_sign(robot, pair)?)));
+        let opposite = parallel
+            .flat_map(|([a, b], sign)| steps.iter().map(move |off| Self::Zeros(vec![(a, *off), (b, -sign * off)])));
+        let steps = (-SCALE_STEPS..=SCALE_STEPS).filter(|step| step.abs() >= LEAST_SCALE_STEPS);
+        let scaled =
+            steps.flat_map(|step| (0..n).map(move |joint| Self::Scaled { joint, factor: SCALE_STEP.powi(step) }));
+        let shifted = [-1, 1].map(Self::Shifted);
+        let of_joints = exchanged.chain([reversed]).chain(coupled).chain(single).chain(opposite).chain(scaled);
+        of_joints.chain(shifted).chain(Self::of_camera(robot)).collect()
+    }
+
+    /// On each link, at the stated pose with its frame turned by quarters; where the stated pose is known.
+    fn of_camera(robot: &Robot) -> Vec<Self> {
+        let camera = &robot.camera;
+        if !has_known_mount(robot) || !robot.further_cameras.is_empty() || robot.camera.mount.n_joints == 0 {
+            return Vec::new();
+        }
+        let turns: Vec<_> = std::iter::once(UnitQuaternion::identity()).chain(quarter_turns()).collect();
+        let on_link = |n_joints: usize| turns.iter().map(move |&turn| Self::Camera { n_joints, turn });
+        let all = (1..=robot.n_joints()).flat_map(on_link);
+        let as_stated = Self::Camera { n_joints: camera.mount.n_joints, turn: UnitQuaternion::identity() };
+        all.filter(|one| *one != as_stated).collect()
+    }
+
+    pub(crate) fn is_of_camera(&self) -> bool {
+        matches!(self, Self::Camera { .. })
+    }
+
+    /// The arm with its camera carried that way.
+    pub(crate) fn robot<'a>(&self, robot: &'a Robot) -> Cow<'a, Robot> {
+        let Self::Camera { n_joints, turn } = self else { return Cow::Borrowed(robot) };
+        let mut robot = robot.clone();
+        let mount = &mut robot.camera.mount;
+        mount.n_joints = *n_joints;
+        mount.link_from_frame.rotation *= turn;
+        Cow::Owned(robot)
+    }
+
+    /// The views, in the order of time, with their readings taken that way.
+    pub(crate) fn applied(&self, robot: &Robot, views: &[View]) -> Vec<View> {
+        let Self::Shifted(by) = self else { return views.iter().map(|view| self.applied_to(robot, view)).collect() };
+        let shifted = |(at, view): (usize, &View)| {
+            let source = views.get(at.checked_add_signed(*by)?)?;
+            Some(View {
+                travel_rad: source.travel_rad,
+                rate_rad_s: source.rate_rad_s,
+                approach: source.approach,
+                ..view.clone()
+            })
+        };
+        views.iter().enumerate().filter_map(shifted).collect()
+    }
+
+    /// The view with its own readings taken that way.
+    fn applied_to(&self, robot: &Robot, view: &View) -> View {
+        let mut changed = view.clone();
+        match self {
+            Self::Order(order) => {
+                for (joint, &from) in order.iter().enumerate().filter(|(joint, from)| joint != *from) {
+                    let (spec, other) = (&robot.sensors[joint], &robot.sensors[from]);
+                    let angle_rad = other.center_rad + view.travel_rad[from];
+                    let counts = other.offset_counts + other.counts_per_rad * angle_rad;
+                    changed.travel_rad[joint] =
+                        wrapped(robot, joint, (counts - spec.offset_counts) / spec.counts_per_rad - spec.center_rad);
+                    changed.rate_rad_s[joint] = view.rate_rad_s[from] * other.counts_per_rad / spec.counts_per_rad;
+                    changed.approach[joint] = view.approach[from];
+                }
+            }
+            Self::Coupled { joint, with, sign } => {
+                let with_rad = robot.sensors[*with].center_rad + view.travel_rad[*with];
+                changed.travel_rad[*joint] = wrapped(robot, *joint, view.travel_rad[*joint] - sign * with_rad);
+                changed.rate_rad_s[*joint] -= sign * view.rate_rad_s[*with];
+            }
+            Self::OtherTurns(joints) => {
+                for &joint in joints {
+                    changed.travel_rad[joint] = wrap_symmetric(view.travel_rad[joint], TAU);
+                }
+            }
+            Self::Zeros(zeros) => {
+                for (joint, off_rad) in zeros {
+                    changed.travel_rad[*joint] = wrapped(robot, *joint, view.travel_rad[*joint] + off_rad);
+                }
+            }
+            Self::Scaled { joint, factor } => {
+                let center_rad = robot.sensors[*joint].center_rad;
+                let angle_rad = factor * (center_rad + view.travel_rad[*joint]);
+                changed.travel_rad[*joint] = wrapped(robot, *joint, angle_rad - center_rad);
+                changed.rate_rad_s[*joint] *= factor;
+            }
+            Self::Shifted(_) | Self::Camera { .. } => {}
+        }
+        changed
+    }
+}
+
+/// Travel of a turning joint within half a turn of the middle of its range.
+fn wrapped(robot: &Robot, joint: usize, travel_rad: f64) -> f64 {
+    if robot.sensors[joint].moves.is_slide() || travel_rad.abs() <= PI {
+        travel_rad
+    } else {
+        wrap_symmetric(travel_rad, TAU)
+    }
+}
+
+/// 1 or -1 where both joints turn about parallel axes however the joints between them stand.
+fn parallel_sign(robot: &Robot, [a, b]: [usize; 2]) -> Option<f64> {
+    let joints = robot.chain.joints();
+    if joints[a..=b].iter().any(|joint| joint.kind.is_slide()) {
+        return None;
+    }
+    let mut axis: Vector3<f64> = joints[a].axis.into_inner();
+    for joint in &joints[a + 1..=b] {
+        axis = joint.parent_from_joint.rotation.inverse() * axis;
+        let cosine = axis.dot(&joint.axis);
+        let is_parallel = cosine.abs().min(1.0).acos() < PARALLEL_RAD;
+        if !is_parallel {
+            return None;
+        }
+        axis = joint.axis.into_inner() * cosine.signum();
+    }
+    Some(axis.dot(&joints[b].axis).signum())
+}

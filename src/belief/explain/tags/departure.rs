@@ -1,0 +1,82 @@
+//! Tags that are not where the survey has them.
+//!
+//! Each tag's pose is estimated under its survey's prior. If the survey holds, the estimate departs from it by d (on
+//! the right, m and rad) with the covariance `S - C`, S the prior's and C the posterior's: what the data moved it by.
+//! In units of the prior, over the directions of which the data tell, `d^T (S - C)^-1 d` is chi-square. A tag beyond
+//! its limit is freed of its survey if that explains more than any other error of the geometry does.
+
+use nalgebra::{Matrix6, Vector6};
+
+use crate::model::blocks::Block;
+use crate::model::prior::at_least;
+use crate::solve::estimate::Estimate;
+use armcal_core::spatial::log;
+use armcal_core::stats::chi_square_quantile;
+
+/// How far the estimate of one tag's pose is from its survey.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct TagDeparture {
+    /// Index into the robot's tags.
+    pub tag_idx: usize,
+    /// Distance of the tag's centre, m.
+    pub shift_m: f64,
+    pub chi2: f64,
+    pub dof: usize,
+}
+
+/// Share of the prior's variance that the data must take away for a direction to count.
+const TOLD_SHARE: f64 = 0.1;
+/// Probability that any tag of a good survey is suspected.
+const FALSE_ALARM: f64 = 1e-4;
+/// Over chi-square's quantile: corners have longer tails than a normal one, and sizes of errors are fitted.
+const TAILS: f64 = 1.5;
+
+impl TagDeparture {
+    /// Whether chance explains it, where `n` tags are tested.
+    fn is_by_chance(&self, n: usize) -> bool {
+        self.chi2 <= TAILS * chi_square_quantile(1.0 - FALSE_ALARM / n.max(1) as f64, self.dof)
+    }
+}
+
+impl Estimate<'_> {
+    /// The tag that is least likely where its survey has it, if that is more than chance, and explains more than any
+    /// link or mount that is not as drawn.
+    pub(crate) fn moved_tag(&self) -> Option<TagDeparture> {
+        let departures: Vec<TagDeparture> =
+            (0..self.problem.robot.tags.len()).filter_map(|tag_idx| self.tag_departure(tag_idx)).collect();
+        let worst = departures.iter().copied().max_by(|a, b| a.chi2.total_cmp(&b.chi2))?;
+        if worst.is_by_chance(departures.len()) {
+            return None;
+        }
+        let others = self.score_tests(&self.view_angles());
+        let by_geometry = others.iter().map(|result| result.chi2).fold(0.0, f64::max);
+        (worst.chi2 > by_geometry).then_some(worst)
+    }
+
+    /// Tags that the data have elsewhere than their survey, by more than chance.
+    pub(crate) fn departed_tags(&self) -> Vec<usize> {
+        let all: Vec<TagDeparture> =
+            (0..self.problem.robot.tags.len()).filter_map(|tag_idx| self.tag_departure(tag_idx)).collect();
+        all.iter().filter(|departure| !departure.is_by_chance(all.len())).map(|departure| departure.tag_idx).collect()
+    }
+
+    /// `None` where the data tell nothing of the tag.
+    pub(crate) fn tag_departure(&self, tag_idx: usize) -> Option<TagDeparture> {
+        let (pose, covariance) = self.tag(tag_idx);
+        let prior = &self.problem.prior;
+        let block = Block::Tag(tag_idx);
+        let by: Vector6<f64> = log(&prior.mean.pose(block).inv_mul(&pose));
+        let std = Vector6::from_column_slice(&prior.std[block][..6]).map(at_least);
+        let scaled = covariance?.component_div(&(std * std.transpose()));
+        let told = (Matrix6::identity() - scaled).symmetric_eigen();
+        let departure = by.component_div(&std);
+        let (mut chi2, mut dof) = (0.0, 0);
+        for (share, direction) in told.eigenvalues.iter().zip(told.eigenvectors.column_iter()) {
+            if *share > TOLD_SHARE {
+                chi2 += direction.dot(&departure).powi(2) / share;
+                dof += 1;
+            }
+        }
+        (dof > 0).then(|| TagDeparture { tag_idx, shift_m: by.fixed_rows::<3>(0).norm(), chi2, dof })
+    }
+}

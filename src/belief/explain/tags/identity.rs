@@ -1,0 +1,251 @@
+//! Tags that are others than the survey has them for: two ids exchanged, a tag of another size, all of another size.
+//!
+//! The camera's poses T_i come from the other tags. A tag that is seen at m_i (camera frame, by its drawn size) and
+//! surveyed at p seems to be at `q_i = T_i m_i`. Where the median of q_i is the place of another tag that does not fit,
+//! and that one's is this one's, their ids are exchanged. A tag of another size is seen too far or too near by the
+//! ratio of the sizes: the median of `|T_i^-1 p| / |m_i|`, if that brings its observations together. Where all tags are
+//! of another size, so is each distance between two of them in one view: the median of `|p_a - p_b| / |m_a - m_b|`,
+//! which no joint has a part in.
+
+use nalgebra::{Isometry3, Point3, Vector3};
+
+use crate::measure::WeightedMeasurement;
+use crate::model::blocks::Block;
+use crate::solve::estimate::Estimate;
+use crate::views::view::{TagObservation, View};
+use armcal_core::robot::Robot;
+use armcal_core::spatial::Pose;
+use armcal_core::stats::quantile;
+
+/// What a tag may be in place of what the survey says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum TagFault {
+    /// Indices into the robot's tags.
+    Swapped([usize; 2]),
+    /// True size over the drawn one.
+    Size { tag_idx: usize, ratio: f64 },
+    /// The same of all tags: printed at another scale.
+    AllSizes { ratio: f64 },
+    /// Moved with others, by about so much in m and rad (module `group`).
+    Moved { tag_idx: usize, std: [f64; 2] },
+    /// Moved with others, by one motion of the base frame; its share of what the motion costs, nats (module `alike`).
+    Alike { tag_idx: usize, base_motion: Isometry3<f64>, cost_nats: f64 },
+}
+
+impl TagFault {
+    /// Makes `robot`'s survey what it is under this fault.
+    pub(crate) fn apply(&self, robot: &mut Robot) {
+        match *self {
+            Self::Swapped([a, b]) => {
+                let place = robot.tags[a].base_from_tag;
+                robot.tags[a].base_from_tag = robot.tags[b].base_from_tag;
+                robot.tags[b].base_from_tag = place;
+            }
+            Self::Size { tag_idx, ratio } => robot.tags[tag_idx].size_m *= ratio,
+            Self::AllSizes { ratio } => {
+                robot.tags.iter_mut().for_each(|tag| tag.size_m *= ratio);
+                robot.gripper_tag.iter_mut().for_each(|tag| tag.size_m *= ratio);
+            }
+            Self::Moved { tag_idx, std } => {
+                let tag = &mut robot.tags[tag_idx];
+                [tag.position_std_m, tag.rotation_std_rad] = std;
+            }
+            Self::Alike { tag_idx, base_motion, .. } => {
+                let tag = &mut robot.tags[tag_idx];
+                tag.base_from_tag = Pose::from_isometry(base_motion * tag.base_from_tag.isometry());
+            }
+        }
+    }
+
+    fn tags(&self) -> Vec<usize> {
+        match *self {
+            Self::Swapped(pair) => pair.to_vec(),
+            Self::Size { tag_idx, .. } | Self::Moved { tag_idx, .. } | Self::Alike { tag_idx, .. } => vec![tag_idx],
+            Self::AllSizes { .. } => Vec::new(),
+        }
+    }
+
+    /// What it costs beside what an estimate under it counts, nats.
+    pub(crate) fn cost_nats(&self) -> f64 {
+        match *self {
+            Self::Alike { cost_nats, .. } => cost_nats,
+            _ => 0.0,
+        }
+    }
+
+    /// The tag, where it is one of several that were moved together.
+    pub(crate) fn moved_tag(&self) -> Option<usize> {
+        match *self {
+            Self::Moved { tag_idx, .. } | Self::Alike { tag_idx, .. } => Some(tag_idx),
+            _ => None,
+        }
+    }
+
+    /// Whether both say something of one tag.
+    pub(crate) fn meets(&self, other: &Self) -> bool {
+        self.tags().iter().any(|tag| other.tags().contains(tag))
+    }
+}
+
+/// A tag is looked at where so many of its observations are rejected, or all the data have it elsewhere.
+const REJECTED_SHARE: f64 = 0.5;
+const MIN_OBSERVATIONS: usize = 3;
+/// Exchanged ids: so near each other's places, m, and so much nearer than to their own.
+pub(crate) const SAME_PLACE_M: f64 = 0.05;
+pub(crate) const NEARER: f64 = 0.3;
+/// A size counts from this ratio on, and from so many of its standard errors.
+const LEAST_RATIO: f64 = 0.005;
+const SURE_SIGMAS: f64 = 4.0;
+/// Tags nearer to each other tell nothing of their size, m.
+const LEAST_DISTANCE_M: f64 = 0.1;
+/// It must bring the observations of its tag this much nearer to the survey.
+const CLOSER: f64 = 0.6;
+
+/// A tag as the views have it.
+struct SeenTag {
+    tag_idx: usize,
+    /// (base_from_camera, position in the camera frame).
+    observations: Vec<(Isometry3<f64>, Vector3<f64>)>,
+}
+
+impl Estimate<'_> {
+    /// The faults of tags that `views` speak for; each has to prove itself by an estimate.
+    pub(crate) fn tag_faults(&self, views: &[View]) -> Vec<TagFault> {
+        let doubtful = self.doubtful_tags();
+        let seen: Vec<SeenTag> = doubtful.into_iter().map(|tag_idx| self.seen(tag_idx, views)).collect();
+        let seen: Vec<&SeenTag> = seen.iter().filter(|tag| tag.observations.len() >= MIN_OBSERVATIONS).collect();
+        let robot = self.problem.robot;
+        let mut faults = Vec::new();
+        for (k, a) in seen.iter().enumerate() {
+            let exchanged = seen[k + 1..].iter().find(|b| a.is_at(robot, b.tag_idx) && b.is_at(robot, a.tag_idx));
+            faults.extend(exchanged.map(|b| TagFault::Swapped([a.tag_idx, b.tag_idx])));
+        }
+        faults.extend(seen.iter().filter_map(|tag| tag.size(robot)));
+        faults
+    }
+
+    /// The tag most of whose observations are rejected, which agree on another place than its survey's, and that place,
+    /// base frame, m.
+    pub(crate) fn rejected_tag(&self, views: &[View]) -> Option<(usize, Vector3<f64>)> {
+        let robot = self.problem.robot;
+        let rejected = (0..robot.tags.len()).filter(|tag| self.rejected_share(*tag) > REJECTED_SHARE);
+        let seen = rejected.map(|tag_idx| self.seen(tag_idx, views));
+        let elsewhere = seen.filter(|tag| tag.observations.len() >= MIN_OBSERVATIONS && tag.is_elsewhere(robot));
+        let most = elsewhere.max_by_key(|tag| tag.observations.len())?;
+        Some((most.tag_idx, most.place(1.0)))
+    }
+
+    /// Tags of which no observation fits, with the number of these.
+    pub(crate) fn left_out_tags(&self) -> impl Iterator<Item = (usize, usize)> {
+        let observations = &self.problem.observations;
+        let n_of = |tag: usize| observations.iter().filter(|observation| observation.block == Block::Tag(tag)).count();
+        let is_unused = |tag: &usize| !observations.iter().any(|seen| seen.block == Block::Tag(*tag) && seen.is_used);
+        let unused = (0..self.problem.robot.tags.len()).filter(is_unused);
+        unused.map(move |tag| (tag, n_of(tag))).filter(|(_, n)| *n >= MIN_OBSERVATIONS)
+    }
+
+    /// Tags that do not fit, or that the data have elsewhere.
+    pub(crate) fn doubtful_tags(&self) -> Vec<usize> {
+        let elsewhere = self.departed_tags();
+        let is_doubtful = |tag: &usize| self.rejected_share(*tag) > REJECTED_SHARE || elsewhere.contains(tag);
+        (0..self.problem.robot.tags.len()).filter(is_doubtful).collect()
+    }
+
+    /// Share of a tag's observations that are rejected.
+    fn rejected_share(&self, tag_idx: usize) -> f64 {
+        let of_tag = || self.problem.observations.iter().filter(|observation| observation.block == Block::Tag(tag_idx));
+        of_tag().filter(|observation| !observation.is_used).count() as f64 / of_tag().count().max(1) as f64
+    }
+
+    /// Where the views that other tags place see a tag.
+    fn seen(&self, tag_idx: usize, views: &[View]) -> SeenTag {
+        let problem = &self.problem;
+        let mut observations = Vec::new();
+        for (view_idx, (data, view)) in problem.views.iter().zip(views).enumerate() {
+            let of_view = &problem.observations[data.observations.clone()];
+            let is_placed = of_view.iter().any(|other| other.is_used && other.block != Block::Tag(tag_idx));
+            let Some(tag) = view.tags.iter().find(|tag| tag.tag_idx == tag_idx).filter(|_| is_placed) else { continue };
+            let is_image = of_view.iter().all(|other| matches!(other.data, WeightedMeasurement::Corners(_)));
+            if is_image {
+                let state = &self.solved.state;
+                let camera = problem.robot.camera_at(view.camera);
+                let link = *problem.link_poses(view_idx, state).link(camera.mount.n_joints);
+                let base_from_camera = link * state.pose(Block::Mount(view.camera)) * state.camera_error[view_idx];
+                observations.push((base_from_camera, tag.center_in_camera_m));
+            }
+        }
+        SeenTag { tag_idx, observations }
+    }
+}
+
+/// True size of all tags over the drawn one, by the distances between tags of one view; `None` where the drawn size
+/// explains them, or no view has two tags.
+pub(crate) fn common_size_ratio(views: &[View], robot: &Robot) -> Option<f64> {
+    let place = |tag: &TagObservation| robot.tags[tag.tag_idx].base_from_tag.isometry().translation.vector;
+    let (mut ratios, mut n_views) = (Vec::new(), 0);
+    for view in views {
+        let tags: Vec<&TagObservation> = view.tags.iter().filter(|tag| tag.corners().is_some()).collect();
+        n_views += u32::from(tags.len() > 1);
+        for (n, a) in tags.iter().enumerate() {
+            let others = tags[n + 1..].iter().map(|b| ((place(a) - place(b)).norm(), a, b));
+            let seen_m = |a: &TagObservation, b: &TagObservation| (a.center_in_camera_m - b.center_in_camera_m).norm();
+            ratios.extend(others.filter(|(m, ..)| *m > LEAST_DISTANCE_M).map(|(m, a, b)| m / seen_m(a, b)));
+        }
+    }
+    let ratio = quantile(&ratios, 0.5)?;
+    let spread: Vec<f64> = ratios.iter().map(|r| (r - ratio).abs()).collect();
+    let std = 1.4826 * quantile(&spread, 0.5)? / f64::from(n_views).sqrt();
+    ((ratio - 1.0).abs() > LEAST_RATIO.max(SURE_SIGMAS * std)).then_some(ratio)
+}
+
+impl SeenTag {
+    /// The median of where it seems to be, base frame.
+    fn place(&self, ratio: f64) -> Vector3<f64> {
+        let along = |axis: usize| {
+            let all = self
+                .observations
+                .iter()
+                .map(|(base_from_camera, at)| (base_from_camera * Point3::from(at * ratio))[axis]);
+            quantile(&all.collect::<Vec<f64>>(), 0.5).unwrap_or(0.0)
+        };
+        Vector3::new(along(0), along(1), along(2))
+    }
+
+    /// Whether the observations are nearer to one another than to the survey.
+    fn is_elsewhere(&self, robot: &Robot) -> bool {
+        let place = self.place(1.0);
+        let off = self.observations.iter().map(|(base_from_camera, at)| base_from_camera * Point3::from(*at) - place);
+        let spread_m: Vec<f64> = off.map(|off| off.coords.norm()).collect();
+        let survey = robot.tags[self.tag_idx].base_from_tag.isometry().translation.vector;
+        quantile(&spread_m, 0.5).is_some_and(|spread_m| spread_m < NEARER * (place - survey).norm())
+    }
+
+    fn is_at(&self, robot: &Robot, other: usize) -> bool {
+        let place = |tag_idx: usize| robot.tags[tag_idx].base_from_tag.isometry().translation.vector;
+        let there_m = (self.place(1.0) - place(other)).norm();
+        there_m < SAME_PLACE_M && there_m < NEARER * (self.place(1.0) - place(self.tag_idx)).norm()
+    }
+
+    fn size(&self, robot: &Robot) -> Option<TagFault> {
+        let survey = robot.tags[self.tag_idx].base_from_tag.isometry().translation.vector;
+        let ratios: Vec<f64> = self
+            .observations
+            .iter()
+            .map(|(base_from_camera, at)| {
+                base_from_camera.inverse_transform_point(&survey.into()).coords.norm() / at.norm()
+            })
+            .collect();
+        let ratio = quantile(&ratios, 0.5)?;
+        let spread: Vec<f64> = ratios.iter().map(|r| (r - ratio).abs()).collect();
+        let std = 1.4826 * quantile(&spread, 0.5)? / (ratios.len() as f64).sqrt();
+        let distance_m = |ratio: f64| {
+            let off = self.observations.iter().map(|(base_from_camera, at)| {
+                (base_from_camera * Point3::from(at * ratio) - Point3::from(survey)).norm()
+            });
+            quantile(&off.collect::<Vec<f64>>(), 0.5).unwrap_or(f64::INFINITY)
+        };
+        let is_sure = (ratio - 1.0).abs() > LEAST_RATIO.max(SURE_SIGMAS * std);
+        let is_closer = distance_m(ratio) < CLOSER * distance_m(1.0);
+        (is_sure && is_closer).then_some(TagFault::Size { tag_idx: self.tag_idx, ratio })
+    }
+}

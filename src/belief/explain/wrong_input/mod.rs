@@ -1,0 +1,43 @@
+//! A file that the images contradict: how the tags stand to one another is seen without the arm.
+//!
+//! `pairs` measures by how much the tags of one view differ from the map; a large mismatch means that map or lens is
+//! wrong, and no joint has a part in it. `map` and `lens` have other readings of their file; `by_pairs` names the one
+//! that makes the mismatch small. `recording` looks at pixels, and at the rotations of a single landmark.
+
+pub(crate) mod by_pairs;
+pub(crate) mod lens;
+pub(crate) mod map;
+pub(crate) mod pairs;
+pub(crate) mod recording;
+
+use crate::say::WrongInput;
+
+use crate::views::view::{CaptureData, View};
+use armcal_core::robot::{Robot, SurveyedTag};
+use by_pairs::by_pairs;
+use pairs::mismatch;
+
+/// Mismatches below this are those of good maps and lenses: the tilt of a small tag is not seen better.
+const GOOD: f64 = 0.12;
+/// What puts an input right makes the mismatch this much smaller.
+const BETTER: f64 = 0.4;
+/// More views tell no more.
+const MAX_VIEWS: usize = 40;
+/// A size within this of the stated one is not called wrong.
+const SIZE_TOLERANCE: f64 = 0.03;
+
+/// The input that explains why the views do not fit; `tags` as the map has them.
+pub(crate) fn wrong_input(data: &CaptureData, tags: &[SurveyedTag], robot: &Robot) -> Option<WrongInput> {
+    let of_first = data.fit.iter().chain(&data.held_out).filter(|view| view.camera == 0);
+    let views: Vec<&View> = of_first.take(MAX_VIEWS).collect();
+    if let Some(input) = recording::beside_image(robot.camera.lens.resolution_px(), data) {
+        return Some(WrongInput { input, mismatch: 1.0, mismatch_otherwise: None, size_hint: None });
+    }
+    match mismatch(&views, tags, &robot.camera.lens) {
+        Some(pairs) => by_pairs(&views, tags, robot, &pairs),
+        None => recording::by_rotations(&views, robot),
+    }
+}
+
+#[cfg(test)]
+mod tests;

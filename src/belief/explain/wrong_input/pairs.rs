@@ -1,0 +1,96 @@
+//! Pairs of tags in one view: the map's distances against those seen, without the arm.
+//!
+//! Of two tags a and b in one view, a's pose in the camera `C_a` and the map's `a_from_b` say where b is. Its distance
+//! from where it is seen, over the distance between both, is the mismatch; the median over all pairs counts. One scale
+//! of all tags is taken out beforehand, by the median ratio of the map's distances to the seen ones.
+
+use nalgebra::{Isometry3, Point3, Vector3};
+
+use crate::views::view::{TagMeasurement, TagObservation, View};
+use armcal_core::optics::{CameraModel, solve_square_both};
+use armcal_core::robot::SurveyedTag;
+use armcal_core::stats::quantile;
+
+/// Fewer pairs determine no median.
+const MIN_PAIRS: usize = 6;
+
+/// Of all pairs of tags in one view: the map's distances over those seen, and the mismatch with that scale.
+pub(crate) struct Pairs {
+    pub ratio: f64,
+    pub mismatch: f64,
+}
+
+/// A tag as one view has it.
+pub(crate) struct PosedTag<'a> {
+    pub surveyed: &'a SurveyedTag,
+    /// In the camera; two where a square has two.
+    poses: Vec<Isometry3<f64>>,
+}
+
+pub(crate) fn mismatch(views: &[&View], tags: &[SurveyedTag], lens: &CameraModel) -> Option<Pairs> {
+    let posed: Vec<Vec<PosedTag<'_>>> = views.iter().map(|view| posed_tags(view, tags, lens)).collect();
+    let pairs: Vec<(&PosedTag<'_>, &PosedTag<'_>)> = posed.iter().flat_map(|of_view| ordered_pairs(of_view)).collect();
+    if pairs.len() < MIN_PAIRS {
+        return None;
+    }
+    let of_pair = |(a, b): &(&PosedTag<'_>, &PosedTag<'_>)| {
+        let by_map = a.surveyed.base_from_tag.isometry().inv_mul(b.surveyed.base_from_tag.isometry());
+        by_map.translation.vector.norm() / (a.center() - b.center()).norm().max(1e-9)
+    };
+    let ratio = quantile(&pairs.iter().map(of_pair).collect::<Vec<f64>>(), 0.5)?;
+    let mismatches: Vec<f64> = pairs.iter().map(|(a, b)| a.mismatch_of(b, ratio)).collect();
+    Some(Pairs { ratio, mismatch: quantile(&mismatches, 0.5)? })
+}
+
+fn ordered_pairs<'a, 'b>(tags: &'b [PosedTag<'a>]) -> impl Iterator<Item = (&'b PosedTag<'a>, &'b PosedTag<'a>)> {
+    let each = move |(n, a)| tags.iter().enumerate().filter(move |(m, _)| *m != n).map(move |(_, b)| (a, b));
+    tags.iter().enumerate().flat_map(each)
+}
+
+pub(crate) fn posed_tags<'a>(view: &View, tags: &'a [SurveyedTag], lens: &CameraModel) -> Vec<PosedTag<'a>> {
+    let posed = |seen: &TagObservation| {
+        let surveyed = tags.get(seen.tag_idx).filter(|tag| tag.is_known())?;
+        let poses = match &seen.measured {
+            TagMeasurement::Corners(corners) => {
+                let (best, other) = solve_square_both(lens, surveyed.size_m, &corners.corners_px).ok()?;
+                [Some(best), other].into_iter().flatten().map(|pose| *pose.camera_from_tag.isometry()).collect()
+            }
+            TagMeasurement::Pose(pose) => vec![*pose],
+            TagMeasurement::Board(seen) => vec![seen.camera_from_board],
+            TagMeasurement::Position => return None,
+        };
+        Some(PosedTag { surveyed, poses })
+    };
+    view.tags.iter().filter_map(posed).collect()
+}
+
+impl PosedTag<'_> {
+    fn center(&self) -> Vector3<f64> {
+        self.poses[0].translation.vector
+    }
+
+    /// Where this tag and the map have `other`, against where it is seen.
+    fn mismatch_of(&self, other: &Self, ratio: f64) -> f64 {
+        let (from, to) = (self.surveyed.base_from_tag.isometry(), other.surveyed.base_from_tag.isometry());
+        let place = Point3::from(from.inv_mul(to).translation.vector / ratio);
+        let off = |pose: &Isometry3<f64>| ((pose * place).coords - other.center()).norm();
+        let least = self.poses.iter().map(off).fold(f64::INFINITY, f64::min);
+        least / (self.center() - other.center()).norm().max(1e-9)
+    }
+}
+
+/// Where the tag `id` is seen against where the tags `others` have it, if it hangs at `place`; median.
+pub(crate) fn mismatch_at(
+    posed: &[Vec<PosedTag<'_>>],
+    id: u32,
+    place: &SurveyedTag,
+    others: &[&SurveyedTag],
+) -> Option<f64> {
+    let is_other = |of: u32| of != id && others.iter().any(|other| other.id == of);
+    let pairs = posed.iter().flat_map(|of_view| ordered_pairs(of_view));
+    let of_tag = pairs.filter(|(a, b)| b.surveyed.id == id && is_other(a.surveyed.id));
+    let mismatch = |(a, b): (&PosedTag<'_>, &PosedTag<'_>)| {
+        a.mismatch_of(&PosedTag { surveyed: place, poses: b.poses.clone() }, 1.0)
+    };
+    quantile(&of_tag.map(mismatch).collect::<Vec<f64>>(), 0.5)
+}

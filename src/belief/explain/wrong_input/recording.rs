@@ -1,0 +1,103 @@
+//! Other readings of the recording: pixels of another image, rotations in another order or direction.
+//!
+//! Where a view has one landmark with its rotation, the arm by its datasheet tells where that stands: the rotations of
+//! `base_from_tag` over the views must agree but for what sensors may be off.
+
+use nalgebra::{Isometry3, Quaternion, UnitQuaternion};
+
+use super::BETTER;
+use crate::say::wrong_input::{WrongInput, WrongInputKind};
+use crate::views::view::{CaptureData, TagMeasurement, View};
+use armcal_core::joints::JointAngles;
+use armcal_core::robot::Robot;
+use armcal_core::stats::quantile;
+
+/// A corner may lie so far outside of the stated image: detectors round.
+const BEYOND_IMAGE: f64 = 1.03;
+/// Rotations of one landmark: spread that says nothing, and that of good ones, rad.
+const SPREAD_RAD: f64 = 0.5;
+const GOOD_SPREAD_RAD: f64 = 0.25;
+const MIN_ROTATIONS: usize = 5;
+
+/// Corners that are no pixels of an image of that size.
+pub(crate) fn beside_image(stated_px: [u32; 2], data: &CaptureData) -> Option<WrongInputKind> {
+    let (smallest_px, largest_px) = (data.smallest_px, data.largest_px);
+    let sides_px = stated_px.map(f64::from);
+    let is_any = |is_so: &dyn Fn(usize) -> bool| stated_px[0] > 0 && (is_so(0) || is_so(1));
+    if is_any(&|axis| largest_px[axis] > BEYOND_IMAGE * sides_px[axis]) {
+        Some(WrongInputKind::ImageSize { stated_px, seen_px: largest_px })
+    } else if is_any(&|axis| smallest_px[axis] < (1.0 - BEYOND_IMAGE) * sides_px[axis]) {
+        Some(WrongInputKind::NegativePixels(smallest_px))
+    } else {
+        let are_shares = largest_px.iter().all(|px| *px > 0.0 && *px <= BEYOND_IMAGE);
+        are_shares.then_some(WrongInputKind::ImageShares)
+    }
+}
+
+/// How a recorded pose may be meant.
+type Reading<'a> = &'a dyn Fn(&Isometry3<f64>) -> Isometry3<f64>;
+
+/// Of recorded poses of one landmark a view.
+pub(crate) fn by_rotations(views: &[&View], robot: &Robot) -> Option<WrongInput> {
+    let base_from_camera = |view: &View| {
+        let angle_rad = |joint: usize| robot.sensors[joint].center_rad + view.travel_rad[joint];
+        robot.tags_from_camera(&JointAngles::from_fn(view.travel_rad.len(), angle_rad))
+    };
+    let posed: Vec<(usize, Isometry3<f64>, Isometry3<f64>)> = views
+        .iter()
+        .flat_map(|view| {
+            let camera = base_from_camera(view);
+            view.tags.iter().filter_map(move |seen| match &seen.measured {
+                TagMeasurement::Pose(pose) => Some((seen.tag_idx, camera, *pose)),
+                _ => None,
+            })
+        })
+        .collect();
+    let spread = |read: &dyn Fn(&Isometry3<f64>) -> Isometry3<f64>| {
+        let turned = |&(tag, camera, pose): &(usize, Isometry3<f64>, Isometry3<f64>)| (tag, camera * read(&pose));
+        spread_rad(&posed.iter().map(turned).collect::<Vec<_>>())
+    };
+    let as_written = spread(&|pose| *pose)?;
+    let with = |pose: &Isometry3<f64>, turn: fn(&UnitQuaternion<f64>) -> UnitQuaternion<f64>| {
+        Isometry3::from_parts(pose.translation, turn(&pose.rotation))
+    };
+    let readings: [(WrongInputKind, Reading<'_>); 5] = [
+        (WrongInputKind::RecordedQuaternions, &|pose| with(pose, reordered)),
+        (WrongInputKind::RecordedQuaternions, &|pose| with(pose, reordered_back)),
+        (WrongInputKind::RecordedQuaternions, &|pose| with(&pose.inverse(), reordered).inverse()),
+        (WrongInputKind::RecordedQuaternions, &|pose| with(&pose.inverse(), reordered_back).inverse()),
+        (WrongInputKind::RecordedDirection, &|pose: &Isometry3<f64>| pose.inverse()),
+    ];
+    let spreads = readings.into_iter().filter_map(|(input, read)| Some((input, spread(read)?)));
+    let (input, least) = spreads.min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let is_better = as_written > SPREAD_RAD && least < GOOD_SPREAD_RAD.min(BETTER * as_written);
+    is_better.then_some(WrongInput { input, mismatch: as_written, mismatch_otherwise: Some(least), size_hint: None })
+}
+
+/// Median angle of a landmark's rotations from the one that is nearest to all others; the largest of all landmarks.
+fn spread_rad(poses: &[(usize, Isometry3<f64>)]) -> Option<f64> {
+    let mut tags: Vec<usize> = poses.iter().map(|(tag, _)| *tag).collect();
+    tags.sort_unstable();
+    tags.dedup();
+    let of_tag = |tag: usize| {
+        let turns: Vec<_> = poses.iter().filter(|(of, _)| *of == tag).map(|(_, pose)| pose.rotation).collect();
+        let median = |from: &UnitQuaternion<f64>| {
+            quantile(&turns.iter().map(|turn| from.angle_to(turn)).collect::<Vec<f64>>(), 0.5)
+        };
+        let spreads = turns.iter().filter_map(median);
+        (turns.len() >= MIN_ROTATIONS).then(|| spreads.fold(f64::INFINITY, f64::min))
+    };
+    tags.into_iter().filter_map(of_tag).reduce(f64::max)
+}
+
+/// `[w, x, y, z]` as read, of what was `[x, y, z, w]`.
+pub(crate) fn reordered(read: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
+    let [x, y, z, w] = [read.w, read.i, read.j, read.k];
+    UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z))
+}
+
+/// The same the other way: `[x, y, z, w]` as read, of what was `[w, x, y, z]`.
+pub(crate) fn reordered_back(read: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
+    let [w, x, y, z] = [read.i, read.j, read.k, read.w];
+    UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z))
+}

@@ -1,0 +1,109 @@
+//! What was believed over time: a line a minute of the arm's time, and one for each event.
+
+use serde::{Deserialize, Serialize};
+
+use crate::follow::event::OnlineEvent;
+use crate::follow::follower::{BeliefRow, Follower};
+use armcal_core::time::Stamp;
+
+/// Between two lines of the belief, s of the arm's time.
+const EVERY_S: f64 = 60.0;
+
+/// A line of belief.jsonl.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BeliefLine {
+    /// What was believed at a time.
+    Belief(BeliefRow),
+    /// What happened.
+    Event(OnlineEvent),
+}
+
+impl BeliefLine {
+    /// As belief.jsonl has it, without its end.
+    #[must_use]
+    pub fn to_json(&self) -> String {
+        // Plain numbers and text: what cannot fail.
+        serde_json::to_string(self).unwrap_or_default()
+    }
+}
+
+/// The lines so far.
+#[derive(Clone, Debug, Default)]
+pub struct BeliefLog {
+    /// In the order in which they became known.
+    pub lines: Vec<BeliefLine>,
+    first: Option<Stamp>,
+    last: Option<Stamp>,
+}
+
+impl BeliefLog {
+    /// After each message: `events` are what it made known. Returns whether there are new lines.
+    pub fn hear(&mut self, follower: &Follower, events: Vec<OnlineEvent>) -> bool {
+        let Some(now) = follower.conditions().stamp else { return false };
+        self.first.get_or_insert(now);
+        let is_due = !events.is_empty() || self.last.is_none_or(|last| now.since_s(last) >= EVERY_S);
+        if !is_due {
+            return false;
+        }
+        self.lines.extend(events.into_iter().map(BeliefLine::Event));
+        self.last = Some(now);
+        self.lines.extend(follower.belief().map(BeliefLine::Belief));
+        true
+    }
+
+    /// After the last message.
+    pub fn end(&mut self, follower: &Follower) {
+        self.lines.extend(follower.belief().map(BeliefLine::Belief));
+    }
+
+    /// What happened.
+    pub fn events(&self) -> impl Iterator<Item = &OnlineEvent> {
+        self.lines.iter().filter_map(|line| match line {
+            BeliefLine::Event(event) => Some(event),
+            BeliefLine::Belief(_) => None,
+        })
+    }
+
+    /// What was believed.
+    pub fn beliefs(&self) -> impl Iterator<Item = &BeliefRow> {
+        self.lines.iter().filter_map(|line| match line {
+            BeliefLine::Belief(row) => Some(row),
+            BeliefLine::Event(_) => None,
+        })
+    }
+
+    /// `h:mm:ss` since the first message.
+    #[must_use]
+    pub fn clock(&self, nanos: i64) -> String {
+        let s = self.first.map_or(0.0, |first| Stamp { nanos }.since_s(first)).max(0.0) as u64;
+        format!("{}:{:02}:{:02}", s / 3600, s / 60 % 60, s % 60)
+    }
+
+    /// Each event with its time, a line each.
+    #[must_use]
+    pub fn told(&self) -> String {
+        self.events().map(|event| format!("{}  {}\n", self.clock(event.since_nanos), event.to_line())).collect()
+    }
+
+    /// Of belief.jsonl.
+    ///
+    /// # Errors
+    /// The first line that is none, by its number.
+    pub fn from_jsonl(text: &str) -> Result<Self, String> {
+        let line = |(n, line): (usize, &str)| {
+            serde_json::from_str::<BeliefLine>(line).map_err(|error| format!("line {}: {error}", n + 1))
+        };
+        let lines = text.lines().enumerate().map(line).collect::<Result<Vec<_>, _>>()?;
+        let mut log = Self { lines, ..Self::default() };
+        let first = log.beliefs().next().map(|row| Stamp { nanos: row.stamp_nanos });
+        log.first = first;
+        Ok(log)
+    }
+
+    /// As belief.jsonl has it.
+    #[must_use]
+    pub fn to_jsonl(&self) -> String {
+        self.lines.iter().map(|line| line.to_json() + "\n").collect()
+    }
+}

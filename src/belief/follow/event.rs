@@ -1,0 +1,83 @@
+//! What happened to the arm, as the online belief tells it.
+
+use serde::{Deserialize, Serialize};
+
+use crate::follow::diagnosis::Verdict;
+use crate::follow::hypothesis::Fault;
+use crate::say;
+use crate::say::finding::{Finding, FindingKind, FindingUnit};
+use armcal_core::codes::Coded;
+use armcal_core::robot::Robot;
+use armcal_core::time::Stamp;
+
+/// An explanation that leads by less than this is told with the next one, in nats (odds of twenty).
+const CLEAR_LEAD_NATS: f64 = 3.0;
+
+/// Something that happened, with the evidence for it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OnlineEvent {
+    /// End of the first view that shows it, ns since the epoch.
+    pub since_nanos: i64,
+    /// End of the view that decided it.
+    pub decided_nanos: i64,
+    /// What it is; the size of a slip or of something moved is how far, that of a scale the slope of the angle by the
+    /// reading.
+    pub finding: Finding,
+    /// Of a worn spot: the joint's angle at its middle by the datasheet, rad.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub at_rad: Option<f64>,
+    /// `ln` of the odds against the next explanation.
+    pub lead_nats: f64,
+    /// The next explanation, where it is not that nothing happened.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub or_else: Option<String>,
+}
+
+impl OnlineEvent {
+    pub(crate) fn of_verdict(robot: &Robot, verdict: &Verdict, since: Stamp, now: Stamp) -> Self {
+        let unit = match verdict.fault {
+            Fault::Slip(joint) | Fault::Worn(joint, ..) => FindingUnit::of_joint(robot.sensors[joint].moves),
+            Fault::Mount => FindingUnit::Radian,
+            Fault::Tag(_) | Fault::Tags(_) | Fault::Base => FindingUnit::Metre,
+            Fault::Scale(_) | Fault::Failed(_) | Fault::Drift => FindingUnit::One,
+        };
+        let is_reversed = matches!(verdict.fault, Fault::Scale(_)) && verdict.size.is_some_and(|slope| slope < 0.0);
+        let finding = Finding {
+            kind: if is_reversed { FindingKind::SensorReversed } else { verdict.fault.kind() },
+            name: verdict.fault.name(robot),
+            size: verdict.size,
+            unit: verdict.size.map(|_| unit),
+            tool_error_m: None,
+            time_s: None,
+            repaired: true,
+        };
+        Self {
+            since_nanos: since.nanos,
+            decided_nanos: now.nanos,
+            finding,
+            at_rad: match verdict.fault {
+                Fault::Worn(joint, spot) => Some(robot.sensors[joint].center_rad + spot.at_rad()),
+                _ => None,
+            },
+            // Nothing else is left to lead against.
+            lead_nats: verdict.lead_nats.min(1e3),
+            or_else: verdict.next.map(|fault| fault.phrase(robot)),
+        }
+    }
+
+    /// Whether `other` is of the same thing, and began before this was decided.
+    pub(crate) fn covers(&self, other: &Self) -> bool {
+        self.finding.name == other.finding.name && other.since_nanos <= self.decided_nanos
+    }
+
+    /// One line for people.
+    #[must_use]
+    pub fn to_line(&self) -> String {
+        let mut line = say::event(&self.finding, self.at_rad);
+        if let Some(other) = self.or_else.as_ref().filter(|_| self.lead_nats < CLEAR_LEAD_NATS) {
+            line += &format!(" (or: {other})");
+        }
+        line + &format!(" [{}]", self.finding.code())
+    }
+}

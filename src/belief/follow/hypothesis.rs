@@ -1,0 +1,277 @@
+//! What may have happened to the arm between two views: each is a belief that is widened where it re-opens.
+
+use nalgebra::{DMatrix, Matrix6};
+
+use crate::follow::filter::Filter;
+use crate::model::parameters::{Parameter, ParameterKind, WornSpot};
+use crate::say;
+use crate::say::finding::FindingKind;
+use crate::views::view::View;
+use armcal_core::robot::Robot;
+use armcal_core::spatial::adjoint;
+
+/// How far a sensor may slip, a tag or the camera be knocked aside: one sigma. Assumed: wide, the views tell it.
+const SLIP_STD_RAD: f64 = 0.1;
+const TAG_STD: [f64; 2] = [0.03, 0.06];
+const MOUNT_STD: [f64; 2] = [0.02, 0.1];
+const BASE_STD: [f64; 2] = [0.1, 0.1];
+const GAIN_STD: f64 = 1.0;
+const DRIFT_STD_RAD: f64 = 1.5e-3;
+const LN_PRIOR_OF_DRIFT: f64 = -2.0;
+const LN_PRIOR: f64 = -7.0;
+/// Less than a slip's by what a tighter height makes up for, and by the lead over the same sensor: where all views are
+/// at one place it is a slip.
+const LN_PRIOR_OF_WORN: f64 = -10.5;
+
+/// Tags of one carrier, by their indices.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct TagSet {
+    /// In rising order, those in use first.
+    indices: [u16; Self::MOST],
+    n: u8,
+}
+
+impl TagSet {
+    /// More are not told apart from a moved base.
+    pub const MOST: usize = 12;
+
+    /// One tag; `None` beyond the index that fits.
+    #[must_use]
+    pub fn of(tag: usize) -> Option<Self> {
+        Self { indices: [0; Self::MOST], n: 0 }.with(tag)
+    }
+
+    /// With one more; `None` where it is among them, or there are too many.
+    #[must_use]
+    pub fn with(mut self, tag: usize) -> Option<Self> {
+        let (tag, n) = (u16::try_from(tag).ok()?, usize::from(self.n));
+        if n == Self::MOST || self.indices[..n].contains(&tag) {
+            return None;
+        }
+        self.indices[n] = tag;
+        self.n += 1;
+        self.indices[..=n].sort_unstable();
+        Some(self)
+    }
+
+    /// The indices, rising.
+    pub fn iter(&self) -> impl Iterator<Item = usize> + '_ {
+        self.indices[..usize::from(self.n)].iter().map(|tag| usize::from(*tag))
+    }
+}
+
+/// What may have happened.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Fault {
+    /// The sensor of a joint turned on its shaft.
+    Slip(usize),
+    /// The sensor of a joint has another scale or sign.
+    Scale(usize),
+    /// The sensor of a joint says nothing any more.
+    Failed(usize),
+    /// The track of a joint's sensor is worn at a place: a bump of its curve there.
+    Worn(usize, WornSpot),
+    /// The tag of that index was knocked aside.
+    Tag(usize),
+    /// Tags on one carrier were knocked aside together.
+    Tags(TagSet),
+    /// The camera slipped on its mount.
+    Mount,
+    /// All tags together moved, or the arm's base.
+    Base,
+    /// All sensors drifted more than expected: nothing to tell of.
+    Drift,
+}
+
+impl Fault {
+    /// All that views could tell of; sensors that are not looked at are not asked. Tags that moved together are found
+    /// by the evidence of one.
+    pub(crate) fn all(filter: &Filter, views: &[&View]) -> Vec<Self> {
+        let (Some(first), Some(last)) = (views.first(), views.last()) else { return Vec::new() };
+        let mut tags: Vec<usize> = views.iter().flat_map(|view| &view.tags).map(|tag| tag.tag_idx).collect();
+        tags.sort_unstable();
+        tags.dedup();
+        let joints = filter.offsets().map(|(joint, _)| joint).filter(|&joint| !last.is_free[joint]);
+        let joints: Vec<usize> = joints.collect();
+        let worn = |&joint: &usize| {
+            let spots = [last, first].map(|view| WornSpot::about(view.travel_rad[joint]));
+            let is_other = !spots[0].is_about(spots[1].at_rad());
+            spots.into_iter().take(1 + usize::from(is_other)).map(move |spot| Self::Worn(joint, spot))
+        };
+        let of_spots: Vec<Self> = joints.iter().filter(|joint| !filter.has_bump(**joint)).flat_map(worn).collect();
+        let of_joint = |joint: usize| [Self::Slip(joint), Self::Scale(joint), Self::Failed(joint)];
+        let of_tags = tags.iter().map(|&tag| Self::Tag(tag)).filter(|_| tags.len() > 1);
+        let of_mount = filter.mount_column().map(|_| Self::Mount);
+        let base = (tags.len() > 1).then_some(Self::Base);
+        std::iter::once(Self::Drift)
+            .chain(joints.into_iter().flat_map(of_joint))
+            .chain(of_spots)
+            .chain(of_tags)
+            .chain(of_mount)
+            .chain(base)
+            .collect()
+    }
+
+    /// `ln` of its odds, before any view, against nothing.
+    pub(crate) fn ln_prior(self) -> f64 {
+        match self {
+            Self::Drift => LN_PRIOR_OF_DRIFT,
+            Self::Worn(..) => LN_PRIOR_OF_WORN,
+            _ => LN_PRIOR,
+        }
+    }
+
+    /// Widens the belief where the fault re-opens it.
+    pub(crate) fn open(self, filter: &mut Filter, robot: &Robot) {
+        match self {
+            Self::Slip(joint) => {
+                let columns: Vec<_> = column(filter, joint, ParameterKind::Offset).into_iter().collect();
+                filter.widen(&columns.iter().map(|at| (*at, SLIP_STD_RAD.powi(2))).collect::<Vec<_>>());
+            }
+            Self::Scale(joint) => {
+                let gain = column(filter, joint, ParameterKind::Gain).map(|at| (at, GAIN_STD.powi(2)));
+                let offset = column(filter, joint, ParameterKind::Offset).map(|at| (at, SLIP_STD_RAD.powi(2)));
+                filter.widen(&gain.into_iter().chain(offset).collect::<Vec<_>>());
+            }
+            Self::Drift => {
+                let columns: Vec<_> = filter.offsets().map(|(_, at)| (at, DRIFT_STD_RAD.powi(2))).collect();
+                filter.widen(&columns);
+            }
+            // The views themselves are taken otherwise.
+            Self::Failed(_) => {}
+            Self::Worn(joint, spot) => {
+                filter.add_parameter(robot, Parameter { joint, kind: ParameterKind::Bump(spot) });
+            }
+            Self::Tag(tag) => filter.widen(&six(filter.tag_column(tag), TAG_STD)),
+            Self::Tags(tags) => filter.widen_along(&carrier_directions(filter, tags)),
+            Self::Mount => filter.widen(&six(filter.mount_column(), MOUNT_STD)),
+            Self::Base => {
+                let along = base_directions(filter, robot);
+                filter.widen_along(&along);
+            }
+        }
+    }
+
+    /// Numbers that are open under it from the start.
+    pub(crate) fn numbers(self) -> usize {
+        match self {
+            Self::Slip(_) | Self::Worn(..) => 1,
+            Self::Scale(_) => 2,
+            Self::Tags(_) | Self::Mount | Self::Base => 6,
+            // These depend on the views.
+            Self::Failed(_) | Self::Tag(_) | Self::Drift => 0,
+        }
+    }
+
+    /// Whether both are about the same sensor.
+    pub(crate) fn is_of_same_sensor(self, other: Self) -> bool {
+        let joint = |fault| match fault {
+            Self::Slip(joint) | Self::Scale(joint) | Self::Failed(joint) | Self::Worn(joint, _) => Some(joint),
+            _ => None,
+        };
+        joint(self).is_some() && joint(self) == joint(other)
+    }
+
+    /// The kind as files write it.
+    #[must_use]
+    pub fn kind(self) -> FindingKind {
+        match self {
+            Self::Slip(_) => FindingKind::SensorSlip,
+            Self::Scale(_) => FindingKind::SensorScale,
+            Self::Failed(_) => FindingKind::SensorFailed,
+            Self::Tag(_) => FindingKind::TagMoved,
+            Self::Tags(_) => FindingKind::TagsMoved,
+            Self::Mount => FindingKind::CameraMount,
+            Self::Base => FindingKind::Base,
+            Self::Worn(..) | Self::Drift => FindingKind::SensorWorn,
+        }
+    }
+
+    /// Joint or tag, as people know it.
+    #[must_use]
+    pub fn name(self, robot: &Robot) -> String {
+        match self {
+            Self::Slip(joint) | Self::Scale(joint) | Self::Failed(joint) | Self::Worn(joint, _) => {
+                robot.sensors[joint].joint.clone()
+            }
+            Self::Tag(tag) => robot.tags[tag].id.to_string(),
+            Self::Tags(tags) => {
+                let ids: Vec<String> = tags.iter().map(|tag| robot.tags[tag].id.to_string()).collect();
+                ids.split_last().map_or_else(String::new, |(last, first)| format!("{} and {last}", first.join(", ")))
+            }
+            Self::Mount => "camera mount".to_owned(),
+            Self::Base => "base".to_owned(),
+            Self::Drift => "sensors".to_owned(),
+        }
+    }
+
+    /// What people read where it is one of several explanations.
+    pub(crate) fn phrase(self, robot: &Robot) -> String {
+        match self {
+            Self::Drift => say::drift(),
+            _ => say::explanation(self.kind(), &self.name(robot)),
+        }
+    }
+
+    /// How far belief `after` is from belief `before` in what the fault is about: m, of a slip by how much the sensor
+    /// reads more since, rad, of a worn spot the same at its middle, of a scale the slope of the angle by the reading;
+    /// `None` without a size.
+    pub(crate) fn size(self, before: &Filter, after: &Filter) -> Option<f64> {
+        match self {
+            Self::Slip(joint) => {
+                let offset = |filter: &Filter| filter.parameters().offset_rad[joint];
+                // The angle falls by what the sensor reads more since.
+                Some(offset(before) - offset(after))
+            }
+            Self::Scale(joint) => Some(after.parameters().gain[joint]),
+            Self::Worn(joint, _) => Some(-after.parameters().terms[joint].bump.height_rad),
+            Self::Failed(_) | Self::Drift => None,
+            Self::Tag(tag) => Some(moved_m(before, after, tag)),
+            Self::Tags(tags) => {
+                let mut all_m: Vec<f64> = tags.iter().map(|tag| moved_m(before, after, tag)).collect();
+                all_m.sort_by(f64::total_cmp);
+                all_m.get(all_m.len() / 2).copied()
+            }
+            Self::Mount => Some((before.mount().rotation.inverse() * after.mount().rotation).angle()),
+            Self::Base => Some(moved_m(before, after, 0)),
+        }
+    }
+}
+
+fn moved_m(before: &Filter, after: &Filter, tag: usize) -> f64 {
+    (after.tag(tag).translation.vector - before.tag(tag).translation.vector).norm()
+}
+
+fn column(filter: &Filter, joint: usize, kind: ParameterKind) -> Option<usize> {
+    filter.joint_parameters().iter().position(|p| *p == Parameter { joint, kind })
+}
+
+fn six(at: Option<usize>, [shift, turn]: [f64; 2]) -> Vec<(usize, f64)> {
+    let variance = |k: usize| if k < 3 { shift * shift } else { turn * turn };
+    at.into_iter().flat_map(|at| (0..6).map(move |k| (at + k, variance(k)))).collect()
+}
+
+/// Tags by a small motion of the first of them that carries the others along, each column times one sigma.
+fn carrier_directions(filter: &Filter, tags: TagSet) -> DMatrix<f64> {
+    let mut along = DMatrix::zeros(filter.n_columns(), 6);
+    let std = Matrix6::from_diagonal(&nalgebra::Vector6::from_fn(|k, _| TAG_STD[k / 3]));
+    let Some(first) = tags.iter().next().map(|tag| *filter.tag(tag)) else { return along };
+    for tag in tags.iter() {
+        let Some(at) = filter.tag_column(tag) else { continue };
+        let by_first = adjoint(&filter.tag(tag).inv_mul(&first)) * std;
+        along.fixed_view_mut::<6, 6>(at, 0).copy_from(&by_first);
+    }
+    along
+}
+
+/// All tags by a small motion of the frame that they are known in, each column times one sigma.
+fn base_directions(filter: &Filter, robot: &Robot) -> DMatrix<f64> {
+    let mut along = DMatrix::zeros(filter.n_columns(), 6);
+    let std = Matrix6::from_diagonal(&nalgebra::Vector6::from_fn(|k, _| BASE_STD[k / 3]));
+    for tag in 0..robot.tags.len() {
+        let Some(at) = filter.tag_column(tag) else { continue };
+        let by_base = adjoint(&filter.tag(tag).inverse()) * std;
+        along.fixed_view_mut::<6, 6>(at, 0).copy_from(&by_base);
+    }
+    along
+}

@@ -1,0 +1,169 @@
+//! One calibration by a method on tag positions: the paper's minimum distance and minimum variance.
+
+use nalgebra::DMatrix;
+
+use crate::checks::assemble::{Evidence, Fit, Provenance, assemble, held_out_metrics};
+use crate::checks::cross_validation::{compared, cross_validate};
+use crate::explain::baseline::Baseline;
+use crate::file::calibration::Calibration;
+use crate::file::camera_mount::CameraMount;
+use crate::file::map_table::MapResult;
+use crate::file::metrics::HeldOutMetrics;
+use crate::methods::gripper_tag::mount_by_gripper_tag;
+use crate::methods::minimum_distance::minimum_distance;
+use crate::methods::minimum_variance::{determined_by_variance, variance_covariance};
+use crate::methods::observability::free_parameters;
+use crate::methods::position_method::PositionMethod;
+use crate::methods::search::SearchOptions;
+use crate::model::parameters::{JointParameters, Parameter};
+use crate::positions::mount_estimate::MountEstimate;
+use crate::positions::position_problem::PositionProblem;
+use crate::positions::solution::Solution;
+use crate::positions::unobservable::{Unobservable, grouped_names};
+use crate::solve::covariance::{CommonErrors, ParameterCovariance, linearity_scale, predict_tool_error};
+use crate::tagmap::tag_mapping::map_unknown_tags;
+use crate::views::calibration_data::{CalibrationData, HeldOut};
+use crate::views::error::CalibError;
+use crate::views::view::View;
+use armcal_core::robot::Robot;
+use armcal_core::routine::Method;
+
+/// Where the search starts, and what is known before it.
+struct Start {
+    /// With the map's tags, and the camera where the tag on the gripper has it.
+    robot: Robot,
+    guess: JointParameters,
+    errors: CommonErrors,
+    map: Option<MapResult>,
+    /// By the tag on the gripper, or why not; none where the robot has none.
+    mount: Result<Option<MountEstimate>, String>,
+    /// What that tag determines.
+    determined: Vec<Parameter>,
+}
+
+/// # Errors
+/// [`CalibError`] where the views make no map or determine no parameter.
+pub(crate) fn calibrate_positions(
+    mut data: CalibrationData,
+    method: Method,
+    prior: Option<&Calibration>,
+) -> Result<Calibration, CalibError> {
+    let start = start(&mut data, prior)?;
+    let problem = PositionProblem::new(&start.robot, &data.data.fit);
+    let (mut free, mut unobservable) = free_parameters(&problem, &start.guess);
+    let n_camera_joints = start.robot.n_seen_joints();
+    let n_parameters = free.len() + unobservable.iter().filter(|u| u.parameter.joint < n_camera_joints).count();
+    unobservable.retain(|u| !start.determined.contains(&u.parameter));
+    let nothing = || CalibError::NothingObservable { recording: data.name.clone() };
+    if free.is_empty() {
+        return Err(nothing());
+    }
+    let solved = solve(method, &problem, &mut free, &start).ok_or_else(nothing)?;
+    unobservable.extend(solved.unobservable);
+    unobservable.sort_by_key(|u| u.parameter);
+    let Solved { solution, covariance, .. } = solved;
+    let held_out_problem = PositionProblem::new(&start.robot, &data.data.held_out);
+    let linearity_scale = linearity_scale(&problem, &held_out_problem, &solution.parameters, free.len());
+    let held_out = held_out(&data, method, &start, (&free, &solution.parameters));
+    let as_found = start.robot.clone().with_linearity(linearity_scale);
+    let predicted = predict_tool_error(&as_found, &solution.parameters, &covariance, data.data.task_rests());
+    let source = Provenance {
+        messages_hash: &data.messages_hash,
+        robot: &start.robot,
+        method,
+        data: &data.data,
+        prior,
+        identified: &data.identified,
+    };
+    let fit = Fit { problem: &problem, solution: &solution, covariance: &covariance, linearity_scale };
+    let has_failed_joint = !start.robot.failed.is_empty();
+    let calibration = assemble(&source, &fit, Evidence { held_out, predicted, n_parameters, has_failed_joint });
+    Ok(Calibration {
+        unobservable: grouped_names(&start.robot, &unobservable),
+        camera_mount: CameraMount::of(&start.robot, &start.mount),
+        map: start.map,
+        ..calibration
+    })
+}
+
+/// Held-out views by `at`, the calibration of `free`, and by mount and map alone.
+fn held_out(
+    data: &CalibrationData,
+    method: Method,
+    start: &Start,
+    (free, at): (&[Parameter], &JointParameters),
+) -> HeldOutMetrics {
+    let views = &data.data.fit;
+    let baseline = Baseline::new(&start.robot, views);
+    let by_baseline =
+        |views: &[View]| baseline.as_ref().map(|baseline| baseline.fit(&start.robot, views)).unwrap_or_default();
+    match data.held_out {
+        HeldOut::AsMarked => {
+            let held_out = &data.data.held_out;
+            let problem = PositionProblem::new(&start.robot, held_out);
+            HeldOutMetrics { baseline: compared(&problem, at, &by_baseline(views)), ..held_out_metrics(&problem, at) }
+        }
+        HeldOut::CrossValidation => {
+            let fit = |views: &[View]| {
+                let part = PositionProblem::new(&start.robot, views);
+                solve(method, &part, &mut free.to_vec(), start).map(|solved| solved.solution.parameters)
+            };
+            cross_validate(&start.robot, views, fit, by_baseline)
+        }
+    }
+}
+
+fn start(data: &mut CalibrationData, prior: Option<&Calibration>) -> Result<Start, CalibError> {
+    let mut robot = data.robot.clone();
+    let mut errors = CommonErrors::priors(&robot);
+    let mapped = map_unknown_tags(&data.name, &mut data.data, &robot)?;
+    let map = mapped.map(|mapped| {
+        (robot, errors) = (mapped.robot, mapped.errors);
+        mapped.result
+    });
+    let mut guess = prior.map_or_else(JointParameters::default, |prior| prior.parameters(&robot));
+    let mount = robot.gripper_tag.map(|tag| {
+        let views = data.gripper_tag_data.as_ref().map_or(&data.data.fit, |data| &data.fit);
+        mount_by_gripper_tag(&robot, &tag, views, &guess)
+    });
+    let mount = mount.transpose();
+    let mut determined = Vec::new();
+    if let Ok(Some(mount)) = &mount {
+        determined = mount.determined(&robot);
+        errors.mount = mount.mount_covariance();
+        guess = mount.parameters;
+        robot = robot.with_camera_at(mount.link_from_camera, &errors.mount);
+    }
+    Ok(Start { robot, guess, errors, map, mount, determined })
+}
+
+struct Solved {
+    solution: Solution,
+    covariance: ParameterCovariance,
+    /// What the method itself cannot determine.
+    unobservable: Vec<Unobservable>,
+}
+
+/// The answer of a method on positions and its covariance. Takes out of `free` what the method cannot determine; `None`
+/// if nothing is left.
+fn solve(method: Method, problem: &PositionProblem<'_>, free: &mut Vec<Parameter>, start: &Start) -> Option<Solved> {
+    let (guess, errors) = (&start.guess, &start.errors);
+    let mut unobservable = Vec::new();
+    let (solution, covariance, by_mount): (Solution, ParameterCovariance, DMatrix<f64>);
+    if method == Method::MinimumVariance {
+        (*free, unobservable) = determined_by_variance(problem, free, guess);
+        if free.is_empty() {
+            return None;
+        }
+        solution = PositionMethod::MinimumVariance.solve(problem, free, guess, &SearchOptions::default());
+        (covariance, by_mount) = variance_covariance(problem, free, &solution.parameters, errors);
+    } else {
+        solution = minimum_distance(problem, free, guess);
+        (covariance, by_mount) = ParameterCovariance::estimate(problem, free, &solution.parameters, errors);
+    }
+    let covariance = match &start.mount {
+        Ok(Some(mount)) => covariance.with_gripper_tag(mount, &start.determined, &by_mount),
+        _ => covariance,
+    };
+    Some(Solved { solution, covariance, unobservable })
+}

@@ -1,0 +1,220 @@
+//! Joint readings that mean something else than the input map and robot.toml say: as data and in words.
+
+use std::fmt;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::say::wrong_input_words::turn_in_words;
+use armcal_core::codes::{Code, Coded};
+use armcal_core::kinematics::JointKind;
+
+/// A joint whose sensor has its zero elsewhere than robot.toml says.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct JointZero {
+    /// Name of the joint in the URDF.
+    pub joint: String,
+    /// Angle minus reading, rad; a slide's way, m.
+    pub off_rad: f64,
+    /// Turns or slides.
+    #[serde(default, skip_serializing_if = "JointKind::is_turning")]
+    pub moves: JointKind,
+    /// The reading at angle zero that explains the views.
+    pub offset_counts: f64,
+}
+
+/// One way in which readings differ from the angles that they are read as.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", tag = "error")]
+pub enum ReadingError {
+    /// Two joints have each other's readings.
+    Exchanged {
+        /// Their names in the URDF.
+        joints: [String; 2],
+    },
+    /// All joints are in the reverse order.
+    Reversed {
+        /// Their names in the URDF, base first.
+        joints: Vec<String>,
+    },
+    /// One joint's reading contains another joint's angle.
+    Coupled {
+        /// Name of the joint in the URDF.
+        joint: String,
+        /// The joint whose angle is added.
+        with: String,
+        /// 1 where it is added, -1 where it is subtracted.
+        sign: f64,
+    },
+    /// Readings of 0 to 360 deg, of joints whose ranges lie about zero.
+    OtherTurns {
+        /// Their names in the URDF.
+        joints: Vec<String>,
+        /// One turn of the first of them.
+        wrap_counts: f64,
+    },
+    /// Zeros differ.
+    Zeros {
+        /// The joints concerned; two of a parallel pair.
+        joints: Vec<JointZero>,
+    },
+    /// One joint's readings are in another unit or scale.
+    Scaled {
+        /// Name of the joint in the URDF.
+        joint: String,
+        /// Angle over reading.
+        factor: f64,
+    },
+    /// Each view has the readings of another view.
+    Shifted {
+        /// So many views later are its own readings; negative: before.
+        views: i32,
+    },
+    /// The camera is not where robot.toml says.
+    Camera {
+        /// The link that carries it, where that is another one.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        link: Option<String>,
+        /// Rotation that follows the stated `quaternion_wxyz`: w, x, y, z.
+        turn: [f64; 4],
+    },
+}
+
+/// The reading error that explains the views, with those that explain them nearly as well.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct MisreadReadings {
+    /// The likeliest one.
+    pub found: ReadingError,
+    /// Others within the margin of evidence.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub alternatives: Vec<ReadingError>,
+    /// Root mean square distance between predicted and surveyed tags, by the datasheet and the readings as they are, m.
+    pub tag_error_m: f64,
+    /// The same root mean square after correction and calibration, m; absent where no tag was predicted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub corrected_m: Option<f64>,
+}
+
+impl fmt::Display for ReadingError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Exchanged { joints: [a, b] } => write!(f, "the readings of {a} and {b} are exchanged"),
+            Self::Reversed { .. } => write!(f, "the joints are in the reverse order, tool first"),
+            Self::OtherTurns { joints, .. } => {
+                write!(f, "readings of {} run from 0 to 360 deg, beyond the joint limits by a turn", joints.join(", "))
+            }
+            Self::Coupled { joint, with, sign } => {
+                let (verb, preposition) = if *sign > 0.0 { ("added", "to") } else { ("subtracted", "from") };
+                write!(f, "the angle of {with} is {verb} {preposition} the reading of {joint}")
+            }
+            Self::Zeros { joints } => {
+                let one = |zero: &JointZero| {
+                    let less = if zero.off_rad > 0.0 { "less" } else { "more" };
+                    let size = zero.moves.unit().shown(zero.off_rad.abs(), 1);
+                    format!("{} reads {size} {less} than its angle", zero.joint)
+                };
+                let all: Vec<String> = joints.iter().map(one).collect();
+                write!(f, "joint zeros differ: {}", all.join(", "))
+            }
+            Self::Scaled { joint, factor } => {
+                write!(
+                    f,
+                    "the sensor of {joint} has another scale than its datasheet: {joint} moves {factor:.4} times as \
+                     far as it says"
+                )
+            }
+            Self::Shifted { views } => {
+                let side = if *views > 0 { "previous" } else { "next" };
+                write!(f, "each view has the joint readings of the {side} one")
+            }
+            Self::Camera { link, turn } => {
+                f.write_str("the camera is not as robot.toml says: ")?;
+                match link {
+                    Some(link) if is_turned(turn) => {
+                        write!(f, "it is on {link}, its frame turned by {}", turn_in_words(turn))
+                    }
+                    Some(link) => write!(f, "it is on {link}"),
+                    None => write!(f, "its frame is turned by {}", turn_in_words(turn)),
+                }
+            }
+        }
+    }
+}
+
+fn is_turned(turn: &[f64; 4]) -> bool {
+    turn[0].abs() < 1.0 - 1e-6
+}
+
+impl fmt::Display for MisreadReadings {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.found)?;
+        if let Some(corrected_m) = self.corrected_m {
+            let [as_read, corrected] = [self.tag_error_m, corrected_m].map(|m| 1e3 * m);
+            write!(f, ": corrected, the tags fit within {corrected:.1} mm rms instead of {as_read:.1} mm")?;
+        }
+        self.alternatives.iter().try_for_each(|other| write!(f, " (nearly as likely: {other})"))
+    }
+}
+
+impl MisreadReadings {
+    /// Advice with the lines to change.
+    #[must_use]
+    pub fn remedy(&self) -> String {
+        match &self.found {
+            ReadingError::Exchanged { joints: [a, b] } => {
+                format!(
+                    "exchange the two in [joint_sensors] of the input map: names = {{ {a} = \"{b}\", {b} = \"{a}\" }}"
+                )
+            }
+            ReadingError::Reversed { joints } => {
+                let pairs = joints.iter().zip(joints.iter().rev());
+                let names: Vec<String> = pairs.map(|(joint, recorded)| format!("{joint} = \"{recorded}\"")).collect();
+                format!("reverse the names in [joint_sensors] of the input map: names = {{ {} }}", names.join(", "))
+            }
+            ReadingError::Coupled { joint, with, .. } => {
+                format!("record the angle of {joint} relative to the link before it, without that of {with}")
+            }
+            ReadingError::OtherTurns { wrap_counts, .. } => {
+                format!("state in [[joint_sensor]] of robot.toml that the word repeats: wrap_counts = {wrap_counts:.6}")
+            }
+            ReadingError::Zeros { joints } => {
+                let one = |zero: &JointZero| format!("{}: offset_counts = {:.5}", zero.joint, zero.offset_counts);
+                let lines: Vec<String> = joints.iter().map(one).collect();
+                format!("set the zeros in [[joint_sensor]] of robot.toml, if the URDF is right: {}", lines.join("; "))
+            }
+            ReadingError::Scaled { joint, factor } => {
+                format!(
+                    "correct the unit of {joint} in the input map, or its scale: multiply scale_counts_per_deg (of a \
+                     slide, scale_counts_per_mm) in robot.toml by {:.4}",
+                    1.0 / factor
+                )
+            }
+            ReadingError::Shifted { .. } => {
+                "give each view the joint readings of its own pose: check the rows of the table, or the stamps"
+                    .to_owned()
+            }
+            ReadingError::Camera { link, turn } => {
+                let link = link.as_ref().map(|link| format!("link = \"{link}\""));
+                let [w, x, y, z] = turn.map(|value| format!("{value:.4}"));
+                let by = is_turned(turn)
+                    .then(|| format!("quaternion_wxyz multiplied by [{w}, {x}, {y}, {z}] from the right"));
+                let lines: Vec<String> = link.into_iter().chain(by).collect();
+                format!("set in [camera] of robot.toml: {}", lines.join(", "))
+            }
+        }
+    }
+}
+
+impl Coded for MisreadReadings {
+    fn code(&self) -> Code {
+        match self.found {
+            ReadingError::Exchanged { .. } | ReadingError::Reversed { .. } => Code::JointsExchanged,
+            ReadingError::Coupled { .. } => Code::JointsCoupled,
+            ReadingError::OtherTurns { .. } => Code::JointTurns,
+            ReadingError::Zeros { .. } => Code::JointZeros,
+            ReadingError::Scaled { .. } => Code::SensorLine,
+            ReadingError::Shifted { .. } => Code::ReadingsShifted,
+            ReadingError::Camera { .. } => Code::InputCamera,
+        }
+    }
+}

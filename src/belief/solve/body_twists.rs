@@ -1,0 +1,73 @@
+//! Twists of the camera by where joints sit on their parent links, and by how the arm bends.
+
+use nalgebra::{Isometry3, Matrix6, SMatrix, Vector3, Vector6};
+
+use crate::solve::body_motion::SagPoint;
+use crate::solve::problem::BundleProblem;
+use crate::solve::schur::{BodyTwists, Group};
+use armcal_core::kinematics::{AboutAxes, LinkCorrections, LinkPoses};
+use armcal_core::spatial::left_jacobian;
+
+/// Of the joints of `group`; zero elsewhere.
+pub(crate) fn body_twists(problem: &BundleProblem<'_>, group: &Group<'_>, corrections: &LinkCorrections) -> BodyTwists {
+    let mut twists = BodyTwists::zeros();
+    let layout = &problem.layout;
+    let n_links = layout.links.len();
+    if !layout.sag.is_empty() {
+        let at = SagPoint::new(&problem.loads(group.view_idx), &corrections.sag, group.poses);
+        for (k, column) in layout.sag.clone().enumerate() {
+            let twist = sag_twist(group, &at.turns(layout.parameters[column]));
+            twists.set_column(n_links + k, &twist);
+        }
+    }
+    for joint in group.joints.clone().take_while(|joint| 6 * joint < n_links) {
+        let by_turn = left_jacobian(&corrections[joint].turn_rad);
+        for axis in 0..3 {
+            let shift = Vector3::ith(axis, group.sign);
+            let turn = by_turn.column(axis) * group.sign;
+            let [shift, turn] = link_twist(group.poses, &group.base_from_camera, joint, [shift, turn]);
+            twists.set_column(6 * joint + axis, &shift);
+            twists.set_column(6 * joint + 3 + axis, &turn);
+        }
+    }
+    twists
+}
+
+/// Twist of the camera by turns of the group's joints and of the base.
+pub(crate) fn sag_twist(group: &Group<'_>, turns: &AboutAxes) -> Vector6<f64> {
+    let center = group.base_from_camera.translation.vector;
+    let to_camera = group.base_from_camera.rotation.inverse();
+    let [moved, turned] =
+        turns.motion(group.poses, group.joints.clone(), &center).map(|by| to_camera * by * group.sign);
+    Vector6::new(moved.x, moved.y, moved.z, turned.x, turned.y, turned.z)
+}
+
+/// Twists of the camera by a shift and by a turn of a joint's place, in its parent link's axes.
+pub(crate) fn link_twist(
+    poses: &LinkPoses,
+    base_from_camera: &Isometry3<f64>,
+    joint: usize,
+    [shift, turn]: [Vector3<f64>; 2],
+) -> [Vector6<f64>; 2] {
+    let to_camera = base_from_camera.rotation.inverse();
+    let lever = base_from_camera.translation.vector - poses.joint_origin(joint);
+    let [shift, turn] = [shift, turn].map(|by| poses.link(joint).rotation * by);
+    let (moved, swept, turned) = (to_camera * shift, to_camera * turn.cross(&lever), to_camera * turn);
+    [
+        Vector6::new(moved.x, moved.y, moved.z, 0.0, 0.0, 0.0),
+        Vector6::new(swept.x, swept.y, swept.z, turned.x, turned.y, turned.z),
+    ]
+}
+
+/// What the links' block takes from a group whose own parameters are eliminated (module `linearize`).
+pub(crate) struct BodySums {
+    pub twists: BodyTwists,
+    /// `G - G M G`.
+    pub q: Matrix6<f64>,
+    pub m: Matrix6<f64>,
+    pub m_h_sum: Matrix6<f64>,
+    pub h_sum: Matrix6<f64>,
+    /// Gradient by the camera's twist, the own parameters eliminated.
+    pub g: Vector6<f64>,
+    pub by_lens: SMatrix<f64, 6, 8>,
+}

@@ -1,0 +1,366 @@
+//! How sure the answer is, in its own units and in millimetres at the tool.
+//!
+//! For an estimator that minimizes a sum of norms, the sandwich `A^-1 B A^-1` (Huber 1967): `A` is the objective's
+//! curvature, `B` the scatter of its gradient. `B` is summed by views, for all tags of one view share one camera pose
+//! and its error. Errors common to all views (camera mount, survey of a tag) do not show in any scatter; they are added
+//! from the priors through the same curvature. What a straight line leaves of a sensor's error (nonlinearity,
+//! temperature) is there again at every new pose; at the tool it is added from the datasheet's linearity, or from more
+//! than that where the residuals say that the sensors are worse than their datasheet.
+
+use nalgebra::{Const, DMatrix, DVector, Dyn, Matrix3, Matrix6, OMatrix, Vector3, Vector6};
+
+use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
+use crate::positions::mount_estimate::MountEstimate;
+use crate::positions::position_problem::PositionProblem;
+use crate::solve::details::TargetPrediction;
+use crate::views::view::{TagObservation, TaskRests};
+use armcal_core::kinematics::{IkGoal, IkSettings, JointLimits, solve_position};
+use armcal_core::robot::{FailedJoint, FailedKind, JointSensorSpec, Robot};
+use armcal_core::sensor::ConditionChange;
+use armcal_core::stats::Summary;
+use armcal_core::streams::{JointAngles, MAX_JOINTS};
+
+/// Covariance of the free parameters, in their own units (gain: 1, offset: rad).
+#[derive(Clone, Debug)]
+pub struct ParameterCovariance {
+    /// In the order of the rows.
+    pub parameters: Vec<Parameter>,
+    /// Square and symmetric; infinite where the data determine nothing.
+    pub matrix: DMatrix<f64>,
+    /// One sigma of what the parameters leave of each sensor's error at a new pose; `None` takes the datasheet's
+    /// linearity.
+    pub residual_std_rad: Option<[f64; MAX_JOINTS]>,
+}
+
+/// A joint at a travel of its sensor.
+#[derive(Clone, Copy, Debug)]
+pub struct JointAt<'a> {
+    /// Its sensor.
+    pub spec: &'a JointSensorSpec,
+    /// Index, base first.
+    pub joint: usize,
+    /// From the middle of its range by the datasheet, rad.
+    pub travel_rad: f64,
+}
+
+/// What the tool's position error is expected to be at the task's targets.
+#[derive(Clone, Debug)]
+pub struct ToolErrorPrediction {
+    /// Over the targets that inverse kinematics reaches.
+    pub error_m: Summary,
+    /// One by one.
+    pub targets: Vec<TargetPrediction>,
+}
+
+/// Distances below this do not make the objective's curvature larger: it is where pixel noise sits, m.
+const DISTANCE_FLOOR_M: f64 = 1e-4;
+
+/// Errors that all views share.
+#[derive(Clone, Debug)]
+pub struct CommonErrors {
+    /// Covariance of the camera's mount (translation m, rotation rad), on the right.
+    pub mount: Matrix6<f64>,
+    /// Covariance of the tags' positions in the base frame, m^2, three rows a tag of the robot.
+    pub tags_m2: DMatrix<f64>,
+}
+
+impl CommonErrors {
+    /// What robot.toml and the survey say: every axis and every tag by itself.
+    #[must_use]
+    pub fn priors(robot: &Robot) -> Self {
+        let (std_m, std_rad) = (robot.camera.mount_std_m, robot.camera.mount_std_rad);
+        let mount = Vector6::from_fn(|row, _| if row < 3 { std_m } else { std_rad }.powi(2));
+        let tags = robot.tags.iter().flat_map(|tag| [tag.position_std_m.powi(2); 3]);
+        let tags_m2 = DMatrix::from_diagonal(&DVector::from_iterator(3 * robot.tags.len(), tags));
+        Self { mount: Matrix6::from_diagonal(&mount), tags_m2 }
+    }
+
+    /// Mount first, then the tags.
+    fn matrix(&self) -> DMatrix<f64> {
+        let n = 6 + self.tags_m2.nrows();
+        let mut matrix = DMatrix::zeros(n, n);
+        matrix.view_mut((0, 0), (6, 6)).copy_from(&self.mount);
+        matrix.view_mut((6, 6), (n - 6, n - 6)).copy_from(&self.tags_m2);
+        matrix
+    }
+}
+
+impl ParameterCovariance {
+    /// The same with gains and offsets as they are under other conditions than the reference's: what temperature and
+    /// pressure do is in them.
+    #[must_use]
+    pub fn under(&self, change: &ConditionChange) -> Self {
+        let mut to = DMatrix::identity(self.parameters.len(), self.parameters.len());
+        for (column, by) in self.parameters.iter().enumerate() {
+            let (kind, share) = match by.kind {
+                ParameterKind::OffsetPerK => (ParameterKind::Offset, change.oil_k),
+                ParameterKind::GainPerK => (ParameterKind::Gain, change.oil_k),
+                ParameterKind::OffsetPerMpa => (ParameterKind::Offset, change.pressure_mpa),
+                ParameterKind::DriftPerH => (ParameterKind::Offset, change.elapsed_h),
+                _ => continue,
+            };
+            let into = Parameter { joint: by.joint, kind };
+            if let Some(row) = self.parameters.iter().position(|p| *p == into) {
+                to[(row, column)] = share;
+            }
+        }
+        Self { matrix: &to * &self.matrix * to.transpose(), ..self.clone() }
+    }
+
+    /// Variance of a joint's angle there, rad^2: by its own parameters, and what is `besides`.
+    #[must_use]
+    pub fn angle_var_rad2(&self, at: JointAt<'_>, change: &ConditionChange, besides: f64) -> f64 {
+        let JointAt { spec, joint, travel_rad } = at;
+        let own = self.parameters.iter().enumerate().filter(|(_, p)| p.joint == joint);
+        let by: Vec<(usize, f64)> =
+            own.map(|(row, p)| (row, p.kind.angle_derivative(spec, travel_rad, change, 0.0))).collect();
+        let mut variance = besides;
+        for &(i, by_i) in &by {
+            for &(k, by_k) in &by {
+                variance += by_i * self.matrix[(i, k)] * by_k;
+            }
+        }
+        variance.max(0.0)
+    }
+
+    /// Estimates the covariance at the solution, and by how much the parameters go along with an error of the mount
+    /// (d parameter / d mount, six columns). A singular curvature gives infinite variances.
+    #[must_use]
+    pub fn estimate(
+        problem: &PositionProblem<'_>,
+        free: &[Parameter],
+        at: &JointParameters,
+        errors: &CommonErrors,
+    ) -> (Self, DMatrix<f64>) {
+        let n = free.len();
+        let n_tags = problem.robot.tags.len();
+        let mut curvature = DMatrix::zeros(n, n);
+        let mut view_gradients = DMatrix::zeros(n, problem.views.len());
+        // Columns: mount translation, mount rotation, then each tag's survey position.
+        let mut by_common = DMatrix::zeros(n, 6 + 3 * n_tags);
+        problem.each(at, |o| {
+            let distance = o.residual_m.norm().max(DISTANCE_FLOOR_M);
+            let unit = o.residual_m / distance;
+            let hessian = (Matrix3::identity() - unit * unit.transpose()) / distance;
+            let mut jacobian = DMatrix::zeros(3, n);
+            for (column, &parameter) in free.iter().enumerate() {
+                jacobian.fixed_view_mut::<3, 1>(0, column).copy_from(&problem.derivative(o, parameter));
+            }
+            let transposed = jacobian.transpose();
+            curvature += &transposed * hessian * &jacobian;
+            let gradient: DVector<f64> = &transposed * unit;
+            let mut sum = view_gradients.column_mut(o.view_idx);
+            sum += gradient;
+            let (by_translation, by_rotation) = PositionProblem::mount_derivative(o);
+            let weighted = &transposed * hessian;
+            add_columns(&mut by_common, 0, &(&weighted * by_translation));
+            add_columns(&mut by_common, 3, &(&weighted * by_rotation));
+            add_columns(&mut by_common, 6 + 3 * o.tag.tag_idx, &(-&weighted));
+        });
+        let (matrix, by_mount) = match curvature.try_inverse() {
+            None => (DMatrix::from_diagonal_element(n, n, f64::INFINITY), DMatrix::zeros(n, 6)),
+            Some(inverse) => {
+                let used = problem.views.iter().filter(|view| !view.tags.is_empty()).count();
+                let small_sample = used as f64 / (used.saturating_sub(1)).max(1) as f64;
+                let scatter = &view_gradients * view_gradients.transpose() * small_sample;
+                let common = &inverse * by_common;
+                let matrix = &inverse * scatter * &inverse + &common * errors.matrix() * common.transpose();
+                (matrix, -common.columns(0, 6))
+            }
+        };
+        (Self { parameters: free.to_vec(), matrix, residual_std_rad: None }, by_mount)
+    }
+
+    /// The same with the joints that the tag on the gripper determined; `by_mount` as [`Self::estimate`] gives it.
+    #[must_use]
+    pub fn with_gripper_tag(self, mount: &MountEstimate, determined: &[Parameter], by_mount: &DMatrix<f64>) -> Self {
+        let rows: Vec<usize> = determined.iter().filter_map(|p| mount.row(*p)).collect();
+        let (n, k) = (self.parameters.len(), rows.len());
+        let mut matrix = DMatrix::zeros(n + k, n + k);
+        matrix.view_mut((0, 0), (n, n)).copy_from(&self.matrix);
+        for (i, &row) in rows.iter().enumerate() {
+            for (j, &column) in rows.iter().enumerate() {
+                matrix[(n + i, n + j)] = mount.covariance[(row, column)];
+            }
+            let with_mount: DVector<f64> = mount.covariance.view((0, row), (6, 1)).column(0).into_owned();
+            let shared = by_mount * with_mount;
+            matrix.view_mut((0, n + i), (n, 1)).copy_from(&shared);
+            matrix.view_mut((n + i, 0), (1, n)).copy_from(&shared.transpose());
+        }
+        let parameters = self.parameters.into_iter().chain(determined.iter().copied()).collect();
+        Self { parameters, matrix, ..self }
+    }
+
+    /// Nothing known of the parameters of `joint`.
+    #[must_use]
+    pub fn without_joint(&self, joint: usize) -> Self {
+        self.without(|parameter| parameter.joint == joint)
+    }
+
+    /// Marginal of the other parameters.
+    #[must_use]
+    pub fn without(&self, is_dropped: impl Fn(Parameter) -> bool) -> Self {
+        let kept: Vec<usize> = (0..self.parameters.len()).filter(|&k| !is_dropped(self.parameters[k])).collect();
+        Self {
+            parameters: kept.iter().map(|&k| self.parameters[k]).collect(),
+            matrix: DMatrix::from_fn(kept.len(), kept.len(), |i, k| self.matrix[(kept[i], kept[k])]),
+            residual_std_rad: self.residual_std_rad,
+        }
+    }
+
+    /// One sigma of a parameter; `None` if it is not among the estimated ones.
+    #[must_use]
+    pub fn std(&self, parameter: Parameter) -> Option<f64> {
+        let row = self.parameters.iter().position(|p| *p == parameter)?;
+        Some(self.matrix[(row, row)].max(0.0).sqrt())
+    }
+}
+
+/// How many times the datasheets' linearity the sensors must have for the residuals to be what they are; at least 1.
+///
+/// `sum |residual|^2 = sum (tr(mount) + tr(survey) + tr(corners) + s^2 tr(linearity))` over all tags of fitted and
+/// held-out views, solved for `s`. Fitted views count for the share that the parameters leave free: a view adds about
+/// three numbers.
+#[must_use]
+pub fn linearity_scale(
+    fit: &PositionProblem<'_>,
+    held_out: &PositionProblem<'_>,
+    at: &JointParameters,
+    n: usize,
+) -> f64 {
+    let [mut found_m2, mut from_drawing_m2, mut from_sensors_m2] = [0.0; 3];
+    let mut views = fit.views.iter().chain(held_out.views).flat_map(|view| &view.tags);
+    if views.any(|tag| tag.corners().is_none()) {
+        // How good positions are nobody says; their scatter shall not count as the sensors'.
+        return 1.0;
+    }
+    for (problem, n_fitted) in [(fit, n), (held_out, 0)] {
+        let views = problem.views.iter().filter(|view| !view.tags.is_empty()).count();
+        let free_share = (1.0 - n_fitted as f64 / (3 * views).max(1) as f64).max(0.1);
+        problem.each(at, |o| {
+            let robot = problem.robot;
+            found_m2 += o.residual_m.norm_squared();
+            from_drawing_m2 += free_share * drawing_variance_m2(robot, o.tag);
+            for (joint, spec) in robot.sensors.iter().enumerate().take(robot.n_seen_joints()) {
+                let by_angle = o.poses.point_jacobian(joint, &o.predicted_m);
+                from_sensors_m2 += free_share * (by_angle * spec.linearity_std_rad).norm_squared();
+            }
+        });
+    }
+    let scale = ((found_m2 - from_drawing_m2) / from_sensors_m2).max(1.0).sqrt();
+    if scale.is_finite() { scale } else { 1.0 }
+}
+
+/// Expected square of a tag's distance from its survey with perfect sensors: mount, survey and corner noise, m^2.
+fn drawing_variance_m2(robot: &Robot, tag: &TagObservation) -> f64 {
+    let (camera, survey) = (&robot.camera, &robot.tags[tag.tag_idx]);
+    let range_m = tag.center_in_camera_m.norm();
+    let bearing_rad = camera.corner_std_px / camera.lens.focal_px()[0];
+    // The range comes from the apparent size: `range^2 / size` times the bearing's error.
+    let along_m = range_m * range_m * bearing_rad / survey.size_m;
+    let across_m = range_m * bearing_rad;
+    3.0 * (camera.mount_std_m.powi(2) + survey.position_std_m.powi(2))
+        + 2.0 * (range_m * camera.mount_std_rad).powi(2)
+        + (along_m.powi(2) + 2.0 * across_m.powi(2)) / tag.corners().map_or(1, |seen| seen.n_frames.max(1)) as f64
+}
+
+fn add_columns(matrix: &mut DMatrix<f64>, column: usize, block: &OMatrix<f64, Dyn, Const<3>>) {
+    let mut view = matrix.fixed_columns_mut::<3>(column);
+    view += block;
+}
+
+fn is_locked(robot: &Robot, joint: usize) -> bool {
+    robot.failed.contains(&FailedJoint { joint, kind: FailedKind::Locked })
+}
+
+/// The arm's angles at each target that inverse kinematics reaches: from where the arm rested for it, as a `reach` goes
+/// there; where it did not, from the stowed pose or the other rests.
+#[must_use]
+pub fn task_angles(robot: &Robot, task: TaskRests<'_>) -> Vec<JointAngles> {
+    numbered_task_angles(robot, task).into_iter().map(|(_, angles)| angles).collect()
+}
+
+/// Returns [`task_angles`] with the number of each target, from 0.
+pub(crate) fn numbered_task_angles(robot: &Robot, TaskRests { task, rests }: TaskRests<'_>) -> Vec<(u32, JointAngles)> {
+    let open = JointLimits { lower_rad: -std::f64::consts::TAU, upper_rad: std::f64::consts::TAU };
+    let settings = IkSettings {
+        limits: robot.chain.joints().iter().map(|joint| joint.limits.unwrap_or(open)).collect(),
+        locked: (0..robot.n_joints()).map(|j| j >= robot.tool.mount.n_joints || is_locked(robot, j)).collect(),
+        tolerance_m: 1e-4,
+        max_iterations: 200,
+    };
+    let reached = (0..).zip(&task.targets_m).filter_map(|(target_idx, target): (u32, _)| {
+        let goal = IkGoal { position_m: Vector3::from(*target) };
+        let from = |start: &JointAngles| solve_position(&robot.chain, &robot.tool.mount, &goal, start, &settings).ok();
+        let rest = |rest: &JointAngles| {
+            JointAngles::from_fn(rest.len(), |j| if settings.locked[j] { robot.stowed[j] } else { rest[j] })
+        };
+        let own = rests.get(&target_idx).map(rest).and_then(|rest| from(&rest));
+        // With a joint that is locked elsewhere the way there may lead past a limit.
+        let angles =
+            own.or_else(|| from(&robot.stowed)).or_else(|| rests.values().find_map(|other| from(&rest(other))));
+        Some((target_idx, angles?))
+    });
+    reached.collect()
+}
+
+/// Expected size of the tool's position error at each target of `task`: `sqrt(trace(covariance))`, summarized.
+#[must_use]
+pub fn predict_tool_error(
+    robot: &Robot,
+    at: &JointParameters,
+    covariance: &ParameterCovariance,
+    task: Option<TaskRests<'_>>,
+) -> Option<ToolErrorPrediction> {
+    let sensors = at.sensors(robot);
+    let predict = |(target_idx, angles): (u32, JointAngles)| {
+        let covariance_m2 = covariance.tool_position_m2(robot, &sensors, &angles);
+        TargetPrediction {
+            target_idx: target_idx as usize,
+            angles,
+            covariance_m2,
+            error_m: covariance_m2.trace().max(0.0).sqrt(),
+            with_priors_m: None,
+            with_priors_m2: None,
+            distribution: None,
+        }
+    };
+    let targets: Vec<TargetPrediction> = numbered_task_angles(robot, task?).into_iter().map(predict).collect();
+    let errors: Vec<f64> = targets.iter().map(|target| target.error_m).collect();
+    Some(ToolErrorPrediction { error_m: Summary::of(&errors)?, targets })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::titan;
+    use armcal_core::streams::ReachTask;
+    use std::collections::BTreeMap;
+
+    /// A target is predicted for where the arm stood at it; for the stowed pose's solution where it was never reached
+    /// for, or where no solution leads from the rest.
+    #[test]
+    fn a_target_is_predicted_where_the_arm_rested_for_it() {
+        let robot = titan();
+        let tool_m = |at: &JointAngles| robot.chain.frame(at, &robot.tool.mount).translation.vector;
+        let mut rested = robot.stowed;
+        for (joint, by_rad) in [(0, -0.6), (1, -0.5), (2, 0.8), (3, -0.9), (4, 0.5)] {
+            rested[joint] += by_rad;
+        }
+        // Wrong sensors: it rested beside the target.
+        let mut at_target = rested;
+        (0..5).for_each(|joint| at_target[joint] += 0.02);
+        let task =
+            ReachTask { stamp: Default::default(), targets_m: vec![tool_m(&at_target).into()], tolerance_m: 0.01 };
+        let angles = |rests: &[(u32, JointAngles)]| {
+            let rests: BTreeMap<u32, JointAngles> = rests.iter().copied().collect();
+            task_angles(&robot, TaskRests { task: &task, rests: &rests })
+        };
+        let [by_rest] = angles(&[(0, rested)])[..] else { panic!("one target") };
+        let by_stowed = angles(&[]);
+        assert!(by_rest.max_abs_difference(&rested) < 0.12, "{by_rest:?}");
+        assert!((tool_m(&by_rest) - tool_m(&at_target)).norm() < 1e-3);
+        assert!(by_stowed[0].max_abs_difference(&rested) > 0.2, "{by_stowed:?}");
+        assert_eq!(angles(&[(1, rested)]), by_stowed);
+    }
+}

@@ -1,0 +1,24 @@
+//! The estimate: maximum a posteriori over everything that the measurements depend on.
+//!
+//! `input` is what a solution takes, `model_for_views` says what has a column, `problem` puts views and priors into
+//! form, `linearize` sums the normal equations (views eliminated: `schur`), `levenberg_marquardt` solves them.
+//! `estimate` is the whole with outliers and the sizes that `evidence` fits; `covariance` what it means for the tool.
+
+pub(crate) mod body_columns;
+pub(crate) mod body_motion;
+pub(crate) mod body_twists;
+pub(crate) mod covariance;
+pub(crate) mod details;
+pub(crate) mod estimate;
+pub(crate) mod evidence;
+pub(crate) mod input;
+pub(crate) mod levenberg_marquardt;
+pub(crate) mod linearize;
+pub(crate) mod model_for_views;
+pub(crate) mod outliers;
+pub(crate) mod prior_terms;
+pub(crate) mod problem;
+pub(crate) mod robust_start;
+pub(crate) mod schur;
+pub(crate) mod time_error;
+pub(crate) mod tool_error;

@@ -1,0 +1,127 @@
+//! Tag observations and corners that do not fit the rest: rejected by their chi-square between two solutions, and
+//! readmitted where they fit.
+//!
+//! One corner that does not belong (occluded, blurred, beside an edge) leaves the other three in use if these fit. Two
+//! such corners, or chi-square of all without any, are a tag that is elsewhere or another one: all four go.
+
+use crate::measure::{ObservationTerm, WeightedMeasurement};
+use crate::solve::levenberg_marquardt::Solved;
+use crate::solve::linearize::NormalEquations;
+use crate::solve::problem::BundleProblem;
+use crate::views::view::View;
+
+/// A tag observation, or a corner of one, that does not fit the rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outlier {
+    /// Index into the views of the input.
+    pub view_idx: usize,
+    /// Id of the tag, which may be that on the gripper.
+    pub tag_id: u32,
+    /// The corner, in the detector's order; `None` where all of the observation is rejected.
+    pub corner: Option<usize>,
+    /// Root mean square of the rejected coordinates' residuals in standard deviations.
+    pub sigmas: f64,
+}
+
+/// Chi-square per coordinate above which an observation belongs elsewhere, and below which it belongs here.
+const LIMITS: Limits = Limits { reject: 7.5, readmit: 5.0 };
+/// Chi-square of a corner: that one of four normal corners is beyond these is as likely (5e-10, 3e-6) as that an
+/// observation with eight coordinates is beyond its own, `4 exp(-x / 2) = P(chi-square of 8 > 60, 40)`.
+const CORNER_LIMITS: Limits = Limits { reject: 45.7, readmit: 28.1 };
+
+/// What is rejected beyond the one comes back below the other.
+struct Limits {
+    reject: f64,
+    readmit: f64,
+}
+
+impl Limits {
+    /// Of each by whether it was used so far.
+    fn of<const N: usize>(&self, used: [bool; N]) -> [f64; N] {
+        used.map(|is_used| if is_used { self.reject } else { self.readmit })
+    }
+}
+
+/// Marks what does not belong; whether anything changed.
+pub(crate) fn reject(problem: &mut BundleProblem<'_>, solved: &Solved) -> bool {
+    reject_by(problem, &solved.normal)
+}
+
+/// The same by normal equations at the solution.
+pub(crate) fn reject_by(problem: &mut BundleProblem<'_>, normal: &NormalEquations) -> bool {
+    let mut changed = false;
+    for (at, observation) in problem.observations.iter_mut().enumerate() {
+        let before = observation.used();
+        let used = match observation.data {
+            WeightedMeasurement::Corners(_) => fitting_corners(before, &normal.corner_chi2[at]),
+            _ => {
+                let n = observation.data.n_coordinates() as f64;
+                let excess = noise_excess(&observation.data);
+                LIMITS.of(before).map(|limit| normal.chi2[at] < limit * n * excess)
+            }
+        };
+        changed |= used != before;
+        observation.set_used(used);
+    }
+    changed
+}
+
+/// The corners that belong: all, three, or none.
+fn fitting_corners(before: [bool; 4], chi2: &[f64; 4]) -> [bool; 4] {
+    let limits = CORNER_LIMITS.of(before);
+    let used = [0, 1, 2, 3].map(|corner| chi2[corner] < limits[corner]);
+    let n = used.iter().filter(|is_used| **is_used).count();
+    let sum: f64 = chi2.iter().zip(used).filter(|(_, is_used)| *is_used).map(|(chi2, _)| chi2).sum();
+    let [limit] = LIMITS.of([before.contains(&true)]);
+    if n >= 3 && sum < limit * 2.0 * n as f64 { used } else { [false; 4] }
+}
+
+/// What is rejected of an observation.
+pub(crate) struct Rejected {
+    pub n_coordinates: usize,
+    /// What it was rejected at.
+    pub chi2: f64,
+}
+
+pub(crate) fn rejected(observation: &ObservationTerm) -> Rejected {
+    let data = &observation.data;
+    if !observation.is_used {
+        let n_coordinates = data.n_coordinates();
+        return Rejected { n_coordinates, chi2: LIMITS.reject * n_coordinates as f64 * noise_excess(data) };
+    }
+    let n_corners = observation.used().iter().filter(|is_used| !**is_used).count();
+    Rejected { n_coordinates: 2 * n_corners, chi2: CORNER_LIMITS.reject * n_corners as f64 }
+}
+
+/// Positions and poses come with a standard deviation that is a guess until the scales are fitted.
+fn noise_excess(seen: &WeightedMeasurement) -> f64 {
+    match seen {
+        WeightedMeasurement::Corners(_) | WeightedMeasurement::Board { .. } => 1.0,
+        WeightedMeasurement::Position { .. } | WeightedMeasurement::Pose { .. } => 4.0,
+    }
+}
+
+/// Those that the solution rejected.
+pub(crate) fn outliers(problem: &BundleProblem<'_>, views: &[View], solved: &Solved) -> Vec<Outlier> {
+    let mut out = Vec::new();
+    for (view_idx, view) in problem.views.iter().enumerate() {
+        for at in view.observations.clone().chain(view.gripper) {
+            let observation = &problem.observations[at];
+            let gripper = problem.robot.gripper_tag.map_or(0, |tag| tag.id);
+            let tag_id = views[view_idx].tags.get(at - view.observations.start).map_or(gripper, |tag| tag.id);
+            let mut add = |corner, chi2: f64, n: usize| {
+                out.push(Outlier { view_idx, tag_id, corner, sigmas: (chi2 / n as f64).sqrt() });
+            };
+            if !observation.is_used {
+                add(None, solved.normal.chi2[at], observation.data.n_coordinates());
+                continue;
+            }
+            for (corner, is_used) in observation.used().into_iter().enumerate() {
+                if !is_used {
+                    add(Some(corner), solved.normal.corner_chi2[at][corner], 2);
+                }
+            }
+        }
+    }
+    out
+}

@@ -1,0 +1,109 @@
+//! Recordings that no method can make sense of, refused by name before anything is fitted.
+
+use crate::views::error::CalibError;
+use crate::views::view::{CaptureData, ObservationRejection};
+use armcal_core::log::{Recording, Stream};
+use armcal_core::robot::Robot;
+
+/// Refuses a recording of another arm.
+///
+/// # Errors
+/// [`CalibError::JointNames`], [`CalibError::NoReadings`].
+pub fn check_joints(recording: &Recording, robot: &Robot) -> Result<(), CalibError> {
+    if recording.joint_names.is_empty() {
+        return Err(CalibError::NoReadings { recording: recording.path.display().to_string() });
+    }
+    if recording.joint_names != robot.joint_names() {
+        return Err(CalibError::JointNames {
+            recording: recording.path.display().to_string(),
+            robot: robot.name.clone(),
+            recorded: recording.joint_names.clone(),
+            expected: robot.joint_names(),
+        });
+    }
+    Ok(())
+}
+
+/// The largest share of messages with numbers that are not finite. Assumed: a sensor that fails now and then still
+/// serves.
+const MAX_NOT_FINITE_SHARE: f64 = 0.01;
+
+/// Stamps that go backwards leave open which reading belongs to which view, and numbers that are none which sensor
+/// works.
+pub(crate) fn check_order(recording: &Recording) -> Result<(), CalibError> {
+    let streams = [Stream::JointSensors, Stream::Detections];
+    for stream in streams {
+        let n_kept = recording.messages.iter().filter(|(_, m)| Stream::of(m) == stream).count() as u64;
+        let n_read = n_kept + recording.left_in_file.get(&stream).copied().unwrap_or(0);
+        let start = format!("{}: ", stream.topic());
+        for (what, &n) in &recording.rejected {
+            if what.starts_with(&start)
+                && what.ends_with("is not finite")
+                && n as f64 > MAX_NOT_FINITE_SHARE * (n_read + n) as f64
+            {
+                let recording = recording.path.display().to_string();
+                return Err(CalibError::NotFinite { recording, what: what.clone(), n, of: n_read + n });
+            }
+        }
+    }
+    recording.stamp_regressions.iter().next().map_or(Ok(()), |(topic, disorder)| {
+        let (recording, topic) = (recording.path.display().to_string(), topic.clone());
+        Err(CalibError::Disorder { recording, topic, disorder: *disorder })
+    })
+}
+
+/// Why no view shows a tag: what rejected most of those seen. Each arm moves between its poses, so that counts where
+/// nothing else does.
+pub(crate) fn no_views(recording: String, robot: &Robot, data: &CaptureData) -> CalibError {
+    if let Err(error) = check_corner_order(&recording, data) {
+        return error;
+    }
+    let known = data.rejected.iter().filter(|(why, _)| **why != ObservationRejection::UnknownTag);
+    let most = known.max_by_key(|(why, n)| (**why != ObservationRejection::ArmMoving, **n));
+    if let Some((most, _)) = most {
+        let reasons = data.rejected_by_reason();
+        let reasons: Vec<String> = reasons.iter().map(|(why, n)| format!("{n} {}", why.replace('_', " "))).collect();
+        return CalibError::AllRejected { recording, reasons: reasons.join(", "), todo: most.remedy() };
+    }
+    let known = robot.tags.iter().map(|tag| tag.id).collect();
+    CalibError::NoTags { recording, robot: robot.name.clone(), known, seen: data.ids_seen.clone() }
+}
+
+/// Refuses corners most of which run the wrong way round: what is left of them are squares seen from their edge.
+pub(crate) fn check_corner_order(name: &str, data: &CaptureData) -> Result<(), CalibError> {
+    let n = data.rejected.get(&ObservationRejection::CornerOrder).copied().unwrap_or(0);
+    let views = data.fit.iter().chain(&data.held_out);
+    let kept = views.flat_map(|view| &view.tags).filter(|tag| tag.corners().is_some()).count();
+    if n <= kept {
+        return Ok(());
+    }
+    let todo = ObservationRejection::CornerOrder.remedy();
+    Err(CalibError::CornerOrder { recording: name.to_owned(), n, of: n + kept, todo })
+}
+
+/// Views count as of one pose where no joint moved by more than this many sigma of its noise. Assumed.
+const MOVED_SIGMAS: f64 = 6.0;
+
+/// The arm must have moved for its sensors to show anything.
+pub(crate) fn check_pose_variation(name: &str, data: &CaptureData, robot: &Robot) -> Result<(), CalibError> {
+    let views = || data.fit.iter().chain(&data.held_out).filter(|view| !view.tags.is_empty());
+    let mut most: Option<(usize, f64)> = None;
+    for (joint, spec) in robot.sensors.iter().enumerate().take(robot.n_seen_joints()) {
+        let travel = views().map(|view| view.travel_rad[joint]);
+        let (low, high) = travel.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), t| (l.min(t), h.max(t)));
+        let noise_rad = spec.noise_std_counts / spec.counts_per_rad.abs();
+        if high - low > MOVED_SIGMAS * noise_rad {
+            return Ok(());
+        }
+        if most.is_none_or(|(_, moved)| high - low > moved) {
+            most = Some((joint, high - low));
+        }
+    }
+    let Some((joint, moved_rad)) = most else { return Ok(()) };
+    Err(CalibError::OnePose {
+        recording: name.to_owned(),
+        views: views().count(),
+        joint: robot.sensors[joint].joint.clone(),
+        moved: robot.sensors[joint].unit().shown(moved_rad, 3),
+    })
+}

@@ -1,0 +1,103 @@
+//! Why no calibration came out at all.
+
+use armcal_core::codes::{Code, Coded};
+use armcal_core::log::StampRegression;
+
+/// Why no calibration came out at all; a poor one comes out refused instead.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "each variant's message says what it is")]
+pub enum CalibError {
+    #[error(
+        "{recording}: the joints {recorded:?} are not those of robot `{robot}`: {expected:?}; name the folder of that \
+         robot, or, where it is of another program, give an input map with --input; `armcal inspect {recording} \
+         --write-input MAP.toml` proposes one"
+    )]
+    JointNames { recording: String, robot: String, recorded: Vec<String>, expected: Vec<String> },
+    #[error(
+        "{recording}: holds no joint readings as armcal records them (topic /joint_sensors): where it is of another \
+         program, give an input map with --input; `armcal inspect {recording} --write-input MAP.toml` proposes one"
+    )]
+    NoReadings { recording: String },
+    #[error(
+        "{recording}: holds no captured views (no marks `capture_fit` on /marks), so there is nothing to fit; capture \
+         views again, or, where it is of another program, give an input map with --input"
+    )]
+    NoCaptures { recording: String },
+    #[error("{recording}: holds no view to fit; the arm came to rest for held-out views alone ({held_out})")]
+    NoFitViews { recording: String, held_out: usize },
+    #[error("{recording}: {}", no_tags(robot, known, seen))]
+    NoTags { recording: String, robot: String, known: Vec<u32>, seen: Vec<u32> },
+    #[error("{recording}: only {views} captured views show a surveyed tag; at least {needed} are needed")]
+    TooFewViews { recording: String, views: usize, needed: usize },
+    #[error("{recording}: no joint lies between the base and the camera with a sensor that the views determine")]
+    NothingObservable { recording: String },
+    #[error("{recording}: no joint can be calibrated by its end stops: {problem}")]
+    NoStops { recording: String, problem: String },
+    #[error("{recording}: no map of the tags can be made from its views: {problem}")]
+    Map { recording: String, problem: String },
+    #[error("the scale of joint `{joint}` cannot be measured: {problem}")]
+    Identify { joint: String, problem: String },
+    #[error(
+        "{recording}: all {views} views are of one pose: between base and camera, no joint moved by more than its noise \
+         (the most: `{joint}`, {moved}), so nothing can be told of any; check the topic and \
+         joint_sensors.unit of the joint readings, or capture views at different poses"
+    )]
+    OnePose { recording: String, views: usize, joint: String, moved: String },
+    #[error("{recording}: no interim estimate: {problem}")]
+    NoInterimEstimate { recording: String, problem: String },
+    #[error("{recording}: duplicate recording: give each recording once")]
+    Twice { recording: String },
+    #[error("{one} and {other} say different things of the tags; give a tag map that holds for both")]
+    Surveys { one: String, other: String },
+    #[error(
+        "{recording}: the prior says how the arm bends under its weight, which is not estimated before a camera that \
+         stands still; calibrate without --prior, or start from a calibration before this camera"
+    )]
+    PriorSag { recording: String },
+    #[error("{recording}: {n} of {of} messages rejected on {what}: too many to go on")]
+    NotFinite { recording: String, what: String, n: u64, of: u64 },
+    #[error("{recording}: the corners of {n} of {of} tags run the wrong way round, as in a mirror; {todo}")]
+    CornerOrder { recording: String, n: usize, of: usize, todo: &'static str },
+    #[error("{recording}: no view is left: {reasons}; {todo}")]
+    AllRejected { recording: String, reasons: String, todo: &'static str },
+    #[error("{recording}: {problem}")]
+    Clocks { recording: String, problem: String },
+    #[error("{recording}: topic {topic}: {disorder}")]
+    Disorder { recording: String, topic: String, disorder: StampRegression },
+}
+
+/// Which tags there are and which were seen, and what to do.
+fn no_tags(robot: &str, known: &[u32], seen: &[u32]) -> String {
+    let todo = if seen.is_empty() {
+        "the camera saw no tag at all: check its images, light and water, and the topic of the tags"
+    } else {
+        "correct the ids in the tag map or in robot.toml"
+    };
+    format!("no surveyed tag was seen in any view to fit; tags of robot `{robot}`: {known:?}, seen: {seen:?}; {todo}")
+}
+
+impl Coded for CalibError {
+    fn code(&self) -> Code {
+        match self {
+            Self::JointNames { .. } => Code::JointsMismatch,
+            Self::NoReadings { .. } => Code::ReadingsMissing,
+            Self::NoCaptures { .. }
+            | Self::NoFitViews { .. }
+            | Self::TooFewViews { .. }
+            | Self::AllRejected { .. }
+            | Self::NoInterimEstimate { .. } => Code::ViewsMissing,
+            Self::NoTags { .. } => Code::TagsNotSeen,
+            Self::CornerOrder { .. } => Code::InputCornerOrder,
+            Self::NothingObservable { .. } | Self::NoStops { .. } => Code::NothingObservable,
+            Self::Map { .. } => Code::MapFailed,
+            Self::Identify { .. } => Code::ScaleUnmeasured,
+            Self::OnePose { .. } => Code::ArmNotMoved,
+            Self::Twice { .. } => Code::RecordingDuplicate,
+            Self::Surveys { .. } => Code::SurveysConflict,
+            Self::PriorSag { .. } => Code::PriorUnusable,
+            Self::NotFinite { .. } => Code::MessageInvalid,
+            Self::Clocks { .. } => Code::ClocksDiffer,
+            Self::Disorder { .. } => Code::StampsDisordered,
+        }
+    }
+}
