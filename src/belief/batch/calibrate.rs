@@ -1,5 +1,6 @@
 //! From a recording to a calibration: each calibration that the recording marks in its turn.
 
+pub use crate::batch::constants::calibrate::MIN_VIEWS;
 use armcal_core::log::Recording;
 use armcal_core::robot::Robot;
 use armcal_core::routine::Method;
@@ -17,9 +18,6 @@ use crate::views::data_checks::{check_corner_order, check_joints, check_order, c
 use crate::views::error::CalibError;
 use crate::views::scale_identification::identify_scales;
 use crate::views::view::CaptureData;
-
-/// The fewest views that may be fitted at all.
-pub const MIN_VIEWS: usize = 3;
 
 /// Calibrates `robot`'s joint sensors from the captured views of a recording, by the tags that it says were there.
 ///

@@ -1,5 +1,6 @@
 //! One calibration by `bundle`, step by step: estimate, diagnose, report, judge.
 
+use crate::batch::constants::calibration::MIN_VIEWS_FOR_EVIDENCE;
 use crate::batch::failure_impact::FailureImpact;
 use crate::batch::tables::{
     add_clock, camera_mount_table, covariance_with_mount, further_camera_tables, lens_tables, map_table, model_table,
@@ -85,9 +86,6 @@ enum Round {
 
 /// Is told of an estimate and what it was made from.
 pub(crate) type EstimateListener<'a> = dyn FnMut(&BundleInput<'_>, &Estimate<'_>) + 'a;
-
-/// Fewer views do not determine how large noise and nonlinearity are: the datasheet's figures stand.
-const MIN_VIEWS_FOR_EVIDENCE: usize = 12;
 
 /// An estimate, and the setup and failures that it was made under.
 struct Estimated<'a> {

@@ -1,5 +1,6 @@
 //! What failed joints cost at the tool, and whether the task can do with them.
 
+use crate::batch::constants::failure_impact::{MIN_VIEWS_SINCE, UNIT_SHARE};
 use crate::explain::failure_detection::is_suspicious;
 use crate::explain::failures::{Failure, FailureSource, slip_in_words};
 use crate::file::failed_joint::FailedJointTable;
@@ -12,9 +13,6 @@ use crate::views::view::{TaskRests, View};
 use armcal_core::kinematics::JointKind;
 use armcal_core::robot::{FailedJoint, FailedKind, Robot};
 use armcal_core::stats::Summary;
-
-/// Fewer views do not tell where a sensor stands since it slipped from views in which it jumped.
-const MIN_VIEWS_SINCE: usize = 3;
 
 /// An estimate with failed joints, on the way to the tool.
 pub(crate) struct FailureImpact<'a> {
@@ -245,9 +243,6 @@ impl FailureImpact<'_> {
         })
     }
 }
-
-/// A gain this close to a ratio of units is that ratio: no sensor of these units differs by so much.
-const UNIT_SHARE: f64 = 0.15;
 
 /// Returns true where the gain is the ratio of degrees and radians, or of millimetres and metres.
 fn is_of_another_unit(moves: JointKind, gain: f64) -> bool {

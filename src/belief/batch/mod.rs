@@ -5,6 +5,7 @@
 
 pub(crate) mod calibrate;
 pub(crate) mod calibration;
+pub(crate) mod constants;
 pub(crate) mod failure_impact;
 pub(crate) mod interim;
 pub(crate) mod slips_since;

@@ -5,6 +5,7 @@
 //! both covariances and the sensor's drift over the time between. A change beyond [`MIN_SIGMAS`] of that, and beyond
 //! what drifts, is a slip; views do not tell when it was, except before the first of them.
 
+use crate::batch::constants::slips_since::{MIN_SIGMAS, MIN_SLIP_RAD, N_ANGLES};
 use nalgebra::DVector;
 
 use crate::explain::calibration_prior::drift_std_rad_per_sqrt_h;
@@ -13,13 +14,6 @@ use crate::model::parameters::{JointParameters, Parameter};
 use crate::say::finding::{Finding, FindingKind, FindingUnit};
 use armcal_core::robot::Robot;
 use armcal_core::sensor::ConditionChange;
-
-/// One false slip in some million comparisons.
-const MIN_SIGMAS: f64 = 5.0;
-/// Smaller changes are drift, rad.
-const MIN_SLIP_RAD: f64 = 0.1 * std::f64::consts::PI / 180.0;
-/// Angles at which the calibrations are compared.
-const N_ANGLES: usize = 9;
 
 /// A calibration as it is compared.
 struct Side<'a> {

@@ -1,5 +1,7 @@
 //! k-fold cross-validation (Stone 1974), by views: all tags of one view share errors.
 
+pub(crate) use crate::checks::constants::cross_validation::FOLDS;
+use crate::checks::constants::cross_validation::LEAST_DISTANCE_M;
 use crate::explain::angles_by_camera::set_by_camera;
 use crate::explain::baseline::N_BASELINES;
 use crate::file::metrics::HeldOutMetrics;
@@ -8,9 +10,6 @@ use crate::model::parameters::JointParameters;
 use crate::positions::position_problem::{PositionProblem, TagResidual};
 use crate::views::view::View;
 use armcal_core::robot::Robot;
-
-/// Every fifth view in the order of time is one fold.
-pub(crate) const FOLDS: usize = 5;
 
 /// The views that a fold fits, and those that it holds out.
 pub(crate) fn fold_of(views: &[View], fold: usize) -> (Vec<View>, Vec<View>) {
@@ -184,9 +183,6 @@ struct ViewDistances {
     sum_ln: Vec<f64>,
     sum_m2: f64,
 }
-
-/// Smaller distances are rounding, m.
-const LEAST_DISTANCE_M: f64 = 1e-9;
 
 impl ViewDistances {
     fn new(n_views: usize) -> Self {

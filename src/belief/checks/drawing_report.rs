@@ -5,6 +5,9 @@
 //! the sensors' parameters x would follow the posterior's covariance, `dx = C_xz C_zz^-1 z`, and the tool would be off
 //! by what both move it together.
 
+use crate::checks::constants::drawing_report::{
+    LEAST_LENGTH_M, MAX_REPAIR_SIGMAS, MAX_SIZE_FACTOR, MAX_UNSTATED_REPAIR_SIGMAS, NAMED_SIGMAS, REACH_M, WORTH_M,
+};
 use nalgebra::{DVector, Matrix3, Vector3};
 
 use crate::explain::drawing::{Drawing, LinkStart};
@@ -20,22 +23,6 @@ use crate::solve::estimate::Estimate;
 use armcal_core::codes::{Coded, Warning};
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::Robot;
-
-/// Sigmas, of stated size and estimate together, from which an element is named: three axes together exceed four as
-/// seldom (0.1 %) as one axis 3.3.
-const NAMED_SIGMAS: f64 = 4.0;
-/// A repair may be this many stated sigmas and no longer than the link itself: beyond, something else is wrong.
-const MAX_REPAIR_SIGMAS: f64 = 10.0;
-/// Largest repair in default sigmas, where robot.toml states none: 20 mm and 1.1 deg, the largest sizes tried.
-const MAX_UNSTATED_REPAIR_SIGMAS: f64 = 40.0;
-/// Largest repair of a tag's size, as a factor: margins of prints make 0.55 to 1.8; 2 is off by its own length.
-const MAX_SIZE_FACTOR: f64 = 2.05;
-/// Links whose joints meet have no length that could bound a repair, m.
-const LEAST_LENGTH_M: f64 = 0.02;
-
-/// A base that is off by less than this at arm's length refuses nothing, m.
-const WORTH_M: f64 = 0.004;
-const REACH_M: f64 = 1.0;
 
 mod sag_report;
 

@@ -7,6 +7,7 @@
 //! camera of each view free, what is left is the noise within the views; the difference is chi-square with six numbers
 //! a view: how well cameras are foretold.
 
+use crate::checks::constants::innovations::{CONTAINED, FREE_CAMERA, TOLD};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::file::metrics::ViewContainment;
@@ -51,13 +52,6 @@ pub struct JointInnovation {
     /// Over the standard deviation that it should have: of unit variance under the model.
     pub normalised: f64,
 }
-
-/// Probability of the region that a view is compared with; U95 has the same.
-const CONTAINED: f64 = 0.95;
-/// Size of a camera's error that says nothing of its pose, m and rad.
-const FREE_CAMERA: f64 = 100.0;
-/// The share of its prior variance that a view must tell of a joint's error, for it to be looked at.
-const TOLD: f64 = 0.3;
 
 impl Estimate<'_> {
     /// Of `left_out`, views with their places among all; `outliers` of all views do not count. `None` if there is no

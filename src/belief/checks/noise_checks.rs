@@ -1,20 +1,12 @@
 //! Checks of the fitted noise of corners, rotations and all other sizes against what is stated for them.
 
+use crate::checks::constants::noise_checks::{MAX_OVER_CORNER_NOISE, MAX_ROTATION_NOISE_RAD, NEAR, NOISY};
 use crate::checks::verdict::{MAX_SIGMAS_OFF, VerdictInput};
 use crate::explain::model_selection::CAMERA_ERROR_STD;
 use crate::file::verdict_tables::{Check, VerdictTable};
 use crate::say::refusal::Refusal;
 use crate::solve::evidence::{NOISE_BOUNDS, POSITION_BOUNDS, SCALE_BOUNDS};
 use armcal_core::codes::{Code, Warning};
-
-/// Noise over the stated one above which something is not as stated: a warning.
-const NOISY: f64 = 2.0;
-/// Corners averaged over a view may be off by so many times what robot.toml says of one frame: averages are better than
-/// one frame, and what lenses and printed tags lack stays below it.
-const MAX_OVER_CORNER_NOISE: f64 = 3.0;
-/// Noise of rotations, where none is stated, above which they are of another form: boards and tags are read to 0.05 rad
-/// or better. Assumed.
-const MAX_ROTATION_NOISE_RAD: f64 = 0.1;
 
 impl VerdictInput<'_> {
     /// Returns the refusal of corners with a larger error than robot.toml says: their fitted noise hides other errors.
@@ -57,7 +49,6 @@ impl VerdictInput<'_> {
 
     /// Warns of fitted sizes that are at a bound.
     pub(crate) fn scales_at_bounds(&self) -> Vec<Warning> {
-        const NEAR: f64 = 1e-6;
         let (robot, now, first) = (self.input.robot, self.found.scales(), &self.input.scales);
         let mut all = vec![("noise of corners".to_owned(), now.noise, 1.0, NOISE_BOUNDS)];
         if self.found.has_positions() {

@@ -10,6 +10,7 @@
 //! 1990), O3 = s_L and O4 = s_L^2 / s_1 (Nahvi, Hollerbach and Hayward 1994; Nahvi and Hollerbach 1996), O5 = 1 / sum(1
 //! / s) (Sun and Hollerbach 2008).
 
+use crate::checks::constants::observability::{NAMED, UNKNOWN, WALL};
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
 use crate::model::blocks::Block;
@@ -55,13 +56,6 @@ struct Name {
     /// An offset or a turn, rad.
     is_angle: bool,
 }
-
-/// Size of a parameter of which nothing is known, in its unit.
-const UNKNOWN: f64 = 1.0;
-/// Information on what is eliminated (m, rad or prior sigmas) that keeps an unseen one from having no factor.
-const WALL: f64 = 1e-9;
-/// Entries of a null direction below this share of the largest are not named.
-const NAMED: f64 = 0.3;
 
 /// At the robust start of `input`; `None` where nothing has a column.
 #[must_use]

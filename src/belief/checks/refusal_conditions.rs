@@ -1,5 +1,9 @@
 //! Accept or refuse: the held-out views decide, never the fit's own residuals.
 
+use crate::checks::constants::refusal_conditions::{
+    CONTRADICTION, HARMLESS_HELD_OUT_M, MAX_HELD_OUT_OVER_FIT, MAX_SHARE_OF_REACH,
+};
+pub use crate::checks::constants::refusal_conditions::{MIN_HELD_OUT_VIEWS, MIN_VIEWS_PER_PARAMETER};
 use crate::judge::baseline_comparison::BaselineComparison;
 use crate::say::refusal::{HeldOutLimitSource, Refusal};
 use armcal_core::numeric::Outcome;
@@ -50,20 +54,6 @@ impl HeldOutLimit {
         Self { limit_m: expected_m * ratio, source: HeldOutLimitSource::StatedNoise }
     }
 }
-
-/// Fewer views say nothing about views not seen.
-pub const MIN_HELD_OUT_VIEWS: usize = 3;
-/// Held-out views this much worse than fitted ones mean that the fit learnt its own noise.
-const MAX_HELD_OUT_OVER_FIT: f64 = 2.5;
-/// Held-out views this good are no sign of it, however well the others fit: tags are not surveyed better, m.
-const HARMLESS_HELD_OUT_M: f64 = 0.001;
-/// Held-out observations without a stated noise may be off by this share of the arm's reach: 19 mm for an arm of 1.9 m.
-/// Assumed; recordings of real arms have 0.1 to 0.9 %.
-const MAX_SHARE_OF_REACH: f64 = 0.01;
-/// A held-out error that a stated noise has with a smaller probability contradicts it.
-const CONTRADICTION: f64 = 1e-4;
-/// Each view adds about three numbers that do not share its camera-pose error; fewer views than parameters overfit.
-pub const MIN_VIEWS_PER_PARAMETER: f64 = 1.0;
 
 /// The fewest fitted views that a calibration of all joints before the camera, from the datasheet, is accepted with.
 #[must_use]

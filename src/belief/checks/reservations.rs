@@ -8,6 +8,9 @@
 
 mod lens;
 
+use crate::checks::constants::reservations::{
+    ALIKE, MAX_RESERVATIONS, TOUCHED_SIGMAS, UNSEEN_SHARE, WORTH_SHARE, WORTH_SHARE_UNWATCHED,
+};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::checks::touch_term::TouchUpdate;
@@ -19,17 +22,6 @@ use crate::say::reservation::Reservation;
 use crate::solve::estimate::Estimate;
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::GeometryPriors;
-
-/// Share of the prior's variance that the views leave, above which an element counts as unseen.
-const UNSEEN_SHARE: f64 = 0.5;
-/// A reservation is worth a line where one sigma of it moves the tool by more than this share of the predicted error.
-const WORTH_SHARE: f64 = 0.5;
-/// The same where nothing watches over what is beyond the camera.
-const WORTH_SHARE_UNWATCHED: f64 = 0.04;
-/// So many are told, the largest at the tool first.
-const MAX_RESERVATIONS: usize = 5;
-/// Touches that tell an element to so many sigmas of its prior would show it where it is beyond the drawing's figure.
-const TOUCHED_SIGMAS: f64 = 5.0;
 
 /// An element of the geometry along one axis, with its prior.
 struct HeldElement {
@@ -240,8 +232,6 @@ fn unstated_link(priors: &GeometryPriors, error: ErrorKind) -> Option<&'static s
 }
 
 const AXES: [&str; 3] = ["x", "y", "z"];
-/// Axes whose shifts are within this share of one another at the tool are spoken of together.
-const ALIKE: f64 = 0.05;
 
 /// What is told of elements that only differ by their axis.
 fn reservations_of(elements: &[HeldElement], worth_m: f64) -> Option<Reservation> {

@@ -12,6 +12,8 @@
 //! covariance S; `y^T S^-1 y` is chi-square if drawing and surfaces hold (Bar-Shalom, Li and Kirubarajan 2001, sec.
 //! 5.4). The update is Kalman's; the drawing is not changed, what it seems to be off stays in the predicted error.
 
+pub(crate) use crate::checks::constants::touch_term::MIN_TOUCHES;
+use crate::checks::constants::touch_term::{ALIKE_CHI2, ALIKE_SHARE, FALSE_ALARM, TOLD_SHARE, USUAL};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Vector3};
 
 use crate::explain::score_test::{GeometryElement, Score, ToolJacobian, columns};
@@ -25,18 +27,6 @@ use crate::views::view::Touch;
 use armcal_core::codes::Code;
 use armcal_core::robot::Robot;
 use armcal_core::stats::chi_square_quantile;
-
-/// Fewer touches leave directions of the tool open, and are not used.
-pub(crate) const MIN_TOUCHES: usize = 3;
-/// Probability that a good arm is refused by chance.
-const FALSE_ALARM: f64 = 1e-4;
-/// Above this quantile the touches are less sure than their sigmas say: the ratio of Birge (1932).
-const USUAL: f64 = 0.95;
-/// A cause that leaves no more than this, or this share of all, beyond the best one is of its class.
-const ALIKE_CHI2: f64 = 6.0;
-const ALIKE_SHARE: f64 = 0.1;
-/// Directions of a cause that the touches tell less than this of, relative to the best one, are left out.
-const TOLD_SHARE: f64 = 1e-3;
 
 /// Causes of touches that are not where they should be.
 pub(crate) const TOOL_POINT: &str = "tool point or links beyond the camera";

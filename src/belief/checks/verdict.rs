@@ -1,6 +1,11 @@
 //! Whether joint sensors explain the data of a calibration by `bundle`: score test of the link geometry, size of the
 //! sensors' errors, outliers, and innovations of held-out views.
 
+use crate::checks::constants::verdict::{
+    FALSE_ALARM, FAR_BEYOND, HELD, LEAST, MAX_NONLINEARITY, MAX_OVER_LINEARITY, MAX_UNCONFIRMED, NAMED_WALK_NATS,
+    TAILS, WALK_SIGNIFICANCE, WALKED, WORN, WORTH_M,
+};
+pub(crate) use crate::checks::constants::verdict::{MAX_OUTLIERS, MAX_SIGMAS_OFF};
 use crate::checks::innovations::{Innovations, JointInnovation};
 use crate::checks::observability::{Observability, observability};
 use crate::explain::score_test::{GeometryElement, ScoreTestResult};
@@ -38,39 +43,8 @@ pub(crate) struct VerdictInput<'a> {
     pub tag_noise: Option<TagNoise>,
 }
 
-/// Probability that a good arm fails any one check by chance.
-const FALSE_ALARM: f64 = 1e-4;
-/// Geometry that would move the tool by less than this, and by less than the predicted error, is no reason to refuse,
-/// m.
-const WORTH_M: f64 = 0.004;
-/// A joint's error from view to view over its datasheet's linearity: sensors do not have more, after what is smooth is
-/// taken off.
-const MAX_OVER_LINEARITY: f64 = 3.0;
-/// Nonlinearity over the datasheet's above which a sensor is called worn, and above which it is no such sensor any
-/// more.
-const WORN: f64 = 3.0;
-const MAX_NONLINEARITY: f64 = 10.0;
-/// Gains and offsets farther from the datasheet than this are no calibration any more.
-pub(crate) const MAX_SIGMAS_OFF: f64 = 5.0;
-/// Sensors that move the tool by more than this many times its predicted error claim more than chance.
-const MAX_UNCONFIRMED: f64 = 3.0;
-/// Share of the tag observations that may be outliers.
-pub(crate) const MAX_OUTLIERS: f64 = 0.25;
-/// Over chi-square's quantile, for pixel noise has longer tails than a normal one and the tags' corners common errors.
-/// Measured.
-const TAILS: f64 = 1.5;
-/// So many times that limit is refused: innovations then are about three times as large as they should be.
-const FAR_BEYOND: f64 = 4.0;
 /// A warning that touches answer, and that every arm without a tag on the gripper has.
 const UNSEEN_LINKS: &str = "links distal to the camera: errors are unobservable without a gripper tag";
-/// An offset that walks by more than so many times a sensor's usual error from view to view is named.
-const WALKED: f64 = 1.0;
-/// Evidence of the walks from which they are named: less widens U95, and is no finding.
-const NAMED_WALK_NATS: f64 = 3.0;
-/// Probability of a joint's errors in a random order of the views below which its walk is named.
-const WALK_SIGNIFICANCE: f64 = 0.01;
-/// Standard deviation over the prior's above which the prior holds a parameter.
-const HELD: f64 = 0.7;
 
 impl VerdictInput<'_> {
     /// Writes tables and findings into `calibration`, and refuses it where something does not hold.
@@ -506,7 +480,6 @@ fn worn(spec: &JointSensorSpec, std_rad: f64) -> Finding {
 /// How many of its own standard deviations von Neumann's ratio lies below 2 (von Neumann 1941): positive where
 /// neighbours are alike. `None` below eight values.
 fn serial_sigmas(values: &[f64]) -> Option<f64> {
-    const LEAST: usize = 8;
     let n = values.len() as f64;
     if values.len() < LEAST {
         return None;

@@ -1,16 +1,11 @@
 //! The angles of joints whose sensor says nothing, as the tags of a view show them.
 
+use crate::explain::constants::angles_by_camera::{CANDIDATES, FINEST_STEP_RAD, SEARCH_WIDTH_M};
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::Robot;
 
 use crate::model::parameters::JointParameters;
 use crate::views::view::{TagObservation, View};
-
-/// Tags farther than this from the survey hardly pull while an angle is searched for, m.
-const SEARCH_WIDTH_M: f64 = 0.1;
-/// Candidates of one joint over its range, by how many joints are searched for in one view.
-const CANDIDATES: [usize; 3] = [90, 40, 16];
-const FINEST_STEP_RAD: f64 = 1e-4;
 
 /// Sets the travel of the view's free joints to what its tags show under `at`; leaves it where the view shows none.
 pub fn set_by_camera(robot: &Robot, view: &mut View, at: &JointParameters) {

@@ -7,6 +7,8 @@
 //! Plain least squares stands next to it: sensors as good as their datasheets, and an error of each view, or noise of
 //! the positions, that takes up all else, equal in all directions. The datasheet's arm itself is the third.
 
+pub(crate) use crate::explain::constants::baseline::N_BASELINES;
+use crate::explain::constants::baseline::{MAX_PASSES, SETTLED};
 use crate::explain::model_selection::CAMERA_ERROR_STD;
 use crate::model::blocks::{Block, Shown};
 use crate::model::estimated::Model;
@@ -18,9 +20,6 @@ use crate::solve::model_for_views::{has_views, reference};
 use crate::views::view::{TagObservation, View};
 use armcal_core::robot::Robot;
 
-/// Ways to do without a calibration of joints: the datasheet's arm, least squares, and joint errors by the evidence.
-pub(crate) const N_BASELINES: usize = 3;
-
 /// Mount and map alone, with the sizes of errors that all views tell.
 pub(crate) struct Baseline {
     model: Model,
@@ -29,11 +28,6 @@ pub(crate) struct Baseline {
     /// Sizes for plain least squares.
     plain: Hyperparameters,
 }
-
-/// Passes over the sizes of errors; each brings exact sensors down by a factor of three.
-const MAX_PASSES: usize = 8;
-/// A size that stays above this share of the one before has settled.
-const SETTLED: f64 = 0.8;
 
 impl Baseline {
     /// `None` where the views determine nothing.

@@ -9,6 +9,9 @@
 //! the covariance `S = A P0 A^T + A C` if the prior holds (linear Gaussian model); `d^T S^+ d` is then chi-square with
 //! as many degrees of freedom as S has eigenvalues above `LEAST_SHARE` in units of P0.
 
+use crate::explain::constants::calibration_prior::{
+    LEAST_SHARE, LEAST_SLIP_STD_RAD, ROUNDING, USUAL_DRIFT_STD_RAD_PER_SQRT_H, Z_999, Z_OF_JOINTS,
+};
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen, Vector6};
 
 use crate::explain::failures::{Failure, FailureAdjusted};
@@ -30,19 +33,6 @@ use armcal_core::time::Stamp;
 /// Names of the camera mount's rows in calibration.toml's covariance (translation m, rotation rad, camera axes).
 pub const MOUNT_ROWS: [&str; 6] =
     ["camera mount x", "camera mount y", "camera mount z", "camera mount rx", "camera mount ry", "camera mount rz"];
-
-/// Of a sensor whose datasheet is silent, rad per root of an hour. Assumed: the standard world's sensors.
-const USUAL_DRIFT_STD_RAD_PER_SQRT_H: f64 = 0.02 * std::f64::consts::PI / 180.0;
-/// How far a sensor may slip where the datasheet says that it has no offset, rad. Assumed.
-const LEAST_SLIP_STD_RAD: f64 = 0.02;
-/// The file's numbers are rounded to seven digits: this share of the variances is added so that the matrix has an
-/// inverse.
-const ROUNDING: f64 = 1e-6;
-/// Directions of which the views tell less than this, in units of the prior's variance, are not tested.
-const LEAST_SHARE: f64 = 0.1;
-/// The normal's 0.999 quantile, and that of 0.001 shared by some eight joints' two sides.
-const Z_999: f64 = 3.090;
-const Z_OF_JOINTS: f64 = 3.9;
 
 /// An earlier calibration as the estimator takes it.
 pub struct CalibrationPrior {

@@ -15,6 +15,8 @@
 //! Alternatives reject other observations. For the comparison, a rejected one costs what it is rejected at (a truncated
 //! square), so that explaining it counts.
 
+pub(crate) use crate::explain::constants::drawing::MULTIPLES;
+use crate::explain::constants::drawing::{GOLDEN_STEPS, LENS_SCALE, LOG_RATIO_RANGE, MIN_GAIN_NATS};
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix6};
 
 use sag_start::SagStart;
@@ -61,17 +63,6 @@ impl LinkStart {
         self.beyond_stated_nats > MIN_GAIN_NATS
     }
 }
-
-/// What an alternative must bring. Of 60 good arms one reached 5 (docs/theory/verdict.md).
-const MIN_GAIN_NATS: f64 = 6.0;
-/// Sizes of an error that are tried, over robot.toml's.
-pub(crate) const MULTIPLES: [f64; 5] = [2.0, 5.0, 10.0, 20.0, 40.0];
-/// The scale of all tags is looked for so near to what the distances between them say, and the interval cut so often:
-/// to some 0.03 %.
-const LOG_RATIO_RANGE: f64 = 0.01;
-const GOLDEN_STEPS: usize = 8;
-/// A lens that is not the one of robot.toml may be off by so many of a measured lens's sigmas.
-const LENS_SCALE: f64 = 10.0;
 
 impl Drawing {
     /// Gives `input` the columns of this drawing.

@@ -6,6 +6,9 @@
 //! parameters' prior, plus `2 ln(prior std / posterior std)` for each reading that is given up (Laplace's approximation
 //! of the evidence, MacKay 1992, with a round figure), must fall by `MARGIN`.
 
+use crate::explain::constants::failure_detection::{
+    LARGE_STD_RAD, MANY_REJECTED, MARGIN, MAX_FOUND, MAX_PER_COORDINATE, PER_READING, PER_STEP,
+};
 use crate::explain::drawing::Drawing;
 use crate::explain::failure_pattern::{FailurePattern, MIN_STILL_VIEWS, Readings, n_still};
 use crate::explain::failures::{FAR_RAD, FAR_SIGMAS, Failure, FailureAdjusted, FailureSource, MIN_VIEWS, SensorUse};
@@ -20,21 +23,6 @@ use crate::solve::outliers::rejected;
 use crate::views::view::View;
 use armcal_core::robot::{FailedKind, Robot};
 use armcal_core::stats::quantile;
-
-/// A joint whose errors over all views are larger than this and than twice the datasheet's linearity is looked at, rad.
-const LARGE_STD_RAD: f64 = 0.15 * std::f64::consts::PI / 180.0;
-/// A share of rejected observations that wrong ids alone do not make.
-const MANY_REJECTED: f64 = 0.1;
-/// What giving up one reading costs: 2 ln(1 rad / 1 mrad).
-const PER_READING: f64 = 14.0;
-/// What a step costs: 2 ln(0.1 rad / 1 mrad).
-const PER_STEP: f64 = 9.0;
-/// A observation costs no more than this per coordinate: beyond it, it is rejected.
-const MAX_PER_COORDINATE: f64 = 7.5;
-/// The evidence that a failure needs: odds of e^15 to one.
-const MARGIN: f64 = 30.0;
-/// At most this many failures are looked for beyond those that the readings alone show.
-const MAX_FOUND: usize = 2;
 
 /// An arm and its views, in which failures are looked for.
 pub(crate) struct FailureSearch<'a> {

@@ -1,5 +1,10 @@
 //! A joint's readings against the angles that the camera shows.
 
+pub(crate) use crate::explain::constants::failure_pattern::MIN_STILL_VIEWS;
+use crate::explain::constants::failure_pattern::{
+    FLOOR_RAD, FOLLOWS, LEAST_GAIN_STD, LOCKED_RAD, LOCKED_SIGMAS, MAX_SINGLE, MIN_SIDE, RIGHT_SIGMAS, ROUNDS,
+    STEP_LEAVES, STILL_SIGMAS, STRAIGHT, STUCK_SIGMAS, WHOLE_TURN_RAD,
+};
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Matrix3, Vector3};
@@ -39,32 +44,6 @@ pub(crate) enum FailurePattern {
     /// The readings are off against each other before and since a view, by so much, rad.
     Lasting { since: usize, step_rad: f64 },
 }
-
-/// An angle that is spread by less than this many of its own sigma, or than `LOCKED_RAD`, does not change.
-const LOCKED_SIGMAS: f64 = 3.0;
-const LOCKED_RAD: f64 = 0.2 * std::f64::consts::PI / 180.0;
-/// A sensor that says something follows the angle to this share of the angle's spread, with about the datasheet's
-/// slope.
-const FOLLOWS: f64 = 0.3;
-/// Distances from a straight line, as a share of the angle's spread, and the least uncertainty of a gain.
-const STRAIGHT: f64 = 0.05;
-const LEAST_GAIN_STD: f64 = 0.01;
-/// A step that lasts leaves this share of the squares that a straight line leaves.
-const STEP_LEAVES: f64 = 1.0 / 6.0;
-const MIN_SIDE: usize = 2;
-/// More single jumps than this share of the views are no exceptions.
-const MAX_SINGLE: f64 = 0.4;
-/// A locked joint's sensor is right if it is off by less than this many of the datasheet's sigma.
-const RIGHT_SIGMAS: f64 = 4.0;
-
-/// A reading moved if it spans more sigma of its noise than this.
-const STILL_SIGMAS: f64 = 8.0;
-/// Fewer views with the same reading are chance.
-pub(crate) const MIN_STILL_VIEWS: usize = 4;
-/// A range that lacks no more than twice this to a whole turn holds some angles twice.
-const WHOLE_TURN_RAD: f64 = 0.05;
-/// Motion that the camera must show meanwhile, over its sigma or [`LOCKED_RAD`].
-const STUCK_SIGMAS: f64 = 5.0;
 
 /// How many of the last readings are the same but for noise.
 pub(crate) fn n_still(travel_rad: &[f64], spec: &JointSensorSpec) -> usize {
@@ -183,8 +162,6 @@ impl Readings {
 
     /// Distances from the line of least absolute deviations, and the line (iteratively reweighted least squares).
     fn off_line(&self, center_rad: f64) -> (Vec<f64>, SensorLine) {
-        const ROUNDS: usize = 60;
-        const FLOOR_RAD: f64 = 1e-5;
         let differences: Vec<f64> = self.angle_rad.iter().zip(&self.travel_rad).map(|(a, t)| a - t).collect();
         let (mut offset, mut slope) = (quantile(&differences, 0.5).unwrap_or(0.0), 1.0);
         let off = |offset: f64, slope: f64| -> Vec<f64> {

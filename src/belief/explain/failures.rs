@@ -5,6 +5,8 @@
 //! locked joint is a sensor that always reads the same and whose offset nobody knows: one column for all views.
 
 use crate::explain::angles_by_camera::set_by_camera;
+pub(crate) use crate::explain::constants::failures::{FAR_RAD, FAR_SIGMAS, MIN_VIEWS};
+use crate::explain::constants::failures::{OTHER_GAIN_STD, OTHER_OFFSET_STD_RAD};
 use crate::model::estimated::Model;
 use crate::model::parameters::{JointParameters, ParameterKind};
 use crate::model::scales::Hyperparameters;
@@ -16,12 +18,6 @@ use crate::views::view::View;
 use armcal_core::robot::{FailedJoint, FailedKind, Robot};
 use armcal_core::stats::quantile;
 use armcal_core::units::Unit;
-
-/// A joint's error in one view that stands out: times the spread of the others (a robust sigma), and at all, rad.
-pub(crate) const FAR_SIGMAS: f64 = 6.0;
-pub(crate) const FAR_RAD: f64 = 0.3 * std::f64::consts::PI / 180.0;
-/// Fewer views show nothing of a joint's history.
-pub(crate) const MIN_VIEWS: usize = 5;
 
 /// Who says that a joint failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,10 +45,6 @@ pub struct SensorLine {
     /// Angle at no travel, from the middle of the range.
     pub offset_rad: f64,
 }
-
-/// Priors of a sensor of another scale than its datasheet's: gain, and offset in rad. Wide.
-const OTHER_GAIN_STD: f64 = 1.0;
-const OTHER_OFFSET_STD_RAD: f64 = 0.5;
 
 /// One failed joint, and what is not used of it.
 #[derive(Clone, Debug, PartialEq)]

@@ -6,6 +6,8 @@
 //! known to have (nonlinearity, temperature, play) is in from the start: its prior size is fitted, so that it costs
 //! nothing where there is none.
 
+pub(crate) use crate::explain::constants::model_selection::CAMERA_ERROR_STD;
+use crate::explain::constants::model_selection::{MIN_GAIN_NATS, MIN_RATE_RAD_S, MIN_SESSION_H};
 use armcal_core::numeric::Loss;
 use nalgebra::Cholesky;
 
@@ -44,14 +46,6 @@ pub struct Selection {
     /// Natural logarithm of the evidence with it over that without.
     pub gain_nats: f64,
 }
-
-const MIN_GAIN_NATS: f64 = 3.0;
-/// First guess of the error of positions by SLAM: translation m, rotation rad (assumed; the evidence fits both).
-pub(crate) const CAMERA_ERROR_STD: [f64; 2] = [0.005, 0.01];
-/// Sessions shorter than this do not drift, h.
-const MIN_SESSION_H: f64 = 0.2;
-/// Slower joints have no clock to tell, rad/s.
-const MIN_RATE_RAD_S: f64 = 0.01;
 
 /// Estimates, and again with each doubtful term that the data may ask for; the best model stays.
 #[must_use]

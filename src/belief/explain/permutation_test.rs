@@ -6,6 +6,9 @@
 //! again (Freedman and Lane 1983). Residuals are scaled to one variance by their leverages, statistics by the sum of
 //! squares. Where nothing depends on time, the p-value is uniform.
 
+use crate::explain::constants::permutation_test::{
+    ENOUGH_ABOVE, LEAST_LEFT, LEAST_NEW, MAX_FUNCTIONS, N_PERMUTATIONS, VIEWS_PER_FUNCTION,
+};
 use crate::explain::step_test::JointError;
 use crate::explain::walk::WARMTH_WORTH_A_FIT;
 use crate::model::parameters::ParameterKind;
@@ -15,19 +18,6 @@ use armcal_core::joints::JointAngles;
 use armcal_core::stats::stream_rng;
 use nalgebra::{DMatrix, DVector};
 use rand::seq::SliceRandom;
-
-/// Permutations of one test: they resolve probabilities down to 5e-4.
-const N_PERMUTATIONS: usize = 1999;
-/// So many permutations above the observed statistic settle that it is chance (Besag and Clifford 1991).
-const ENOUGH_ABOVE: usize = 20;
-/// Views for each function of the configuration that is regressed on.
-const VIEWS_PER_FUNCTION: usize = 4;
-/// More functions cost time and explain little more.
-const MAX_FUNCTIONS: usize = 120;
-/// A view of which the regression leaves less than this share of the variance shows nothing beyond it.
-const LEAST_LEFT: f64 = 0.05;
-/// A function of which the others leave less than this share of its square is one of theirs.
-const LEAST_NEW: f64 = 1e-3;
 
 /// The errors of one joint in the order of time, and what its configurations explain.
 pub(crate) struct TimeOrder {

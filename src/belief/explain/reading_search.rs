@@ -8,6 +8,9 @@
 
 mod hypothesis;
 
+use crate::explain::constants::reading_search::{
+    ALTERNATIVE, CAMERA_HANDICAP, MARGIN, MAX_ALTERNATIVES, MAX_ESTIMATED, MAX_OF_CAMERA, MAX_VIEWS, MIN_SIGMAS,
+};
 use std::f64::consts::TAU;
 
 use crate::explain::angles_by_camera::distance_cost;
@@ -24,23 +27,6 @@ use crate::views::view::View;
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::wrap_symmetric;
-
-/// Evidence that a reading error needs, twice the logarithm of the odds: e^30, as about 500 are tried.
-const MARGIN: f64 = 60.0;
-/// Hypotheses within this of the best one are printed with it, in the same unit: odds of e^5.
-const ALTERNATIVE: f64 = 10.0;
-/// Added to the score of a camera hypothesis, in the same unit (assumed): where it explains the views as well as a
-/// sensor's zero does, the zero is named first.
-const CAMERA_HANDICAP: f64 = 5.0;
-const MAX_ALTERNATIVES: usize = 2;
-/// More views do not change the answer; they would cost time.
-const MAX_VIEWS: usize = 40;
-/// Hypotheses that are estimated: those under which the nominal arm places the tags nearest to their survey.
-const MAX_ESTIMATED: usize = 36;
-/// Hypotheses among them that move or turn the camera.
-const MAX_OF_CAMERA: usize = 6;
-/// A zero error in stated sigmas below which a sensor is as stated.
-const MIN_SIGMAS: f64 = 4.0;
 
 /// A hypothesis and what it explains.
 struct Tried {

@@ -6,6 +6,7 @@
 //! ask for, `s^T I^-1 s` is chi-square under the model. Directions that the data tell less of than [`SIZE_M`] or
 //! [`SIZE_RAD`] do not count.
 
+use crate::explain::constants::score_test::{SIZE_M, SIZE_RAD};
 use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, Vector3, Vector6};
 
 use crate::model::blocks::Block;
@@ -22,9 +23,6 @@ use armcal_core::robot::Robot;
 use armcal_core::sensor::{ArmSensors, ConditionChange};
 use armcal_core::stats::chi_square_above;
 
-/// Size of an error of geometry that is worth a look: what the data cannot tell to that is not tested.
-const SIZE_M: f64 = 0.01;
-const SIZE_RAD: f64 = 0.0175;
 /// Trial columns: of each joint's place in its parent link three of translation, then three of rotation; then the
 /// mount's six.
 const N_TRIALS: usize = 6 * MAX_JOINTS + 6;

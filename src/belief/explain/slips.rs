@@ -6,6 +6,9 @@
 //! ratio of likelihoods), and the square of the step in its standard deviations both exceed [`MIN_LIKELIHOOD_RATIO`],
 //! and what other links, mounts or tags would explain.
 
+use crate::explain::constants::slips::{
+    MAX_MOVES, MAX_P, MAX_STEPS, MIN_LIKELIHOOD_RATIO, MIN_STEP_RAD, MISPLACED, WORTH_A_FIT,
+};
 use crate::explain::failure_detection::FailureSearch;
 use crate::explain::failures::Failure;
 use crate::explain::model_selection::log_evidence_of_all;
@@ -17,22 +20,6 @@ use crate::solve::problem::past_derivative;
 use crate::views::view::View;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::time::Stamp;
-
-/// What a candidate must promise to be fitted: three to four good arms in a hundred have one.
-const WORTH_A_FIT: f64 = 16.0;
-/// Good arms have 18 at most in 200 (measured), and chi-square's quantile at 1e-4 over some hundred joints and change
-/// points is 24.
-const MIN_LIKELIHOOD_RATIO: f64 = 24.0;
-/// Probability of as large a step in a random order of the views, above which the step may be an effect of the
-/// configurations (`permutation_test`).
-const MAX_P: f64 = 0.01;
-/// Smaller steps are drift, and do no harm, rad.
-const MIN_STEP_RAD: f64 = 0.05 * std::f64::consts::PI / 180.0;
-const MAX_STEPS: usize = 3;
-/// How often a change point is moved.
-const MAX_MOVES: usize = 3;
-/// A further step that promises more than this may be the change point's being elsewhere.
-const MISPLACED: f64 = 6.0;
 
 /// What a step is measured by.
 struct Baseline {

@@ -13,6 +13,8 @@
 //! the sum of the errors' squares, r of `S = sum w e^2`, counts `-N ln(1 - r / N)` with the variance fitted anew to
 //! N = `sum (1 - var / prior var)` errors and the prior's few.
 
+pub(crate) use crate::explain::constants::step_test::MIN_SIDE;
+use crate::explain::constants::step_test::{LEAST_TOLD, SATURATED};
 use nalgebra::DVector;
 
 use crate::solve::estimate::Estimate;
@@ -37,13 +39,6 @@ pub(crate) enum OffsetPrior {
     /// They may have changed since an earlier calibration, in all views alike.
     Calibrated,
 }
-
-/// Views on each side of a change point: one or two are a jump, not a step.
-pub(crate) const MIN_SIDE: usize = 3;
-/// Views that tell less of a joint's error than this share of its variance are on no side.
-const LEAST_TOLD: f64 = 0.01;
-/// More of a joint's errors than this share is no longer told apart from all of them.
-const SATURATED: f64 = 1.0 - 1e-6;
 
 /// A joint's error in one view.
 pub(crate) struct JointError {

@@ -13,6 +13,8 @@
 //! it (`permutation_test`). No view constrains the offsets afterwards: as much again as during the views is added
 //! to each joint's error.
 
+pub(crate) use crate::explain::constants::walk::WARMTH_WORTH_A_FIT;
+use crate::explain::constants::walk::{FEW_VIEWS, MAX_WALK_P, MIN_VIEWS, MIN_WALK_NATS, SCORE_WORTH_A_FIT};
 use crate::explain::model_selection::{OptionalTerm, Selection, evidence_gain_nats};
 use crate::model::estimated::Walk;
 use crate::model::parameters::ParameterKind;
@@ -23,22 +25,6 @@ use crate::views::view::View;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::time::Stamp;
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
-
-/// Fewer views do not tell a walk from anything else.
-const MIN_VIEWS: usize = 8;
-/// So few views tell little before columns are tried, and the trial is quick.
-const FEW_VIEWS: usize = 20;
-/// Columns are tried where offsets change with temperature by more than so many times what is stated: no good arm of
-/// 60.
-pub(crate) const WARMTH_WORTH_A_FIT: f64 = 1.6;
-/// Or where the score test's statistic lies so many of its standard deviations above its mean: one good arm of 60.
-const SCORE_WORTH_A_FIT: f64 = 3.0;
-/// A walk that is missed is an error beyond its bound, one too many a bound that is too wide. Good arms lose two nats
-/// or more by it (60 of 60); of 40 arms that walk by 0.29 deg in 14 views 34 gain some.
-const MIN_WALK_NATS: f64 = 0.0;
-/// Probability of the likeliest joint's errors in a random order of the views, times the number of joints: above it
-/// they may follow the configurations.
-const MAX_WALK_P: f64 = 0.05;
 
 /// When the first and the last of `views` end; `None` for views that all end together.
 pub(crate) fn span(views: &[View]) -> Option<[Stamp; 2]> {

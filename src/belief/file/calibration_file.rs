@@ -1,5 +1,6 @@
 //! calibration.toml as a file: written, read, checked, and turned into sensors again.
 
+use crate::file::constants::calibration_file::{LEAST_SLOPE, SAME};
 use armcal_core::codes::Code;
 use armcal_core::schema::first_line;
 use std::path::Path;
@@ -34,16 +35,11 @@ pub struct CalibrationFiles {
 impl JointResult {
     /// Counts per radian that the gain is relative to, over those of `spec`, where the scale was measured on the way.
     fn ratio_to(&self, spec: &JointSensorSpec) -> Option<f64> {
-        /// `spec` has the scale already, but for rounding.
-        const SAME: f64 = 1e-9;
         let gain = self.gain_over_datasheet? * self.identified_ratio?;
         let ratio = gain / self.gain_rad_per_count / spec.counts_per_rad;
         Some(ratio).filter(|ratio| (ratio - 1.0).abs() > SAME)
     }
 }
-
-/// The least slope that a sensor may have anywhere, over its gain.
-const LEAST_SLOPE: f64 = 0.2;
 
 const TERMS_HEAD: &str = "\
 # With [joint.terms], in rad, the angle has beyond that

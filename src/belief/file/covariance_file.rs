@@ -3,6 +3,7 @@
 //! calibration.toml is for people; a hundred rows of numbers are not. `NAME.toml` has its covariance in
 //! `NAME.covariance.toml`. Each file holds the other's hash, so that a covariance never meets another's parameters.
 
+use crate::file::constants::covariance_file::FULL_DIGITS_ROWS;
 use armcal_core::codes::Code;
 use std::path::{Path, PathBuf};
 
@@ -17,8 +18,6 @@ use armcal_core::robot::{FileIssue, RobotError, read_text};
 use armcal_core::schema::{first_line, schema_of};
 use armcal_core::text::printable;
 
-/// Above so many rows, a covariance is written with seven significant digits.
-const FULL_DIGITS_ROWS: usize = 24;
 /// What the key of a file's own counterpart begins with; the line counts in neither hash.
 const CALIBRATION_HASH: &str = "calibration_hash";
 

@@ -1,12 +1,10 @@
 //! Sensors with terms as tables, for programs that know no basis functions.
 
+use crate::file::constants::lookup::POINTS;
 use serde::Serialize;
 
 use crate::file::calibration::{Calibration, JointResult};
 use armcal_core::sensor::{SensorModel, nonlinearity_basis};
-
-/// Points of a table; between them a straight line is off by some 1 % of the nonlinearity.
-const POINTS: usize = 65;
 
 /// The angle of one joint over its range under the reference's conditions.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -1,16 +1,16 @@
 //! The answer: calibration.toml, its tables and its short form.
 //!
-//! `calibration` is the file's content; the other files are its tables. `calibration_file` reads
-//! and writes it, `covariance_file` the covariance beside it, `compact` is one line of less than 512 bytes, `lookup` a table from
+//! `calibration` is the file's content; the other files are its tables. `calibration_file` reads and writes it,
+//! `covariance_file` the covariance beside it, `compact` is one line of less than 512 bytes, `lookup` a table from
 //! counts to radians.
 
-#[cfg(test)]
 pub(crate) mod bare;
 pub(crate) mod calibrated_arm;
 pub(crate) mod calibration;
 pub(crate) mod calibration_file;
 pub(crate) mod camera_mount;
 pub(crate) mod compact;
+pub(crate) mod constants;
 pub(crate) mod covariance_file;
 pub(crate) mod failed_joint;
 pub(crate) mod file_error;

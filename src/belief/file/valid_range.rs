@@ -1,16 +1,12 @@
 //! `[valid]` of calibration.toml.
 
+use crate::file::constants::valid_range::{MARGIN_H, MARGIN_K, MARGIN_PA};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::views::view::CaptureData;
 use armcal_core::sensor::Conditions;
 use armcal_core::time::{Stamp, utc};
-
-/// Excess that is not reported: oil (K), pressure (Pa), age (h). Assumed.
-const MARGIN_K: f64 = 2.0;
-const MARGIN_PA: f64 = 0.5e6;
-const MARGIN_H: f64 = 6.0;
 
 /// What the captured views covered; beyond it the result is a guess.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

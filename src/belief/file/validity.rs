@@ -1,5 +1,6 @@
 //! Where a calibration holds: what a configuration, a task or the conditions have beyond the captured views.
 
+use crate::file::constants::validity::{MARGIN_RAD, MAX_EXTRAPOLATION, MIN_LEVER_M};
 use std::collections::BTreeSet;
 
 use crate::file::calibration::{Calibration, JointResult};
@@ -7,9 +8,6 @@ use crate::file::valid_range::{ordered, past};
 use armcal_core::robot::{FailedKind, Robot};
 use armcal_core::sensor::Conditions;
 use armcal_core::streams::JointAngles;
-
-/// Excess of an angle that is not reported, rad. Assumed.
-const MARGIN_RAD: f64 = 0.05;
 
 impl Calibration {
     /// In words, what `angles` (of as many joints as there are, base first) under `conditions` have beyond what the
@@ -41,12 +39,6 @@ impl Calibration {
         joints.map(one).chain(self.valid.in_words()).collect()
     }
 }
-
-/// Excess over the captured range, in widths of that range, from which a target is not judged: U95 includes the stated
-/// linearity of a sensor beyond the views, and in good arms up to 0.96 widths occur. Assumed.
-const MAX_EXTRAPOLATION: f64 = 1.0;
-/// A joint that moves the tool by less than this matters to no target, m/rad; slides always do. Assumed.
-const MIN_LEVER_M: f64 = 0.01;
 
 /// Postures at the targets of a task, by number from 0, against the angles that the views covered.
 pub(crate) struct Extrapolation<'a> {

@@ -1,13 +1,11 @@
 //! What was believed over time: a line a minute of the arm's time, and one for each event.
 
+use crate::follow::constants::belief_log::EVERY_S;
 use serde::{Deserialize, Serialize};
 
 use crate::follow::event::OnlineEvent;
 use crate::follow::follower::{BeliefRow, Follower};
 use armcal_core::time::Stamp;
-
-/// Between two lines of the belief, s of the arm's time.
-const EVERY_S: f64 = 60.0;
 
 /// A line of belief.jsonl.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

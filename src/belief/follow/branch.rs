@@ -1,5 +1,7 @@
 //! One explanation of what happened, and the belief under it.
 
+pub(crate) use crate::follow::constants::branch::NOTHING_FITS_NATS;
+use crate::follow::constants::branch::{LEAST_BUMP_RAD, LEAST_SCALE, SPEAKS_NATS};
 use crate::follow::filter::{Filter, ViewUpdate};
 use crate::follow::hypothesis::Fault;
 use crate::follow::process_noise::ProcessNoise;
@@ -8,16 +10,6 @@ use crate::views::view::View;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::ConditionChange;
 use armcal_core::time::Stamp;
-
-/// What a view costs an explanation under which none of its observations belongs, per observation; that of a rejected
-/// one.
-pub(crate) const NOTHING_FITS_NATS: f64 = 30.0;
-/// A view that makes one explanation more probable than another by this speaks for it, nats.
-const SPEAKS_NATS: f64 = 1.0;
-/// A scale this close to the datasheet's is the drift of a sensor, not another sensor.
-const LEAST_SCALE: f64 = 0.2;
-/// A lower bump is the nonlinearity of a sound sensor, rad: 0.15 deg.
-const LEAST_BUMP_RAD: f64 = 2.6e-3;
 
 /// One explanation, and the belief under it.
 #[derive(Clone)]

@@ -3,6 +3,12 @@
 //! joints may be the one whose sensor is worn.
 
 use crate::follow::branch::{Branch, Step};
+use crate::follow::constants::diagnosis::{
+    CONFIRMED_BY, HOPELESS_NATS, JOINS_NATS, LEAD_NATS, LEAD_OF_SENSOR_NATS, LONE_LEAD_IN_MOTION_NATS, LONE_LEAD_NATS,
+    LONE_TAG_LEAD_NATS, LONE_TAG_M, MAX_BRANCHES, MAX_RECENT, MAX_VIEWS, MAX_VIEWS_OF_DRIFT, MAX_VIEWS_OF_SLIP,
+    MAX_VIEWS_OF_TIE, MAX_VIEWS_TO_NAME, NEARER_NATS, OPEN_SENSOR_CONFIRMED_BY, OPEN_VIEWS, RECENT_S,
+    SUSPICIOUS_STEP_Z, SUSPICIOUS_Z,
+};
 use crate::follow::filter::{Filter, Scores, ViewUpdate, WalkScore};
 use crate::follow::hypothesis::{Fault, TagSet};
 use crate::follow::view_stream::is_moving;
@@ -11,46 +17,6 @@ use crate::views::view::View;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::robot::Robot;
 use armcal_core::time::Stamp;
-
-/// A view is suspicious beyond this quantile of the normal by its cost (one in ten thousand).
-const SUSPICIOUS_Z: f64 = 3.719;
-/// The same of a step of one joint's sensor: looked at more often, for it is one direction among many.
-const SUSPICIOUS_STEP_Z: f64 = 3.3;
-/// What leads by this is taken for true, in nats.
-const LEAD_NATS: f64 = 5.0;
-/// The same over another explanation by the same sensor: which one it is matters more than how it failed.
-const LEAD_OF_SENSOR_NATS: f64 = 1.5;
-/// What one view at rest tells by this is taken for a worn spot, in nats; one in motion, whose readings may be torn.
-const LONE_LEAD_NATS: f64 = 10.0;
-const LONE_LEAD_IN_MOTION_NATS: f64 = 20.0;
-/// What one view tells of a tag is taken for true where it is not farther from its place than this, m.
-const LONE_TAG_M: f64 = 0.08;
-const LONE_TAG_LEAD_NATS: f64 = 1.5;
-/// A middle of a spot aside must explain more by this, in nats: views of one place fit all that are near.
-const NEARER_NATS: f64 = 1.0;
-/// Explanations followed at most.
-const MAX_BRANCHES: usize = 8;
-/// What is less probable than the best one by this is not followed any more, in nats.
-const HOPELESS_NATS: f64 = 25.0;
-/// Views this close to each other are looked at together, s, and how many of them.
-const RECENT_S: f64 = 60.0;
-const MAX_RECENT: usize = 6;
-/// Views after which the best explanation is taken where it is clear that something happened, where it may have been
-/// drift, where a slip may be a worn spot, and in any case; and those that one needs.
-const MAX_VIEWS_TO_NAME: usize = 2;
-const MAX_VIEWS_OF_DRIFT: usize = 3;
-const MAX_VIEWS_OF_SLIP: usize = 3;
-const MAX_VIEWS: usize = 5;
-/// The same where it may be one joint's sensor that is worn or another's: the next look at tags may tell.
-const MAX_VIEWS_OF_TIE: usize = 20;
-/// Views after the first ones for which all explanations are opened.
-const OPEN_VIEWS: usize = 2;
-/// What a tag that moved with others explains at least, in nats.
-const JOINS_NATS: f64 = 3.0;
-const CONFIRMED_BY: usize = 2;
-/// The same for another scale, whose two numbers explain any two views, and for a sensor that says nothing, which
-/// explains any.
-const OPEN_SENSOR_CONFIRMED_BY: usize = 3;
 
 /// Explanations of what the last views show.
 #[derive(Clone)]

@@ -1,6 +1,7 @@
 //! The estimator that is fed view by view: beliefs under several lags of the sensors' temperature, and the one that
 //! explains the views best.
 
+use crate::follow::constants::estimator::{APART_K, GIVEN_UP_NATS, LAGS_S, TOLD_LATE_NANOS};
 use std::sync::Arc;
 
 use crate::follow::event::OnlineEvent;
@@ -16,17 +17,6 @@ use crate::views::view::View;
 use armcal_core::robot::{FailedJoint, FailedKind, Robot};
 use armcal_core::sensor::Conditions;
 use armcal_core::time::Stamp;
-
-/// Lags of the sensors' temperature behind the oil's, s. Assumed: from none to a housing full of oil. Views hardly tell
-/// neighbours apart, and each costs as much as the first.
-const LAGS_S: [f64; 4] = [0.0, 200.0, 600.0, 1800.0];
-/// A lag has a belief of its own once its temperature was this far from the oil's in a view, K: before that the
-/// belief without any lag is its own, to some thousandths of a degree.
-const APART_K: f64 = 0.25;
-/// A lag whose views are less probable by this is given up, in nats.
-const GIVEN_UP_NATS: f64 = 12.0;
-/// What a belief decided longer ago than this is not told any more where it becomes the best one, ns.
-const TOLD_LATE_NANOS: i64 = 600_000_000_000;
 
 /// Keeps a calibration up to date, view by view. It has no clock and no thread; the same views give the same belief.
 #[derive(Clone)]

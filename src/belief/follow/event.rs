@@ -1,5 +1,6 @@
 //! What happened to the arm, as the online belief tells it.
 
+use crate::follow::constants::event::CLEAR_LEAD_NATS;
 use serde::{Deserialize, Serialize};
 
 use crate::follow::diagnosis::Verdict;
@@ -9,9 +10,6 @@ use crate::say::finding::{Finding, FindingKind, FindingUnit};
 use armcal_core::codes::Coded;
 use armcal_core::robot::Robot;
 use armcal_core::time::Stamp;
-
-/// An explanation that leads by less than this is told with the next one, in nats (odds of twenty).
-const CLEAR_LEAD_NATS: f64 = 3.0;
 
 /// Something that happened, with the evidence for it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -5,6 +5,7 @@
 //! information. Between views what drifts is widened, `(W^-1 + Q)^-1` by the matrix inversion lemma. Time and memory of
 //! a view do not depend on how many came before.
 
+use crate::follow::constants::filter::{CORNER_WIDTH, LAST_GAIN, MAX_STEPS, SHORTER, UNKNOWN_STD};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Isometry3, Matrix3, SVector, Vector3};
 
 use crate::explain::angles_by_camera::seen_angles;
@@ -28,16 +29,6 @@ use crate::views::view::View;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::numeric::{Loss, cholesky, solve_lower};
 use armcal_core::robot::Robot;
-
-/// Steps of a view at most; two are the rule.
-const MAX_STEPS: usize = 8;
-/// A step that would save less than this is not taken any more, in units of the cost (sums of squares in sigmas).
-const LAST_GAIN: f64 = 1e-4;
-/// Where a step does not lower the cost, this share of it is tried next.
-const SHORTER: f64 = 0.3;
-const CORNER_WIDTH: f64 = 3.0;
-/// Of the place of a tag that nobody surveyed, m and rad: no view of it is used.
-const UNKNOWN_STD: f64 = 100.0;
 
 /// Means and information of all columns, base to tags.
 #[derive(Clone)]

@@ -1,5 +1,6 @@
 //! A belief that is fed messages, and what it says over time.
 
+use crate::follow::constants::follower::AHEAD_H;
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
@@ -15,9 +16,6 @@ use armcal_core::sensor::{ArmSensors, Conditions};
 use armcal_core::stats::Summary;
 use armcal_core::streams::{JointAngles, Mark, MarkKind, Message, ReachTask, Thermometer};
 use armcal_core::time::Stamp;
-
-/// How far ahead the error without any further view is predicted, h.
-const AHEAD_H: f64 = 1.0;
 
 /// Follows the messages of an arm: push messages, read belief, predicted tool error and events.
 ///

@@ -3,6 +3,10 @@
 //! Innovations have no memory, so that the scores of one place of a track, and of one tag, add up; where they are too
 //! many sigmas, the views since are taken in once more under what may have happened before the first of them.
 
+use crate::follow::constants::hindsight::{
+    A_LITTLE_ASIDE_M, COMPARED_CHI2, COMPARED_Z, FARTHER_BY, GROWN_BY, LEAST_VIEWS, MIDDLES, SUSPICIOUS_CHI2,
+    SUSPICIOUS_Z, VIEWS_OF_SPAN, WORTH_COMPARING_NATS,
+};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::follow::branch::{Branch, Step, speaks};
@@ -12,30 +16,6 @@ use crate::model::parameters::WornSpot;
 use crate::views::view::View;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::robot::Robot;
-
-/// Views of a span; two spans are kept, so that one to two of them are looked back on.
-const VIEWS_OF_SPAN: usize = 40;
-/// Scores of one place are looked into beyond this, in sigmas.
-const SUSPICIOUS_Z: f64 = 4.0;
-/// And again where their square grew by this.
-const GROWN_BY: f64 = 3.0;
-/// Other explanations are looked at where the spot is more probable than nothing by this, in nats.
-const WORTH_COMPARING_NATS: f64 = 2.0;
-/// Middles of a spot that a view may be of, in widths from where it stands, the nearest first.
-const MIDDLES: [f64; 9] = [0.0, -0.5, 0.5, -1.0, 1.0, -1.5, 1.5, -2.0, 2.0];
-/// One farther away must explain more by this, in squared sigmas: views of one place fit all of them.
-const FARTHER_BY: f64 = 1.0;
-/// Other joints' spots are compared where their own scores are beyond this, in sigmas.
-const COMPARED_Z: f64 = 2.5;
-/// Views of a spot or a tag at least.
-const LEAST_VIEWS: usize = 2;
-/// Scores of a tag's place are looked into beyond this, chi-square of three: by chance once in 15,000.
-const SUSPICIOUS_CHI2: f64 = 22.0;
-/// Other tags are compared from this on, once in 50.
-const COMPARED_CHI2: f64 = 10.0;
-/// One sigma of how far aside a tag is that no view tells alone, m. In a direction of which the views tell less than
-/// this, scores are rounding.
-const A_LITTLE_ASIDE_M: f64 = 0.005;
 
 /// The last views, and the belief before them.
 #[derive(Clone, Default)]

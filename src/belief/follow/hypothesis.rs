@@ -1,5 +1,8 @@
 //! What may have happened to the arm between two views: each is a belief that is widened where it re-opens.
 
+use crate::follow::constants::hypothesis::{
+    BASE_STD, DRIFT_STD_RAD, GAIN_STD, LN_PRIOR, LN_PRIOR_OF_DRIFT, LN_PRIOR_OF_WORN, MOUNT_STD, SLIP_STD_RAD, TAG_STD,
+};
 use nalgebra::{DMatrix, Matrix6};
 
 use crate::follow::filter::Filter;
@@ -9,19 +12,6 @@ use crate::say::finding::FindingKind;
 use crate::views::view::View;
 use armcal_core::robot::Robot;
 use armcal_core::spatial::adjoint;
-
-/// How far a sensor may slip, a tag or the camera be knocked aside: one sigma. Assumed: wide, the views tell it.
-const SLIP_STD_RAD: f64 = 0.1;
-const TAG_STD: [f64; 2] = [0.03, 0.06];
-const MOUNT_STD: [f64; 2] = [0.02, 0.1];
-const BASE_STD: [f64; 2] = [0.1, 0.1];
-const GAIN_STD: f64 = 1.0;
-const DRIFT_STD_RAD: f64 = 1.5e-3;
-const LN_PRIOR_OF_DRIFT: f64 = -2.0;
-const LN_PRIOR: f64 = -7.0;
-/// Less than a slip's by what a tighter height makes up for, and by the lead over the same sensor: where all views are
-/// at one place it is a slip.
-const LN_PRIOR_OF_WORN: f64 = -10.5;
 
 /// Tags of one carrier, by their indices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -1,16 +1,9 @@
 //! How noisy corners are: of one image by the scatter between the images of a rest, and of images of a moving arm by
 //! what they leave.
 
+use crate::follow::constants::image_noise::{CREEPS, KNOWN_COORDINATES, POSE};
 use crate::follow::filter::ViewUpdate;
 use crate::views::view::View;
-
-/// Coordinates that robot.toml's figure counts for.
-const KNOWN_COORDINATES: f64 = 64.0;
-/// A view's own parameters, the camera's pose, fit themselves to the noise.
-const POSE: f64 = 6.0;
-
-/// Images that scatter by more than this many times the usual noise are of a camera that moved.
-const CREEPS: f64 = 2.0;
 
 /// Of one corner in one image, by the views so far.
 #[derive(Clone, Copy, Debug)]

@@ -1,5 +1,8 @@
 //! The estimator under one lag of the sensors' temperature behind the thermometer's.
 
+use crate::follow::constants::member::{
+    FORGETTING, MOVING_FOR_START, N_STARTS_OF_DRIFTING, START_AT, START_PAUSE_S, VIEWS_FOR_EVIDENCE,
+};
 use std::sync::Arc;
 
 use crate::follow::branch::{Branch, Step};
@@ -23,19 +26,6 @@ use armcal_core::joints::MAX_JOINTS;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::Conditions;
 use armcal_core::time::Stamp;
-
-/// Evidence of views of before counts less by this factor a view.
-const FORGETTING: f64 = 0.98;
-/// From so many views on the batch fits the scales.
-const VIEWS_FOR_EVIDENCE: usize = 12;
-/// After a pause this long the first views are over, however many they were, s.
-const START_PAUSE_S: f64 = 300.0;
-/// Views of a moving arm that make a start where no view at rest comes.
-const MOVING_FOR_START: usize = 40;
-/// Numbers of views at which the batch of the first ones is made anew: what was linearized far from the end is again.
-const START_AT: [usize; 15] = [1, 2, 3, 4, 6, 8, 12, 17, 24, 34, 48, 68, 96, 136, 192];
-/// The first so many where sensors drift: the batch knows nothing of that.
-const N_STARTS_OF_DRIFTING: usize = 9;
 
 /// A belief kept up view by view, for sensors that follow the thermometer with one lag.
 #[derive(Clone)]

@@ -10,6 +10,7 @@
 pub(crate) mod batch;
 pub(crate) mod belief_log;
 pub(crate) mod branch;
+pub(crate) mod constants;
 pub(crate) mod diagnosis;
 pub(crate) mod estimator;
 pub(crate) mod event;

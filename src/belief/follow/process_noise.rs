@@ -6,25 +6,15 @@
 //! the belief before a view counts as given), from a prior about the datasheet's figure.
 
 use crate::explain::calibration_prior::drift_std_rad_per_sqrt_h;
+use crate::follow::constants::process_noise::{
+    BEHIND_SHARE, ERROR_PRIOR_VIEWS, FORGETTING, LEAST_OF_FIRST, LN_BOUND, LN_STD,
+};
 use crate::follow::filter::{Filter, ViewUpdate};
 use crate::model::scales::Hyperparameters;
 use crate::solve::time_error::TimeErrorOfView;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::ConditionChange;
-
-/// One sigma of `ln` of a variance's factor before any view: a standard deviation may be wrong by two.
-const LN_STD: f64 = 1.4;
-/// A factor stays within its prior's this many sigmas.
-const LN_BOUND: f64 = 3.0 * LN_STD;
-/// The share of temperature and pressure effects that a sensor is behind by, at first. Assumed.
-const BEHIND_SHARE: f64 = 0.12;
-/// Views of before count less by this factor a view: figures may change in a day.
-const FORGETTING: f64 = 0.99;
-/// Information that the first guess of a joint's error from view to view counts for.
-const ERROR_PRIOR_VIEWS: f64 = 12.0;
-/// A joint's error is never less than this share of the first guess.
-const LEAST_OF_FIRST: f64 = 0.1;
 
 /// The factor of one variance.
 #[derive(Clone, Copy, Debug, PartialEq)]

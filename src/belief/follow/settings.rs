@@ -1,14 +1,12 @@
 //! What an online estimator is told beforehand.
 
+use crate::follow::constants::settings::WRONG_BY;
 use crate::model::blocks::Shown;
 use crate::model::estimated::Model;
 use crate::model::parameters::JointParameters;
 use crate::model::scales::{Hyperparameters, TIME_JITTER_STD_S};
 use crate::solve::model_for_views::{Scope, model_of};
 use armcal_core::robot::Robot;
-
-/// How much larger an effect may be than its datasheet's figure.
-const WRONG_BY: f64 = 1.5;
 
 /// How an online estimator works.
 #[derive(Clone, Debug)]

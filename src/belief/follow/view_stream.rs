@@ -6,6 +6,10 @@
 //! what a sensor's model leaves is the same again at the same posture and must not count twice. Memory is bounded: a
 //! window of messages, whatever the length of the stream.
 
+use crate::follow::constants::view_stream::{
+    ABOUT_IMAGE_S, APART_RAD, LONGEST_REST_S, MARK_DELAY_S, MOVES_RAD, REST_RAD, REST_SIGMAS, SETTLE_S,
+    SHORTEST_REST_S, SLOWEST_RAD_S, WAITING_IMAGES, WINDOW_MESSAGES,
+};
 use std::collections::{BTreeMap, VecDeque};
 
 use crate::views::association::view_of_span;
@@ -17,31 +21,8 @@ use armcal_core::sensor::ArmSensors;
 use armcal_core::streams::{JointSensorSample, Mark, MarkKind, Message, TagDetections};
 use armcal_core::time::Stamp;
 
-/// A joint that leaves this, and so many sigma of its noise, moves, rad.
-const REST_RAD: f64 = 0.003;
-const REST_SIGMAS: f64 = 8.0;
-/// What comes after a motion before the arm counts as at rest, s.
-const SETTLE_S: f64 = 0.5;
-/// A rest of which less than this is left is none, s.
-const SHORTEST_REST_S: f64 = 0.5;
-/// A rest becomes a view after this at the latest, s.
-const LONGEST_REST_S: f64 = 20.0;
-/// Where the tags are this far apart in the first image and the last of a rest it is none, rad.
-const MOVES_RAD: f64 = 0.02;
-/// A mark may come this much later than the span it marks, s.
-const MARK_DELAY_S: f64 = 2.0;
-/// Readings this far about an image make a view of a moving arm, s.
-const ABOUT_IMAGE_S: f64 = 0.06;
-/// Between two views of a moving arm some joint moves this far at least, rad.
-const APART_RAD: f64 = 0.15;
-/// An arm all of whose joints are slower rests, rad/s.
-const SLOWEST_RAD_S: f64 = 0.02;
-/// Images that wait for readings at most: without any nothing is made of them.
-const WAITING_IMAGES: usize = 1000;
 /// What is kept of the past: a rest, with what was read before it.
 const WINDOW_S: f64 = LONGEST_REST_S + BACK_S + NEAR_S + 10.0;
-/// Messages kept at most, whatever their rate.
-const WINDOW_MESSAGES: usize = 100_000;
 
 /// Turns the messages of an arm into views as they come.
 #[derive(Clone)]

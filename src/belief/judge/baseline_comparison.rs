@@ -5,15 +5,11 @@
 //! `t = m sqrt(n) / s` is Student's with n - 1 degrees of freedom where neither is better (Student 1908). The
 //! logarithm, for distances differ between views by factors.
 
+use crate::judge::constants::baseline_comparison::LEAST_P;
+pub use crate::judge::constants::baseline_comparison::SIGNIFICANCE;
 use armcal_core::stats::student_t_above;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-
-/// Level of the test: an improvement that chance makes more often is none.
-pub const SIGNIFICANCE: f64 = 0.01;
-
-/// Smaller probabilities say nothing that this one does not.
-const LEAST_P: f64 = 1e-9;
 
 /// Mount and map alone on the held-out views, and whether the calibration beats it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -5,16 +5,10 @@
 //! freedom. So `P(|e| <= r)` is the mean of `P(rho^2 <= r^2 / sum l_i s_i^2)` over the sphere. It is integrated over an
 //! octant: Gauss-Legendre in `s_1`, the midpoint rule in the angle about that axis.
 
+pub use crate::judge::constants::coverage::COVERAGE;
+use crate::judge::constants::coverage::{ANGLES, INFINITE_DOF, NEWTON_STEPS, NODES, STEPS};
 use armcal_core::stats::{chi_square_above, student_t_above};
 use nalgebra::Matrix3;
-
-/// Probability that U95 holds (GUM 6.2; JCGM 106 calls it the coverage probability).
-pub const COVERAGE: f64 = 0.95;
-/// Nodes in `s_1` and in the angle: the probability is then right to 1e-5 from isotropic to rank one.
-const NODES: usize = 24;
-const ANGLES: usize = 12;
-/// More degrees of freedom than this are as good as infinite: U95 differs by less than 0.3 %.
-const INFINITE_DOF: f64 = 500.0;
 
 /// Distribution of the tool's position error at one configuration of the arm.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,7 +56,6 @@ impl ErrorDistribution {
     /// U95, m.
     #[must_use]
     pub fn u95_m(&self) -> f64 {
-        const STEPS: usize = 60;
         let largest_m = self.eigenvalues_m2[0].sqrt();
         if largest_m == 0.0 {
             return 0.0;
@@ -111,7 +104,6 @@ fn beta_with_half(dof: usize) -> f64 {
 
 /// Gauss-Legendre nodes and weights on [0, 1], by Newton's method on the Legendre polynomial.
 fn octant_nodes() -> [(f64, f64); NODES] {
-    const NEWTON_STEPS: usize = 6;
     std::array::from_fn(|k| {
         let mut x = (std::f64::consts::PI * (k as f64 + 0.75) / (NODES as f64 + 0.5)).cos();
         let mut slope = 1.0;

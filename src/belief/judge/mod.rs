@@ -5,6 +5,7 @@
 //! fit better than without joints.
 
 pub(crate) mod baseline_comparison;
+pub(crate) mod constants;
 pub(crate) mod coverage;
 pub(crate) mod decision;
 

@@ -4,6 +4,7 @@
 //! its linearization in the camera's twist. `point` is the only place that linearizes a projection.
 
 mod board;
+pub(crate) mod constants;
 mod corners;
 mod information;
 mod observation;

@@ -1,5 +1,6 @@
 //! One tag in one view, weighted.
 
+use crate::measure::constants::observation::UNSEEN_SIGMAS;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
@@ -47,9 +48,6 @@ pub(crate) enum WeightedMeasurement {
     Position { in_camera_m: Vector3<f64>, info: f64 },
     Pose { tag_from_camera: Isometry3<f64>, info_position: f64, info_rotation: f64 },
 }
-
-/// An observation that the lens cannot have seen counts as this many sigma off in each coordinate.
-const UNSEEN_SIGMAS: f64 = 1e3;
 
 impl WeightedMeasurement {
     /// Linearizes; `noise` multiplies the corners' standard deviations. Adds the lens's part to `by_lens` where that is

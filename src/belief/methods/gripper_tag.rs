@@ -9,6 +9,7 @@
 //! `R = sigma^2 / n_frames * I + sum_j (d u / d theta_j) (d u / d theta_j)^T linearity_j^2` for the eight coordinates
 //! `u` of a view.
 
+use crate::methods::constants::gripper_tag::{MAX_PRIOR_SIGMAS, MIN_STD, MIN_VIEWS};
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, SMatrix, SVector, Vector2, Vector6};
@@ -23,12 +24,6 @@ use armcal_core::robot::{GripperTag, Robot};
 use armcal_core::spatial::{adjoint, exp, log};
 use armcal_core::streams::JointAngles;
 
-/// Fewer views than this are left to the priors.
-const MIN_VIEWS: usize = 4;
-/// Mount and tag this many sigma of their priors off: one of them was knocked, or it is another tag.
-const MAX_PRIOR_SIGMAS: f64 = 6.0;
-/// Least standard deviation of a prior: what is said to be exact stays where it is.
-const MIN_STD: f64 = 1e-9;
 const DAMPING: Damping =
     Damping { first: 0.0, min: 0.0, max: f64::INFINITY, down: 0.1, up: 10.0, min_after_rejection: 1.0 };
 /// A step this small in units of the priors' sigma changes nothing. The views' weights change a little with the state:

@@ -6,6 +6,7 @@
 //! It needs no camera, and knows nothing but what the drawing says of the stops; where the vehicle is in the way of one
 //! there is none.
 
+use crate::methods::constants::joint_limits::{LEAST_TRAVEL_SHARE, SAME_STOP_RAD, STOP_STD_RAD};
 use nalgebra::{DMatrix, Matrix2, Vector2};
 
 use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
@@ -26,13 +27,6 @@ pub struct EndStopFit {
     /// Joints without two stops, and why.
     pub left_out: Vec<Unobservable>,
 }
-
-/// How far a stop may be from its drawing, one sigma, rad; assumed: half a degree, as machined stops on a worn arm.
-const STOP_STD_RAD: f64 = 0.0087;
-/// Angles nearer than this are one stop, rad.
-const SAME_STOP_RAD: f64 = 0.01;
-/// Readings of different stops differ by at least this share of the angle between them, or the sensor is dead.
-const LEAST_TRAVEL_SHARE: f64 = 0.1;
 
 /// Fits every joint of `robot` that has two different stops among `readings`; the others keep `guess`.
 ///

@@ -7,6 +7,7 @@
 //! direction but an exact freedom of gauge, which noise has nothing to do with. The offset is held,
 //! and so is everything else that the views leave without any effect.
 
+use crate::methods::constants::minimum_variance::{NULL_SHARE, PART_OF_NULL};
 use nalgebra::{Const, DMatrix, DVector, Dyn, OMatrix, Vector3};
 
 use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
@@ -138,11 +139,6 @@ fn center(all: &mut DMatrix<f64>, observations: &[usize]) {
         }
     }
 }
-
-/// Below this share of the largest, an eigenvalue of the objective's curvature is zero as far as rounding can tell.
-const NULL_SHARE: f64 = 1e-12;
-/// A parameter with more than this share of a null direction takes part in it.
-const PART_OF_NULL: f64 = 1e-6;
 
 /// The joint nearest to the tags: the first, or the last before tags that the arm carries.
 fn gauge_joint(robot: &Robot) -> usize {

@@ -6,6 +6,7 @@
 //! [`PositionMethod::solve`].
 
 pub(crate) mod calibration;
+pub(crate) mod constants;
 pub(crate) mod end_stops;
 pub(crate) mod gripper_tag;
 mod joint_limits;

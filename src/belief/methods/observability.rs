@@ -5,15 +5,12 @@
 //! datasheet's value, and its name and reason go into the result; the worst goes first, for leaving it out may settle
 //! the others.
 
+use crate::methods::constants::observability::POSITION_STD_M;
 use nalgebra::DMatrix;
 
 use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::positions::position_problem::PositionProblem;
 use crate::positions::unobservable::Unobservable;
-
-/// Assumed error of one seen tag position per axis before any residual is known, m: what 0.3 px corners, a mount off by
-/// 2 mm and a survey off by 1 mm come to at 1 m. It decides only what is hopeless, so its exact size matters little.
-const POSITION_STD_M: f64 = 0.004;
 
 /// The parameters worth estimating, and those that are not, linearized at `guess`.
 #[must_use]

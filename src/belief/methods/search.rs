@@ -4,6 +4,7 @@
 //! one; bounds keep them within what a sensor of that datasheet can be. Without it the search runs on the numbers of
 //! the paper's equation 1, `theta = k1 eta + k2`, as they are: rad per count and rad.
 
+use crate::methods::constants::search::{BOUND_SIGMAS, ON_BOUND};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
@@ -14,11 +15,6 @@ use armcal_core::numeric::Outcome;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::wrap_symmetric;
 use armcal_core::stats::stream_rng;
-
-/// Half-width of the search box in units of prior sigma; beyond it a sensor is broken, not out of calibration.
-const BOUND_SIGMAS: f64 = 6.0;
-/// Share of the box beyond which a parameter counts as resting on its bound.
-const ON_BOUND: f64 = 0.999;
 
 /// In which numbers the search moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,6 +5,7 @@
 //! values, `prior` what is known before, `scales` the sizes that the data may tell.
 
 pub(crate) mod blocks;
+pub(crate) mod constants;
 pub(crate) mod estimated;
 pub(crate) mod layout;
 pub(crate) mod parameters;

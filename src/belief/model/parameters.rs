@@ -4,6 +4,7 @@
 //! `theta_j = center_j + gain_j * travel_j + offset_j` (the paper's equation 2), and the terms of
 //! [`armcal_core::sensor`].
 
+use crate::model::constants::parameters::SHAPE_STD;
 use armcal_core::kinematics::LinkCorrections;
 use armcal_core::robot::{JointSensorSpec, Robot};
 use armcal_core::sensor::{
@@ -262,9 +263,6 @@ impl WornSpot {
         (travel_rad - self.at_rad()).abs() > 3.0 * Self::WIDTH_RAD
     }
 }
-
-/// How far a spot's middle and its width are from the bump's, in widths. Assumed: tracks wear as they are used.
-const SHAPE_STD: f64 = 0.3;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 

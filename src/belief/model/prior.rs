@@ -1,5 +1,6 @@
 //! Priors of the common parameters.
 
+use crate::model::constants::prior::MIN_STD;
 use nalgebra::{DMatrix, DVector};
 
 use crate::model::blocks::{Block, MAX_COLUMNS, PerBlock, Std, Value};
@@ -8,9 +9,6 @@ use crate::model::parameters::{JointParameters, Parameter};
 use crate::model::scales::Hyperparameters;
 use crate::model::state::State;
 use armcal_core::robot::Robot;
-
-/// Least standard deviation of a prior: what is said to be exact stays where it is.
-const MIN_STD: f64 = 1e-9;
 
 /// One sigma of a standard deviation that is in use: never zero.
 pub(crate) fn at_least(std: f64) -> f64 {

@@ -1,5 +1,7 @@
 //! How large the things are that are not known exactly: standard deviations that the data themselves may tell.
 
+pub use crate::model::constants::scales::SHAPE_LENGTH;
+pub(crate) use crate::model::constants::scales::{BUMP_STD_RAD, STEP_STD_RAD, TIME_JITTER_STD_S};
 use crate::model::parameters::ParameterKind;
 use crate::model::walk_modes::mode_std;
 use armcal_core::joints::MAX_JOINTS;
@@ -52,19 +54,6 @@ pub struct Hyperparameters {
     /// Of an image's stamp about the camera's clock, s: what a moving arm's angles are off by, times its rates.
     pub time_jitter_std_s: f64,
 }
-
-/// Correlation length of a sensor's nonlinearity, half ranges. Assumed: four waves over the range are then still half
-/// as likely as one.
-pub const SHAPE_LENGTH: f64 = 0.16;
-
-/// Of an image's stamp about the camera's clock, with what sensors of moving joints are late by, s. Assumed.
-pub(crate) const TIME_JITTER_STD_S: f64 = 0.005;
-
-/// How far a sensor may slip on its shaft, rad. Assumed: wide, the views tell it.
-pub(crate) const STEP_STD_RAD: f64 = 0.1;
-
-/// Height of a worn spot's bump, rad. Assumed: wide, the views tell it.
-pub(crate) const BUMP_STD_RAD: f64 = 0.03;
 
 impl Hyperparameters {
     /// What robot.toml says, and where it is silent what is usual (assumed; the data correct it).

@@ -4,12 +4,10 @@
 //! `phi_k(u) = sin((k - 1/2) pi u)` with variances `2 s^2 / ((k - 1/2) pi)^2` (Karhunen and Loeve; Ghanem and Spanos
 //! 1991, 2.3). Each is zero at the last view: the offset beside them is that of the sensor as it is then.
 
+pub(crate) use crate::model::constants::walk_modes::N_WALK_MODES;
 use std::f64::consts::PI;
 
 use armcal_core::time::Stamp;
-
-/// Modes of a walk that are estimated: they hold 95 % of its variance.
-pub(crate) const N_WALK_MODES: usize = 4;
 
 /// Standard deviation of mode `k` (from 0) of a walk of unit standard deviation.
 pub(crate) fn mode_std(k: u8) -> f64 {

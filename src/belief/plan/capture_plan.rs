@@ -3,6 +3,7 @@
 //! What a session does with the arm in hand, done on paper: the arm is taken to stand at its stowed pose, and to be as
 //! wrong as the datasheet, or an earlier calibration, allows.
 
+use crate::plan::constants::capture_plan::{PROVEN_TO_M, SAMPLE_RAD};
 use armcal_core::codes::{Code, Coded, Warning};
 use rand_chacha::ChaCha8Rng;
 
@@ -166,11 +167,6 @@ pub enum ItineraryError {
     #[error("no path leads to any of the {n} poses; {first}")]
     NoPath { n: usize, first: PathError },
 }
-
-/// Joint step between the samples of a believed arm's path, rad: a link's end 2 m away moves 2 cm.
-const SAMPLE_RAD: f64 = 0.01;
-/// Proven clearances are known to this, m.
-const PROVEN_TO_M: f64 = 0.002;
 
 /// Plans the first capture of a routine, from the stowed pose.
 ///

@@ -1,5 +1,6 @@
 //! plan.toml: a plan as operators, checks and pictures read it.
 
+use crate::plan::constants::file::{COUNT_DIGITS, LENGTH_DIGITS, RAD_DIGITS, TIME_DIGITS};
 use armcal_core::codes::Code;
 use armcal_core::codes::Warning;
 use std::path::Path as FilePath;
@@ -170,12 +171,6 @@ pub struct LeftOutTable {
 pub fn plan_schema() -> serde_json::Value {
     schema_of::<PlanFile>(Kind::Plan)
 }
-
-/// Digits of the file: a millionth of a radian is a few micrometres at the tool.
-const RAD_DIGITS: f64 = 1e6;
-const COUNT_DIGITS: f64 = 1e3;
-const LENGTH_DIGITS: f64 = 1e5;
-const TIME_DIGITS: f64 = 1e3;
 
 const HEAD: &str = "\
 # Poses to look from and the paths between them, planned before anything moves. Angles (rad) are believed ones; raw

@@ -9,6 +9,7 @@ mod bounds;
 mod capture_plan;
 mod certify;
 mod clearance;
+pub(crate) mod constants;
 mod error;
 mod file;
 mod motion;

@@ -1,5 +1,6 @@
 //! What can be seen to be wrong with arm, vehicle, scene and task before anything moves.
 
+use crate::plan::constants::scene_check::{DRAWS_PER_TAG, EVEN_DRAWS, INSIDE_M};
 use armcal_core::codes::{Code, Warning};
 use std::collections::BTreeMap;
 
@@ -17,12 +18,6 @@ use armcal_core::robot::Robot;
 use armcal_core::routine::{Routine, Step};
 use armcal_core::streams::JointAngles;
 use armcal_core::text::counted;
-
-/// Configurations drawn evenly, and camera poses drawn for each tag, in search of one that sees it.
-const EVEN_DRAWS: usize = 2000;
-const DRAWS_PER_TAG: usize = 60;
-/// A tag is drawn on the face that carries it, or just before it: deeper than this it is inside, m.
-const INSIDE_M: f64 = 0.003;
 
 /// What is looked at.
 pub struct SceneCheck<'a> {

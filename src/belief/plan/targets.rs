@@ -1,5 +1,6 @@
 //! Joint angles for the reach task's targets, clear for every arm within the joint errors.
 
+use crate::plan::constants::targets::{IK_TOLERANCE_M, RANDOM_SEEDS, SPARE_TRIES};
 use std::collections::BTreeSet;
 
 use nalgebra::Vector3;
@@ -13,12 +14,6 @@ use armcal_core::kinematics::{IkError, IkGoal, IkSettings, solve_position};
 use armcal_core::robot::Robot;
 use armcal_core::routine::{ReachSettings, Routine, Step};
 use armcal_core::streams::JointAngles;
-
-/// Starts of the inverse kinematics beside the preferred ones.
-const RANDOM_SEEDS: usize = 24;
-/// A target of the task that none of those leads to is tried so many times more, from draws of its own.
-const SPARE_TRIES: usize = 8;
-const IK_TOLERANCE_M: f64 = 1e-6;
 
 /// Solves every target under one belief, near `preferred` postures where given.
 ///

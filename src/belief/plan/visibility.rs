@@ -1,5 +1,6 @@
 //! Which tags a pose is expected to see.
 
+use crate::plan::constants::visibility::SIGHT_END_M;
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::plan::clearance::ClearanceModel;
@@ -22,9 +23,6 @@ pub struct VisibilityModel {
     /// Kept free at the border of the image.
     pub border_px: f64,
 }
-
-/// Left out before a tag's corner, where its own plate is, m.
-const SIGHT_END_M: f64 = 0.01;
 
 impl Default for VisibilityModel {
     fn default() -> Self {

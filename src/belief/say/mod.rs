@@ -4,6 +4,7 @@
 //! `reading_error`, `geometry_error` are causes), `reservation` what it rests on. `repair` says what to do about a
 //! finding. Each kind has its words in a file beside it, and nowhere else.
 
+pub(crate) mod constants;
 pub(crate) mod finding;
 pub(crate) mod finding_words;
 pub(crate) mod geometry_error;

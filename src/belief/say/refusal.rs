@@ -1,5 +1,6 @@
 //! Why a calibration is refused: cause, evidence and remedy as data. Their words are made in `words` and nowhere else.
 
+pub(crate) use crate::say::constants::refusal::MIN_USED_SHARE;
 use std::borrow::Cow;
 use std::fmt;
 
@@ -366,9 +367,6 @@ impl InnovationQuantity {
         }
     }
 }
-
-/// A smaller share of used observations means that the views fit nothing near the prior.
-pub(crate) const MIN_USED_SHARE: f64 = 0.6;
 
 impl Refusal {
     /// Whether it is about the data themselves, so that it comes before what a fit of them shows.

@@ -1,5 +1,6 @@
 //! Errors of the arm or its survey, and their remedies.
 
+use crate::say::constants::repair::LEAST_FOCAL;
 use crate::say::finding::{Finding, FindingKind};
 use armcal_core::codes::{Code, Coded};
 use armcal_core::robot::FailedKind;
@@ -66,9 +67,6 @@ const REPAIRS: [FindingKind; 11] = [
     FindingKind::Base,
     FindingKind::Link,
 ];
-
-/// A focal length that is off by less is not what was found of a lens, relative.
-const LEAST_FOCAL: f64 = 1e-3;
 
 fn of_finding(found: &Finding, since: &str) -> Option<Repair> {
     let name = &found.name;

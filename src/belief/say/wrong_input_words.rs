@@ -1,5 +1,6 @@
 //! The cause and the remedy of a wrong input, in words.
 
+use crate::say::constants::wrong_input_words::{NEAR, WATER};
 use std::borrow::Cow;
 use std::fmt;
 
@@ -183,8 +184,6 @@ pub(crate) fn turn_in_words([w, x, y, z]: &[f64; 4]) -> String {
 /// In what medium a lens shows a focal length of `ratio` times the stated one: sea water has the refractive index 1.34,
 /// by which a flat window in front of the lens multiplies the focal length (Treibitz et al. 2012).
 pub(crate) fn medium_of_lens(ratio: f64) -> &'static str {
-    const WATER: f64 = 1.34;
-    const NEAR: f64 = 0.04;
     match ratio {
         r if (r / WATER - 1.0).abs() < NEAR => ". A lens of air shows this factor in water",
         r if (r * WATER - 1.0).abs() < NEAR => ". A lens of water shows this factor in air",

@@ -1,12 +1,10 @@
 //! An operator's word before each motion.
 
 use crate::plan::Path;
+use crate::session::constants::approval::HOLD_S;
 use crate::session::motion::Driver;
 use crate::session::{Approval, MotionAhead, SessionError};
 use armcal_core::streams::LogLevel;
-
-/// How long a held arm waits before it asks again, s.
-const HOLD_S: f64 = 5.0;
 
 impl Driver<'_> {
     /// Comes back when the motion may begin.

@@ -7,6 +7,7 @@ use crate::plan::{
     VisibilityModel, choose_poses,
 };
 use crate::session::SessionError;
+use crate::session::constants::capture::{FIRST_RENEWAL, LEAST_VIEWS, MOST_IN_VAIN, SPARE_TRIES, TRUST_IN_ADVANCE};
 use crate::session::outcome::{EstimateUpdate, Visit};
 use crate::session::runner::ScriptRunner;
 use armcal_core::robot::Robot;
@@ -14,18 +15,6 @@ use armcal_core::routine::CaptureSettings;
 use armcal_core::stats::stream_rng;
 use armcal_core::streams::{CaptureSet, JointAngles, JointCounts, LogLevel, MarkKind, Phase};
 use armcal_core::time::Stamp;
-
-/// A second look at the margins comes early: the first few views tell most.
-const FIRST_RENEWAL: usize = 3;
-/// Tries at poses, beside those wanted, after which a capture goes no further.
-const SPARE_TRIES: usize = 10;
-/// So many poses in a row at which the arm did not settle, or met something on its way, end a capture.
-const MOST_IN_VAIN: usize = 6;
-/// Sightings as predicted that a tag is given in advance.
-const TRUST_IN_ADVANCE: f64 = 2.0;
-
-/// With fewer views no calibration begins: then it is the reason why there are no more that matters.
-const LEAST_VIEWS: usize = 3;
 
 /// A capture under way.
 struct CaptureRun<'a> {

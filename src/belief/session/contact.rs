@@ -6,34 +6,13 @@
 //! goes with the motion (De Luca and Mattone 2003 do it with momentum, for arms that measure torques; this one measures
 //! angles alone).
 
+use crate::session::constants::contact::{
+    FIRST_LAG_S, FIRST_REST_RAD, FIRST_WEIGHT, MAX_PERIODS, MOVING, NO_TOUCH, NOISE_SIGMAS, PERSISTS_S, RATE_MEMORY_S,
+    REACHABLE, REMEMBERED, RESTING, UNUSUAL,
+};
 use crate::session::settling::NEAR_RAD;
 use armcal_core::robot::Robot;
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
-
-/// A joint must be off for this long: spikes of a worn sensor are shorter, s.
-const PERSISTS_S: f64 = 0.08;
-/// Periods that are looked back at most.
-const MAX_PERIODS: usize = 32;
-/// Multiple of what has been usual that is no longer usual.
-const UNUSUAL: f64 = 2.5;
-/// Share of the distance within which a joint counts as at its set-point that is no touch, whatever has been usual.
-const NO_TOUCH: f64 = 0.5;
-/// What is taken for usual until something has been learnt: seconds behind a moving set-point, and distance from a
-/// resting one.
-const FIRST_LAG_S: f64 = 0.3;
-const FIRST_REST_RAD: f64 = 0.02;
-/// Edges that this first guess weighs as much as, and edges that are remembered.
-const FIRST_WEIGHT: f64 = 2.0;
-const REMEMBERED: f64 = 30.0;
-/// A set-point's rate is still felt for about this long after it has gone down, s.
-const RATE_MEMORY_S: f64 = 0.4;
-/// Shares of the joint's rate above which a lag is learnt, and below which an error at rest is.
-const MOVING: f64 = 0.15;
-const RESTING: f64 = 0.01;
-/// No joint turns faster than this many times its rate: readings that do have jumped, and say nothing of the joint.
-const REACHABLE: f64 = 3.0;
-/// Nor do they by noise, standard deviations.
-const NOISE_SIGMAS: f64 = 8.0;
 
 /// A joint that is where nothing but a touch explains it.
 #[derive(Clone, Copy, Debug, PartialEq)]

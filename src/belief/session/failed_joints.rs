@@ -5,16 +5,13 @@ use crate::file::calibration::Calibration;
 use crate::file::failed_joint::FailedJointTable;
 use crate::plan::{JointErrorBounds, PlanError, TargetRequest, plan_targets};
 use crate::session::SessionError;
+use crate::session::constants::failed_joints::{AT_REST_RAD, SIGMAS};
 use crate::session::held_joint::{HeldJoint, hold_in, holding_bounds};
 use crate::session::outcome::{Epoch, StillReachable};
 use crate::session::runner::ScriptRunner;
 use crate::session::tool_belief::Certainty;
 use armcal_core::robot::FailedKind;
 use armcal_core::streams::JointAngles;
-
-/// Multiple of one sigma of a joint's angle that is kept clear for, and what an arm at rest stands off besides, rad.
-const SIGMAS: f64 = 4.0;
-const AT_REST_RAD: f64 = 0.0016;
 
 impl ScriptRunner<'_, '_> {
     /// Takes account of joints that were given up since it was last asked; whether there are any.

@@ -1,14 +1,9 @@
 //! Whether the arm moves as much oil as its set-points ask for: a pump far below the datasheet's figure leaves it
 //! behind.
 
+use crate::session::constants::flow::{S_PER_MIN, SOUND_SHARE, SPAN_S};
 use armcal_core::robot::Robot;
 use armcal_core::streams::JointAngles;
-
-/// Flow is that of a span of so long, s.
-const SPAN_S: f64 = 0.5;
-/// A sound arm lags, and yet moves most of the oil that it is asked to move.
-const SOUND_SHARE: f64 = 0.6;
-const S_PER_MIN: f64 = 60.0;
 
 /// The largest flows so far.
 pub(crate) struct FlowWatch {

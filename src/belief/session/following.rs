@@ -6,30 +6,13 @@
 //! the set-point left (`locked`). A joint in cold oil starts late, so that this takes three suspected contacts and a
 //! set-point that has gone far: at the third the joint is probed, and the contact not obeyed until it moves or has not.
 
+use crate::session::constants::following::{
+    DECISIVE_RAD, FLICKERS, LEAPT_S, LEFT_RAD, NEAR_RAD, NOISE_SIGMAS, NOISY_COUNTS, REACHABLE, REST_S, SAME_S,
+    SUSPECTED,
+};
 use armcal_core::robot::{FailedKind, Robot};
 use armcal_core::sensor::wrap_symmetric;
 use armcal_core::streams::JointCounts;
-
-/// A word that is the same for this long, while the set-point leaves by `LEFT_RAD`, is stuck, s.
-const SAME_S: f64 = 0.15;
-const LEFT_RAD: f64 = 0.03;
-/// A word that leapt and stood still for so long is dead: spikes are shorter, s.
-const LEAPT_S: f64 = 0.3;
-/// A joint has been at rest when reading and set-point stood still, near each other, for so long, s.
-const REST_S: f64 = 0.3;
-const NEAR_RAD: f64 = 0.02;
-/// Readings of a joint at rest lie within so many standard deviations of the noise, and two counts.
-const NOISE_SIGMAS: f64 = 10.0;
-/// No joint turns faster than this many times its rate.
-const REACHABLE: f64 = 3.0;
-/// A sensor with less noise may read the same for long, counts; as may one whose word did not flicker for so many
-/// periods at rest.
-const NOISY_COUNTS: f64 = 1.0;
-const FLICKERS: u32 = 30;
-/// Suspected contacts of a joint that has not moved, after which it is probed.
-const SUSPECTED: u32 = 2;
-/// A joint that has not moved while its set-point went so far, and three times as far as noise does, is locked, rad.
-const DECISIVE_RAD: f64 = 0.1;
 
 /// Follows set-points and words, one pair a control period.
 pub(crate) struct FollowWatch {

@@ -1,18 +1,12 @@
 //! Opens and closes the gripper, and keeps room for open jaws.
 
+use crate::session::constants::grip::{ARRIVED_M, AS_AT_REST_M, PATIENCE_S};
 use std::rc::Rc;
 
 use crate::plan::{ClearanceModel, grips_at_first};
 use crate::session::SessionError;
 use crate::session::runner::ScriptRunner;
 use armcal_core::streams::{GripperCommand, LogLevel, Mark, MarkKind, Message};
-
-/// The jaws are where they were told within this, m.
-const ARRIVED_M: f64 = 1e-3;
-/// Waited beyond twice the closing time, s.
-const PATIENCE_S: f64 = 2.0;
-/// Jaws that are told less than this beyond rest are at rest, m.
-const AS_AT_REST_M: f64 = 1e-6;
 
 impl ScriptRunner<'_, '_> {
     /// Drives the jaws to `opening`, 0 (closed) .. 1 (open), and waits until they are there. From then on the arm keeps

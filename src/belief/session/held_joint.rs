@@ -5,17 +5,11 @@
 //! everything for all angles that it may have.
 
 use crate::plan::JointErrorBounds;
+use crate::session::constants::held_joint::{BOUND_SIGMAS, CREEP_RAD_PER_S, OLD_S};
 use armcal_core::robot::{FailedKind, Robot};
 use armcal_core::sensor::{ArmSensors, Correction, Terms};
 use armcal_core::streams::{JointAngles, JointCounts};
 use armcal_core::time::Stamp;
-
-/// A bound is this many sigma.
-const BOUND_SIGMAS: f64 = 4.0;
-/// How far a joint may creep while its valve is shut, one sigma: 1 deg an hour. Assumed.
-const CREEP_RAD_PER_S: f64 = 4.85e-6;
-/// Where a joint was found this long ago is looked for again where it matters, s.
-const OLD_S: f64 = 1800.0;
 
 /// A joint of which no plan makes use any more.
 #[derive(Clone, Debug, PartialEq)]

@@ -3,6 +3,7 @@
 use crate::plan::JointErrorBounds;
 use crate::say::finding::FindingKind;
 use crate::session::SessionError;
+use crate::session::constants::keeping_up::LOCATING_POSES;
 use crate::session::held_joint::{HeldJoint, StandingJoint};
 use crate::session::online_belief::{AskedPoses, OnlineBelief, OnlineOutcome};
 use crate::session::outcome::Epoch;
@@ -12,9 +13,6 @@ use crate::session::tool_belief::Certainty;
 use armcal_core::robot::FailedKind;
 use armcal_core::routine::{CalibrateSettings, CalibrateViews, CaptureSettings, OnRefusal, WorkSettings};
 use armcal_core::streams::{JointAngles, LogLevel, PriorSource};
-
-/// Poses that tell where a joint stands, and enough for a verdict.
-const LOCATING_POSES: u32 = 14;
 
 impl ScriptRunner<'_, '_> {
     /// Follows the recording from its start, and what comes from now on: as the arm is believed to be by its links and

@@ -11,6 +11,7 @@ mod annotations;
 mod approval;
 mod belief_update;
 mod capture;
+pub(crate) mod constants;
 mod contact;
 mod end_stops;
 mod error;

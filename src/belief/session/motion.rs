@@ -1,6 +1,7 @@
 //! Drives an arm along believed angles and waits until its own sensors say that it stands, or that it has met
 //! something.
 
+use crate::session::constants::motion::{BACK_OUT_SLOWNESS, BELIEF_EVERY, REST_S, SETTLE_LIMIT_S, WAIT_STRIDE_S};
 use nalgebra::Vector3;
 
 use crate::plan::{Edge, Path, Timing};
@@ -58,16 +59,6 @@ pub enum MotionOutcome {
         at: JointAngles,
     },
 }
-
-/// Backing out takes so many times as long as coming did.
-const BACK_OUT_SLOWNESS: f64 = 2.5;
-/// The arm counts as settled when it has stood for this long, s.
-const REST_S: f64 = 0.4;
-/// A long wait is asked at this distance whether it shall go on, s.
-const WAIT_STRIDE_S: f64 = 600.0;
-const SETTLE_LIMIT_S: f64 = 12.0;
-/// Believed angles and commands are recorded each so many control periods.
-const BELIEF_EVERY: u64 = 4;
 
 /// What is looked out for on the way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,13 +2,11 @@
 
 use crate::plan::{TargetRequest, plan_targets};
 use crate::session::SessionError;
+pub(crate) use crate::session::constants::reach::REACH_DWELL_S;
 use crate::session::outcome::SkippedTarget;
 use crate::session::runner::ScriptRunner;
 use armcal_core::routine::ReachSettings;
 use armcal_core::streams::{JointAngles, LogLevel, MarkKind, Phase, ReachAttempt};
-
-/// How long the arm is watched at a target, s.
-pub(crate) const REACH_DWELL_S: f64 = 0.6;
 
 /// Where the arm is to go, or has come to rest; or why not.
 pub(crate) type OrReason<T> = Result<T, String>;

@@ -3,6 +3,7 @@
 
 use crate::plan::{JointErrorBounds, Path, UnknownScale};
 use crate::session::SessionError;
+use crate::session::constants::scale_identification::{DWELL_S, LOCAL_SLOPE, SHRINK, SIGMAS};
 use crate::session::motion::MotionOutcome;
 use crate::session::runner::ScriptRunner;
 use crate::views::association::associate;
@@ -11,15 +12,6 @@ use armcal_core::robot::Robot;
 use armcal_core::routine::IdentifySettings;
 use armcal_core::sensor::ArmSensors;
 use armcal_core::streams::{JointAngles, LogLevel, MarkKind, Phase};
-
-/// How long each view of an excursion is watched, s.
-const DWELL_S: f64 = 1.0;
-/// What the sensor's nonlinearity may bend the slope by over a short excursion, relative.
-const LOCAL_SLOPE: f64 = 0.03;
-/// Multiple of one sigma that is kept clear for.
-const SIGMAS: f64 = 3.0;
-/// An excursion that is not clear is tried again at this share of its size.
-const SHRINK: f64 = 0.75;
 
 impl ScriptRunner<'_, '_> {
     pub(crate) fn identify(&mut self, step: usize, settings: &IdentifySettings) -> Result<(), SessionError> {

@@ -1,5 +1,6 @@
 //! The steps of a routine's script, carried out in order.
 
+use crate::session::constants::script::{LINK_REACH_M, START_SHARES};
 use std::rc::Rc;
 
 use crate::batch::calibrate::calibrate;
@@ -19,12 +20,6 @@ use armcal_core::routine::{AssertFigure, AssertLimits, CalibrateSettings, Calibr
 use armcal_core::sensor::ArmSensors;
 use armcal_core::stats::stream_rng;
 use armcal_core::streams::{Arm, JointAngles, LogLevel, Mark, MarkKind, Message, Phase, ReachAttempt};
-
-/// Shares of the clearance that are tried in this order for a path from a place that the whole of it does not let the
-/// arm leave.
-const START_SHARES: [f64; 3] = [0.5, 0.2, 0.05];
-/// How far from a joint the arm may be that its link's turn moves, m.
-const LINK_REACH_M: f64 = 2.0;
 
 /// Carries out the routine's script.
 ///

@@ -1,15 +1,8 @@
 //! When an arm stands still, by its own noisy sensors.
 
+pub(crate) use crate::session::constants::settling::NEAR_RAD;
+use crate::session::constants::settling::{NOISE_SIGMAS, SMOOTHING, STILL_RAD};
 use armcal_core::streams::JointAngles;
-
-/// No sensor, smoothed, has moved by more than this, rad, and by what its own noise leaves of it ...
-const STILL_RAD: f64 = 0.0008;
-/// ... while it was this near to its set-point (a controller may leave a steady error), rad.
-pub(crate) const NEAR_RAD: f64 = 0.02;
-/// Share of a new reading in the smoothed one: a tenth of a second at 100 Hz.
-const SMOOTHING: f64 = 0.1;
-/// Multiple of a smoothed reading's own deviation that is no motion.
-const NOISE_SIGMAS: f64 = 4.0;
 
 /// Follows the readings since the arm was told to stop.
 pub(crate) struct SettlingDetector {

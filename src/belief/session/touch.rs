@@ -4,6 +4,10 @@
 //! believed arm alone is kept clear of everything but the touched part, for a contact is what it comes for. It feels
 //! it as its readings staying behind the set-point by more than on the free way before (`TouchDetector`).
 
+use crate::session::constants::touch::{
+    BACK_SPEED_M_S, BEYOND_M, HELD_UP_M, HELD_UP_SIGMAS, IK_TOLERANCE_M, LASTS_S, LEARNT_BEFORE_M, MAX_STRIDE_RAD,
+    PART_CLEARANCE_M, RANDOM_SEEDS, REST_CLEARANCE_M, REST_S, SMOOTHING_S, SPEED_M_S, STRIDE_M, UNTOLD,
+};
 use nalgebra::{Matrix3, Vector3};
 use rand::RngExt;
 
@@ -15,28 +19,6 @@ use armcal_core::kinematics::{IkGoal, IkSettings, solve_position};
 use armcal_core::routine::TouchSettings;
 use armcal_core::streams::{JointAngles, LogLevel, Message, Phase, ToolTouch};
 
-/// The tip goes on behind the drawn surface by at most this much, m.
-const BEYOND_M: f64 = 0.05;
-/// What is usual is learnt up to here before the drawn surface, m.
-const LEARNT_BEFORE_M: f64 = 0.035;
-/// Of the tip on its way to the surface, and back, m/s.
-const SPEED_M_S: f64 = 0.006;
-const BACK_SPEED_M_S: f64 = 0.02;
-/// Distance of the configurations that are solved for on the way, m.
-const STRIDE_M: f64 = 0.005;
-/// Largest change of a joint over such a stride, rad: else the way has two branches.
-const MAX_STRIDE_RAD: f64 = 0.05;
-/// What the believed arm keeps clear on the slow way, m: of the touched part with all but its tip, and of the rest.
-const PART_CLEARANCE_M: f64 = 0.008;
-const REST_CLEARANCE_M: f64 = 0.004;
-/// Starts of the inverse kinematics beside where the arm is.
-const RANDOM_SEEDS: usize = 40;
-const IK_TOLERANCE_M: f64 = 1e-6;
-/// Until the pressed arm stands, s.
-const REST_S: f64 = 1.0;
-/// Weight of directions that no touch has told yet over those that one has.
-const UNTOLD: f64 = 100.0;
-
 /// Finds when the tool no longer follows.
 #[derive(Clone, Debug)]
 struct TouchDetector {
@@ -46,15 +28,6 @@ struct TouchDetector {
     learnt: (f64, f64, f64),
     behind_s: f64,
 }
-
-/// A tool this far behind what is usual has been held up, m ...
-const HELD_UP_M: f64 = 0.0015;
-/// ... if it is more than so many standard deviations of the free way ...
-const HELD_UP_SIGMAS: f64 = 6.0;
-/// ... for this long, s.
-const LASTS_S: f64 = 0.1;
-/// Of the smoothing, s.
-const SMOOTHING_S: f64 = 0.1;
 
 impl TouchDetector {
     fn new(period_s: f64) -> Self {

@@ -1,5 +1,6 @@
 //! The arm as believed, as transforms for viewers.
 
+use crate::session::constants::transforms::{REST_SPACING_S, SPACING_S, STEP_RAD};
 use nalgebra::{Isometry3, UnitQuaternion};
 
 use armcal_core::kinematics::{Attachment, Chain, LinkPoses};
@@ -7,13 +8,6 @@ use armcal_core::log::ros::{TfMessage, TransformStamped};
 use armcal_core::robot::{FrameTree, Robot};
 use armcal_core::streams::{JointAngles, JointStateBelief};
 use armcal_core::time::Stamp;
-
-/// Least time between two messages, s: viewers draw no more.
-const SPACING_S: f64 = 0.1;
-/// Most time between two of a resting arm, s.
-const REST_SPACING_S: f64 = 2.0;
-/// An arm of which no joint left its drawn angle by more is at rest, rad: 1 mm at 2 m.
-const STEP_RAD: f64 = 5e-4;
 
 /// Where the links that move and the camera are believed to be, at most ten times a second.
 pub struct BelievedFrames {

@@ -7,6 +7,7 @@
 //! temperature) is there again at every new pose; at the tool it is added from the datasheet's linearity, or from more
 //! than that where the residuals say that the sensors are worse than their datasheet.
 
+use crate::solve::constants::covariance::DISTANCE_FLOOR_M;
 use nalgebra::{Const, DMatrix, DVector, Dyn, Matrix3, Matrix6, OMatrix, Vector3, Vector6};
 
 use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
@@ -51,9 +52,6 @@ pub struct ToolErrorPrediction {
     /// One by one.
     pub targets: Vec<TargetPrediction>,
 }
-
-/// Distances below this do not make the objective's curvature larger: it is where pixel noise sits, m.
-const DISTANCE_FLOOR_M: f64 = 1e-4;
 
 /// Errors that all views share.
 #[derive(Clone, Debug)]

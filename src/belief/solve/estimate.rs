@@ -1,6 +1,7 @@
 //! The estimate from start to end: a robust start, what does not belong left out, the scales by evidence, the rest by
 //! least squares.
 
+use crate::solve::constants::estimate::{CONSISTENT_COST, CONVERGED_CHANGE, CORNER_WIDTH, MAX_ROUNDS};
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Vector6};
 
 use crate::measure::{ObservationTerm, WeightedMeasurement};
@@ -46,13 +47,6 @@ pub struct Estimate<'a> {
     /// Sum of squared whitened residuals, priors and views' own errors included.
     pub cost_final: f64,
 }
-
-const CORNER_WIDTH: f64 = 3.0;
-/// Cost per used measurement above which something does not hold. Good views have about one (corner noise is not quite
-/// normal).
-const CONSISTENT_COST: f64 = 3.0;
-const MAX_ROUNDS: usize = 40;
-const CONVERGED_CHANGE: f64 = 0.01;
 
 /// Estimates; `None` where the views determine nothing at all (no cost that is finite).
 #[must_use]

@@ -4,6 +4,8 @@
 //! are told by the data, and `s^2 = (sum x^2 + nu s0^2) / (gamma + nu)` (MacKay 1992, eq. 4.9), with nu
 //! pseudo-observations of the datasheet's s0. The noise: `(sum chi^2 + nu) / (N - gamma_all + nu)`.
 
+use crate::solve::constants::evidence::{FEW, NU_CAMERA, NU_LINK, NU_NOISE, NU_SHAPE, NU_TERM, STEP};
+pub(crate) use crate::solve::constants::evidence::{NOISE_BOUNDS, NU_JOINT, POSITION_BOUNDS, SCALE_BOUNDS};
 use nalgebra::{Cholesky, DMatrix, Dyn};
 
 use crate::measure::WeightedMeasurement;
@@ -42,19 +44,6 @@ pub(crate) struct Marginal {
     pub factor: f64,
 }
 
-/// Pseudo-observations that the first guess of each scale counts for.
-pub(crate) const NU_JOINT: f64 = 3.0;
-const NU_SHAPE: f64 = 2.0;
-const NU_TERM: f64 = 2.0;
-const NU_LINK: f64 = 2.0;
-const NU_NOISE: f64 = 20.0;
-const NU_CAMERA: f64 = 6.0;
-/// Bounds of the noise's factor, and of every other scale over its first guess.
-pub(crate) const NOISE_BOUNDS: [f64; 2] = [0.1, 30.0];
-/// Of positions and rotations over their first guess, which nobody stated.
-pub(crate) const POSITION_BOUNDS: [f64; 2] = [1e-3, 1e3];
-pub(crate) const SCALE_BOUNDS: [f64; 2] = [0.02, 50.0];
-
 impl Posterior {
     /// `None` where the normal equations have no inverse.
     pub(crate) fn of(problem: &BundleProblem<'_>, normal: &NormalEquations) -> Option<Self> {
@@ -78,9 +67,6 @@ impl Posterior {
         Some(Self { covariance, own, by_common })
     }
 }
-
-/// A column with less than one entry in so many goes by its entries alone: a view sees few of many tags.
-const FEW: usize = 4;
 
 /// `b^T N^-1 b` of each column b of `right`, by the factor of N or by its inverse, the covariance.
 fn squares_over(factor: &Cholesky<f64, Dyn>, covariance: &DMatrix<f64>, mut right: DMatrix<f64>) -> Vec<f64> {
@@ -426,7 +412,6 @@ impl NoiseKind {
 /// times `1 + e`, chi-square grows by `e` times its part, and `ln det` of the normal matrix, the views' own parameters
 /// with it, by `ln (1 + e)` times the parameters told.
 fn share_of(problem: &BundleProblem<'_>, state: &State, normal: &NormalEquations, kind: NoiseKind) -> (f64, f64) {
-    const STEP: f64 = 1e-3;
     let mut stiffer = problem.clone();
     let by = |wanted: NoiseKind| if kind == wanted { 1.0 + STEP } else { 1.0 };
     stiffer.weigh_positions([by(NoiseKind::Position), by(NoiseKind::Rotation)]);

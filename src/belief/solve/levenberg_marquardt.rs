@@ -4,6 +4,7 @@
 //! its steps overshoot to and fro along one direction, each by the same share. So what a step gained tells the
 //! curvature along it, and the next step is as much shorter, if it only goes back (the secant's rule along a line).
 
+use crate::solve::constants::levenberg_marquardt::{COST_AT_PRIORS, GOES_BACK, OVERSHOT, ROUNDING, SLACK};
 use nalgebra::{Cholesky, DMatrix, DVector, Vector6};
 
 use crate::model::state::State;
@@ -15,17 +16,10 @@ use armcal_core::numeric::{Damping, LeastSquares, Loss, Outcome, Proposal, StopR
 use armcal_core::spatial::exp;
 
 const DAMPING: Damping = Damping { first: 1e-6, min: 1e-14, max: 1e12, down: 0.1, up: 10.0, min_after_rejection: 0.0 };
-/// Near the end a step may cost a few last digits; relative error of a sum of thousands of squares.
-const SLACK: f64 = 1e-13;
-const ROUNDING: f64 = 1e-11;
 
 pub(crate) const TIGHT: StopRule = until(100, 1e-15);
 /// While scales or weights still change.
 pub(crate) const LOOSE: StopRule = until(20, 1e-6);
-
-/// Where every observation is rejected the priors alone are left, whose least cost is zero: no step ever saves too
-/// small a share of it. Below this cost, a sum of squares in standard deviations, all is within 1e-6 of the priors.
-const COST_AT_PRIORS: f64 = 1e-12;
 
 /// Until one more step would save less than `predicted_gain` of the cost.
 pub(crate) const fn until(max_iterations: usize, predicted_gain: f64) -> StopRule {
@@ -79,11 +73,6 @@ impl LastStep {
         if cosine < GOES_BACK { 1.0 / self.curvature } else { 1.0 }
     }
 }
-
-/// From this curvature on a step has overshot: it saved less than half of what it should.
-const OVERSHOT: f64 = 1.5;
-/// Cosine of the angle between two steps, the second of which goes back along the first.
-const GOES_BACK: f64 = -0.9;
 
 impl LeastSquares for Solver<'_, '_> {
     fn cost(&self) -> f64 {

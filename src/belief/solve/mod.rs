@@ -7,6 +7,7 @@
 pub(crate) mod body_columns;
 pub(crate) mod body_motion;
 pub(crate) mod body_twists;
+pub(crate) mod constants;
 pub(crate) mod covariance;
 pub(crate) mod details;
 pub(crate) mod estimate;

@@ -3,6 +3,7 @@
 use crate::model::blocks::{Block, Shown};
 use crate::model::estimated::Model;
 use crate::model::parameters::ParameterKind;
+pub use crate::solve::constants::model_for_views::MIN_GRIPPER_VIEWS;
 use crate::views::view::View;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::{Conditions, N_SHAPE};
@@ -11,9 +12,6 @@ use armcal_core::sensor::{Conditions, N_SHAPE};
 pub(crate) fn shape_kinds() -> impl Iterator<Item = ParameterKind> {
     (0..N_SHAPE).map(|h| ParameterKind::Shape(h as u8))
 }
-
-/// Fewer views of the tag on the gripper are not used.
-pub const MIN_GRIPPER_VIEWS: usize = 4;
 
 /// Model by what the recording can tell: terms whose cause did not change have no column.
 #[must_use]

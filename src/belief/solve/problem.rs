@@ -1,5 +1,6 @@
 //! What is solved: views and observations in the form that the loops want, with columns and priors.
 
+use crate::solve::constants::problem::CORNER_PRIOR_DOF;
 use std::ops::Range;
 
 use nalgebra::{DVector, Isometry3, SMatrix, Vector3};
@@ -62,9 +63,6 @@ pub(crate) struct BundleProblem<'a> {
 pub(crate) const N_VIEW_PARAMETERS: usize = MAX_JOINTS + 6;
 /// Of a view's own parameters by one another.
 pub(crate) type Own = SMatrix<f64, N_VIEW_PARAMETERS, N_VIEW_PARAMETERS>;
-
-/// Degrees of freedom that the corner noise by robot.toml counts for, beside the scatter between a view's frames.
-const CORNER_PRIOR_DOF: f64 = 16.0;
 
 impl<'a> BundleProblem<'a> {
     pub(crate) fn new(input: &BundleInput<'a>, prior: Prior) -> Self {

@@ -3,16 +3,13 @@
 use crate::model::estimated::Model;
 use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::model::scales::Hyperparameters;
+use crate::solve::constants::robust_start::{START_STD_M, START_WIDTH};
 use crate::solve::input::BundleInput;
 use crate::solve::levenberg_marquardt::{LOOSE, solve};
 use crate::solve::problem::{BundleProblem, parameters_of};
 use crate::views::view::TagMeasurement;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::numeric::Loss;
-
-/// Standard deviations of the tags' positions in the robust start, one after the other, m.
-const START_STD_M: [f64; 3] = [0.3, 0.1, 0.03];
-const START_WIDTH: f64 = 1.0;
 
 /// Where the estimate starts.
 pub(crate) struct RobustStart {

@@ -4,12 +4,10 @@
 //! one sigma of the time error. Its inverse is `D^-1 - u u^T / (1 + s)`, `u = D^-1 j`, `s = j^T u` (Sherman and
 //! Morrison 1950).
 
+use crate::solve::constants::time_error::LEAST_OWN_VAR;
 use nalgebra::{SMatrix, SVector};
 
 use crate::solve::problem::{BundleProblem, N_VIEW_PARAMETERS, ViewData};
-
-/// Of what a joint of a moving arm is off by itself, rad^2: the inverse takes differences.
-const LEAST_OWN_VAR: f64 = 1e-14;
 
 /// What the time error takes off the information on a view's own parameters.
 #[derive(Clone, Debug)]

@@ -4,6 +4,11 @@
 //! without those that stay far off, with a loss that is quadratic for all but the rarest of honest residuals, so that
 //! the answer is as good as least squares.
 
+pub(super) use crate::tagmap::constants::adjust::MAX_STEPS;
+use crate::tagmap::constants::adjust::{
+    AT_REST, CAUCHY_WIDTH, CONVERGED, FIRST_WIDTH, HUBER_WIDTH, MAX_ITERATIONS, MEDIAN_OF_LENGTH, ROUGHLY, ROUNDING,
+    SCALE_BOUNDS,
+};
 use nalgebra::{Isometry3, Vector6};
 
 use crate::tagmap::linearize::{cost, squares};
@@ -12,32 +17,7 @@ use crate::tagmap::problem::{Block, MapProblem};
 use armcal_core::numeric::{self, Damping, LeastSquares, Loss, Outcome, Proposal, Stop, StopRule};
 use armcal_core::spatial::exp;
 
-/// Width of the Cauchy loss, in standard deviations found (Zhang 1997: 2.385 costs 5 % of efficiency; it is the start
-/// alone).
-const CAUCHY_WIDTH: f64 = 2.385;
-/// The very first loss, whose pull does not fade.
-const FIRST_WIDTH: f64 = 1.345;
-/// Corners to here count fully in the end; one in 3000 honest ones lies beyond.
-const HUBER_WIDTH: f64 = 4.0;
-/// Bounds of the scale that is taken from the residuals, over the corners' standard deviation given: a detector's noise
-/// lies well within; what lies beyond is a wrong model. Assumed.
-const SCALE_BOUNDS: (f64, f64) = (0.02, 50.0);
-/// The median of the length of a two-dimensional unit normal vector is sqrt(2 ln 2).
-const MEDIAN_OF_LENGTH: f64 = 1.177_41;
-const MAX_ITERATIONS: usize = 50;
-/// Of all adjustments of a map. Views that fit each other take 10 to 40; those that contradict each other never rest.
-pub(super) const MAX_STEPS: usize = 250;
-/// Steps that change the cost by less than this share of it end an adjustment.
-const CONVERGED: f64 = 1e-14;
-/// A chi-square that still falls by less than this a step moves nothing by a noticeable share of its standard
-/// deviation. A loss that is not quadratic converges no faster than this where a few detections lie beyond its width.
-const AT_REST: f64 = 1e-3;
-/// Where only a start is wanted.
-const ROUGHLY: f64 = 1e-3;
-
 const DAMPING: Damping = Damping { first: 1e-6, min: 1e-12, max: 1e12, down: 0.1, up: 10.0, min_after_rejection: 1e-6 };
-/// Below this share of the cost it is rounding, not the model, that stands in the way.
-const ROUNDING: f64 = 1e-12;
 
 /// Lowers the cost from the state of `problem` on; whether it came to rest.
 pub(super) fn minimize(problem: &mut MapProblem<'_>, loss: Loss, converged: f64) -> bool {

@@ -1,5 +1,6 @@
 //! From the solved problem to the map.
 
+use crate::tagmap::constants::assemble::FAR_FROM_KNOWN;
 use armcal_core::codes::{Code, Warning};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -108,9 +109,6 @@ fn doubts(problem: &MapProblem<'_>) -> Vec<Warning> {
     }
     out
 }
-
-/// Chi-square of 6 degrees of freedom, 99.99 %.
-const FAR_FROM_KNOWN: f64 = 27.86;
 
 fn is_used(problem: &MapProblem<'_>, range: std::ops::Range<usize>) -> bool {
     problem.observations[range].iter().any(|seen| seen.is_used)

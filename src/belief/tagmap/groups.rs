@@ -1,5 +1,6 @@
 //! From tags and observations to groups with a frame each, and to the unknowns of the adjustment.
 
+use crate::tagmap::constants::groups::LEAST_STD;
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Isometry3, Vector6};
@@ -8,9 +9,6 @@ use crate::tagmap::localize::localize;
 use crate::tagmap::problem::{Block, Extra, MapProblem, Observation, PosePrior, TagState};
 use crate::tagmap::result::GroupFrame;
 use crate::tagmap::types::{Body, MapSettings};
-
-/// Tighter than this a place on a body cannot be known: m and rad.
-const LEAST_STD: f64 = 1e-7;
 
 /// A tag, its known place in the group's frame, and the standard deviations of that.
 type Place = (usize, Isometry3<f64>, Option<[f64; 6]>);

@@ -5,6 +5,7 @@
 //! are located by all placed tags in them, and it is put where its images, together, want it. Neighbours then agree to
 //! a few pixels however long the chain, which the adjustment needs.
 
+use crate::tagmap::constants::incremental_layout::MAX_IMAGES;
 use nalgebra::Isometry3;
 
 use crate::tagmap::localize::{localize, place_tag, refine_tag, tag_cost};
@@ -12,9 +13,6 @@ use crate::tagmap::problem::Observation;
 use crate::tagmap::tag_pairs::{Pairs, consensus};
 use crate::tagmap::vote::is_finite;
 use armcal_core::optics::CameraModel;
-
-/// Images that place a tag; more change little but the time. Assumed.
-const MAX_IMAGES: usize = 24;
 
 /// What growing looks at.
 struct Growing<'a> {

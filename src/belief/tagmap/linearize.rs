@@ -4,6 +4,7 @@
 //! `pixel = project(X c)`, X = V^-1 T. Both poses are perturbed on the right, and a motion of the tag is one of the
 //! camera the other way: `xi_V = -Ad(X) xi_T`. Residual = whitened (measured - predicted).
 
+use crate::tagmap::constants::linearize::UNSEEN_SIGMAS;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix6, Point3, Vector2, Vector6};
@@ -16,9 +17,6 @@ use crate::tagmap::sparse::Pattern;
 use armcal_core::numeric::Loss;
 use armcal_core::optics::CameraModel;
 use armcal_core::spatial::{adjoint, log};
-
-/// A corner that the lens does not see counts as one that is this many standard deviations off.
-const UNSEEN_SIGMAS: f64 = 1e4;
 
 /// Whitened residuals of the four corners; `None` for one that the lens does not see.
 pub(super) fn residuals(

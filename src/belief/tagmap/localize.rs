@@ -1,5 +1,6 @@
 //! Where the camera was, by the tags of one image whose places are known; and the same for a tag by its images.
 
+use crate::tagmap::constants::localize::{COMPARE_PX, MAX_IMAGES};
 use nalgebra::{Isometry3, Matrix6, Point3, Vector6};
 
 use crate::measure::{ImagePoint, TwistSums};
@@ -8,9 +9,6 @@ use crate::tagmap::problem::Observation;
 use armcal_core::numeric::{Damping, LeastSquares, Loss, Proposal, StopRule, minimize};
 use armcal_core::optics::CameraModel;
 use armcal_core::spatial::{adjoint, exp};
-
-/// Width of the Cauchy loss by which starts are compared, px: a start is a few pixels off, a wrong one tens.
-const COMPARE_PX: f64 = 5.0;
 
 /// How badly poses fit: the Cauchy loss over all corners, in squared pixels.
 fn cost(camera: &CameraModel, camera_from_tag: &Isometry3<f64>, seen: &Observation) -> f64 {
@@ -132,7 +130,6 @@ pub(super) fn place_tag(
     cameras: &[CameraModel],
     images: &[(&Observation, Isometry3<f64>)],
 ) -> Option<(Isometry3<f64>, f64)> {
-    const MAX_IMAGES: usize = 40;
     let some: Vec<_> =
         (0..images.len().min(MAX_IMAGES)).map(|k| &images[k * images.len() / images.len().min(MAX_IMAGES)]).collect();
     let mut best: Option<(Isometry3<f64>, f64)> = None;

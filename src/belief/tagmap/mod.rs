@@ -2,14 +2,14 @@
 //!
 //! `screen` validates detections and solves each square; `vote`, `initial_guess` and `incremental_layout` lay out
 //! groups of tags; `linearize`, `normal_equations`, `sparse` and `adjust` are the bundle adjustment on corner pixels
-//! (Triggs et al. 2000); `result` is the map with its accuracy; `scale` finds wrong tag sizes. `tag_mapping` maps the tags of a
-//! calibration; `files` reads and writes
-//! files of tags and cameras, `recording` gets views from recordings.
+//! (Triggs et al. 2000); `result` is the map with its accuracy; `scale` finds wrong tag sizes. `tag_mapping` maps the
+//! tags of a calibration; `files` reads and writes files of tags and cameras, `recording` gets views from recordings.
 
 mod adjust;
 mod assemble;
 mod attitude;
 mod check;
+pub(crate) mod constants;
 mod groups;
 mod incremental_layout;
 mod initial_guess;

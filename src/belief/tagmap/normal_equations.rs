@@ -1,5 +1,6 @@
 //! Normal equations of the map and the Schur complement that eliminates the views.
 
+use crate::tagmap::constants::normal_equations::UNDETERMINED;
 use std::sync::Arc;
 
 use nalgebra::{Matrix6, Vector6};
@@ -90,10 +91,6 @@ impl NormalEquations {
         inverse * right
     }
 }
-
-/// Keeps a step possible while some camera or tag sees nothing at all: what is determined has 1e4 and more (1/m^2,
-/// 1/rad^2).
-const UNDETERMINED: f64 = 1e-6;
 
 fn damped(block: &Matrix6<f64>, damping: f64) -> Matrix6<f64> {
     let mut out = *block;

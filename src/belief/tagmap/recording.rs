@@ -1,5 +1,6 @@
 //! Views from recordings, ours and others'.
 
+use crate::tagmap::constants::recording::MAX_GAP_S;
 use armcal_core::codes::{Code, Coded};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -175,9 +176,6 @@ fn seen(
     }
     Some(MapDetection { id, corners_px, covariance_px2: None })
 }
-
-/// Longest gap between attitudes that is bridged, s.
-const MAX_GAP_S: f64 = 0.2;
 
 /// Between the two neighbours in time.
 fn attitude_at(attitudes: &[(Stamp, UnitQuaternion<f64>)], stamp: Stamp) -> Option<UnitQuaternion<f64>> {

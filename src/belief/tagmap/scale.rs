@@ -4,6 +4,7 @@
 //! of sight. So with two tags of known distance D at p_a and p_b (camera frame), `|s_a p_a - s_b p_b| = D` tells the
 //! factors s by which the sizes must be multiplied: 1 where they are right.
 
+use crate::tagmap::constants::scale::{EXPLAINS, FARTHEST, LEAST_FACTOR, MAX_ROOTS, MAX_SAMPLES};
 use nalgebra::Vector3;
 
 use crate::tagmap::screen::Screened;
@@ -30,15 +31,6 @@ impl std::fmt::Display for ScaleWarning {
         )
     }
 }
-
-/// Sizes nearer to right than this are not spoken of: a square's distance is itself uncertain by some percent.
-const LEAST_FACTOR: f64 = 1.15;
-/// A measured distance that is off by more than this (natural logarithm) counts as this.
-const FARTHEST: f64 = 1.0;
-/// An explanation must leave less than this share of the disagreement.
-const EXPLAINS: f64 = 0.5;
-const MAX_SAMPLES: usize = 400;
-const MAX_ROOTS: usize = 60;
 
 /// Two tags of known distance in one image.
 struct Sample {

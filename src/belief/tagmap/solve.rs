@@ -4,6 +4,7 @@ use crate::tagmap::adjust::{approach, finish, select};
 use crate::tagmap::assemble::assemble;
 use crate::tagmap::attitude::{self, Wanted};
 use crate::tagmap::check::check;
+use crate::tagmap::constants::solve::{MAX_ROUNDS, MUCH_WORSE};
 use crate::tagmap::groups::{Group, build};
 use crate::tagmap::initial_guess::lay_out;
 use crate::tagmap::localize::{localize, place_tag, tag_cost, view_cost};
@@ -15,11 +16,6 @@ use crate::tagmap::types::{MapInput, MapSettings, NoiseScale, TagMapError};
 use crate::tagmap::{adjust, linearize};
 use armcal_core::codes::{Code, Warning};
 use armcal_core::numeric::Loss;
-
-/// Rounds of choosing detections and fitting again.
-const MAX_ROUNDS: usize = 8;
-/// A pose found anew replaces one that fits worse by this factor.
-const MUCH_WORSE: f64 = 1.25;
 
 /// Finds where the tags are, by bundle adjustment on the corner pixels of all views (Triggs et al. 2000).
 ///

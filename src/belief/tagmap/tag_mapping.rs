@@ -5,6 +5,7 @@
 //! are not independent: a base tag that is turned by a little turns the whole map about it (0.2 deg is 7 mm at 2 m), so
 //! that the joint covariance of all positions, anchor included, goes into the predicted tool error.
 
+use crate::tagmap::constants::tag_mapping::MAX_RELATIVE_STD_M;
 use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, Isometry3, Matrix2, Matrix3};
@@ -54,10 +55,6 @@ pub(crate) struct Mapped {
     pub errors: CommonErrors,
     pub result: MapResult,
 }
-
-/// A tag whose place in the base tag's frame is less sure than this per axis is left out, m. Assumed: ten times a usual
-/// survey.
-const MAX_RELATIVE_STD_M: f64 = 0.01;
 
 /// Maps the tags of `data`'s fitted views; takes the detections of tags that the map lacks out of all views.
 fn map_tags(data: &mut CaptureData, robot: &Robot) -> Result<Mapped, String> {

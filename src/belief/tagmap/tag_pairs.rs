@@ -1,5 +1,6 @@
 //! Pairs of tags in the same images and the consensus on their relative poses.
 
+use crate::tagmap::constants::tag_pairs::MIN_SHARE;
 use std::collections::BTreeMap;
 
 use nalgebra::Isometry3;
@@ -7,9 +8,6 @@ use nalgebra::Isometry3;
 use crate::tagmap::problem::{Observation, TagState};
 use crate::tagmap::types::Body;
 use crate::tagmap::vote;
-
-/// The least share of a pair's images that must agree.
-const MIN_SHARE: f64 = 0.3;
 
 /// Two tags in the same images.
 pub(super) struct Pair {

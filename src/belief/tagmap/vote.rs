@@ -5,19 +5,13 @@
 //! least sum of truncated squared Mahalanobis distances to the nearest pose of each other image wins, and is refined on
 //! its voters.
 
+use crate::tagmap::constants::vote::{AGREES, MAX_VOTERS, VOTE_STD_PX};
 use nalgebra::{Isometry3, Matrix6, Vector6};
 
 use crate::tagmap::problem::Observation;
 use armcal_core::optics::SquarePose;
 use armcal_core::spatial::adjoint;
 use armcal_core::spatial::{exp, log};
-
-/// Images that vote; more change nothing but the time. Assumed.
-const MAX_VOTERS: usize = 24;
-/// Chi-square of 6 degrees of freedom, 99.9 %: agreement.
-const AGREES: f64 = 22.46;
-/// A corner's standard deviation as votes take it, px: detectors are seldom worse. Assumed.
-const VOTE_STD_PX: f64 = 0.5;
 
 struct Hypothesis {
     first_from_second: Isometry3<f64>,

@@ -4,6 +4,7 @@
 //! words, which wrap), corners of one tag over the frames in it. The arm is at rest there, so that a camera clock some
 //! ten milliseconds late changes nothing.
 
+pub(crate) use crate::views::constants::association::MAX_SQUARE_RMS_PX;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
@@ -25,9 +26,6 @@ use armcal_core::streams::{
     ToolTouch,
 };
 use armcal_core::time::Stamp;
-
-/// Corners that fit a square worse than this are no tag: three times the worst that the lens prior allows.
-pub(crate) const MAX_SQUARE_RMS_PX: f64 = 3.0;
 
 /// The survey that a recording carries, and its index among the messages; the earliest, should there be several.
 fn recorded_survey(recording: &Recording) -> Option<(usize, &RecordedSurvey)> {

@@ -4,6 +4,8 @@
 //! Thermometers and the depth gauge speak once in a while; a reading inside of a span counts as the span's, else the
 //! line between the nearest before and after it. All is found by the messages' own stamps.
 
+pub(crate) use crate::views::constants::conditions::{BACK_S, NEAR_S, ROUNDING_COUNTS};
+use crate::views::constants::conditions::{CLEAR_READINGS, CLEAR_SIGMAS};
 use crate::views::message_index::MessageIndex;
 use armcal_core::input::{ConditionKind, ConditionReading};
 use armcal_core::log::Recording;
@@ -11,17 +13,6 @@ use armcal_core::robot::JointSensorSpec;
 use armcal_core::sensor::{ArmSensors, Conditions, wrap_symmetric};
 use armcal_core::streams::{JointAngles, MAX_JOINTS, Mark, Message, Thermometer};
 use armcal_core::time::Stamp;
-
-/// A reading farther from a span than this says nothing of it, s.
-pub(crate) const NEAR_S: f64 = 60.0;
-/// How far back a joint's last motion is looked for, s.
-pub(crate) const BACK_S: f64 = 30.0;
-/// A reading that is this many sigma of its noise from where the joint rests was taken before it came there.
-const CLEAR_SIGMAS: f64 = 8.0;
-/// Readings in a row that must agree: one alone may be a jump of the sensor.
-const CLEAR_READINGS: usize = 2;
-/// One sigma of rounding to whole counts.
-pub(crate) const ROUNDING_COUNTS: f64 = 0.288_675;
 
 /// One reading of a slow sensor.
 #[derive(Clone, Copy, Debug)]

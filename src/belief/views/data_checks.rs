@@ -1,5 +1,6 @@
 //! Recordings that no method can make sense of, refused by name before anything is fitted.
 
+use crate::views::constants::data_checks::{MAX_NOT_FINITE_SHARE, MOVED_SIGMAS};
 use crate::views::error::CalibError;
 use crate::views::view::{CaptureData, ObservationRejection};
 use armcal_core::log::{Recording, Stream};
@@ -23,10 +24,6 @@ pub fn check_joints(recording: &Recording, robot: &Robot) -> Result<(), CalibErr
     }
     Ok(())
 }
-
-/// The largest share of messages with numbers that are not finite. Assumed: a sensor that fails now and then still
-/// serves.
-const MAX_NOT_FINITE_SHARE: f64 = 0.01;
 
 /// Stamps that go backwards leave open which reading belongs to which view, and numbers that are none which sensor
 /// works.
@@ -80,9 +77,6 @@ pub(crate) fn check_corner_order(name: &str, data: &CaptureData) -> Result<(), C
     let todo = ObservationRejection::CornerOrder.remedy();
     Err(CalibError::CornerOrder { recording: name.to_owned(), n, of: n + kept, todo })
 }
-
-/// Views count as of one pose where no joint moved by more than this many sigma of its noise. Assumed.
-const MOVED_SIGMAS: f64 = 6.0;
 
 /// The arm must have moved for its sensors to show anything.
 pub(crate) fn check_pose_variation(name: &str, data: &CaptureData, robot: &Robot) -> Result<(), CalibError> {

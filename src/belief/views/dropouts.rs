@@ -3,11 +3,9 @@
 //! One reading at the end of the track among a hundred moves their mean by more than the whole error of a calibrated
 //! joint. The median does not care while fewer than half drop out.
 
+use crate::views::constants::dropouts::AT_REST_RAD;
 use armcal_core::stats::quantile;
 use armcal_core::streams::JointAngles;
-
-/// A joint at rest is nowhere farther from its median, rad: vehicles rock an arm by a tenth of it.
-const AT_REST_RAD: f64 = 0.05;
 
 /// Puts each joint's median in the place of readings that cannot be of a joint at rest; all others stay as they are.
 pub(crate) fn replace_dropouts(readings: &mut [JointAngles]) {

@@ -4,18 +4,11 @@
 //! one frame puts another tag's corners under this id: the mean of all frames would be off by a share of the distance
 //! between the two tags.
 
+use crate::views::constants::frame_consensus::{CLOSE_SIGMAS, ELSEWHERE_SIGMAS, USUAL_DISTANCES};
 use crate::views::view::MeanCorners;
 
 /// Corners of one tag in one frame, px.
 type Corners = [[f64; 2]; 4];
-
-/// Frames farther apart than this many sigma of a corner are looked at more closely.
-const CLOSE_SIGMAS: f64 = 10.0;
-/// The same in units of the usual distance between one frame and the next nearest, where that is more.
-const USUAL_DISTANCES: f64 = 6.0;
-/// However noisy the corners are: farther apart than this many sigma is elsewhere. Tags do not stand that close to each
-/// other.
-const ELSEWHERE_SIGMAS: f64 = 100.0;
 
 /// The mean over the frames that agree, and how many do not; no mean where fewer than half of them do.
 ///

@@ -2,13 +2,14 @@
 //!
 //! `association` finds the readings and corners of each captured view, `frame_consensus` the frames of it that agree,
 //! `conditions` the temperatures and the pressure under which it was captured, `dropouts` readings that are none.
-//! `external` does the same for recordings that mark no views, `pooling` for several recordings.
-//! `scale_identification` measures the scale of an unknown sensor; `data_checks` refuses unusable recordings;
-//! `error` says what is refused before any estimate; `marked_spans` reads what views are made of and leaves the rest in the file.
+//! `external` does the same for recordings that mark no views, `pooling` for several recordings. `scale_identification`
+//! measures the scale of an unknown sensor; `data_checks` refuses unusable recordings; `error` says what is refused
+//! before any estimate; `marked_spans` reads what views are made of and leaves the rest in the file.
 
 pub(crate) mod association;
 pub(crate) mod calibration_data;
 pub(crate) mod conditions;
+pub(crate) mod constants;
 pub(crate) mod data_checks;
 pub(crate) mod dropouts;
 pub(crate) mod error;

@@ -3,6 +3,7 @@
 use crate::views::association::{associate_within, declared_failed, surveyed};
 use crate::views::calibration_data::{CalibrationData, HeldOut};
 use crate::views::calibration_data::{hash_of, used_by};
+use crate::views::constants::pooling::POSES_PER_RECORDING;
 use crate::views::data_checks::{check_joints, check_order};
 use crate::views::error::CalibError;
 use crate::views::scale_identification::identify_scales;
@@ -12,9 +13,6 @@ use armcal_core::robot::{Robot, TagSurvey};
 use armcal_core::routine::Method;
 use armcal_core::streams::{Message, ReachTask, RecordedSurvey};
 use armcal_core::time::Stamp;
-
-/// Poses of one recording are numbered below this.
-const POSES_PER_RECORDING: u32 = 1_000_000;
 
 /// Makes the captured views of all recordings ready, whatever calibrations they mark; `survey` instead of what they say
 /// of the tags, `task` where none of them names one. The order of the recordings does not matter.

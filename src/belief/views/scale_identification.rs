@@ -5,6 +5,7 @@
 //! in the camera. Each view's camera pose comes from all its tags' corners; the turn's common axis is the principal one
 //! of the rotation vectors, its direction the drawing's; the slope of the turn against the readings is the gain.
 
+use crate::views::constants::scale_identification::{DRAWING_STD, MAX_RELATIVE_STD, MIN_VIEWS, TURN_FLOOR_RAD};
 use nalgebra::{DVector, Isometry3, Matrix3, Matrix6, Vector3, Vector6};
 
 use crate::measure::{ImagePoint, TwistSums};
@@ -26,15 +27,6 @@ pub struct IdentifiedScale {
     /// One sigma of the ratio over itself.
     pub relative_std: f64,
 }
-
-/// Fewer views have no residuals to speak of.
-const MIN_VIEWS: usize = 3;
-/// A slope less sure than this times its own size says nothing.
-const MAX_RELATIVE_STD: f64 = 0.2;
-/// What a camera mount and tags that are not quite where the drawing has them bend the slope by, relative.
-const DRAWING_STD: f64 = 1e-3;
-/// A camera's turn is not known better than this from corners a third of a pixel off, rad.
-const TURN_FLOOR_RAD: f64 = 3e-4;
 
 /// Measures the scale of every joint with `identify` views; gives the robot with these scales.
 ///

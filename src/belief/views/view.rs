@@ -1,5 +1,6 @@
 //! A view: averaged data of an arm at rest, and all views of a recording.
 
+pub(crate) use crate::views::constants::view::FASTEST_RAD_S;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -11,10 +12,6 @@ use armcal_core::robot::Robot;
 use armcal_core::sensor::Conditions;
 use armcal_core::streams::{JointAngles, MAX_JOINTS, ReachTask, RejectReason};
 use armcal_core::time::Stamp;
-
-/// In a faster arm the readings about an image are too far apart for a line through them, and to be told from
-/// drop-outs, rad/s.
-pub(crate) const FASTEST_RAD_S: f64 = 0.5;
 
 /// Averaged data of an arm at rest that looks at tags.
 #[derive(Clone, Debug)]

@@ -1,14 +1,12 @@
 //! What an estimate found of how the arm bends.
 
+use crate::checks::constants::drawing_report_sag_report::NAMED_SIGMAS;
 use nalgebra::{Cholesky, DVector};
 
 use crate::model::parameters::{Parameter, ParameterKind};
 use crate::say::finding::{Finding, FindingKind, FindingUnit};
 use crate::solve::estimate::Estimate;
 use armcal_core::joints::JointAngles;
-
-/// Sigmas of the estimate from which a compliance is named.
-const NAMED_SIGMAS: f64 = 3.0;
 
 /// A parameter of sag that was estimated.
 struct SagFigure {

@@ -5,6 +5,7 @@
 //! `P = (1 + I)^-1` about `m = P s`. The tool of an estimate that keeps the lens is off by `T y`,
 //! `T = d tool/dx dx/dy`: its covariance gets `T (P + m m^T) T^T`.
 
+use crate::checks::constants::reservations_lens::N;
 use nalgebra::{Const, DMatrix, Dyn, Matrix3, OMatrix, SMatrix, SVector};
 
 use crate::checks::reservations::HeldElement;
@@ -15,9 +16,6 @@ use crate::solve::estimate::Estimate;
 use crate::solve::linearize::NormalEquations;
 use armcal_core::numeric::Loss;
 use armcal_core::robot::{CameraSpec, LensPriors};
-
-/// Focal length (both axes alike), centre, distortion.
-const N: usize = 7;
 
 /// The lens at its priors.
 pub(crate) struct HeldLens {

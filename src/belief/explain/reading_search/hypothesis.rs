@@ -1,5 +1,9 @@
 //! Ways in which the readings of all joints may be meant and the camera be carried, and how a view is read in each.
 
+use crate::explain::constants::reading_search_hypothesis::{
+    KNOWN_MOUNT, LEAST_SCALE_STEPS, NEXT_TURN_RAD, PARALLEL_RAD, SCALE_STEP, SCALE_STEPS,
+};
+pub(crate) use crate::explain::constants::reading_search_hypothesis::{SCALE_STD, ZERO_STD_RAD};
 use std::borrow::Cow;
 use std::f64::consts::{FRAC_PI_6, PI, TAU};
 
@@ -10,21 +14,8 @@ use crate::views::view::View;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::wrap_symmetric;
 
-/// A camera mount with larger stated sigmas does not place the tags, m and rad.
-const KNOWN_MOUNT: [f64; 2] = [0.05, 0.2];
-/// Excess over the half range from which a reading is on another turn, rad.
-const NEXT_TURN_RAD: f64 = 0.1;
 /// Zeros are tried at these steps; one sigma of what is left, rad.
 const ZERO_STEP_RAD: f64 = FRAC_PI_6;
-pub(crate) const ZERO_STD_RAD: f64 = 0.2;
-/// Scales are tried at these steps, up to about a thousandth and a thousand; one sigma of what is left.
-const SCALE_STEP: f64 = 1.6;
-const SCALE_STEPS: i32 = 15;
-pub(crate) const SCALE_STD: f64 = 0.2;
-/// A scale that is off by fewer steps shows in the sensor's line.
-const LEAST_SCALE_STEPS: i32 = 4;
-/// Axes within this angle are parallel, rad.
-const PARALLEL_RAD: f64 = 0.02;
 /// One way to read the joints, or to carry the camera.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Hypothesis {

@@ -13,6 +13,7 @@
 //! all other parameters following (Rao 1948), and promises the evidence of `drawing::gain_nats` under a prior of g,
 //! less the logarithm of the number of sets.
 
+use crate::explain::constants::tags_alike::LEAST_STD;
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Translation3, Vector3, Vector6};
 
 use crate::explain::drawing::{MULTIPLES, gain_nats};
@@ -21,9 +22,6 @@ use crate::explain::tags::identity::TagFault;
 use crate::model::blocks::Block;
 use crate::solve::estimate::Estimate;
 use armcal_core::spatial::{adjoint, exp, log};
-
-/// A tag whose survey is better known than this is no suspect, m and rad.
-const LEAST_STD: f64 = 1e-7;
 
 /// Score and information of each tag's own motion about the base's origin.
 struct SurveyScore {

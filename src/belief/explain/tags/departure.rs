@@ -5,6 +5,7 @@
 //! In units of the prior, over the directions of which the data tell, `d^T (S - C)^-1 d` is chi-square. A tag beyond
 //! its limit is freed of its survey if that explains more than any other error of the geometry does.
 
+use crate::explain::constants::tags_departure::{FALSE_ALARM, TAILS, TOLD_SHARE};
 use nalgebra::{Matrix6, Vector6};
 
 use crate::model::blocks::Block;
@@ -23,13 +24,6 @@ pub(crate) struct TagDeparture {
     pub chi2: f64,
     pub dof: usize,
 }
-
-/// Share of the prior's variance that the data must take away for a direction to count.
-const TOLD_SHARE: f64 = 0.1;
-/// Probability that any tag of a good survey is suspected.
-const FALSE_ALARM: f64 = 1e-4;
-/// Over chi-square's quantile: corners have longer tails than a normal one, and sizes of errors are fitted.
-const TAILS: f64 = 1.5;
 
 impl TagDeparture {
     /// Whether chance explains it, where `n` tags are tested.

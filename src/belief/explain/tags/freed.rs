@@ -1,5 +1,6 @@
 //! Tags that were found moved: freed of their survey, estimated with the rest, and reported.
 
+use crate::explain::constants::tags_freed::{FREED_STD_M, FREED_STD_RAD, MIN_TRUSTED};
 use nalgebra::{Isometry3, Translation3};
 
 use crate::explain::drawing::Drawing;
@@ -22,12 +23,6 @@ pub(crate) struct MovedTags {
     /// More tags than may have moved do not fit: the survey stands, and other tests say what is wrong.
     has_given_up: bool,
 }
-
-/// Prior of a freed tag: anywhere.
-const FREED_STD_M: f64 = 1.0;
-const FREED_STD_RAD: f64 = 1.0;
-/// Tags that must stay where the survey has them.
-const MIN_TRUSTED: usize = 3;
 
 impl MovedTags {
     pub(crate) fn new(robot: &Robot) -> Self {

@@ -6,6 +6,7 @@
 //! to blame, and a departure of its own of each tag i that was moved. Generalized least squares; the tags that save
 //! most of `d^T V^-1 d` were moved, while each saves enough. The evidence decides whether they stay.
 
+use crate::explain::constants::tags_group::{LEAST_SAVING, LOOSE_STD_M, LOOSE_STD_RAD, MAX_TRIED_ALL, MIN_STAYING};
 use nalgebra::{Cholesky, DMatrix, DVector, Vector3};
 
 use crate::explain::tags::identity::{NEARER, TagFault};
@@ -13,16 +14,6 @@ use crate::solve::estimate::{Estimate, estimate};
 use crate::solve::input::BundleInput;
 use armcal_core::robot::Robot;
 use armcal_core::spatial::{adjoint, log};
-
-/// One sigma of each tag's pose while all are freed: no tag is farther off by far.
-const LOOSE_STD_M: f64 = 0.1;
-const LOOSE_STD_RAD: f64 = 0.2;
-/// So many tags must stay, and more than half of those seen.
-const MIN_STAYING: usize = 3;
-/// Up to so many tags every three are tried.
-const MAX_TRIED_ALL: usize = 16;
-/// What a tag's departure must save, chi-square of 6: by chance once in a hundred.
-const LEAST_SAVING: f64 = 16.8;
 
 /// The tags that were moved together; none where fewer than two were, or too few would stay.
 pub(crate) fn moved_group(input: &BundleInput<'_>) -> Vec<TagFault> {

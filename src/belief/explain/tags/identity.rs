@@ -7,6 +7,10 @@
 //! of another size, so is each distance between two of them in one view: the median of `|p_a - p_b| / |m_a - m_b|`,
 //! which no joint has a part in.
 
+use crate::explain::constants::tags_identity::{
+    CLOSER, LEAST_DISTANCE_M, LEAST_RATIO, MIN_OBSERVATIONS, REJECTED_SHARE, SURE_SIGMAS,
+};
+pub(crate) use crate::explain::constants::tags_identity::{NEARER, SAME_PLACE_M};
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::measure::WeightedMeasurement;
@@ -86,20 +90,6 @@ impl TagFault {
         self.tags().iter().any(|tag| other.tags().contains(tag))
     }
 }
-
-/// A tag is looked at where so many of its observations are rejected, or all the data have it elsewhere.
-const REJECTED_SHARE: f64 = 0.5;
-const MIN_OBSERVATIONS: usize = 3;
-/// Exchanged ids: so near each other's places, m, and so much nearer than to their own.
-pub(crate) const SAME_PLACE_M: f64 = 0.05;
-pub(crate) const NEARER: f64 = 0.3;
-/// A size counts from this ratio on, and from so many of its standard errors.
-const LEAST_RATIO: f64 = 0.005;
-const SURE_SIGMAS: f64 = 4.0;
-/// Tags nearer to each other tell nothing of their size, m.
-const LEAST_DISTANCE_M: f64 = 0.1;
-/// It must bring the observations of its tag this much nearer to the survey.
-const CLOSER: f64 = 0.6;
 
 /// A tag as the views have it.
 struct SeenTag {

@@ -2,12 +2,10 @@
 
 use super::pairs::{Pairs, mismatch};
 use super::{BETTER, GOOD, SIZE_TOLERANCE, lens, map};
+use crate::explain::constants::wrong_input_by_pairs::BAD;
 use crate::say::wrong_input::{WrongInput, WrongInputKind};
 use crate::views::view::View;
 use armcal_core::robot::{Robot, SurveyedTag};
-
-/// Above this a map is of other tags.
-const BAD: f64 = 0.3;
 
 /// The first of these: a reading of map or lens that fits, exchanged ids, another map, a wrong scale.
 pub(crate) fn by_pairs(views: &[&View], tags: &[SurveyedTag], robot: &Robot, as_written: &Pairs) -> Option<WrongInput> {

@@ -1,16 +1,9 @@
 //! Other lenses than robot.toml's: of another image size, focal length or model, without distortion.
 
 use super::SIZE_TOLERANCE;
+use crate::explain::constants::wrong_input_lens::{FISHEYE_RAD, FOCAL_STEP, FOCAL_STEPS, IMAGE_SCALES};
 use crate::say::wrong_input::WrongInputKind;
 use armcal_core::optics::{CameraModel, Fisheye, LensModel, Radtan};
-
-/// Image sizes that are tried, over robot.toml's.
-const IMAGE_SCALES: [f64; 4] = [0.5, 2.0, 0.25, 4.0];
-/// Focal lengths that are tried, over robot.toml's: so many steps of a logarithm up and down, to 0.5 and 2.
-const FOCAL_STEP: f64 = 0.02;
-const FOCAL_STEPS: i32 = 35;
-/// Half of the field of view of a fisheye that nobody describes, rad.
-const FISHEYE_RAD: f64 = 1.5;
 
 /// The lens as it may be meant.
 pub(crate) fn readings(lens: &CameraModel) -> Vec<(WrongInputKind, CameraModel)> {

@@ -10,21 +10,13 @@ pub(crate) mod map;
 pub(crate) mod pairs;
 pub(crate) mod recording;
 
+use crate::explain::constants::wrong_input::{BETTER, GOOD, MAX_VIEWS, SIZE_TOLERANCE};
 use crate::say::WrongInput;
 
 use crate::views::view::{CaptureData, View};
 use armcal_core::robot::{Robot, SurveyedTag};
 use by_pairs::by_pairs;
 use pairs::mismatch;
-
-/// Mismatches below this are those of good maps and lenses: the tilt of a small tag is not seen better.
-const GOOD: f64 = 0.12;
-/// What puts an input right makes the mismatch this much smaller.
-const BETTER: f64 = 0.4;
-/// More views tell no more.
-const MAX_VIEWS: usize = 40;
-/// A size within this of the stated one is not called wrong.
-const SIZE_TOLERANCE: f64 = 0.03;
 
 /// The input that explains why the views do not fit; `tags` as the map has them.
 pub(crate) fn wrong_input(data: &CaptureData, tags: &[SurveyedTag], robot: &Robot) -> Option<WrongInput> {

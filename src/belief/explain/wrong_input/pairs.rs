@@ -4,15 +4,13 @@
 //! from where it is seen, over the distance between both, is the mismatch; the median over all pairs counts. One scale
 //! of all tags is taken out beforehand, by the median ratio of the map's distances to the seen ones.
 
+use crate::explain::constants::wrong_input_pairs::MIN_PAIRS;
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::views::view::{TagMeasurement, TagObservation, View};
 use armcal_core::optics::{CameraModel, solve_square_both};
 use armcal_core::robot::SurveyedTag;
 use armcal_core::stats::quantile;
-
-/// Fewer pairs determine no median.
-const MIN_PAIRS: usize = 6;
 
 /// Of all pairs of tags in one view: the map's distances over those seen, and the mismatch with that scale.
 pub(crate) struct Pairs {

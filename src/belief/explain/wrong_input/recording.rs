@@ -3,6 +3,7 @@
 //! Where a view has one landmark with its rotation, the arm by its datasheet tells where that stands: the rotations of
 //! `base_from_tag` over the views must agree but for what sensors may be off.
 
+use crate::explain::constants::wrong_input_recording::{BEYOND_IMAGE, GOOD_SPREAD_RAD, MIN_ROTATIONS, SPREAD_RAD};
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion};
 
 use super::BETTER;
@@ -11,13 +12,6 @@ use crate::views::view::{CaptureData, TagMeasurement, View};
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::Robot;
 use armcal_core::stats::quantile;
-
-/// A corner may lie so far outside of the stated image: detectors round.
-const BEYOND_IMAGE: f64 = 1.03;
-/// Rotations of one landmark: spread that says nothing, and that of good ones, rad.
-const SPREAD_RAD: f64 = 0.5;
-const GOOD_SPREAD_RAD: f64 = 0.25;
-const MIN_ROTATIONS: usize = 5;
 
 /// Corners that are no pixels of an image of that size.
 pub(crate) fn beside_image(stated_px: [u32; 2], data: &CaptureData) -> Option<WrongInputKind> {

@@ -3,6 +3,10 @@
 //! A number of steps is one to four printable characters: digits of base 45, the last from the first half of
 //! [`DIGITS`], those before it from the second half, so that small numbers are short and none needs a space between.
 
+pub(crate) use crate::file::constants::compact_terms::SHAPE_STEPS_RAD;
+use crate::file::constants::compact_terms::{
+    BASE, DRIFT_STEPS, GAIN_STEPS, LARGEST_STEPS, MAX_DIGITS, OFFSET_STEPS, OIL_STEPS, PLAY_STEPS, PRESSURE_STEPS,
+};
 use serde::Serialize;
 
 use crate::file::compact::error::CompactError;
@@ -12,23 +16,8 @@ use crate::file::terms_table::ReferenceTable;
 use armcal_core::sensor::{Conditions, N_SHAPE, Terms};
 use armcal_core::time::Stamp;
 
-/// Steps of the shape's coefficients, finest first, rad; the finest that fits is used. The coarsest moves the tool of a
-/// 2 m arm by less than 0.05 mm.
-pub(crate) const SHAPE_STEPS_RAD: [f64; 3] = [1e-6, 2e-6, 5e-6];
-/// Steps per rad/K and rad/MPa, 1/K, rad/h, rad: half a step at 20 K, 20 MPa or 5 h moves a joint by at most 5e-6 rad.
-const OFFSET_STEPS: f64 = 2e6;
-const GAIN_STEPS: f64 = 5e6;
-const DRIFT_STEPS: f64 = 1e6;
-const PLAY_STEPS: f64 = 2e5;
-/// Of the reference: per C and per Pa.
-const OIL_STEPS: f64 = 1e2;
-const PRESSURE_STEPS: f64 = 1e-3;
 /// Printable ASCII but quotes, backslash and backquote.
 const DIGITS: &[u8; 90] = b"0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz!#$%&()*+,-./:;<=>?@[]^_{|}~";
-const BASE: i64 = 45;
-/// More digits than any allowed number has.
-const MAX_DIGITS: usize = 4;
-const LARGEST_STEPS: i64 = 1_000_000;
 
 /// What the terms are counted from, and how finely they are written.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

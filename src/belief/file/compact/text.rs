@@ -1,5 +1,6 @@
 //! The line itself: fields between single spaces, a checksum at the end.
 
+use crate::file::constants::compact_text::{MAX_CODE, MAX_NAME_BYTES, SUM_DIGITS};
 use std::fmt::Write as _;
 
 use crate::file::calibration::Status;
@@ -13,9 +14,6 @@ use armcal_core::streams::MAX_JOINTS;
 
 pub(crate) const FORMAT: &str = "armcal1";
 pub(crate) const FORMAT_WITH_TERMS: &str = "armcal2";
-/// Robot names longer than this are shortened, bytes after escaping.
-const MAX_NAME_BYTES: usize = 40;
-const SUM_DIGITS: usize = 8;
 
 pub(crate) fn write(c: &CompactCalibration) -> String {
     let verdict = match (c.status, &c.refusal_code) {
@@ -139,9 +137,6 @@ fn fields(words: &[&str]) -> Result<CompactCalibration, CompactError> {
         joint,
     })
 }
-
-/// Letters of the longest code of a refusal, with room for later ones.
-const MAX_CODE: usize = 32;
 
 fn verdict(word: &str) -> Result<(Status, Option<String>), CompactError> {
     if word == "ok" {

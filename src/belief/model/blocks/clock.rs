@@ -1,9 +1,7 @@
 //! How much later the joint sensors' stamps are than the camera's, s.
 
 use crate::model::blocks::{MAX_COLUMNS, Std, Value};
-
-/// One sigma, s. Assumed: clocks of one vehicle that nobody synchronized.
-const CLOCK_STD_S: f64 = 0.05;
+use crate::model::constants::blocks_clock::CLOCK_STD_S;
 
 pub(super) fn drawn() -> Value {
     Value::Number(0.0)

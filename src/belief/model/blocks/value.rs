@@ -1,12 +1,11 @@
 //! What a block's parameters are, and what a step of its columns does to them.
 
+pub(crate) use crate::model::constants::blocks_value::MAX_COLUMNS;
 use nalgebra::{Isometry3, Vector6};
 
 use armcal_core::optics::CameraModel;
 use armcal_core::spatial::{exp, log};
 
-/// Columns of a lens, which has the most.
-pub(crate) const MAX_COLUMNS: usize = 8;
 /// One sigma of each column; zero beyond the block's own.
 pub(crate) type Std = [f64; MAX_COLUMNS];
 

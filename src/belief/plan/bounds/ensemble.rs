@@ -4,6 +4,7 @@
 //! datasheet the errors are uniform and large, so that neither a normal distribution nor a linearization gives an
 //! honest 99 %.
 
+use crate::plan::constants::bounds_ensemble::{BOUNDS_EASE, N_ARMS, N_PROPOSED};
 use nalgebra::{DVector, Point3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -15,14 +16,6 @@ use armcal_core::kinematics::LinkPoses;
 use armcal_core::robot::{JointSensorSpec, Robot};
 use armcal_core::sensor::{ArmSensors, ConditionChange, Conditions};
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
-
-/// Arms drawn: the 99 % quantile is the tenth largest, exceeded with a probability of 1 % give or take 0.3 %.
-const N_ARMS: usize = 1000;
-
-/// Drawn from an estimate's normal density, to pick those arms from that the datasheet allows.
-const N_PROPOSED: usize = 8000;
-/// An estimate may come to lie a little beyond the datasheet's bounds before the arm does.
-const BOUNDS_EASE: f64 = 1.02;
 
 /// Arms as the belief allows them, each equally likely.
 pub struct ArmEnsemble {

@@ -10,16 +10,10 @@
 use crate::file::calibration::Calibration;
 use crate::model::ParameterKind;
 use crate::plan::bounds::joint_bounds::{JointBound, JointErrorBounds};
+use crate::plan::constants::bounds_estimate_bounds::{AT_REST_RAD, PLACES, SIGMAS};
 use crate::solve::covariance::{JointAt, ParameterCovariance};
 use armcal_core::robot::Robot;
 use armcal_core::sensor::{ArmSensors, ConditionChange, SensorModel};
-
-/// Multiple of one sigma that is kept clear for.
-const SIGMAS: f64 = 4.0;
-/// Places over the range at which the envelope is fitted.
-const PLACES: usize = 41;
-/// A settled arm stands within this of its set-point by its own readings, rad.
-const AT_REST_RAD: f64 = 0.0016;
 
 impl JointErrorBounds {
     /// Of the sensors that `calibration` found, accepted or not; joints that it did not determine keep the datasheet's

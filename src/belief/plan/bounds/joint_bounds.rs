@@ -1,5 +1,6 @@
 //! How far each joint may truly be from where it is believed to be.
 
+use crate::plan::constants::bounds_joint_bounds::AGE_SIGMAS;
 use crate::plan::motion::tracking_error::TrackingErrorBound;
 use armcal_core::kinematics::JointLimits;
 use armcal_core::robot::{JointSensorSpec, Robot};
@@ -52,9 +53,6 @@ pub struct UnknownScale {
     /// It turns at most this many times as far as believed, either way round.
     pub gain_max: f64,
 }
-
-/// The same for what temperature and time do to it afterwards.
-const AGE_SIGMAS: f64 = 3.0;
 
 impl JointErrorBounds {
     /// The datasheet's worst case.

@@ -3,10 +3,8 @@
 use crate::plan::certify::motion_bound::{ArmRegion, Split, Trend};
 use crate::plan::certify::sweep::{FINEST_M, Finding, OpenPair, Search, Sweep};
 use crate::plan::clearance::pair::Pair;
+use crate::plan::constants::certify_error_box::MAX_REGIONS;
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
-
-/// Regions that may be looked at for one pair of one stretch; then it counts as too near.
-const MAX_REGIONS: usize = 4000;
 
 /// A stretch of the edge, by shares of the way, and a box of errors.
 #[derive(Clone, Copy, Debug)]

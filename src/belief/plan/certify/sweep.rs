@@ -10,22 +10,13 @@ use crate::plan::bounds::joint_bounds::JointErrorBounds;
 use crate::plan::clearance::pair::Pair;
 use crate::plan::clearance::separation::{gap_m, separate};
 use crate::plan::clearance::{ClearanceModel, ClosestPair};
+pub(crate) use crate::plan::constants::certify_sweep::FINEST_M;
+use crate::plan::constants::certify_sweep::{BREADTH, FINEST_ALONG_M, LONG_STRETCH_M, MAX_STRETCHES};
 use crate::plan::motion::tracking_error::TrackingErrorBound;
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
 use crate::plan::certify::motion_bound::{ArmRegion, MotionBound, ShapeMotion, Split};
 use parry3d::math::Vec3;
-
-/// Where shapes can move less than this and are still not certified, they count as too near, m.
-pub(crate) const FINEST_M: f64 = 0.006;
-/// The same where only the stretch of the edge is left to halve.
-const FINEST_ALONG_M: f64 = 0.001;
-/// Stretches that move a shape farther than this to either side are halved without a closer look, m.
-const LONG_STRETCH_M: f64 = 0.8;
-/// Stretches that are looked at from the coarse to the fine; from then on each is finished before the next.
-const BREADTH: usize = 64;
-/// Stretches of an edge that may be looked at; then it counts as too near.
-const MAX_STRETCHES: usize = 4000;
 
 /// Believed angles on a straight line and all that the errors may make of them.
 pub(crate) struct Sweep<'a> {

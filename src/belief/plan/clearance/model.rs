@@ -4,6 +4,9 @@
 //! obstacles and the seafloor (fixed in the world; what the vehicle's motion about its station may do is added to the
 //! margin). Links closer than two joints apart cannot be told from a joint and are not tested against each other.
 
+pub use crate::plan::constants::clearance_model::SELF_MARGIN_REDUCTION_M;
+pub(crate) use crate::plan::constants::clearance_model::TOUCHING_M;
+use crate::plan::constants::clearance_model::{FAR_M, ROUND_TOOL_M, SWAY_SIGMAS};
 use nalgebra::Vector3;
 use parry3d::math::{Pose3, Vec3};
 use parry3d::shape::SharedShape;
@@ -89,17 +92,6 @@ impl StationBound {
         }
     }
 }
-
-/// Distances beyond this are all the same to planning, m.
-const FAR_M: f64 = 0.4;
-/// Shapes that touch are never clear, whatever is asked for, m.
-pub(crate) const TOUCHING_M: f64 = 1e-6;
-/// Links of one arm neither sway against each other nor are surveyed: they need less water than the vehicle does.
-pub const SELF_MARGIN_REDUCTION_M: f64 = 0.03;
-/// A tool whose boxes stay this near to the axis that it turns about counts as round, m.
-const ROUND_TOOL_M: f64 = 0.07;
-/// Of the vehicle's position and attitude.
-const SWAY_SIGMAS: f64 = 3.0;
 
 impl<'a> ClearanceModel<'a> {
     /// The arm on its vehicle in the scene, with the jaws at rest.

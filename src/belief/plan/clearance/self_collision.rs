@@ -1,5 +1,7 @@
 //! Which links of an arm can ever come near each other, by sampling.
 
+pub(crate) use crate::plan::constants::clearance_self_collision::UNSEEN_M;
+use crate::plan::constants::clearance_self_collision::{NEAR_M, NEARLY_ALWAYS};
 use std::collections::{BTreeMap, BTreeSet};
 
 use rand::RngExt;
@@ -11,12 +13,6 @@ use armcal_core::kinematics::JointLimits;
 use armcal_core::robot::{Robot, SelfPair, SelfPairs};
 use armcal_core::stats::stream_rng;
 use armcal_core::streams::JointAngles;
-
-/// Links that were never nearer than this are left out of the list, m: more than a margin asks for, and [`UNSEEN_M`].
-const NEAR_M: f64 = 0.2;
-/// What random configurations may have missed, m: links that were never nearer than a distance are taken to keep it
-/// less this.
-pub(crate) const UNSEEN_M: f64 = 0.05;
 
 /// The nearest that each two links of the arm come to each other in `n` random configurations: within the joint limits,
 /// and beyond them by what the datasheet lets the sensors hide.
@@ -38,10 +34,6 @@ pub fn sample_self_pairs(robot: &Robot, n: u64, seed: u64) -> SelfPairs {
     pairs.sort_by_key(|pair| pair.bodies);
     SelfPairs { seed, n, near_m: NEAR_M, pairs }
 }
-
-/// Share of the configurations from which links that are near each other there are taken to be so by design, or by
-/// hulls that are larger than the links. The rule of MoveIt's setup assistant.
-const NEARLY_ALWAYS: f64 = 0.95;
 
 /// Links that overlap or are nearer to each other than `margin_m` at nearly all of `n` random configurations: no plan
 /// could keep them apart.

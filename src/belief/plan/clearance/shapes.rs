@@ -1,5 +1,6 @@
 //! The solid things that planning knows: links' shapes, which move, and what stands around the arm.
 
+use crate::plan::constants::clearance_shapes::{EVERYWHERE_M, MIN_BODY_GAP};
 use nalgebra::{Isometry3, Vector3};
 use parry3d::bounding_volume::Aabb;
 use parry3d::math::{Mat3, Pose3, Vec3};
@@ -11,10 +12,6 @@ use armcal_core::kinematics::LinkPoses;
 use armcal_core::robot::{PlacedShape, Robot, Shape, parry_pose};
 use armcal_core::streams::MAX_JOINTS;
 
-/// Bodies nearer along the chain than this share a joint or a short link and always nearly touch.
-const MIN_BODY_GAP: usize = 2;
-/// Larger than any site, m.
-const EVERYWHERE_M: f64 = 1e6;
 /// A link's shape.
 pub(crate) struct LinkShape {
     pub body: usize,

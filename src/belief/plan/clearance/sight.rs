@@ -3,6 +3,7 @@
 //! Whether anything hides a tag is asked of many poses: shapes are placed once a pose, and one that stays clear of all
 //! rays to a tag's corners, or whose box a ray misses, is not asked for more.
 
+use crate::plan::constants::clearance_sight::{HOUSING_M, MISS_M};
 use nalgebra::{Isometry3, Point3, Vector3};
 use parry3d::math::Pose3;
 use parry3d::query;
@@ -13,12 +14,6 @@ use crate::plan::clearance::separation::Placed;
 use crate::plan::clearance::shapes::{LinkShape, StaticShape, vec3};
 use armcal_core::kinematics::LinkPoses;
 use armcal_core::robot::{MAX_COLLISION_SHAPES, parry_pose};
-
-/// The camera's own housing surrounds the start of the ray.
-const HOUSING_M: f64 = 0.08;
-/// A ray that passes a shape's box or sphere by more than this does not meet the shape, however its distance is
-/// rounded.
-const MISS_M: f64 = 1e-3;
 
 /// A line from an eye to a point, without its ends.
 struct Ray {

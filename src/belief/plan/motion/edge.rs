@@ -1,10 +1,8 @@
 //! Paths and their edges: straight lines in joint space, each driven from rest to rest at a speed of its own.
 
+pub(crate) use crate::plan::constants::motion_edge::SLOWNESS;
 use armcal_core::streams::JointAngles;
 
-/// How much longer than needed an edge may take: what the joints stray by goes with their rates, so that a slower arm
-/// keeps clear where a quick one would not.
-pub(crate) const SLOWNESS: [f64; 5] = [1.0, 1.4, 2.0, 2.8, 4.0];
 pub(crate) const SLOWEST: f64 = SLOWNESS[SLOWNESS.len() - 1];
 
 /// A straight motion from rest to rest.

@@ -4,18 +4,11 @@
 //! its rate is largest at the middle, 1.5 times its mean. An edge takes as long as the slowest of its joints needs, and
 //! as the pump needs for all of them: `sum_j D_j |rate_j| <= Q`, with `D_j` the oil that joint j takes a radian.
 
+use crate::plan::constants::motion_timing::{CUBIC_PEAK, S_PER_MIN};
+pub(crate) use crate::plan::constants::motion_timing::{RATE_SHARE, SETTLE_S};
 use crate::plan::motion::edge::{Edge, Path};
 use armcal_core::robot::Robot;
 use armcal_core::streams::JointAngles;
-
-/// Share of rates and flow that set-points use; the rest is left to the controller.
-pub(crate) const RATE_SHARE: f64 = 0.7;
-/// How long an arm takes to come to rest after a path, s: 0.84 in the median and 1.14 in the 90 % quantile of a
-/// simulated arm's 58 rests, assumed for others.
-pub(crate) const SETTLE_S: f64 = 1.0;
-/// Largest rate of the cubic over its mean.
-const CUBIC_PEAK: f64 = 1.5;
-const S_PER_MIN: f64 = 60.0;
 
 /// What the joints and the pump allow.
 #[derive(Clone, Debug, PartialEq)]

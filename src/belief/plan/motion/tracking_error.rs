@@ -6,13 +6,11 @@
 //! rate, though never by more than it was to move so far, and by a droop in proportion to the rate; an overshoot comes
 //! at the end of the edge, ahead for the most part. What does not move does not stray.
 
+use crate::plan::constants::motion_tracking_error::BEHIND;
 use crate::plan::motion::edge::{Edge, SLOWEST};
 use crate::plan::motion::timing::{RATE_SHARE, Timing};
 use armcal_core::robot::Robot;
 use armcal_core::streams::MAX_JOINTS;
-
-/// Of the overshoot, the share by which a joint may be behind instead where its edge ends.
-const BEHIND: f64 = 0.25;
 
 /// Bounds on the straying along one edge.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -3,6 +3,7 @@
 //! The straight edge is tried first. Where it is blocked, RRT-Connect (`rrt_connect`) searches a path, and shortcuts
 //! make it faster. An error names the closest goal that can be reached on the straight edge.
 
+use crate::plan::constants::path_planner::{HALVINGS, PLACES, ROUNDING_RAD};
 use rand_chacha::ChaCha8Rng;
 
 use crate::plan::clearance::ClosestPair;
@@ -12,13 +13,6 @@ use crate::plan::path::error::PathError;
 use crate::plan::path::rrt_connect::RrtConnect;
 use armcal_core::kinematics::JointLimits;
 use armcal_core::streams::JointAngles;
-
-/// Halvings of the straight way when an error names the nearest that works.
-const HALVINGS: u32 = 8;
-/// Places on the straight way where an error looks for what is nearest.
-const PLACES: u32 = 20;
-/// Angles this near a limit are within it, rad.
-const ROUNDING_RAD: f64 = 1e-9;
 
 impl PathPlanner<'_> {
     /// A path from `from` to `to`.

@@ -5,27 +5,15 @@
 //! the same work on every machine. A path found is made quicker: waypoints are left out, then random places on it are
 //! connected directly as long as both edges about the shortcut are certified too.
 
+use crate::plan::constants::path_rrt_connect::{
+    ABOUT_RAD, LEAST_GAIN, LEAST_WEIGHT, MAX_REGIONS, MAX_SAMPLES, MAX_SHORTCUTS, SHORTCUT_REGIONS, STEP_RAD,
+};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use crate::plan::motion::edge::{Edge, Path, SLOWEST};
 use crate::plan::path::edge_check::{PathPlanner, between};
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
-
-/// Longest step by which a tree grows: of a joint that moves the arm's farthest point most, rad.
-const STEP_RAD: f64 = 0.5;
-/// Joints with short levers count for no less than this share of those with the longest.
-const LEAST_WEIGHT: f64 = 0.25;
-/// Samples about the straight way are off it by this at most, rad.
-const ABOUT_RAD: f64 = 0.8;
-/// Regions that a search may look at, and shortcuts after it: about 2 us each.
-const MAX_REGIONS: usize = 120_000;
-/// Samples that a search may try: each costs at least one region, and trees are searched one node after the other.
-const MAX_SAMPLES: usize = 4_000;
-const SHORTCUT_REGIONS: usize = 4_000;
-const MAX_SHORTCUTS: usize = 40;
-/// A shortcut that saves less than this share of the path's time is not worth looking at.
-const LEAST_GAIN: f64 = 0.02;
 
 /// A search between two poses.
 pub(crate) struct RrtConnect<'a, 'b> {

@@ -5,6 +5,7 @@
 //! weighted by the range, so that both count as displacements at the tag). The arm need not get there: what it comes to
 //! is tested like any other pose.
 
+use crate::plan::constants::view_planning_camera_ik::{BESIDE_RAD, MAX_STEP_RAD, RANGES_M, STEPS};
 use nalgebra::{SMatrix, SVector, UnitQuaternion, Vector3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -24,14 +25,6 @@ pub(crate) struct CameraGoal {
     /// Unit.
     pub axis: Vector3<f64>,
 }
-
-const STEPS: usize = 12;
-/// Longest step of a joint, rad.
-const MAX_STEP_RAD: f64 = 0.4;
-/// Nearer and farther from a tag than this there is little to gain: corners leave the image, or are coarse. Assumed.
-const RANGES_M: [f64; 2] = [0.35, 1.5];
-/// How far the optical axis may point beside the tag, rad.
-const BESIDE_RAD: f64 = 0.6;
 
 impl CameraGoal {
     /// From a good range and incidence at a tag that is drawn evenly.

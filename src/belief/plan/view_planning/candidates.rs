@@ -5,6 +5,9 @@
 //! tags. Cheap tests come first: field of view, clearance of the believed arm, probability of the tags, the
 //! certificate, what hides them.
 
+use crate::plan::constants::view_planning_candidates::{
+    BOX_SHARES, FAILED_RADIUS_RAD, MAX_BLOCKED, MAX_DRAWS, MAX_REGIONS, MOST_TAGS, N_ARMS, R8, TARGET_DISTANCE_M,
+};
 use nalgebra::Vector3;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -49,24 +52,6 @@ pub(crate) struct InfeasibleCounts {
     /// Whether certificates took so much that the search ended before its time.
     is_cut_short: bool,
 }
-
-/// More tags in view are counted as so many.
-const MOST_TAGS: usize = 31;
-const MAX_DRAWS: usize = 200_000;
-/// Poses that see enough and are not clear; then it is not for want of tags.
-const MAX_BLOCKED: usize = 20_000;
-/// Regions that all certificates may look at: under a belief that is wide, one pose may take thousands.
-const MAX_REGIONS: usize = 5_000_000;
-/// Capture poses keep their tool this far from every target, m.
-const TARGET_DISTANCE_M: f64 = 0.15;
-/// Nothing this near (largest joint difference) to a pose that failed is tried again, rad.
-const FAILED_RADIUS_RAD: f64 = 0.1;
-/// Smallest and largest of the boxes around the start, shares of the joint ranges.
-const BOX_SHARES: [f64; 2] = [0.03, 0.6];
-/// Arms that stand for the belief.
-const N_ARMS: usize = 16;
-/// Square root of 2 and its like for 8 dimensions: the positive root of x^9 = x + 1 (Roberts 2018, the R sequence).
-const R8: f64 = 1.085_070_245_491_45;
 
 /// Where a draw comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,6 +5,7 @@
 //! its own errors take: `V (diag(1/s^2) + D^T H D)^-1 V^T`, `V = sum G_i^T H_i D`. These are the normal equations of
 //! `bundle` at what is believed.
 
+use crate::plan::constants::view_planning_forecast::{EDGE_SHARE, EDGES, MIN_STD};
 use nalgebra::{Cholesky, DMatrix, Matrix6, Vector3};
 
 use crate::plan::view_planning::parameter_prior::{ParameterPrior, WIDTH, basis};
@@ -34,14 +35,6 @@ pub(crate) struct Task {
     /// camera.
     pub floor_m2: f64,
 }
-
-/// What the joints at the edges of their reachable ranges count beside the task. Assumed: little, so that the task
-/// decides.
-const EDGE_SHARE: f64 = 0.3;
-/// Quantiles of the reachable angles that count as edges.
-const EDGES: [f64; 2] = [0.01, 0.99];
-/// Least standard deviation of what is said to be exact.
-const MIN_STD: f64 = 1e-6;
 
 impl Task {
     pub(crate) fn new(request: &PoseRequest<'_>, unknowns: &ParameterPrior) -> Self {

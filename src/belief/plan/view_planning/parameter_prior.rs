@@ -5,6 +5,8 @@
 //! survey's common error (a twist of all tags together in their frame). The covariance is what the estimator `bundle`
 //! takes for its prior, or the running estimate's.
 
+pub(crate) use crate::plan::constants::view_planning_parameter_prior::N_COMMON;
+use crate::plan::constants::view_planning_parameter_prior::UNKNOWN_STD;
 use nalgebra::{DMatrix, Matrix6, Vector6};
 
 use crate::explain::calibration_prior::MOUNT_ROWS;
@@ -19,16 +21,11 @@ use armcal_core::streams::MAX_JOINTS;
 
 /// Parameters of one joint: gain, offset, nonlinearity.
 pub(crate) const WIDTH: usize = 2 + N_SHAPE;
-/// Camera mount and survey.
-pub(crate) const N_COMMON: usize = 12;
 /// Ways that a view's camera can be moved by what is not known: each joint's angle, and the common ones.
 pub(crate) const N_DIRECTIONS: usize = MAX_JOINTS + N_COMMON;
 
 /// d(angle)/d(parameter) of each joint before the camera.
 pub(crate) type Basis = [[f64; WIDTH]; MAX_JOINTS];
-
-/// One sigma of what nobody knows at all: m and rad. Assumed; larger than any arm's site.
-const UNKNOWN_STD: f64 = 3.0;
 
 /// What is not known before the views to come.
 #[derive(Clone, Debug)]

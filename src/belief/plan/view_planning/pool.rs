@@ -1,5 +1,6 @@
 //! Candidates, and the choice among them.
 
+use crate::plan::constants::view_planning_pool::{ANCHORED_EVERY, CANDIDATES_PER_POSE, MIN_CANDIDATES};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
@@ -46,10 +47,6 @@ impl DesignInputs {
         request.taken.iter().map(look).collect()
     }
 }
-
-/// Where tags have to be mapped first, one view in so many shows one whose place is known: the map hangs on that tag,
-/// and is turned about it by as much as its corners leave its direction open.
-const ANCHORED_EVERY: usize = 2;
 
 impl PosePool {
     /// Draws until there are `enough`, or no more are found.
@@ -213,10 +210,6 @@ impl PosePool {
         PosePlan { poses, predicted_tool_error_m, tool_error_before_m, needed, arm_time_s, candidates, tried }
     }
 }
-
-/// More candidates than this gain little.
-const CANDIDATES_PER_POSE: usize = 20;
-const MIN_CANDIDATES: usize = 300;
 
 /// Chooses `n_fit` views for the fit and `n_held_out` for the verdict.
 ///

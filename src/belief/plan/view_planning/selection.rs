@@ -5,21 +5,12 @@
 //! computed earlier is taken for an upper bound, and most candidates need not be looked at again (lazy greedy, Minoux
 //! 1978). Exchange then puts one candidate in place of one pick as long as `ln measure + TIME_POWER ln time` falls.
 
+use crate::plan::constants::view_planning_selection::{LEAST_GAIN, MAX_ROUNDS, ROUNDING, SHORTLIST, TIME_POWER};
 use crate::plan::view_planning::candidates::Candidate;
 use crate::plan::view_planning::criterion::{DesignState, Scratch};
 use crate::plan::view_planning::view_information::WhitenedView;
 use crate::plan::view_planning::visit_order::Tour;
 use armcal_core::streams::JointAngles;
-
-/// What the arm's time counts beside the measure.
-const TIME_POWER: f64 = 0.7;
-const MAX_ROUNDS: usize = 3;
-/// An exchange that gains less than this is not made.
-const LEAST_GAIN: f64 = 1e-3;
-/// Candidates that an exchange looks at: those that would gain most on top of all that is picked.
-const SHORTLIST: usize = 120;
-/// Of two stale gains the one that is larger by rounding is not larger.
-const ROUNDING: f64 = 1e-12;
 
 /// What is picked from, and for what.
 pub(crate) struct ViewSelector<'a> {

@@ -7,6 +7,7 @@
 //! that stands still before tags on the arm the opposite of the tags' own. The joints' own errors of a view add
 //! `sum_j d_j d_j^T s_j^2` to the noise `H^-1`.
 
+use crate::plan::constants::view_planning_view_information::{FRAMES_PER_S, OWN_SURVEY_SHARE, REFERENCE_RANGE_M};
 use nalgebra::{Cholesky, Isometry3, Matrix6, SMatrix, Vector3};
 
 use crate::measure::ImagePoint;
@@ -52,14 +53,6 @@ pub(crate) struct CornerModel {
     /// Corner noise over the datasheet's.
     pub noise: f64,
 }
-
-/// Images a second of a detector. Assumed: slow ones read as many.
-const FRAMES_PER_S: f64 = 5.0;
-/// Range at which robot.toml's corner noise is meant, facing the tag, m.
-const REFERENCE_RANGE_M: f64 = 1.0;
-/// Of each tag's own survey error, the share that counts as noise of a view when views are ranked: the rest is known as
-/// soon as a few views have tied the tags together. Assumed; the forecast has each tag by itself.
-const OWN_SURVEY_SHARE: f64 = 0.35;
 
 impl CornerModel {
     pub(crate) fn new(dwell_s: f64, noise: f64) -> Self {

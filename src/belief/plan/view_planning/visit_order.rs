@@ -4,12 +4,9 @@
 //! neither helps (Croes 1958, Or 1976). Times of edges are those of rest-to-rest motion; paths that have to go around
 //! something take longer.
 
+use crate::plan::constants::view_planning_visit_order::{LEAST_GAIN_S, MAX_SWEEPS};
 use crate::plan::motion::timing::Timing;
 use armcal_core::streams::JointAngles;
-
-const MAX_SWEEPS: usize = 30;
-/// Gains below this are rounding, s.
-const LEAST_GAIN_S: f64 = 1e-9;
 
 /// Poses to visit from a start.
 pub(crate) struct Tour<'a> {

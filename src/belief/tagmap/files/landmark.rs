@@ -3,6 +3,7 @@
 //! A landmark may be less than an AprilTag: without size, without rotation, with a name instead of a number. The use of
 //! the detections decides whether that is enough.
 
+pub use crate::tagmap::constants::files_landmark::FIRST_NAMED_ID;
 use armcal_core::codes::Code;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -15,8 +16,6 @@ use armcal_core::optics::Chessboard;
 use armcal_core::robot::{FileIssue, Robot, SurveyedTag, TagSurvey};
 use armcal_core::spatial::{Base, Pose, Tag};
 
-/// Numbers of landmarks that have a name and no number: this plus their place in the file, from 0.
-pub const FIRST_NAMED_ID: u32 = 1_000_000;
 /// One sigma of a rotation of which nothing is known, rad: half a turn.
 pub const UNKNOWN_ROTATION_STD_RAD: f64 = std::f64::consts::PI;
 

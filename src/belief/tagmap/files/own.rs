@@ -7,6 +7,7 @@
 //! chessboard or ChArUco board with a name, whose origin is an outer corner; `[[body]]` with `name` and `moving`, for
 //! frames that move.
 
+use crate::tagmap::constants::files_own::MAX_SQUARES;
 use armcal_core::codes::Code;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -26,9 +27,6 @@ use armcal_core::optics::Chessboard;
 use armcal_core::robot::{FileIssue, RobotError};
 use armcal_core::schema::{first_line, schema_of};
 use armcal_core::spatial::{Base, Pose, Tag};
-
-/// Squares of a board along one side.
-const MAX_SQUARES: f64 = 100.0;
 
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

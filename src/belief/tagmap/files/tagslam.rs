@@ -1,5 +1,6 @@
 //! tagslam.yaml: bodies and their tags, as TagSLAM (Pfrommer and Daniilidis 2019) reads them.
 
+use crate::tagmap::constants::files_tagslam::HELD;
 use armcal_core::codes::Code;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -265,9 +266,6 @@ fn stamp(file: &Path, key: &str, text: &str) -> Result<Stamp, RobotError> {
     let total = seconds.checked_mul(1_000_000_000).and_then(|s| s.checked_add(nanos)).ok_or_else(wrong)?;
     Ok(Stamp { nanos: total })
 }
-
-/// The least that files give as a standard deviation, for a held tag has none.
-const HELD: (f64, f64) = (1e-4, 1e-5);
 
 /// A map as tagslam.yaml: one body for each group.
 pub(super) fn to_text(groups: &[WrittenGroup]) -> String {

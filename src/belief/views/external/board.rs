@@ -1,5 +1,6 @@
 //! A board over the frames of a view: the mean place of each corner, and the board's pose by them.
 
+use crate::views::constants::external_board::{CLOSE_SIGMAS, FAR_SIGMAS, MAX_LEFT_OUT, SIGMA_OF_MEDIAN};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -8,15 +9,6 @@ use nalgebra::{Point3, Vector2};
 use crate::views::association::MAX_SQUARE_RMS_PX;
 use crate::views::view::{BoardPoint, BoardPoints, ObservationRejection};
 use armcal_core::optics::{BoardPose, CameraModel, Chessboard, SquareError, solve_board};
-
-/// Frames in which a corner is farther than this many sigma from the median of all show another corner.
-const CLOSE_SIGMAS: f64 = 10.0;
-/// Corners farther than this many sigma from where the others have them are another corner, or a shadow.
-const FAR_SIGMAS: f64 = 6.0;
-/// A sigma by the median of absolute values.
-const SIGMA_OF_MEDIAN: f64 = 1.4826;
-/// The share of a board's corners that may be left out.
-const MAX_LEFT_OUT: f64 = 0.25;
 
 /// A board, and the camera that sees it.
 #[derive(Clone, Copy)]

@@ -1,5 +1,6 @@
 //! One landmark over the frames of a view.
 
+use crate::views::constants::external_landmarks::{NEVER_APART_M, USUAL_DISTANCES};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use crate::views::association::check_square;
@@ -24,11 +25,6 @@ pub(crate) struct Averaged {
     pub center_in_camera_m: Vector3<f64>,
     pub measured: TagMeasurement,
 }
-
-/// Frames farther from the median than this many times the median distance from it show something else.
-const USUAL_DISTANCES: f64 = 6.0;
-/// Closer than this is never left out, m: what positions from tags are good for at best. Assumed.
-const NEVER_APART_M: f64 = 2e-3;
 
 /// The mean of a board's corners over the frames, and how many of them were left out.
 pub(crate) fn average_board(

@@ -5,16 +5,12 @@
 //! nearest counts.
 
 use crate::views::conditions::{BACK_S, ROUNDING_COUNTS, RestPose};
+pub(crate) use crate::views::constants::external_pairing::{CONTINUOUS_WITHIN_S, RATE_WINDOW_S};
 use armcal_core::input::{ExternalRecording, Reading};
 use armcal_core::robot::Robot;
 use armcal_core::sensor::{ArmSensors, wrap_symmetric};
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
 use armcal_core::time::Stamp;
-
-/// Readings this close to each other are a continuous stream, s. Assumed.
-pub(crate) const CONTINUOUS_WITHIN_S: f64 = 0.25;
-/// Rates are measured over this on either side, s: long against the noise of readings, short against a motion. Assumed.
-pub(crate) const RATE_WINDOW_S: f64 = 0.1;
 
 /// The travel at a stamp.
 #[derive(Clone, Copy, Debug)]

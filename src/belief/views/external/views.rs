@@ -1,5 +1,8 @@
 //! From tag messages to views: what was seen while the arm stood still is one view.
 
+use crate::views::constants::external_views::{
+    ATTITUDE_WITHIN_S, MIN_MEAN_UP, RATE_SIGMAS, REST_RATE_RAD_S, SAME_POSE_SIGMAS,
+};
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Vector3;
@@ -12,18 +15,6 @@ use armcal_core::input::{AttitudeReading, ExternalRecording, InputMap, RawMeasur
 use armcal_core::robot::Robot;
 use armcal_core::streams::JointAngles;
 use armcal_core::time::Stamp;
-
-/// Readings within this many sigma of each other are of one pose. Assumed.
-const SAME_POSE_SIGMAS: f64 = 5.0;
-/// Faster than this, beyond what noise makes of it, is on the way, rad/s: at a reach of 2 m and a camera clock 50 ms
-/// late, 1 mm.
-const REST_RATE_RAD_S: f64 = 0.01;
-/// An attitude farther from a view than this says nothing of it, s: a vehicle leans another way within seconds.
-const ATTITUDE_WITHIN_S: f64 = 0.5;
-/// Attitudes whose mean is shorter contradict each other.
-const MIN_MEAN_UP: f64 = 0.5;
-/// Noise of a rate that counts as none, sigma.
-const RATE_SIGMAS: f64 = 5.0;
 
 /// A view, the hash of its first message, and the first and the last reading that it comes from.
 pub(crate) struct MadeView {

@@ -1,0 +1,16 @@
+//! Constants that decide something in `say`: unit, source and effect of each, by the file that uses it.
+
+pub(crate) mod refusal {
+    /// A smaller share of used observations means that the views fit nothing near the prior.
+    pub(crate) const MIN_USED_SHARE: f64 = 0.6;
+}
+
+pub(crate) mod repair {
+    /// A focal length that is off by less is not what was found of a lens, relative.
+    pub(crate) const LEAST_FOCAL: f64 = 1e-3;
+}
+
+pub(crate) mod wrong_input_words {
+    pub(crate) const WATER: f64 = 1.34;
+    pub(crate) const NEAR: f64 = 0.04;
+}

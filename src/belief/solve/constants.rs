@@ -1,0 +1,67 @@
+//! Constants that decide something in `solve`: unit, source and effect of each, by the file that uses it.
+
+pub(crate) mod covariance {
+    /// Distances below this do not make the objective's curvature larger: it is where pixel noise sits, m.
+    pub(crate) const DISTANCE_FLOOR_M: f64 = 1e-4;
+}
+
+pub(crate) mod estimate {
+    pub(crate) const CORNER_WIDTH: f64 = 3.0;
+    /// Cost per used measurement above which something does not hold. Good views have about one (corner noise is not
+    /// quite normal).
+    pub(crate) const CONSISTENT_COST: f64 = 3.0;
+    pub(crate) const MAX_ROUNDS: usize = 40;
+    pub(crate) const CONVERGED_CHANGE: f64 = 0.01;
+}
+
+pub(crate) mod evidence {
+    /// Pseudo-observations that the first guess of each scale counts for.
+    pub(crate) const NU_JOINT: f64 = 3.0;
+    pub(crate) const NU_SHAPE: f64 = 2.0;
+    pub(crate) const NU_TERM: f64 = 2.0;
+    pub(crate) const NU_LINK: f64 = 2.0;
+    pub(crate) const NU_NOISE: f64 = 20.0;
+    pub(crate) const NU_CAMERA: f64 = 6.0;
+    /// Bounds of the noise's factor, and of every other scale over its first guess.
+    pub(crate) const NOISE_BOUNDS: [f64; 2] = [0.1, 30.0];
+    /// Of positions and rotations over their first guess, which nobody stated.
+    pub(crate) const POSITION_BOUNDS: [f64; 2] = [1e-3, 1e3];
+    pub(crate) const SCALE_BOUNDS: [f64; 2] = [0.02, 50.0];
+    /// A column with less than one entry in so many goes by its entries alone: a view sees few of many tags.
+    pub(crate) const FEW: usize = 4;
+    pub(crate) const STEP: f64 = 1e-3;
+}
+
+pub(crate) mod levenberg_marquardt {
+    /// Near the end a step may cost a few last digits; relative error of a sum of thousands of squares.
+    pub(crate) const SLACK: f64 = 1e-13;
+    pub(crate) const ROUNDING: f64 = 1e-11;
+    /// Where every observation is rejected the priors alone are left, whose least cost is zero: no step ever saves too
+    /// small a share of it. Below this cost, a sum of squares in standard deviations, all is within 1e-6 of the priors.
+    pub(crate) const COST_AT_PRIORS: f64 = 1e-12;
+    /// From this curvature on a step has overshot: it saved less than half of what it should.
+    pub(crate) const OVERSHOT: f64 = 1.5;
+    /// Cosine of the angle between two steps, the second of which goes back along the first.
+    pub(crate) const GOES_BACK: f64 = -0.9;
+}
+
+pub(crate) mod model_for_views {
+    /// Fewer views of the tag on the gripper are not used.
+    pub const MIN_GRIPPER_VIEWS: usize = 4;
+}
+
+pub(crate) mod problem {
+    /// Degrees of freedom that the corner noise by robot.toml counts for, beside the scatter between a view's frames.
+    pub(crate) const CORNER_PRIOR_DOF: f64 = 16.0;
+}
+
+pub(crate) mod robust_start {
+    /// Standard deviations of the tags' positions in the robust start, one after the other, m.
+    pub(crate) const START_STD_M: [f64; 3] = [0.3, 0.1, 0.03];
+    pub(crate) const START_WIDTH: f64 = 1.0;
+}
+
+pub(crate) mod time_error {
+    /// Of what a joint of a moving arm is off by itself, rad^2: the inverse takes differences.
+    pub(crate) const LEAST_OWN_VAR: f64 = 1e-14;
+}

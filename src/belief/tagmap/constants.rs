@@ -1,0 +1,120 @@
+//! Constants that decide something in `tagmap`: unit, source and effect of each, by the file that uses it.
+
+pub(crate) mod adjust {
+    /// Width of the Cauchy loss, in standard deviations found (Zhang 1997: 2.385 costs 5 % of efficiency; it is the
+    /// start alone).
+    pub(crate) const CAUCHY_WIDTH: f64 = 2.385;
+    /// The very first loss, whose pull does not fade.
+    pub(crate) const FIRST_WIDTH: f64 = 1.345;
+    /// Corners to here count fully in the end; one in 3000 honest ones lies beyond.
+    pub(crate) const HUBER_WIDTH: f64 = 4.0;
+    /// Bounds of the scale that is taken from the residuals, over the corners' standard deviation given: a detector's
+    /// noise lies well within; what lies beyond is a wrong model. Assumed.
+    pub(crate) const SCALE_BOUNDS: (f64, f64) = (0.02, 50.0);
+    /// The median of the length of a two-dimensional unit normal vector is sqrt(2 ln 2).
+    pub(crate) const MEDIAN_OF_LENGTH: f64 = 1.177_41;
+    pub(crate) const MAX_ITERATIONS: usize = 50;
+    /// Of all adjustments of a map. Views that fit each other take 10 to 40; those that contradict each other never
+    /// rest.
+    pub(crate) const MAX_STEPS: usize = 250;
+    /// Steps that change the cost by less than this share of it end an adjustment.
+    pub(crate) const CONVERGED: f64 = 1e-14;
+    /// A chi-square that still falls by less than this a step moves nothing by a noticeable share of its standard
+    /// deviation. A loss that is not quadratic converges no faster than this where a few detections lie beyond its
+    /// width.
+    pub(crate) const AT_REST: f64 = 1e-3;
+    /// Where only a start is wanted.
+    pub(crate) const ROUGHLY: f64 = 1e-3;
+    /// Below this share of the cost it is rounding, not the model, that stands in the way.
+    pub(crate) const ROUNDING: f64 = 1e-12;
+}
+
+pub(crate) mod assemble {
+    /// Chi-square of 6 degrees of freedom, 99.99 %.
+    pub(crate) const FAR_FROM_KNOWN: f64 = 27.86;
+}
+
+pub(crate) mod files_landmark {
+    /// Numbers of landmarks that have a name and no number: this plus their place in the file, from 0.
+    pub const FIRST_NAMED_ID: u32 = 1_000_000;
+}
+
+pub(crate) mod files_own {
+    /// Squares of a board along one side.
+    pub(crate) const MAX_SQUARES: f64 = 100.0;
+}
+
+pub(crate) mod files_tagslam {
+    /// The least that files give as a standard deviation, for a held tag has none.
+    pub(crate) const HELD: (f64, f64) = (1e-4, 1e-5);
+}
+
+pub(crate) mod groups {
+    /// Tighter than this a place on a body cannot be known: m and rad.
+    pub(crate) const LEAST_STD: f64 = 1e-7;
+}
+
+pub(crate) mod incremental_layout {
+    /// Images that place a tag; more change little but the time. Assumed.
+    pub(crate) const MAX_IMAGES: usize = 24;
+}
+
+pub(crate) mod linearize {
+    /// A corner that the lens does not see counts as one that is this many standard deviations off.
+    pub(crate) const UNSEEN_SIGMAS: f64 = 1e4;
+}
+
+pub(crate) mod localize {
+    /// Width of the Cauchy loss by which starts are compared, px: a start is a few pixels off, a wrong one tens.
+    pub(crate) const COMPARE_PX: f64 = 5.0;
+    pub(crate) const MAX_IMAGES: usize = 40;
+}
+
+pub(crate) mod normal_equations {
+    /// Keeps a step possible while some camera or tag sees nothing at all: what is determined has 1e4 and more (1/m^2,
+    /// 1/rad^2).
+    pub(crate) const UNDETERMINED: f64 = 1e-6;
+}
+
+pub(crate) mod recording {
+    /// Longest gap between attitudes that is bridged, s.
+    pub(crate) const MAX_GAP_S: f64 = 0.2;
+}
+
+pub(crate) mod scale {
+    /// Sizes nearer to right than this are not spoken of: a square's distance is itself uncertain by some percent.
+    pub(crate) const LEAST_FACTOR: f64 = 1.15;
+    /// A measured distance that is off by more than this (natural logarithm) counts as this.
+    pub(crate) const FARTHEST: f64 = 1.0;
+    /// An explanation must leave less than this share of the disagreement.
+    pub(crate) const EXPLAINS: f64 = 0.5;
+    pub(crate) const MAX_SAMPLES: usize = 400;
+    pub(crate) const MAX_ROOTS: usize = 60;
+}
+
+pub(crate) mod solve {
+    /// Rounds of choosing detections and fitting again.
+    pub(crate) const MAX_ROUNDS: usize = 8;
+    /// A pose found anew replaces one that fits worse by this factor.
+    pub(crate) const MUCH_WORSE: f64 = 1.25;
+}
+
+pub(crate) mod tag_mapping {
+    /// A tag whose place in the base tag's frame is less sure than this per axis is left out, m. Assumed: ten times a
+    /// usual survey.
+    pub(crate) const MAX_RELATIVE_STD_M: f64 = 0.01;
+}
+
+pub(crate) mod tag_pairs {
+    /// The least share of a pair's images that must agree.
+    pub(crate) const MIN_SHARE: f64 = 0.3;
+}
+
+pub(crate) mod vote {
+    /// Images that vote; more change nothing but the time. Assumed.
+    pub(crate) const MAX_VOTERS: usize = 24;
+    /// Chi-square of 6 degrees of freedom, 99.9 %: agreement.
+    pub(crate) const AGREES: f64 = 22.46;
+    /// A corner's standard deviation as votes take it, px: detectors are seldom worse. Assumed.
+    pub(crate) const VOTE_STD_PX: f64 = 0.5;
+}
