@@ -4,6 +4,7 @@
 //! `covariance_file` the covariance beside it, `compact` is one line of less than 512 bytes, `lookup` a table from
 //! counts to radians.
 
+#[cfg(test)]
 pub(crate) mod bare;
 pub(crate) mod calibrated_arm;
 pub(crate) mod calibration;
