@@ -7,7 +7,7 @@ use armcal_core::routine::Method;
 use armcal_core::streams::{Mark, MarkKind, Message, PriorSource};
 use armcal_core::time::Stamp;
 
-use crate::batch::calibration::{BundleCalibration, EstimateListener, EstimatePurpose};
+use crate::batch::rounds::{BundleCalibration, EstimateListener, EstimatePurpose};
 use crate::batch::slips_since::slips_since;
 use crate::file::calibration::{Calibration, Status};
 use crate::methods::calibration::calibrate_positions;

@@ -5,7 +5,7 @@ pub(crate) mod calibrate {
     pub const MIN_VIEWS: usize = 3;
 }
 
-pub(crate) mod calibration {
+pub(crate) mod rounds {
     /// Fewer views do not determine how large noise and nonlinearity are: the datasheet's figures stand.
     pub(crate) const MIN_VIEWS_FOR_EVIDENCE: usize = 12;
 }

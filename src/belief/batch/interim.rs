@@ -1,6 +1,6 @@
 //! What the views captured so far say, for whoever must go on by it: margins and poses to come.
 
-use crate::batch::calibration::{BundleCalibration, EstimatePurpose};
+use crate::batch::rounds::{BundleCalibration, EstimatePurpose};
 use crate::file::calibration::Calibration;
 use crate::views::association::{associate_within, declared_failed, surveyed};
 use crate::views::calibration_data::{CalibrationData, HeldOut};

@@ -3,7 +3,7 @@
 use nalgebra::Isometry3;
 
 use crate::measure::information::{LensInformation, PoseInformation, TwistSums};
-use crate::measure::point::ImagePoint;
+use crate::measure::projection::ImagePoint;
 use armcal_core::optics::CameraModel;
 use armcal_core::spatial::adjoint;
 

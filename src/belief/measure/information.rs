@@ -7,7 +7,7 @@
 
 use nalgebra::{Matrix6, SMatrix, SVector, Vector6};
 
-use crate::measure::point::ImagePoint;
+use crate::measure::projection::ImagePoint;
 
 /// An observation linearized, in the camera's frame.
 #[derive(Clone, Debug)]

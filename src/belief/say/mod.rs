@@ -1,8 +1,8 @@
 //! What is said of a calibration, and its words: the same in terminal, report, replay and files.
 //!
 //! `finding` is what was found to be other than stated, `refusal` why a result must not be used (`wrong_input`,
-//! `reading_error`, `geometry_error` are causes), `reservation` what it rests on. `repair` says what to do about a
-//! finding. Each kind has its words in a file beside it, and nowhere else.
+//! `reading_error`, `geometry_error` are causes), `reservation` its limits. `repair` says what to do about a
+//! finding. Their words are in this room and nowhere else.
 
 pub(crate) mod constants;
 pub(crate) mod finding;

@@ -38,8 +38,8 @@ pub enum CalibError {
     #[error("the scale of joint `{joint}` cannot be measured: {problem}")]
     Identify { joint: String, problem: String },
     #[error(
-        "{recording}: all {views} views are of one pose: between base and camera, no joint moved by more than its noise \
-         (the most: `{joint}`, {moved}), so nothing can be told of any; check the topic and \
+        "{recording}: all {views} views are of one pose: between base and camera, no joint moved by more than its \
+         noise (the most: `{joint}`, {moved}), so nothing can be told of any; check the topic and \
          joint_sensors.unit of the joint readings, or capture views at different poses"
     )]
     OnePose { recording: String, views: usize, joint: String, moved: String },

@@ -1,6 +1,6 @@
 //! One calibration by `bundle`, step by step: estimate, diagnose, report, judge.
 
-use crate::batch::constants::calibration::MIN_VIEWS_FOR_EVIDENCE;
+use crate::batch::constants::rounds::MIN_VIEWS_FOR_EVIDENCE;
 use crate::batch::failure_impact::FailureImpact;
 use crate::batch::tables::{
     add_clock, camera_mount_table, covariance_with_mount, further_camera_tables, lens_tables, map_table, model_table,
