@@ -11,17 +11,18 @@ pub use crate::file::{
     TermsTable, ValidRange, VerdictTable, ViewContainment, calibration_schema, covariance_file, covariance_schema,
     metric,
 };
-pub use crate::judge::{BaselineComparison, SIGNIFICANCE};
+pub use crate::judge::baseline_comparison::{BaselineComparison, SIGNIFICANCE};
 pub use crate::methods::{
     EndStopFit, Gauge, Interpolation, PositionMethod, PositionSearch, Scaling, SearchOptions, VarianceObjective,
     determined_by_variance, fisher_information, fit_stops, free_parameters, least_squares, minimum_distance,
     mount_by_gripper_tag,
 };
 pub use crate::positions::{MountEstimate, PositionProblem, Solution, Unobservable};
-pub use crate::say::{
-    ErrorKind, GeometryError, InnovationQuantity, JointZero, MisreadReadings, ReadingError, Refusal, Reservation,
-    WrongInput, WrongInputKind, refusals_in_files, with_advice,
-};
+pub use crate::say::geometry_error::{ErrorKind, GeometryError};
+pub use crate::say::reading_error::{JointZero, MisreadReadings, ReadingError};
+pub use crate::say::refusal::{InnovationQuantity, Refusal, in_files as refusals_in_files, with_advice};
+pub use crate::say::reservation::Reservation;
+pub use crate::say::wrong_input::{WrongInput, WrongInputKind};
 pub use crate::solve::covariance::{CommonErrors, JointAt, ParameterCovariance, ToolErrorPrediction};
 pub use crate::solve::details::{CornerResidual, FitDetails, ObservedTag, TargetPrediction, ViewResidual};
 pub use crate::views::error::CalibError;

@@ -105,6 +105,7 @@ pub(crate) mod failures {
 }
 
 pub(crate) mod model_selection {
+    /// Evidence that a doubtful term must add to stay, nats: odds of 20 to one.
     pub(crate) const MIN_GAIN_NATS: f64 = 3.0;
     /// First guess of the error of positions by SLAM: translation m, rotation rad (assumed; the evidence fits both).
     pub(crate) const CAMERA_ERROR_STD: [f64; 2] = [0.005, 0.01];

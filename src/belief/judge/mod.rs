@@ -9,7 +9,6 @@ pub(crate) mod constants;
 pub(crate) mod coverage;
 pub(crate) mod decision;
 
-pub use baseline_comparison::{BaselineComparison, SIGNIFICANCE};
 pub use coverage::{COVERAGE, ErrorDistribution};
 pub(crate) use decision::TargetError;
 pub use decision::{MAX_RISK, RULE, TargetU95, U95Table};

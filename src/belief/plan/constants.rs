@@ -161,6 +161,7 @@ pub(crate) mod targets {
 }
 
 pub(crate) mod view_planning_camera_ik {
+    /// Most steps of the inverse kinematics of the camera.
     pub(crate) const STEPS: usize = 12;
     /// Longest step of a joint, rad.
     pub(crate) const MAX_STEP_RAD: f64 = 0.4;
@@ -240,6 +241,7 @@ pub(crate) mod view_planning_view_information {
 }
 
 pub(crate) mod view_planning_visit_order {
+    /// Most sweeps of exchanges over the order of visits.
     pub(crate) const MAX_SWEEPS: usize = 30;
     /// Gains below this are rounding, s.
     pub(crate) const LEAST_GAIN_S: f64 = 1e-9;

@@ -11,6 +11,8 @@ pub(crate) mod repair {
 }
 
 pub(crate) mod wrong_input_words {
+    /// Refractive index of sea water (Treibitz et al. 2012).
     pub(crate) const WATER: f64 = 1.34;
+    /// Relative difference from it within which a ratio of focal lengths is named as water.
     pub(crate) const NEAR: f64 = 0.04;
 }

@@ -18,10 +18,5 @@ pub(crate) mod wrong_input_words;
 
 pub use finding::{Finding, FindingKind, FindingUnit};
 pub(crate) use finding_words::{drift, event, explanation, offset_walks, slip};
-pub use geometry_error::{ErrorKind, GeometryError};
-pub use reading_error::{JointZero, MisreadReadings, ReadingError};
-pub use refusal::{InnovationQuantity, Refusal, in_files as refusals_in_files, with_advice};
 pub use repair::{FailedJoint, Repair, repairs};
-pub use reservation::Reservation;
 pub use sentence::sentence;
-pub use wrong_input::{WrongInput, WrongInputKind};

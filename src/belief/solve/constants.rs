@@ -6,11 +6,14 @@ pub(crate) mod covariance {
 }
 
 pub(crate) mod estimate {
+    /// Width of the Cauchy loss in the first solution, standard deviations of a measurement.
     pub(crate) const CORNER_WIDTH: f64 = 3.0;
     /// Cost per used measurement above which something does not hold. Good views have about one (corner noise is not
     /// quite normal).
     pub(crate) const CONSISTENT_COST: f64 = 3.0;
+    /// Most rounds of estimates and scales.
     pub(crate) const MAX_ROUNDS: usize = 40;
+    /// Change of the scales in a round below which they have settled.
     pub(crate) const CONVERGED_CHANGE: f64 = 0.01;
 }
 

@@ -11,7 +11,7 @@ pub(crate) mod pairs;
 pub(crate) mod recording;
 
 use crate::explain::constants::wrong_input::{BETTER, GOOD, MAX_VIEWS, SIZE_TOLERANCE};
-use crate::say::WrongInput;
+use crate::say::wrong_input::WrongInput;
 
 use crate::views::view::{CaptureData, View};
 use armcal_core::robot::{Robot, SurveyedTag};

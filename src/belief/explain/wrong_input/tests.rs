@@ -1,4 +1,4 @@
-use crate::say::WrongInputKind;
+use crate::say::wrong_input::WrongInputKind;
 use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 use std::sync::LazyLock;
