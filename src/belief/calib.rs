@@ -1,7 +1,7 @@
 //! Calibrations as programs make and read them: what the rooms from `views` to `follow` offer.
 
-pub use crate::batch::calibrate::{MIN_VIEWS, calibrate, calibrate_data, calibrate_with_survey};
 pub use crate::batch::interim::interim_estimate;
+pub use crate::batch::marked_calibrations::{MIN_VIEWS, calibrate, calibrate_data, calibrate_with_survey};
 pub use crate::checks::refusal_conditions::{MIN_HELD_OUT_VIEWS, MIN_VIEWS_PER_PARAMETER, fewest_views};
 pub use crate::file::{
     CalibratedArm, Calibration, CalibrationFileError, CalibrationFiles, CameraMount, Check, CompactCalibration,

@@ -1,6 +1,6 @@
 //! Constants that decide something in `batch`: unit, source and effect of each, by the file that uses it.
 
-pub(crate) mod calibrate {
+pub(crate) mod marked_calibrations {
     /// The fewest views that may be fitted at all.
     pub const MIN_VIEWS: usize = 3;
 }

@@ -1,12 +1,12 @@
 //! A calibration from a recording, as a whole.
 //!
-//! `calibrate` works through the calibrations that a recording marks; `rounds` is the default method: estimate,
+//! `marked_calibrations` works through the calibrations that a recording marks; `rounds` is the default method: estimate,
 //! explanations, checks, in rounds; `tables` writes what it found. `interim` estimates during a capture.
 
-pub(crate) mod calibrate;
 pub(crate) mod constants;
 pub(crate) mod failure_impact;
 pub(crate) mod interim;
+pub(crate) mod marked_calibrations;
 pub(crate) mod rounds;
 pub(crate) mod slips_since;
 pub(crate) mod tables;

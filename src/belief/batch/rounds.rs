@@ -7,10 +7,10 @@ use crate::batch::tables::{
     prior_table,
 };
 use crate::checks::assemble::{Evidence, Fit, Provenance, assemble, is_near, noise_dof, refusal_by_priors};
+use crate::checks::consistency::{MAX_OUTLIERS, VerdictInput};
 use crate::checks::cross_validation::{FOLDS, Fold, FoldSums, fold_of};
 use crate::checks::innovations::Innovations;
 use crate::checks::touch_term::TouchUpdate;
-use crate::checks::verdict::{MAX_OUTLIERS, VerdictInput};
 use crate::explain::angles_by_camera::set_by_camera;
 use crate::explain::baseline::Baseline;
 use crate::explain::calibration_prior::PriorConsistency;

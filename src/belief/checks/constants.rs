@@ -111,7 +111,7 @@ pub(crate) mod touch_term {
     pub(crate) const TOLD_SHARE: f64 = 1e-3;
 }
 
-pub(crate) mod verdict {
+pub(crate) mod consistency {
     /// Probability that a good arm fails any one check by chance.
     pub(crate) const FALSE_ALARM: f64 = 1e-4;
     /// Geometry that would move the tool by less than this, and by less than the predicted error, is no reason to

@@ -1,10 +1,11 @@
 //! Checks of one calibration: do joint sensors explain the views, and what is the result worth?
 //!
-//! `verdict` is all checks of an estimate, `innovations` and `cross_validation` are about views that the fit did not
+//! `consistency` is all checks of an estimate, `innovations` and `cross_validation` are about views that the fit did not
 //! use, `observability` and `reservations` about what the views cannot show. `refusal_conditions` and the decision rule
 //! come last, in `assemble`, which fills calibration.toml.
 
 pub(crate) mod assemble;
+pub(crate) mod consistency;
 pub(crate) mod constants;
 pub(crate) mod cross_validation;
 pub(crate) mod drawing_report;
@@ -16,4 +17,3 @@ pub(crate) mod refusal_conditions;
 pub(crate) mod reservations;
 pub(crate) mod stated_error;
 pub(crate) mod touch_term;
-pub(crate) mod verdict;

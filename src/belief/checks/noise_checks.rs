@@ -1,7 +1,7 @@
 //! Checks of the fitted noise of corners, rotations and all other sizes against what is stated for them.
 
+use crate::checks::consistency::{MAX_SIGMAS_OFF, VerdictInput};
 use crate::checks::constants::noise_checks::{MAX_OVER_CORNER_NOISE, MAX_ROTATION_NOISE_RAD, NEAR, NOISY};
-use crate::checks::verdict::{MAX_SIGMAS_OFF, VerdictInput};
 use crate::explain::model_selection::CAMERA_ERROR_STD;
 use crate::file::verdict_tables::{Check, VerdictTable};
 use crate::say::refusal::Refusal;

@@ -78,7 +78,7 @@ mod tests {
         let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
         let robot = titan();
         let recording = read_recording(root.join("recordings/sample/run.mcap")).unwrap();
-        let mut calibration = crate::batch::calibrate::calibrate(&recording, &robot, Method::Bundle).unwrap();
+        let mut calibration = crate::batch::marked_calibrations::calibrate(&recording, &robot, Method::Bundle).unwrap();
         let is_offset = |name: &String| name.ends_with(" offset");
         let kept: Vec<usize> = (0..calibration.covariance.parameters.len())
             .filter(|row| is_offset(&calibration.covariance.parameters[*row]))

@@ -1,6 +1,6 @@
 //! The batch of all views, to compare a belief with that took in the same views one by one.
 
-use crate::batch::calibrate::calibrate_bundle;
+use crate::batch::marked_calibrations::calibrate_bundle;
 use crate::file::calibration::Calibration;
 use crate::follow::estimator::OnlineEstimator;
 use crate::follow::event::OnlineEvent;

@@ -3,7 +3,7 @@
 use crate::session::constants::script::{LINK_REACH_M, START_SHARES};
 use std::rc::Rc;
 
-use crate::batch::calibrate::calibrate;
+use crate::batch::marked_calibrations::calibrate;
 use crate::file::calibration::{Calibration, Status};
 use crate::file::file_error::CalibrationFileError;
 use crate::plan::{ClearanceModel, Elapsed, JointErrorBounds, LeastClearance, PathError, PathPlanner};

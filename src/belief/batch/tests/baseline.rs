@@ -2,7 +2,7 @@
 
 use rand::seq::SliceRandom;
 
-use crate::batch::calibrate::calibrate_data;
+use crate::batch::marked_calibrations::calibrate_data;
 use crate::batch::tests::data::{Noise, Truth, rng, titan, views};
 use crate::file::calibration::{Calibration, Status};
 use crate::model::parameters::JointParameters;

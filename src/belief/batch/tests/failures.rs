@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Vector3};
 use rand::RngExt;
 
-use crate::batch::calibrate::calibrate_data;
+use crate::batch::marked_calibrations::calibrate_data;
 use crate::batch::tests::data::{Noise, Truth, rng, titan, views};
 use crate::batch::tests::score_test::with_link;
 use crate::explain::drawing::Drawing;

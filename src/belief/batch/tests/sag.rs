@@ -1,6 +1,6 @@
 //! Arms that bend under their weight.
 
-use crate::batch::calibrate::calibrate_data;
+use crate::batch::marked_calibrations::calibrate_data;
 use crate::batch::tests::arms::{Built, arm, better};
 use crate::batch::tests::data::{normal, rng, titan};
 use crate::batch::tests::drawing::{Case, case_changed, tool_errors_m};

@@ -1,6 +1,6 @@
 //! From a recording to a calibration: each calibration that the recording marks in its turn.
 
-pub use crate::batch::constants::calibrate::MIN_VIEWS;
+pub use crate::batch::constants::marked_calibrations::MIN_VIEWS;
 use armcal_core::log::Recording;
 use armcal_core::robot::Robot;
 use armcal_core::routine::Method;

@@ -1,11 +1,11 @@
 //! Whether joint sensors explain the data of a calibration by `bundle`: score test of the link geometry, size of the
 //! sensors' errors, outliers, and innovations of held-out views.
 
-use crate::checks::constants::verdict::{
+use crate::checks::constants::consistency::{
     FALSE_ALARM, FAR_BEYOND, HELD, LEAST, MAX_NONLINEARITY, MAX_OVER_LINEARITY, MAX_UNCONFIRMED, NAMED_WALK_NATS,
     TAILS, WALK_SIGNIFICANCE, WALKED, WORN, WORTH_M,
 };
-pub(crate) use crate::checks::constants::verdict::{MAX_OUTLIERS, MAX_SIGMAS_OFF};
+pub(crate) use crate::checks::constants::consistency::{MAX_OUTLIERS, MAX_SIGMAS_OFF};
 use crate::checks::innovations::{Innovations, JointInnovation};
 use crate::checks::observability::{Observability, observability};
 use crate::explain::score_test::{GeometryElement, ScoreTestResult};
