@@ -56,6 +56,7 @@ impl VerdictInput<'_> {
         let configurations = if targets.is_empty() { self.found.view_angles() } else { targets.clone() };
         let mut table = VerdictTable { warnings: Vec::new(), not_covered: Vec::new(), checks: Vec::new() };
         let refusals = [
+            self.block_measurements(&mut table),
             self.walks(calibration),
             self.geometry(&configurations, calibration, &mut table),
             self.baseline(&configurations, calibration, &mut table),

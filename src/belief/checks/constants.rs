@@ -111,6 +111,11 @@ pub(crate) mod touch_term {
     pub(crate) const TOLD_SHARE: f64 = 1e-3;
 }
 
+pub(crate) mod block_measurements {
+    /// Probability that a good measurement is called contradicted.
+    pub(crate) const FALSE_ALARM: f64 = 1e-4;
+}
+
 pub(crate) mod consistency {
     /// Probability that a good arm fails any one check by chance.
     pub(crate) const FALSE_ALARM: f64 = 1e-4;

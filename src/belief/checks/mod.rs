@@ -5,6 +5,7 @@
 //! come last, in `assemble`, which fills calibration.toml.
 
 pub(crate) mod assemble;
+pub(crate) mod block_measurements;
 pub(crate) mod consistency;
 pub(crate) mod constants;
 pub(crate) mod cross_validation;

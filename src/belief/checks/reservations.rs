@@ -21,7 +21,7 @@ use crate::say::geometry_error::ErrorKind;
 use crate::say::reservation::Reservation;
 use crate::solve::estimate::Estimate;
 use armcal_core::joints::JointAngles;
-use armcal_core::robot::GeometryPriors;
+use armcal_core::robot::geometry::GeometryPriors;
 
 /// An element of the geometry along one axis, with its prior.
 struct HeldElement {

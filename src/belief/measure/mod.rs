@@ -2,7 +2,9 @@
 //!
 //! `corners` of a tag, points of a `board`, a tag's `position` or `pose`; `observation` is any of them, `information`
 //! its linearization in the camera's twist. `projection` is the only place that linearizes a projection.
+//! `block_measurement` is what no view shows.
 
+mod block_measurement;
 mod board;
 pub(crate) mod constants;
 mod corners;
@@ -12,6 +14,7 @@ mod pose;
 mod position;
 mod projection;
 
+pub(crate) use block_measurement::BlockMeasurement;
 pub(crate) use board::WeightedPoint;
 pub(crate) use corners::WeightedCorners;
 pub(crate) use information::{LensInformation, PoseInformation, TwistSums};

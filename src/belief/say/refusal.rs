@@ -274,6 +274,19 @@ pub enum Refusal {
         /// From the drawn tool point to one that would explain it best, axes of `link`.
         tool_point_m: [f64; 3],
     },
+    /// A measured length and the views contradict each other.
+    Length {
+        /// What was measured.
+        what: String,
+        /// The key that states it.
+        key: String,
+        /// As stated.
+        measured_m: f64,
+        /// By the views and all else.
+        by_views_m: f64,
+        /// One sigma of the difference.
+        std_m: f64,
+    },
     /// The prior rests on the same messages.
     PriorReused,
     /// The prior's covariance has no inverse.
@@ -468,6 +481,7 @@ impl Refusal {
                 "measure the tool point ([tool] point_m of robot.toml), the links beyond the camera and the camera \
                  mount"
             }
+            Self::Length { .. } => "measure again, and correct this length or the tags' size_m in robot.toml",
             Self::PriorReused => "give a prior that was made from other views",
             Self::PriorSingular => "make the prior again",
             Self::PriorContradicted { .. } => "calibrate without --prior",
@@ -520,6 +534,7 @@ impl Coded for Refusal {
             Self::Outliers { .. } => Code::TooManyOutliers,
             Self::Innovations { .. } => Code::Innovations,
             Self::Touch { .. } => Code::TouchContradicted,
+            Self::Length { .. } => Code::LengthContradicted,
             Self::PriorReused => Code::PriorReused,
             Self::PriorSingular => Code::PriorSingular,
             Self::PriorUntested => Code::PriorUntested,

@@ -113,6 +113,7 @@ impl NormalEquations {
         if !is_full {
             self.add_priors(problem, state);
         }
+        self.add_block_measurements(problem, state);
     }
 
     fn add_group(&mut self, at: &Point<'_, '_>, group: &Group<'_>, own: &mut SchurBlock) {

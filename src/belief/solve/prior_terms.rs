@@ -1,4 +1,4 @@
-//! What is known before: the priors' part of the normal equations.
+//! What no view shows: the parts of the normal equations by priors and by what is measured of blocks.
 
 use nalgebra::{Dyn, Matrix6, OMatrix, U6, Vector6};
 
@@ -53,6 +53,22 @@ impl NormalEquations {
             below.copy_from(&turned);
             let pulled = jacobian.tr_mul(&self.right.fixed_rows::<6>(at));
             self.right.fixed_rows_mut::<6>(at).copy_from(&pulled);
+        }
+    }
+
+    pub(crate) fn add_block_measurements(&mut self, problem: &BundleProblem<'_>, state: &State) {
+        for measurement in &problem.block_measurements {
+            let of = measurement.predicted(&state.blocks);
+            let (off_m, info) = (of.measured_m - of.predicted_m, of.std_m.powi(-2));
+            self.cost += info * off_m * off_m;
+            let rows = of.by.map(|(block, by)| problem.layout.at(block).map(|at| (at, by)));
+            for (at, by) in rows.into_iter().flatten() {
+                let mut right = self.right.fixed_rows_mut::<6>(at);
+                right += by * (info * off_m);
+                for (before, other) in rows.into_iter().flatten().filter(|(before, _)| *before <= at) {
+                    self.add_block(at, before, &(by * other.transpose() * info));
+                }
+            }
         }
     }
 

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use nalgebra::{DVector, Isometry3, SMatrix, Vector3};
 
-use crate::measure::{ObservationTerm, WeightedCorners, WeightedMeasurement, WeightedPoint};
+use crate::measure::{BlockMeasurement, ObservationTerm, WeightedCorners, WeightedMeasurement, WeightedPoint};
 use crate::model::blocks::Block;
 use crate::model::estimated::Walk;
 use crate::model::layout::Layout;
@@ -51,6 +51,8 @@ pub(crate) struct BundleProblem<'a> {
     pub layout: Layout,
     pub views: Vec<ViewData>,
     pub observations: Vec<ObservationTerm>,
+    /// Between blocks that have columns.
+    pub block_measurements: Vec<BlockMeasurement>,
     pub prior: Prior,
     pub scales: Hyperparameters,
     /// Links as they were known before.
@@ -65,11 +67,16 @@ pub(crate) const N_VIEW_PARAMETERS: usize = MAX_JOINTS + 6;
 pub(crate) type Own = SMatrix<f64, N_VIEW_PARAMETERS, N_VIEW_PARAMETERS>;
 
 impl<'a> BundleProblem<'a> {
+    /// With what is measured of its blocks.
     pub(crate) fn new(input: &BundleInput<'a>, prior: Prior) -> Self {
-        Self::with_layout(input, input.layout(), prior)
+        let mut problem = Self::with_layout(input, input.layout(), prior);
+        let has_columns = |block: &Block| problem.layout.at(*block).is_some();
+        let all = BlockMeasurement::all(input.robot).into_iter().flatten();
+        problem.block_measurements = all.filter(|of| of.blocks().iter().all(has_columns)).collect();
+        problem
     }
 
-    /// The same with columns that may be more than the views' own.
+    /// The views alone, with columns that may be more than their own.
     pub(crate) fn with_layout(input: &BundleInput<'a>, layout: Layout, prior: Prior) -> Self {
         let BundleInput { robot, views, model, scales, .. } = input;
         let (robot, scales) = (*robot, scales.clone());
@@ -108,7 +115,8 @@ impl<'a> BundleProblem<'a> {
             data.push(view_data(input, view, &layout, from..to, gripper));
         }
         let (guess_links, n_seen_joints) = (input.guess.links, robot.n_seen_joints());
-        Self { robot, layout, views: data, observations, prior, scales, guess_links, n_seen_joints }
+        let block_measurements = Vec::new();
+        Self { robot, layout, views: data, observations, block_measurements, prior, scales, guess_links, n_seen_joints }
     }
 
     /// Makes the datasheet's priors those of the scales.

@@ -159,6 +159,7 @@ codes! {
     TooManyOutliers = "too_many_outliers",
     Innovations = "innovations",
     TouchContradicted = "touch_contradicted",
+    LengthContradicted = "length_contradicted",
     PriorReused = "prior_reused",
     PriorSingular = "prior_singular",
     PriorUntested = "prior_untested",
@@ -186,6 +187,7 @@ codes! {
     OffsetWalks = "offset_walks",
     Outliers = "outliers",
     // Warnings.
+    LengthUnused = "length_unused",
     LinksUnobservable = "links_unobservable",
     SensorsUnconfirmed = "sensors_unconfirmed",
     GeometryDoubtful = "geometry_doubtful",

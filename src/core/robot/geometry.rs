@@ -10,7 +10,7 @@ use super::error::FileIssue;
 
 /// One sigma of each axis, about the drawing. `[geometry]` of robot.toml; the defaults are those of a machined arm that
 /// was never bent (assumed): they weigh explanations, and are no statement on which an uncertainty could be based.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(from = "GeometryTable")]
 pub struct GeometryPriors {
     /// Of each joint's place in its parent link, m.

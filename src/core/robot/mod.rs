@@ -16,7 +16,7 @@ mod error;
 mod failed;
 mod file;
 mod frame_tree;
-mod geometry;
+pub mod geometry;
 mod gripper;
 mod gripper_tag;
 mod hull;
@@ -47,7 +47,6 @@ pub use error::{FileIssue, RobotError, from_table, parse_toml, read_table, read_
 pub use failed::{FailedJoint, FailedKind};
 pub use file::{load, load_attached, load_without_pairs, robot_schema};
 pub use frame_tree::{FixedFrame, FrameTree, MovingFrame};
-pub use geometry::{GeometryPriors, StatedGeometry};
 pub use gripper::{GripperSpec, Jaw};
 pub use gripper_tag::GripperTag;
 pub use hull::{Hull, HullError, MAX_HULL_POINTS};

@@ -88,7 +88,7 @@ mod tests {
     use crate::as_built::AsBuilt;
     use crate::as_built::tests::{assert_normal, robot};
     use crate::spec::WorldSpec;
-    use armcal_core::robot::GeometryPriors;
+    use armcal_core::robot::geometry::GeometryPriors;
 
     fn drawn(ratio: f64) -> WorldSpec {
         WorldSpec { geometry: GeometrySpec { error_ratio: ratio }, ..WorldSpec::default() }

@@ -38,6 +38,7 @@ impl Refusal {
             | Self::Nonlinearity { .. }
             | Self::SensorLine { .. }
             | Self::TooFewViewsSinceSlip { .. }
+            | Self::Length { .. }
             | Self::Touch { .. } => self.fmt_of_arm(f),
             Self::Innovations { .. }
             | Self::CornerNoise { .. }
@@ -269,6 +270,14 @@ impl Refusal {
             Self::TooFewViewsSinceSlip { joint, evidence, views } => {
                 write!(f, "{joint}: {evidence}; {views} views since then cannot calibrate it")
             }
+            Self::Length { what, key, measured_m, by_views_m, std_m } => write!(
+                f,
+                "{what} is {:.1} mm by {key} and {:.1} mm by the views: {:.0} sigmas of {:.1} mm apart",
+                measured_m * 1e3,
+                by_views_m * 1e3,
+                (measured_m - by_views_m).abs() / std_m,
+                std_m * 1e3
+            ),
             Self::Touch { off_m, surface, chi2, limit, causes, link, tool_point_m: [x, y, z] } => write!(
                 f,
                 "touch: the tool is {:.0} mm from its predicted position at {surface} (chi-square {chi2:.0}, limit \
