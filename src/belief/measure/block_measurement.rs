@@ -2,14 +2,19 @@
 //!
 //! Each kind has a file with its prediction; a new kind is that file, a variant and a line in each function here.
 
+mod tag_distance;
+
 use nalgebra::Vector6;
 
+use crate::measure::block_measurement::tag_distance::DistanceTerm;
 use crate::model::blocks::{Block, PerBlock, Value};
 use armcal_core::robot::Robot;
 
 /// One measured length.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum BlockMeasurement {}
+pub(crate) enum BlockMeasurement {
+    TagDistance(DistanceTerm),
+}
 
 /// A measured length and what blocks predict for it.
 pub(crate) struct BlockPrediction {
@@ -23,27 +28,35 @@ pub(crate) struct BlockPrediction {
 
 impl BlockMeasurement {
     /// All that robot.toml states; the name of one between blocks that the arm does not have.
-    pub(crate) fn all(_robot: &Robot) -> Vec<Result<Self, String>> {
-        Vec::new()
+    pub(crate) fn all(robot: &Robot) -> Vec<Result<Self, String>> {
+        tag_distance::all(robot).map(|stated| stated.map(Self::TagDistance)).collect()
     }
 
     /// `robot` without any.
     pub(crate) fn none_of(robot: &Robot) -> Robot {
-        robot.clone()
+        let mut robot = robot.clone();
+        robot.geometry.tag_distances.clear();
+        robot
     }
 
     /// The two poses that it is between.
     pub(crate) fn blocks(self) -> [Block; 2] {
-        match self {}
+        match self {
+            Self::TagDistance(term) => term.blocks(),
+        }
     }
 
     /// Linearized at the values of `blocks`.
-    pub(crate) fn predicted(self, _blocks: &PerBlock<Value>) -> BlockPrediction {
-        match self {}
+    pub(crate) fn predicted(self, blocks: &PerBlock<Value>) -> BlockPrediction {
+        match self {
+            Self::TagDistance(term) => term.predicted(blocks),
+        }
     }
 
     /// What was measured, in words, and the key that states it.
     pub(crate) fn name(self) -> (String, &'static str) {
-        match self {}
+        match self {
+            Self::TagDistance(term) => term.name(),
+        }
     }
 }

@@ -7,6 +7,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::error::FileIssue;
+use crate::codes::Code;
 
 /// One sigma of each axis, about the drawing. `[geometry]` of robot.toml; the defaults are those of a machined arm that
 /// was never bent (assumed): they weigh explanations, and are no statement on which an uncertainty could be based.
@@ -27,8 +28,24 @@ pub struct GeometryPriors {
     pub tool_load_std_n: f64,
     /// Against gravity, in the base frame; of any length.
     pub up: [f64; 3],
+    /// Distances between tags, measured without the camera.
+    pub tag_distances: Vec<TagDistance>,
     /// The sigmas that robot.toml states.
     pub stated: StatedGeometry,
+}
+
+/// Distance between the centres of two tags.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TagDistance {
+    /// Numbers of the two tags.
+    pub tags: [u32; 2],
+    /// From centre to centre, by tape or laser.
+    #[schemars(range(min = 1e-3, max = 1e3))]
+    pub distance_m: f64,
+    /// Sigma of it.
+    #[schemars(range(min = 1e-6, max = 1.0))]
+    pub std_m: f64,
 }
 
 /// True for each sigma that robot.toml states; the others are defaults.
@@ -66,6 +83,8 @@ pub(super) struct GeometryTable {
     tool_load_std_n: f64,
     /// Direction against gravity in the base frame, of any length.
     up: [f64; 3],
+    /// Distances between tags that were measured without the camera; used where the views show both tags.
+    tag_distance: Vec<TagDistance>,
 }
 
 impl Default for GeometryTable {
@@ -79,6 +98,7 @@ impl Default for GeometryTable {
             mount_compliance_std_rad_per_nm: usual.mount_compliance_std_rad_per_nm,
             tool_load_std_n: usual.tool_load_std_n,
             up: usual.up,
+            tag_distance: usual.tag_distances,
         }
     }
 }
@@ -94,6 +114,7 @@ impl From<GeometryTable> for GeometryPriors {
             mount_compliance_std_rad_per_nm: table.mount_compliance_std_rad_per_nm,
             tool_load_std_n: table.tool_load_std_n,
             up: table.up,
+            tag_distances: table.tag_distance,
             stated: StatedGeometry {
                 link_position: table.link_position_std_m.is_some(),
                 link_rotation: table.link_rotation_std_rad.is_some(),
@@ -113,6 +134,7 @@ impl Default for GeometryPriors {
             mount_compliance_std_rad_per_nm: 1e-6,
             tool_load_std_n: 200.0,
             up: [0.0, 0.0, 1.0],
+            tag_distances: Vec::new(),
             stated: StatedGeometry::default(),
         }
     }
@@ -130,6 +152,14 @@ impl GeometryPriors {
             ("up (length)", Vector3::from(self.up).norm() - 1e-6, 1e3),
         ] {
             FileIssue::check_range(file, &format!("geometry.{key}"), value, 0.0..=most)?;
+        }
+        for TagDistance { tags: [a, b], distance_m, std_m } in &self.tag_distances {
+            let key = |key: &str| format!("geometry.tag_distance of tags {a} and {b}: {key}");
+            FileIssue::check_range(file, &key("distance_m"), *distance_m, 1e-3..=1e3)?;
+            FileIssue::check_range(file, &key("std_m"), *std_m, 1e-6..=1.0)?;
+            if a == b {
+                return Err(FileIssue::new(Code::ValueInvalid, file, key("tags"), "must be two tags"));
+            }
         }
         Ok(self)
     }

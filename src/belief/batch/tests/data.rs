@@ -15,6 +15,7 @@ use crate::views::view::{MeanCorners, TagMeasurement, TagObservation, View};
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
 use armcal_core::kinematics::Attachment;
 use armcal_core::optics::square_corners;
+use armcal_core::robot::geometry::TagDistance;
 use armcal_core::robot::{CameraSpec, Robot, SurveyedTag, TagSurvey, load};
 use armcal_core::sensor::Conditions;
 use armcal_core::spatial::{Pose, exp};
@@ -23,6 +24,18 @@ use armcal_core::time::SIMULATION_EPOCH;
 
 pub fn titan() -> Robot {
     load(&Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots/titan4")).expect("the robot reads")
+}
+
+/// The titan with distances between its tags, each a little off, that leave some tag out.
+pub fn titan_with_taped_tags() -> Robot {
+    let mut robot = titan();
+    for (a, b) in [(0, 3), (3, 5), (1, 4)] {
+        let [at_a, at_b] = [a, b].map(|tag: usize| robot.tags[tag].base_from_tag.isometry().translation.vector);
+        let tags = [a, b].map(|tag| robot.tags[tag].id);
+        let distance_m = (at_a - at_b).norm() + 0.002;
+        robot.geometry.tag_distances.push(TagDistance { tags, distance_m, std_m: 5e-4 });
+    }
+    robot
 }
 
 pub fn titan_with_gripper_tag() -> Robot {

@@ -4,8 +4,8 @@ use nalgebra::DVector;
 use rand::RngExt;
 
 use crate::batch::tests::data::{
-    Noise, Truth, normal, reference, rng, titan_watched_by_two, titan_with_gripper_tag, titan_with_two_cameras, views,
-    watched_titan,
+    Noise, Truth, normal, reference, rng, titan_watched_by_two, titan_with_gripper_tag, titan_with_taped_tags,
+    titan_with_two_cameras, views, watched_titan,
 };
 use crate::model::blocks::Block;
 use crate::model::estimated::Model;
@@ -131,6 +131,11 @@ fn the_gradient_is_that_of_the_cost_with_a_second_camera() {
     has_the_costs_gradient(titan_watched_by_two);
 }
 
+#[test]
+fn the_gradient_is_that_of_the_cost_with_taped_distances() {
+    has_the_costs_gradient(titan_with_taped_tags);
+}
+
 fn has_the_costs_gradient(robot: fn() -> Robot) {
     /// In units of a column's sigma with all others held; the difference quotient's own error is far below.
     const STEP: f64 = 1e-3;
@@ -195,7 +200,7 @@ fn the_curvature_is_that_of_the_cost_where_nothing_is_off() {
 /// Each cell of the matrix, by how the gradient changes: sensors, links, sag, mounts, clock, lens and tags, all by all.
 #[test]
 fn every_cell_of_the_curvature_is_that_of_the_gradient() {
-    for robot in [titan_with_gripper_tag, watched_titan, titan_with_two_cameras] {
+    for robot in [titan_with_gripper_tag, watched_titan, titan_with_two_cameras, titan_with_taped_tags] {
         for camera_error_std in [None, Some([0.003, 0.004])] {
             has_the_gradients_curvature(robot(), camera_error_std);
         }

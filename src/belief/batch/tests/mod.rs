@@ -19,6 +19,7 @@ mod score_test;
 mod slips;
 mod small_samples;
 mod statistics;
+mod tag_distances;
 mod touches;
 mod walks;
 mod within_sigmas;
