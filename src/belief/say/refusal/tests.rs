@@ -21,7 +21,7 @@ use crate::say::geometry_error::ErrorKind;
 #[test]
 fn the_words_of_each_reason() {
     let mut all = measured();
-    all.extend([geometry(), contradicted(), touch(), Refusal::PriorReused, Refusal::PriorSingular]);
+    all.extend([geometry(), contradicted(), touch(), length(), Refusal::PriorReused, Refusal::PriorSingular]);
     all.push(Refusal::PriorUntested);
     let mut words: Vec<String> = all.iter().map(ToString::to_string).collect();
     words.extend(in_words(&all[..2]));
@@ -79,6 +79,11 @@ fn touch() -> Refusal {
         link: "manipulator_link".to_owned(),
         tool_point_m: [0.0, 0.02, -0.001],
     }
+}
+
+fn length() -> Refusal {
+    let (what, key) = ("the distance of tags 3 and 7".to_owned(), "[[geometry.tag_distance]]".to_owned());
+    Refusal::Length { what, key, measured_m: 1.204, by_views_m: 1.1903, std_m: 0.0011 }
 }
 
 fn misread(found: ReadingError) -> Refusal {
