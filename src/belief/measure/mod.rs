@@ -2,7 +2,7 @@
 //!
 //! `corners` of a tag, points of a `board`, a tag's `position` or `pose`; `observation` is any of them, `information`
 //! its linearization in the camera's twist. `projection` is the only place that linearizes a projection.
-//! `block_measurement` is what no view shows.
+//! `block_measurement` is of blocks against each other.
 
 mod block_measurement;
 mod board;

@@ -76,7 +76,7 @@ impl<'a> BundleProblem<'a> {
         problem
     }
 
-    /// The views alone, with columns that may be more than their own.
+    /// Only the views, with columns that may be more than their own.
     pub(crate) fn with_layout(input: &BundleInput<'a>, layout: Layout, prior: Prior) -> Self {
         let BundleInput { robot, views, model, scales, .. } = input;
         let (robot, scales) = (*robot, scales.clone());

@@ -1,7 +1,7 @@
 //! The distance of two tags' centres, by tape or laser: `|p_i - p_j|`.
 //!
-//! With the unit vector u from j to i, a small motion of tag i (right, its own axes) lengthens it by `u^T R_i` times its
-//! shift, one of tag j by `-u^T R_j`; a turn about the centre does not change it.
+//! With the unit vector u from j to i, a small motion of tag i (right, its own axes) lengthens it by `u^T R_i` times
+//! its shift, one of tag j by `-u^T R_j`; a turn about the centre does not change it.
 
 use nalgebra::{Isometry3, Vector3, Vector6};
 
