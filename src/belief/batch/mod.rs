@@ -1,7 +1,7 @@
 //! A calibration from a recording, as a whole.
 //!
-//! `marked_calibrations` works through the calibrations that a recording marks; `rounds` is the default method: estimate,
-//! explanations, checks, in rounds; `tables` writes what it found. `interim` estimates during a capture.
+//! `marked_calibrations` works through the calibrations that a recording marks; `rounds` is the default method:
+//! estimate, explanations, checks, in rounds; `tables` writes what it found. `interim` estimates during a capture.
 
 pub(crate) mod constants;
 pub(crate) mod failure_impact;
