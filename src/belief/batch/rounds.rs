@@ -1,18 +1,16 @@
-//! One calibration by `bundle`, step by step: estimate, diagnose, report, judge.
+//! One calibration by `bundle`: rounds of an estimate and its stages, which the lists in `BundleCalibration` name.
 
 use crate::batch::constants::rounds::MIN_VIEWS_FOR_EVIDENCE;
 use crate::batch::failure_impact::FailureImpact;
 use crate::batch::tables::{
     add_clock, camera_mount_table, covariance_with_mount, further_camera_tables, lens_tables, map_table, model_table,
-    prior_table,
+    outlier_name, prior_table, unobservable, with_datasheets,
 };
 use crate::checks::assemble::{Evidence, Fit, Provenance, assemble, is_near, noise_dof, refusal_by_priors};
-use crate::checks::consistency::{MAX_OUTLIERS, VerdictInput};
-use crate::checks::cross_validation::{FOLDS, Fold, FoldSums, fold_of};
+use crate::checks::consistency::VerdictInput;
+use crate::checks::cross_validation::{FoldSums, cross_validate_with_innovations};
 use crate::checks::innovations::Innovations;
 use crate::checks::touch_term::TouchUpdate;
-use crate::explain::angles_by_camera::set_by_camera;
-use crate::explain::baseline::Baseline;
 use crate::explain::calibration_prior::PriorConsistency;
 use crate::explain::drawing::Drawing;
 use crate::explain::failure_detection::FailureSearch;
@@ -24,25 +22,24 @@ use crate::explain::tags::freed::MovedTags;
 use crate::explain::wrong_input::wrong_input;
 use crate::file::calibration::{Calibration, Status};
 use crate::file::map_table::MapResult;
-use crate::file::metrics::{HeldOutMetrics, ViewContainment};
+use crate::file::metrics::HeldOutMetrics;
 use crate::judge::{TargetError, U95Table};
-use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
+use crate::model::parameters::JointParameters;
 use crate::positions::position_problem::PositionProblem;
 use crate::positions::solution::Solution;
-use crate::positions::unobservable::{Unobservable, grouped_names};
+use crate::positions::unobservable::grouped_names;
 use crate::say::refusal::Refusal;
 use crate::say::wrong_input::WrongInput;
 use crate::solve::covariance::{ParameterCovariance, task_angles};
 use crate::solve::estimate::{Estimate, estimate};
 use crate::solve::input::{BundleInput, HyperparameterMode};
-use crate::solve::outliers::Outlier;
 use crate::tagmap::tag_mapping::map_unknown_tags;
 use crate::views::calibration_data::CalibrationData;
 use crate::views::error::CalibError;
-use crate::views::view::{ObservationRejection, Touch, View};
+use crate::views::view::{ObservationRejection, View};
 use armcal_core::codes::Code;
 use armcal_core::joints::JointAngles;
-use armcal_core::robot::{JointSensorSpec, Robot, SurveyedTag};
+use armcal_core::robot::{Robot, SurveyedTag};
 use armcal_core::routine::Method;
 use armcal_core::stats::Summary;
 use nalgebra::Matrix3;
@@ -84,6 +81,14 @@ enum Round {
     Done(Box<Calibration>),
 }
 
+/// How the views are taken from the next round on.
+enum Otherwise {
+    /// The joints' clock is off by this.
+    ReadLater { offset_s: f64 },
+    /// Survey or drawing are others, the tags' sizes among them.
+    Resized,
+}
+
 /// Is told of an estimate and what it was made from.
 pub(crate) type EstimateListener<'a> = dyn FnMut(&BundleInput<'_>, &Estimate<'_>) + 'a;
 
@@ -104,17 +109,6 @@ struct Touched<'a> {
 }
 
 impl<'a> Estimated<'a> {
-    /// Takes the touches in, if there are enough and every joint up to the tool has a sensor.
-    fn with_touches(mut self, touches: &[Touch], robot: &Robot) -> Self {
-        let has_sensors = (0..robot.tool.mount.n_joints).all(|joint| !self.setup.has_no_sensor(joint));
-        if let Some(update) = self.estimate.touch_update(touches).filter(|_| has_sensors) {
-            let updated = self.estimate.with_touches(&update);
-            let before = std::mem::replace(&mut self.estimate, updated);
-            self.touches = Some(Touched { before, update });
-        }
-        self
-    }
-
     fn by_views(&self) -> &Estimate<'a> {
         self.touches.as_ref().map_or(&self.estimate, |touched| &touched.before)
     }
@@ -181,63 +175,88 @@ impl<'a> BundleCalibration<'a> {
         }
     }
 
-    /// One estimate by `views`: failures, then the clock, then survey and drawing; where one of the last two is to be
-    /// taken otherwise, everything begins again with that.
+    /// The first estimate, then the stages in their order.
     fn round(&mut self, mut views: Vec<View>) -> Result<Round, CalibError> {
         let sizes_m: Vec<f64> = self.data.robot.tags.iter().map(|tag| tag.size_m).collect();
         let declared = declared(&self.data.robot, &views);
-        let clocks = if self.clock.is_some() { Clocks::Aligned } else { Clocks::AsStamped };
-        let setup = |robot: &Robot, failures: &[Failure]| {
-            BundleSetup::new(robot, &views, failures, self.prior).with_drawing(&self.drawing).with_clocks(clocks)
-        };
-        let first = setup(&self.data.robot, &declared);
+        let setup = |failures: &[Failure]| self.setup(&views, failures);
+        let first = setup(&declared);
         self.check_observable(&first, &declared)?;
         let estimated = self.first_estimate(&first);
-        let failures = match self.purpose {
-            EstimatePurpose::Final => {
-                let (robot, prior, drawing) = (&self.data.robot, self.prior, &self.drawing);
-                let search = FailureSearch { robot, views: &views, prior, drawing };
-                search.failures(&declared, estimated.as_ref().map(|(estimate, _)| estimate))
-            }
-            EstimatePurpose::Interim => declared.clone(),
-        };
+        let failures = self.failures(&views, &declared, estimated.as_ref().map(|(estimate, _)| estimate));
         let second;
         let (setup, estimated) = if failures == declared {
             (&first, estimated)
         } else {
-            second = setup(&self.data.robot, &failures);
+            second = setup(&failures);
             (&second, second.estimate())
         };
-        if self.purpose == EstimatePurpose::Final
-            && let Some((estimate, selections)) = &estimated
-            && let Some((offset_s, _)) = self.clock_of(estimate, selections)
-        {
-            drop(estimated);
-            views.iter_mut().for_each(|view| view.read_later(offset_s));
-            return Ok(Round::Revised(views));
-        }
-        if self.purpose == EstimatePurpose::Final
-            && let Some((estimate, _)) = &estimated
-            && self.revise(setup, estimate)
-        {
-            drop(estimated);
-            rescale(&mut views, &sizes_m, &self.data.robot);
-            return Ok(Round::Revised(views));
-        }
-        let (mut estimate, mut selections) = estimated.ok_or_else(|| self.nothing_observable())?;
+        let (estimate, selections) = estimated.ok_or_else(|| self.nothing_observable())?;
+        let mut estimated = Estimated { setup, failures: &failures, estimate, selections, touches: None };
         if self.purpose == EstimatePurpose::Final {
-            let walks;
-            (estimate, walks) = estimate.with_walks(&setup.input(), |joint| !setup.has_no_sensor(joint));
-            selections.extend(walks);
+            if let Some(otherwise) = Self::REVISIONS.iter().find_map(|revise| revise(self, &estimated)) {
+                drop(estimated);
+                otherwise.take(&mut views, &sizes_m, &self.data.robot);
+                return Ok(Round::Revised(views));
+            }
+            for refine in Self::REFINEMENTS {
+                estimated = refine(self, estimated);
+            }
         }
-        let estimated = Estimated { setup, failures: &failures, estimate, selections, touches: None };
-        let touches: &[Touch] = match self.purpose {
-            EstimatePurpose::Final => &self.data.data.touches,
-            EstimatePurpose::Interim => &[],
-        };
-        let estimated = estimated.with_touches(touches, &self.data.robot);
         self.as_read = views;
         self.finish(estimated).map(|calibration| Round::Done(Box::new(calibration)))
+    }
+
+    /// What an estimate may show to be taken otherwise; the first that does ends the round.
+    const REVISIONS: [fn(&mut Self, &Estimated<'_>) -> Option<Otherwise>; 2] =
+        [Self::find_clock, Self::revise_survey_and_drawing];
+
+    /// What is added to the estimate of the last round.
+    const REFINEMENTS: [for<'e> fn(&Self, Estimated<'e>) -> Estimated<'e>; 2] = [Self::add_walks, Self::add_touches];
+
+    /// What is said of the estimate. Each looks at what those before it wrote: the last may put a cause before theirs.
+    const STATEMENTS: [fn(&Self, &Estimated<'_>, &Diagnosis, &mut Calibration); 6] = [
+        Self::judge_by_views,
+        Self::judge_by_touches,
+        Self::state_reservations,
+        Self::report_moved_tags,
+        Self::report_drawing,
+        Self::blame_input,
+    ];
+
+    fn setup(&self, views: &[View], failures: &[Failure]) -> BundleSetup {
+        let clocks = if self.clock.is_some() { Clocks::Aligned } else { Clocks::AsStamped };
+        let setup = BundleSetup::new(&self.data.robot, views, failures, self.prior);
+        setup.with_drawing(&self.drawing).with_clocks(clocks)
+    }
+
+    fn failures(&self, views: &[View], declared: &[Failure], first: Option<&Estimate<'_>>) -> Vec<Failure> {
+        match self.purpose {
+            EstimatePurpose::Final => {
+                let (robot, prior, drawing) = (&self.data.robot, self.prior, &self.drawing);
+                FailureSearch { robot, views, prior, drawing }.failures(declared, first)
+            }
+            EstimatePurpose::Interim => declared.to_vec(),
+        }
+    }
+
+    fn add_walks<'e>(&self, mut estimated: Estimated<'e>) -> Estimated<'e> {
+        let setup = estimated.setup;
+        let (estimate, walks) = estimated.estimate.with_walks(&setup.input(), |joint| !setup.has_no_sensor(joint));
+        estimated.selections.extend(walks);
+        Estimated { estimate, ..estimated }
+    }
+
+    /// Takes the touches in, if there are enough and every joint up to the tool has a sensor.
+    fn add_touches<'e>(&self, mut estimated: Estimated<'e>) -> Estimated<'e> {
+        let (robot, touches) = (&self.data.robot, &self.data.data.touches);
+        let has_sensors = (0..robot.tool.mount.n_joints).all(|joint| !estimated.setup.has_no_sensor(joint));
+        if let Some(update) = estimated.estimate.touch_update(touches).filter(|_| has_sensors) {
+            let updated = estimated.estimate.with_touches(&update);
+            let before = std::mem::replace(&mut estimated.estimate, updated);
+            estimated.touches = Some(Touched { before, update });
+        }
+        estimated
     }
 
     fn finish(&mut self, mut estimated: Estimated<'_>) -> Result<Calibration, CalibError> {
@@ -261,29 +280,43 @@ impl<'a> BundleCalibration<'a> {
             }
             EstimatePurpose::Interim => {}
             EstimatePurpose::Final => {
-                let input = &BundleInput { views: &diagnosis.views, ..estimated.setup.input() };
-                let (found, innovations) = (estimated.by_views(), &diagnosis.innovations[..]);
-                let task = self.data.data.task_rests();
-                let tag_noise = self.data.data.tag_noise;
-                VerdictInput { input, found, innovations, task, tag_noise }.judge(&mut calibration);
-                if let Some(touched) = &estimated.touches {
-                    touched.update.judge(&self.data.robot, &mut calibration);
-                }
-                self.state_reservations(estimated, &diagnosis, &mut calibration);
-                self.moved.report(&estimated.estimate, &mut calibration);
-                let targets = task.map(|task| task_angles(&diagnosis.robot, task)).unwrap_or_default();
-                let at = if targets.is_empty() { found.view_angles() } else { targets };
-                found.report_drawing(&self.drawing, &at, &mut calibration);
-                self.blame_input(estimated.failures, &mut calibration);
+                Self::STATEMENTS.iter().for_each(|state| state(self, estimated, &diagnosis, &mut calibration));
             }
         }
         Ok(calibration)
     }
 
+    /// Checks of the estimate by the views.
+    fn judge_by_views(&self, estimated: &Estimated<'_>, diagnosis: &Diagnosis, calibration: &mut Calibration) {
+        let input = &BundleInput { views: &diagnosis.views, ..estimated.setup.input() };
+        let (found, innovations) = (estimated.by_views(), &diagnosis.innovations[..]);
+        let (task, tag_noise) = (self.data.data.task_rests(), self.data.data.tag_noise);
+        VerdictInput { input, found, innovations, task, tag_noise }.judge(calibration);
+    }
+
+    fn judge_by_touches(&self, estimated: &Estimated<'_>, _: &Diagnosis, calibration: &mut Calibration) {
+        if let Some(touched) = &estimated.touches {
+            touched.update.judge(&self.data.robot, calibration);
+        }
+    }
+
+    fn report_moved_tags(&self, estimated: &Estimated<'_>, _: &Diagnosis, calibration: &mut Calibration) {
+        self.moved.report(&estimated.estimate, calibration);
+    }
+
+    fn report_drawing(&self, estimated: &Estimated<'_>, diagnosis: &Diagnosis, calibration: &mut Calibration) {
+        let found = estimated.by_views();
+        let task = self.data.data.task_rests();
+        let targets = task.map(|task| task_angles(&diagnosis.robot, task)).unwrap_or_default();
+        let at = if targets.is_empty() { found.view_angles() } else { targets };
+        found.report_drawing(&self.drawing, &at, calibration);
+    }
+
     /// Where the calibration is refused and the images contradict a file, or the readings mean something else than the
     /// input map says, that comes first. Several repaired tags are refused, too, where one other reading of the whole
     /// map or of the lens explains them.
-    fn blame_input(&self, failures: &[Failure], calibration: &mut Calibration) {
+    fn blame_input(&self, estimated: &Estimated<'_>, _: &Diagnosis, calibration: &mut Calibration) {
+        let failures = estimated.failures;
         if calibration.status != Status::Refused {
             let has_moved_tags = self.moved.n_moved() > 1;
             let wrong =
@@ -317,26 +350,29 @@ impl<'a> BundleCalibration<'a> {
 
     /// The offset between the clocks, where it is found for the first time; from then on the readings are at the times
     /// of the images, for all that is made of the views.
-    fn clock_of(&mut self, estimate: &Estimate<'_>, selections: &[Selection]) -> Option<(f64, Selection)> {
+    fn find_clock(&mut self, estimated: &Estimated<'_>) -> Option<Otherwise> {
         if self.clock.is_some() {
             return None;
         }
-        let [offset_s, _] = estimate.time_offset_s()?;
-        let decided = selections.iter().find(|selection| selection.term == OptionalTerm::TimeOffset)?;
+        let [offset_s, _] = estimated.estimate.time_offset_s()?;
+        let mut selections = estimated.selections.iter();
+        let decided = selections.find(|selection| selection.term == OptionalTerm::TimeOffset)?;
         self.clock = Some((offset_s, *decided));
-        self.clock
+        Some(Otherwise::ReadLater { offset_s })
     }
 
-    /// Whether survey or drawing are to be taken otherwise than so far.
-    fn revise(&mut self, setup: &BundleSetup, estimate: &Estimate<'_>) -> bool {
+    /// Survey or drawing, where they are to be taken otherwise than so far.
+    fn revise_survey_and_drawing(&mut self, estimated: &Estimated<'_>) -> Option<Otherwise> {
+        let Estimated { setup, estimate, .. } = estimated;
         let by_moved_tag = self.moved.gain_nats(estimate);
         if let Some(better) = self.drawing.better(&setup.input(), estimate, by_moved_tag) {
             self.drawing.apply_new_faults(&better, &mut self.data.robot);
             self.moved.resurveyed(&mut self.data.robot, &better);
             self.drawing = better;
-            return true;
+            return Some(Otherwise::Resized);
         }
-        self.moved.revise(estimate, setup.input().views, &mut self.data.robot)
+        let is_revised = self.moved.revise(estimate, setup.input().views, &mut self.data.robot);
+        is_revised.then_some(Otherwise::Resized)
     }
 
     fn nothing_observable(&self) -> CalibError {
@@ -369,7 +405,7 @@ impl<'a> BundleCalibration<'a> {
         with_steps.iter_mut().for_each(|view| estimate.see_through_found_lens(view, &datasheet));
         let input = BundleInput { views: &with_steps, ..setup.input() };
         let (held_out, innovations) = match self.purpose {
-            EstimatePurpose::Final => cross_validated(&input, estimate, &datasheet),
+            EstimatePurpose::Final => cross_validate_with_innovations(&input, estimate, &datasheet),
             EstimatePurpose::Interim => (FoldSums::default().metrics(), Vec::new()),
         };
         let views = estimate.as_read_now(&with_steps);
@@ -432,7 +468,7 @@ impl<'a> BundleCalibration<'a> {
             lens: lens_tables(datasheet, estimate),
             model: Some(model),
             map: self.map.clone().map(|map| map_table(map, datasheet, estimate)),
-            outliers: estimate.outliers.iter().map(|outlier| named(outlier, &diagnosis.views)).collect(),
+            outliers: estimate.outliers.iter().map(|outlier| outlier_name(outlier, &diagnosis.views)).collect(),
             covariance: with_mount.unwrap_or_else(|| calibration.covariance.clone()),
             ..calibration
         }
@@ -571,97 +607,19 @@ impl<'a> BundleCalibration<'a> {
     }
 }
 
+impl Otherwise {
+    /// Takes `views` so; `sizes_m` were the tags' before.
+    fn take(self, views: &mut [View], sizes_m: &[f64], robot: &Robot) {
+        match self {
+            Self::ReadLater { offset_s } => views.iter_mut().for_each(|view| view.read_later(offset_s)),
+            Self::Resized => rescale(views, sizes_m, robot),
+        }
+    }
+}
+
 /// Moves the centres of tags in the camera's frame to where tags of their present size are; `sizes_m` were before.
 fn rescale(views: &mut [View], sizes_m: &[f64], robot: &Robot) {
     for seen in views.iter_mut().flat_map(|view| &mut view.tags).filter(|seen| seen.corners().is_some()) {
         seen.center_in_camera_m *= robot.tags[seen.tag_idx].size_m / sizes_m[seen.tag_idx];
     }
-}
-
-/// The sensors as estimated, those of joints without one as their datasheets say.
-fn with_datasheets(estimated: &Robot, datasheet: &Robot, setup: &BundleSetup) -> Vec<JointSensorSpec> {
-    let pairs = estimated.sensors.iter().zip(&datasheet.sensors).enumerate();
-    pairs.map(|(joint, (own, nominal))| if setup.has_no_sensor(joint) { nominal } else { own }.clone()).collect()
-}
-
-/// `view 12: tag 3: 45 sigma`, or `view 12: tag 3, corner 0: 45 sigma`; views count from 1.
-fn named(outlier: &Outlier, views: &[View]) -> String {
-    let number = views.get(outlier.view_idx).map_or(0, |view| view.pose_idx) + 1;
-    let corner = outlier.corner.map_or(String::new(), |corner| format!(", corner {corner}"));
-    format!("view {number}: tag {}{corner}: {:.0} sigma", outlier.tag_id, outlier.sigmas)
-}
-
-/// Gains and offsets that keep the datasheet's value: of joints distal to the camera, and of failed ones.
-fn unobservable(robot: &Robot, setup: &BundleSetup, estimate: &Estimate<'_>) -> Vec<Unobservable> {
-    let all = (0..robot.n_joints())
-        .flat_map(|joint| [ParameterKind::Gain, ParameterKind::Offset].map(|kind| Parameter { joint, kind }));
-    let missing = all.filter(|p| {
-        p.prior_std(robot) > 0.0 && !estimate.joint_parameters().contains(p) && !setup.has_no_sensor(p.joint)
-    });
-    missing.map(Unobservable::distal).chain(setup.unobservable()).collect()
-}
-
-/// Observations that the held-out figures leave out: those that were rejected, where they are no more than good
-/// recordings have. Where they are more, it may be the arm that is wrong, and not they.
-fn left_out<'b>(all: &'b Estimate<'_>) -> &'b [Outlier] {
-    let share = all.outliers.len() as f64 / all.problem.observations.len().max(1) as f64;
-    if share <= MAX_OUTLIERS { &all.outliers } else { &[] }
-}
-
-/// A view without the observations that were rejected as a whole; `None` if it shows no other.
-fn without_rejected(view_idx: usize, mut view: View, outliers: &[Outlier]) -> Option<View> {
-    let is_rejected =
-        |id: u32| outliers.iter().any(|out| out.view_idx == view_idx && out.tag_id == id && out.corner.is_none());
-    view.tags.retain(|tag| !is_rejected(tag.id));
-    (!view.tags.is_empty()).then_some(view)
-}
-
-/// Held-out views by what was estimated from the other folds, with the hyperparameters of all; and by mount and map
-/// alone about `datasheet`. Observations that the fit of all views rejected are in neither: what a tag of another id
-/// is off by says nothing of the arm.
-fn cross_validated(
-    input: &BundleInput<'_>,
-    all: &Estimate<'_>,
-    datasheet: &Robot,
-) -> (HeldOutMetrics, Vec<Innovations>) {
-    let mut sums = FoldSums::default();
-    let baseline = Baseline::new(datasheet, input.views);
-    let mut innovations = Vec::new();
-    for fold in 0..FOLDS {
-        let (fitted, held_out) = fold_of(input.views, fold);
-        let part = BundleInput {
-            views: &fitted,
-            model: all.model.clone(),
-            scales: all.scales().clone(),
-            evidence: HyperparameterMode::Given,
-            ..input.clone()
-        };
-        let Some(found) = estimate(&part) else { continue };
-        let as_found = found.as_found(input.robot);
-        let places = held_out.into_iter().enumerate().map(|(n, view)| (n * FOLDS + fold, view));
-        let mut with_places: Vec<(usize, View)> = places
-            .filter_map(|(view_idx, view)| Some((view_idx, without_rejected(view_idx, view, left_out(all))?)))
-            .collect();
-        // Where no sensor tells an angle, the view's own tags tell where to linearize, with nothing of other folds.
-        for (_, view) in &mut with_places {
-            all.see_through_found_lens(view, &as_found);
-            set_by_camera(&as_found, view, &found.parameters());
-        }
-        let held_out: Vec<View> = with_places.iter().map(|(_, view)| view.clone()).collect();
-        innovations.extend(found.innovations(&part, &with_places, &all.outliers));
-        sums.add(&Fold {
-            views: &found.as_read_now(&held_out),
-            as_found: &as_found,
-            at: &found.parameters(),
-            nominal: datasheet,
-            baselines: &baseline.as_ref().map(|baseline| baseline.fit(datasheet, &fitted)).unwrap_or_default(),
-        });
-    }
-    let mut within = ViewContainment::default();
-    for fold in &innovations {
-        within.views += fold.within_95.views;
-        within.within += fold.within_95.within;
-    }
-    let within_95 = (within.views > 0).then_some(within);
-    (HeldOutMetrics { within_95, ..sums.metrics() }, innovations)
 }

@@ -2,6 +2,7 @@
 
 use crate::explain::calibration_prior::{MOUNT_ROWS, PriorConsistency, with_mount_rows};
 use crate::explain::model_selection::{OptionalTerm, Selection};
+use crate::explain::setup::BundleSetup;
 use crate::file::calibration::Calibration;
 use crate::file::camera_mount::{CameraMount, FurtherCamera};
 use crate::file::covariance_file::CovarianceTable;
@@ -10,10 +11,13 @@ use crate::file::lens_table::LensResult;
 use crate::file::map_table::MapResult;
 use crate::file::model_table::ModelTable;
 use crate::model::blocks::Block;
+use crate::model::parameters::{Parameter, ParameterKind};
+use crate::positions::unobservable::Unobservable;
 use crate::solve::estimate::Estimate;
 use crate::solve::model_for_views::MIN_GRIPPER_VIEWS;
+use crate::solve::outliers::Outlier;
 use crate::views::view::View;
-use armcal_core::robot::Robot;
+use armcal_core::robot::{JointSensorSpec, Robot};
 use armcal_core::spatial::{Base, Camera, Link, Pose, Tag};
 
 pub(crate) fn model_table(robot: &Robot, found: &Estimate<'_>, selections: &[Selection]) -> ModelTable {
@@ -150,4 +154,27 @@ pub(crate) fn covariance_with_mount(robot: &Robot, found: &Estimate<'_>, kept: &
     };
     let matrix = nalgebra::DMatrix::from_fn(rows.len(), rows.len(), |i, k| full[(rows[i], rows[k])]);
     Some(CovarianceTable::new(rows.iter().map(name).collect(), &matrix))
+}
+
+/// The sensors as estimated, those of joints without one as their datasheets say.
+pub(crate) fn with_datasheets(estimated: &Robot, datasheet: &Robot, setup: &BundleSetup) -> Vec<JointSensorSpec> {
+    let pairs = estimated.sensors.iter().zip(&datasheet.sensors).enumerate();
+    pairs.map(|(joint, (own, nominal))| if setup.has_no_sensor(joint) { nominal } else { own }.clone()).collect()
+}
+
+/// `view 12: tag 3: 45 sigma`, or `view 12: tag 3, corner 0: 45 sigma`; views count from 1.
+pub(crate) fn outlier_name(outlier: &Outlier, views: &[View]) -> String {
+    let number = views.get(outlier.view_idx).map_or(0, |view| view.pose_idx) + 1;
+    let corner = outlier.corner.map_or(String::new(), |corner| format!(", corner {corner}"));
+    format!("view {number}: tag {}{corner}: {:.0} sigma", outlier.tag_id, outlier.sigmas)
+}
+
+/// Gains and offsets that keep the datasheet's value: of joints distal to the camera, and of failed ones.
+pub(crate) fn unobservable(robot: &Robot, setup: &BundleSetup, estimate: &Estimate<'_>) -> Vec<Unobservable> {
+    let all = (0..robot.n_joints())
+        .flat_map(|joint| [ParameterKind::Gain, ParameterKind::Offset].map(|kind| Parameter { joint, kind }));
+    let missing = all.filter(|p| {
+        p.prior_std(robot) > 0.0 && !estimate.joint_parameters().contains(p) && !setup.has_no_sensor(p.joint)
+    });
+    missing.map(Unobservable::distal).chain(setup.unobservable()).collect()
 }

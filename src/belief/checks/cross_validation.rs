@@ -1,13 +1,18 @@
 //! k-fold cross-validation (Stone 1974), by views: all tags of one view share errors.
 
+use crate::checks::consistency::MAX_OUTLIERS;
 pub(crate) use crate::checks::constants::cross_validation::FOLDS;
 use crate::checks::constants::cross_validation::LEAST_DISTANCE_M;
+use crate::checks::innovations::Innovations;
 use crate::explain::angles_by_camera::set_by_camera;
-use crate::explain::baseline::N_BASELINES;
-use crate::file::metrics::HeldOutMetrics;
+use crate::explain::baseline::{Baseline, N_BASELINES};
+use crate::file::metrics::{HeldOutMetrics, ViewContainment};
 use crate::judge::baseline_comparison::BaselineComparison;
 use crate::model::parameters::JointParameters;
 use crate::positions::position_problem::{PositionProblem, TagResidual};
+use crate::solve::estimate::{Estimate, estimate};
+use crate::solve::input::{BundleInput, HyperparameterMode};
+use crate::solve::outliers::Outlier;
 use crate::views::view::View;
 use armcal_core::robot::Robot;
 
@@ -40,6 +45,71 @@ pub(crate) fn cross_validate(
         }
     }
     sums.metrics()
+}
+
+/// Held-out views by what was estimated from the other folds, with the hyperparameters of all; and by mount and map
+/// alone about `datasheet`. Observations that the fit of all views rejected are in neither: what a tag of another id
+/// is off by says nothing of the arm.
+pub(crate) fn cross_validate_with_innovations(
+    input: &BundleInput<'_>,
+    all: &Estimate<'_>,
+    datasheet: &Robot,
+) -> (HeldOutMetrics, Vec<Innovations>) {
+    let mut sums = FoldSums::default();
+    let baseline = Baseline::new(datasheet, input.views);
+    let mut innovations = Vec::new();
+    for fold in 0..FOLDS {
+        let (fitted, held_out) = fold_of(input.views, fold);
+        let part = BundleInput {
+            views: &fitted,
+            model: all.model.clone(),
+            scales: all.scales().clone(),
+            evidence: HyperparameterMode::Given,
+            ..input.clone()
+        };
+        let Some(found) = estimate(&part) else { continue };
+        let as_found = found.as_found(input.robot);
+        let places = held_out.into_iter().enumerate().map(|(n, view)| (n * FOLDS + fold, view));
+        let mut with_places: Vec<(usize, View)> = places
+            .filter_map(|(view_idx, view)| Some((view_idx, without_rejected(view_idx, view, left_out(all))?)))
+            .collect();
+        // Where no sensor tells an angle, the view's own tags tell where to linearize, with nothing of other folds.
+        for (_, view) in &mut with_places {
+            all.see_through_found_lens(view, &as_found);
+            set_by_camera(&as_found, view, &found.parameters());
+        }
+        let held_out: Vec<View> = with_places.iter().map(|(_, view)| view.clone()).collect();
+        innovations.extend(found.innovations(&part, &with_places, &all.outliers));
+        sums.add(&Fold {
+            views: &found.as_read_now(&held_out),
+            as_found: &as_found,
+            at: &found.parameters(),
+            nominal: datasheet,
+            baselines: &baseline.as_ref().map(|baseline| baseline.fit(datasheet, &fitted)).unwrap_or_default(),
+        });
+    }
+    let mut within = ViewContainment::default();
+    for fold in &innovations {
+        within.views += fold.within_95.views;
+        within.within += fold.within_95.within;
+    }
+    let within_95 = (within.views > 0).then_some(within);
+    (HeldOutMetrics { within_95, ..sums.metrics() }, innovations)
+}
+
+/// Observations that the held-out figures leave out: those that were rejected, where they are no more than good
+/// recordings have. Where they are more, it may be the arm that is wrong, and not they.
+fn left_out<'b>(all: &'b Estimate<'_>) -> &'b [Outlier] {
+    let share = all.outliers.len() as f64 / all.problem.observations.len().max(1) as f64;
+    if share <= MAX_OUTLIERS { &all.outliers } else { &[] }
+}
+
+/// A view without the observations that were rejected as a whole; `None` if it shows no other.
+fn without_rejected(view_idx: usize, mut view: View, outliers: &[Outlier]) -> Option<View> {
+    let is_rejected =
+        |id: u32| outliers.iter().any(|out| out.view_idx == view_idx && out.tag_id == id && out.corner.is_none());
+    view.tags.retain(|tag| !is_rejected(tag.id));
+    (!view.tags.is_empty()).then_some(view)
 }
 
 /// The held-out views of a fold, and what was found without them.
