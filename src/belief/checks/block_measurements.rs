@@ -4,8 +4,8 @@
 //! variance v of their prediction and the length's own s^2, measured less predicted has the variance `s^2 + v`.
 
 use crate::checks::consistency::VerdictInput;
-use crate::checks::constants::block_measurements::FALSE_ALARM;
 use crate::file::verdict_tables::{Check, VerdictTable};
+use crate::judge::constants::FALSE_ALARM;
 use crate::measure::BlockMeasurement;
 use crate::say::refusal::Refusal;
 use crate::solve::estimate::{Estimate, estimate};

@@ -2,17 +2,19 @@
 //! sensors' errors, outliers, and innovations of held-out views.
 
 use crate::checks::constants::consistency::{
-    FALSE_ALARM, FAR_BEYOND, HELD, LEAST, MAX_NONLINEARITY, MAX_OVER_LINEARITY, MAX_UNCONFIRMED, NAMED_WALK_NATS,
-    TAILS, WALK_SIGNIFICANCE, WALKED, WORN, WORTH_M,
+    FAR_BEYOND, HELD, LEAST, MAX_NONLINEARITY, MAX_OVER_LINEARITY, MAX_UNCONFIRMED, NAMED_WALK_NATS, WALK_SIGNIFICANCE,
+    WALKED, WORN, WORTH_M,
 };
 pub(crate) use crate::checks::constants::consistency::{MAX_OUTLIERS, MAX_SIGMAS_OFF};
 use crate::checks::innovations::{Innovations, JointInnovation};
 use crate::checks::observability::{Observability, observability};
+use crate::explain::constants::tags_departure::TAILS;
 use crate::explain::score_test::{GeometryElement, ScoreTestResult};
 use crate::file::calibration::Calibration;
 use crate::file::validity::Extrapolation;
 use crate::file::verdict_tables::{Check, ObservabilityTable, VerdictTable};
 use crate::judge::baseline_comparison::SIGNIFICANCE;
+use crate::judge::constants::FALSE_ALARM;
 use crate::model::blocks::Block;
 use crate::model::estimated::Walk;
 use crate::model::parameters::{Parameter, ParameterKind};

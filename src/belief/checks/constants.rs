@@ -24,8 +24,6 @@ pub(crate) mod drawing_report {
     pub(crate) const MAX_SIZE_FACTOR: f64 = 2.05;
     /// Links whose joints meet have no length that could bound a repair, m.
     pub(crate) const LEAST_LENGTH_M: f64 = 0.02;
-    /// A base that is off by less than this at arm's length refuses nothing, m.
-    pub(crate) const WORTH_M: f64 = 0.004;
     pub(crate) const REACH_M: f64 = 1.0;
 }
 
@@ -100,8 +98,6 @@ pub(crate) mod reservations {
 pub(crate) mod touch_term {
     /// Fewer touches leave directions of the tool open, and are not used.
     pub(crate) const MIN_TOUCHES: usize = 3;
-    /// Probability that a good arm is refused by chance.
-    pub(crate) const FALSE_ALARM: f64 = 1e-4;
     /// Above this quantile the touches are less sure than their sigmas say: the ratio of Birge (1932).
     pub(crate) const USUAL: f64 = 0.95;
     /// A cause that leaves no more than this, or this share of all, beyond the best one is of its class.
@@ -111,14 +107,7 @@ pub(crate) mod touch_term {
     pub(crate) const TOLD_SHARE: f64 = 1e-3;
 }
 
-pub(crate) mod block_measurements {
-    /// Probability that a good measurement is called contradicted.
-    pub(crate) const FALSE_ALARM: f64 = 1e-4;
-}
-
 pub(crate) mod consistency {
-    /// Probability that a good arm fails any one check by chance.
-    pub(crate) const FALSE_ALARM: f64 = 1e-4;
     /// Geometry that would move the tool by less than this, and by less than the predicted error, is no reason to
     /// refuse, m.
     pub(crate) const WORTH_M: f64 = 0.004;
@@ -135,9 +124,6 @@ pub(crate) mod consistency {
     pub(crate) const MAX_UNCONFIRMED: f64 = 3.0;
     /// Share of the tag observations that may be outliers.
     pub(crate) const MAX_OUTLIERS: f64 = 0.25;
-    /// Over chi-square's quantile, for pixel noise has longer tails than a normal one and the tags' corners common
-    /// errors. Measured.
-    pub(crate) const TAILS: f64 = 1.5;
     /// So many times that limit is refused: innovations then are about three times as large as they should be.
     pub(crate) const FAR_BEYOND: f64 = 4.0;
     /// An offset that walks by more than so many times a sensor's usual error from view to view is named.

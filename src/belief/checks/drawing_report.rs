@@ -5,8 +5,9 @@
 //! the sensors' parameters x would follow the posterior's covariance, `dx = C_xz C_zz^-1 z`, and the tool would be off
 //! by what both move it together.
 
+use crate::checks::constants::consistency::WORTH_M;
 use crate::checks::constants::drawing_report::{
-    LEAST_LENGTH_M, MAX_REPAIR_SIGMAS, MAX_SIZE_FACTOR, MAX_UNSTATED_REPAIR_SIGMAS, NAMED_SIGMAS, REACH_M, WORTH_M,
+    LEAST_LENGTH_M, MAX_REPAIR_SIGMAS, MAX_SIZE_FACTOR, MAX_UNSTATED_REPAIR_SIGMAS, NAMED_SIGMAS, REACH_M,
 };
 use nalgebra::{DVector, Matrix3, Vector3};
 

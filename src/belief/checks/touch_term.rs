@@ -13,7 +13,8 @@
 //! 5.4). The update is Kalman's; the drawing is not changed, what it seems to be off stays in the predicted error.
 
 pub(crate) use crate::checks::constants::touch_term::MIN_TOUCHES;
-use crate::checks::constants::touch_term::{ALIKE_CHI2, ALIKE_SHARE, FALSE_ALARM, TOLD_SHARE, USUAL};
+use crate::checks::constants::touch_term::{ALIKE_CHI2, ALIKE_SHARE, TOLD_SHARE, USUAL};
+use crate::judge::constants::FALSE_ALARM;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Vector3};
 
 use crate::explain::score_test::{GeometryElement, Score, ToolJacobian, columns};

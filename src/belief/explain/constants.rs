@@ -206,8 +206,6 @@ pub(crate) mod tags_alike {
 pub(crate) mod tags_departure {
     /// Share of the prior's variance that the data must take away for a direction to count.
     pub(crate) const TOLD_SHARE: f64 = 0.1;
-    /// Probability that any tag of a good survey is suspected.
-    pub(crate) const FALSE_ALARM: f64 = 1e-4;
     /// Over chi-square's quantile: corners have longer tails than a normal one, and sizes of errors are fitted.
     pub(crate) const TAILS: f64 = 1.5;
 }

@@ -85,7 +85,6 @@ pub(crate) mod filter {
     pub(crate) const LAST_GAIN: f64 = 1e-4;
     /// Where a step does not lower the cost, this share of it is tried next.
     pub(crate) const SHORTER: f64 = 0.3;
-    pub(crate) const CORNER_WIDTH: f64 = 3.0;
     /// Of the place of a tag that nobody surveyed, m and rad: no view of it is used.
     pub(crate) const UNKNOWN_STD: f64 = 100.0;
 }

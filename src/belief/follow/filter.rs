@@ -5,7 +5,8 @@
 //! information. Between views what drifts is widened, `(W^-1 + Q)^-1` by the matrix inversion lemma. Time and memory of
 //! a view do not depend on how many came before.
 
-use crate::follow::constants::filter::{CORNER_WIDTH, LAST_GAIN, MAX_STEPS, SHORTER, UNKNOWN_STD};
+use crate::follow::constants::filter::{LAST_GAIN, MAX_STEPS, SHORTER, UNKNOWN_STD};
+use crate::solve::constants::estimate::CORNER_WIDTH;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Isometry3, Matrix3, SVector, Vector3};
 
 use crate::explain::angles_by_camera::seen_angles;

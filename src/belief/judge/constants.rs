@@ -1,5 +1,8 @@
 //! Constants that decide something in `judge`: unit, source and effect of each, by the file that uses it.
 
+/// Probability that a good arm, tag or length fails any one check by chance.
+pub(crate) const FALSE_ALARM: f64 = 1e-4;
+
 pub(crate) mod baseline_comparison {
     /// Level of the test: an improvement that chance makes more often is none.
     pub const SIGNIFICANCE: f64 = 0.01;

@@ -5,8 +5,6 @@ pub(crate) mod gripper_tag {
     pub(crate) const MIN_VIEWS: usize = 4;
     /// Mount and tag this many sigma of their priors off: one of them was knocked, or it is another tag.
     pub(crate) const MAX_PRIOR_SIGMAS: f64 = 6.0;
-    /// Least standard deviation of a prior: what is said to be exact stays where it is.
-    pub(crate) const MIN_STD: f64 = 1e-9;
 }
 
 pub(crate) mod joint_limits {

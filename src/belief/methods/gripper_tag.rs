@@ -9,7 +9,8 @@
 //! `R = sigma^2 / n_frames * I + sum_j (d u / d theta_j) (d u / d theta_j)^T linearity_j^2` for the eight coordinates
 //! `u` of a view.
 
-use crate::methods::constants::gripper_tag::{MAX_PRIOR_SIGMAS, MIN_STD, MIN_VIEWS};
+use crate::methods::constants::gripper_tag::{MAX_PRIOR_SIGMAS, MIN_VIEWS};
+use crate::model::constants::prior::MIN_STD;
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, SMatrix, SVector, Vector2, Vector6};

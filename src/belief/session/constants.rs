@@ -44,17 +44,8 @@ pub(crate) mod contact {
     /// Shares of the joint's rate above which a lag is learnt, and below which an error at rest is.
     pub(crate) const MOVING: f64 = 0.15;
     pub(crate) const RESTING: f64 = 0.01;
-    /// No joint turns faster than this many times its rate: readings that do have jumped, and say nothing of the joint.
-    pub(crate) const REACHABLE: f64 = 3.0;
     /// Nor do they by noise, standard deviations.
     pub(crate) const NOISE_SIGMAS: f64 = 8.0;
-}
-
-pub(crate) mod failed_joints {
-    /// Multiple of one sigma of a joint's angle that is kept clear for, and what an arm at rest stands off besides,
-    /// rad.
-    pub(crate) const SIGMAS: f64 = 4.0;
-    pub(crate) const AT_REST_RAD: f64 = 0.0016;
 }
 
 pub(crate) mod flow {
@@ -62,7 +53,6 @@ pub(crate) mod flow {
     pub(crate) const SPAN_S: f64 = 0.5;
     /// A sound arm lags, and yet moves most of the oil that it is asked to move.
     pub(crate) const SOUND_SHARE: f64 = 0.6;
-    pub(crate) const S_PER_MIN: f64 = 60.0;
 }
 
 pub(crate) mod following {
@@ -73,7 +63,6 @@ pub(crate) mod following {
     pub(crate) const LEAPT_S: f64 = 0.3;
     /// A joint has been at rest when reading and set-point stood still, near each other, for so long, s.
     pub(crate) const REST_S: f64 = 0.3;
-    pub(crate) const NEAR_RAD: f64 = 0.02;
     /// Readings of a joint at rest lie within so many standard deviations of the noise, and two counts.
     pub(crate) const NOISE_SIGMAS: f64 = 10.0;
     /// No joint turns faster than this many times its rate.
@@ -176,7 +165,6 @@ pub(crate) mod touch {
     pub(crate) const REST_CLEARANCE_M: f64 = 0.004;
     /// Starts of the inverse kinematics beside where the arm is.
     pub(crate) const RANDOM_SEEDS: usize = 40;
-    pub(crate) const IK_TOLERANCE_M: f64 = 1e-6;
     /// Until the pressed arm stands, s.
     pub(crate) const REST_S: f64 = 1.0;
     /// Weight of directions that no touch has told yet over those that one has.

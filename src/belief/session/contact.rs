@@ -8,8 +8,9 @@
 
 use crate::session::constants::contact::{
     FIRST_LAG_S, FIRST_REST_RAD, FIRST_WEIGHT, MAX_PERIODS, MOVING, NO_TOUCH, NOISE_SIGMAS, PERSISTS_S, RATE_MEMORY_S,
-    REACHABLE, REMEMBERED, RESTING, UNUSUAL,
+    REMEMBERED, RESTING, UNUSUAL,
 };
+use crate::session::constants::following::REACHABLE;
 use crate::session::settling::NEAR_RAD;
 use armcal_core::robot::Robot;
 use armcal_core::streams::{JointAngles, MAX_JOINTS};

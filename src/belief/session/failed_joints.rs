@@ -3,9 +3,10 @@
 
 use crate::file::calibration::Calibration;
 use crate::file::failed_joint::FailedJointTable;
+use crate::plan::constants::bounds_estimate_bounds::AT_REST_RAD;
+use crate::plan::constants::bounds_estimate_bounds::SIGMAS;
 use crate::plan::{JointErrorBounds, PlanError, TargetRequest, plan_targets};
 use crate::session::SessionError;
-use crate::session::constants::failed_joints::{AT_REST_RAD, SIGMAS};
 use crate::session::held_joint::{HeldJoint, hold_in, holding_bounds};
 use crate::session::outcome::{Epoch, StillReachable};
 use crate::session::runner::ScriptRunner;

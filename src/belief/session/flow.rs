@@ -1,7 +1,8 @@
 //! Whether the arm moves as much oil as its set-points ask for: a pump far below the datasheet's figure leaves it
 //! behind.
 
-use crate::session::constants::flow::{S_PER_MIN, SOUND_SHARE, SPAN_S};
+use crate::plan::constants::motion_timing::S_PER_MIN;
+use crate::session::constants::flow::{SOUND_SHARE, SPAN_S};
 use armcal_core::robot::Robot;
 use armcal_core::streams::JointAngles;
 

@@ -7,9 +7,9 @@
 //! set-point that has gone far: at the third the joint is probed, and the contact not obeyed until it moves or has not.
 
 use crate::session::constants::following::{
-    DECISIVE_RAD, FLICKERS, LEAPT_S, LEFT_RAD, NEAR_RAD, NOISE_SIGMAS, NOISY_COUNTS, REACHABLE, REST_S, SAME_S,
-    SUSPECTED,
+    DECISIVE_RAD, FLICKERS, LEAPT_S, LEFT_RAD, NOISE_SIGMAS, NOISY_COUNTS, REACHABLE, REST_S, SAME_S, SUSPECTED,
 };
+use crate::session::constants::settling::NEAR_RAD;
 use armcal_core::robot::{FailedKind, Robot};
 use armcal_core::sensor::wrap_symmetric;
 use armcal_core::streams::JointCounts;

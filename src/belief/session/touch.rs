@@ -4,9 +4,10 @@
 //! believed arm alone is kept clear of everything but the touched part, for a contact is what it comes for. It feels
 //! it as its readings staying behind the set-point by more than on the free way before (`TouchDetector`).
 
+use crate::plan::constants::targets::IK_TOLERANCE_M;
 use crate::session::constants::touch::{
-    BACK_SPEED_M_S, BEYOND_M, HELD_UP_M, HELD_UP_SIGMAS, IK_TOLERANCE_M, LASTS_S, LEARNT_BEFORE_M, MAX_STRIDE_RAD,
-    PART_CLEARANCE_M, RANDOM_SEEDS, REST_CLEARANCE_M, REST_S, SMOOTHING_S, SPEED_M_S, STRIDE_M, UNTOLD,
+    BACK_SPEED_M_S, BEYOND_M, HELD_UP_M, HELD_UP_SIGMAS, LASTS_S, LEARNT_BEFORE_M, MAX_STRIDE_RAD, PART_CLEARANCE_M,
+    RANDOM_SEEDS, REST_CLEARANCE_M, REST_S, SMOOTHING_S, SPEED_M_S, STRIDE_M, UNTOLD,
 };
 use nalgebra::{Matrix3, Vector3};
 use rand::RngExt;

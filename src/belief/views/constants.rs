@@ -32,8 +32,6 @@ pub(crate) mod dropouts {
 }
 
 pub(crate) mod external_board {
-    /// Frames in which a corner is farther than this many sigma from the median of all show another corner.
-    pub(crate) const CLOSE_SIGMAS: f64 = 10.0;
     /// Corners farther than this many sigma from where the others have them are another corner, or a shadow.
     pub(crate) const FAR_SIGMAS: f64 = 6.0;
     /// A sigma by the median of absolute values.
@@ -43,8 +41,6 @@ pub(crate) mod external_board {
 }
 
 pub(crate) mod external_landmarks {
-    /// Frames farther from the median than this many times the median distance from it show something else.
-    pub(crate) const USUAL_DISTANCES: f64 = 6.0;
     /// Closer than this is never left out, m: what positions from tags are good for at best. Assumed.
     pub(crate) const NEVER_APART_M: f64 = 2e-3;
 }

@@ -5,7 +5,8 @@
 //! In units of the prior, over the directions of which the data tell, `d^T (S - C)^-1 d` is chi-square. A tag beyond
 //! its limit is freed of its survey if that explains more than any other error of the geometry does.
 
-use crate::explain::constants::tags_departure::{FALSE_ALARM, TAILS, TOLD_SHARE};
+use crate::explain::constants::tags_departure::{TAILS, TOLD_SHARE};
+use crate::judge::constants::FALSE_ALARM;
 use nalgebra::{Matrix6, Vector6};
 
 use crate::model::blocks::Block;

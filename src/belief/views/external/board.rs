@@ -1,6 +1,7 @@
 //! A board over the frames of a view: the mean place of each corner, and the board's pose by them.
 
-use crate::views::constants::external_board::{CLOSE_SIGMAS, FAR_SIGMAS, MAX_LEFT_OUT, SIGMA_OF_MEDIAN};
+use crate::views::constants::external_board::{FAR_SIGMAS, MAX_LEFT_OUT, SIGMA_OF_MEDIAN};
+use crate::views::constants::frame_consensus::CLOSE_SIGMAS;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 

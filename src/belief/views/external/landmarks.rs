@@ -1,6 +1,7 @@
 //! One landmark over the frames of a view.
 
-use crate::views::constants::external_landmarks::{NEVER_APART_M, USUAL_DISTANCES};
+use crate::views::constants::external_landmarks::NEVER_APART_M;
+use crate::views::constants::frame_consensus::USUAL_DISTANCES;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use crate::views::association::check_square;
