@@ -2,20 +2,18 @@
 
 pub use crate::batch::interim::interim_estimate;
 pub use crate::batch::marked_calibrations::{MIN_VIEWS, calibrate, calibrate_data, calibrate_with_survey};
-pub use crate::checks::refusal_conditions::{MIN_HELD_OUT_VIEWS, MIN_VIEWS_PER_PARAMETER, fewest_views};
+pub use crate::checks::refusal_conditions::MIN_VIEWS_PER_PARAMETER;
 pub use crate::file::{
-    CalibratedArm, Calibration, CalibrationFileError, CalibrationFiles, CameraMount, Check, CompactCalibration,
-    CompactError, CompactJoint, CovarianceTable, FailedJointTable, FitMetrics, FurtherCamera, HeldOutMetrics,
-    JointCompliance, JointResult, LensResult, LinkResult, LookupTable, MAX_COMPACT_BYTES, MapResult, MapTag,
-    ModelTable, ObservabilityTable, PredictedToolError, PriorTable, ReferenceTable, SagTable, Status, SurveyCoverage,
-    TermsTable, ValidRange, VerdictTable, ViewContainment, calibration_schema, covariance_file, covariance_schema,
-    metric,
+    CalibratedArm, Calibration, CalibrationFileError, CameraMount, Check, CompactCalibration, CompactError,
+    CompactJoint, CovarianceTable, FailedJointTable, FitMetrics, FurtherCamera, HeldOutMetrics, JointCompliance,
+    JointResult, LensResult, LinkResult, LookupTable, MapResult, MapTag, ModelTable, ObservabilityTable,
+    PredictedToolError, PriorTable, ReferenceTable, SagTable, Status, SurveyCoverage, TermsTable, ValidRange,
+    VerdictTable, ViewContainment, calibration_schema, covariance_file, covariance_schema, metric,
 };
-pub use crate::judge::baseline_comparison::{BaselineComparison, SIGNIFICANCE};
+pub use crate::judge::baseline_comparison::BaselineComparison;
 pub use crate::methods::{
-    EndStopFit, Gauge, Interpolation, PositionMethod, PositionSearch, Scaling, SearchOptions, VarianceObjective,
-    determined_by_variance, fisher_information, fit_stops, free_parameters, least_squares, minimum_distance,
-    mount_by_gripper_tag,
+    Gauge, Interpolation, PositionMethod, PositionSearch, Scaling, SearchOptions, determined_by_variance,
+    fisher_information, free_parameters, least_squares, minimum_distance, mount_by_gripper_tag,
 };
 pub use crate::positions::{MountEstimate, PositionProblem, Solution, Unobservable};
 pub use crate::say::geometry_error::{ErrorKind, GeometryError};
@@ -29,21 +27,19 @@ pub use crate::views::error::CalibError;
 pub use crate::views::{
     BoardPoint, BoardPoints, CalibrationData, CaptureData, ConditionHistory, EndStopReading, ExternalContext, HeldOut,
     IdentifiedScale, MarkedSpans, MeanCorners, ObservationRejection, PlainLandmark, TagMeasurement, TagObservation,
-    TaskRests, View, associate, associate_within, check_joints, identify_scales, prepare_external, prepare_pooled,
-    read_marked, surveyed,
+    TaskRests, View, associate, check_joints, identify_scales, prepare_external, prepare_pooled, read_marked, surveyed,
 };
 
 /// The default method, step by step.
 pub mod bundle {
     pub use crate::checks::innovations::{Innovations, JointInnovation};
     pub use crate::checks::observability::{Observability, observability};
-    pub use crate::explain::calibration_prior::{CalibrationPrior, MOUNT_ROWS, PriorConsistency, with_mount_rows};
     pub use crate::explain::failures::{Failure, FailureAdjusted, FailureSource, SensorLine, SensorUse};
-    pub use crate::explain::model_selection::{OptionalTerm, Selection, select_model};
+    pub use crate::explain::model_selection::{OptionalTerm, Selection};
     pub use crate::explain::score_test::{GeometryElement, ScoreTestResult};
     pub use crate::solve::estimate::{Estimate, LeastSquares, estimate, least_squares};
     pub use crate::solve::input::{BundleInput, HyperparameterMode};
-    pub use crate::solve::model_for_views::{MIN_GRIPPER_VIEWS, model_for, reference};
+    pub use crate::solve::model_for_views::{model_for, reference};
     pub use crate::solve::outliers::Outlier;
 }
 
@@ -51,6 +47,6 @@ pub mod bundle {
 pub mod online {
     pub use crate::follow::{
         Batch, BeliefLine, BeliefLog, BeliefRow, DriftModel, Fault, FaultSearch, Follower, OnlineEstimator,
-        OnlineEvent, OnlineSettings, Oracle, OracleGain, TagSet, ViewStream, online_model,
+        OnlineEvent, OnlineSettings, Oracle, OracleGain, TagSet, ViewStream,
     };
 }

@@ -30,9 +30,8 @@ pub(crate) mod verdict_tables;
 
 pub use calibrated_arm::CalibratedArm;
 pub use calibration::{Calibration, JointResult, Status, calibration_schema};
-pub use calibration_file::CalibrationFiles;
 pub use camera_mount::{CameraMount, FurtherCamera};
-pub use compact::{CompactCalibration, CompactError, CompactJoint, MAX_COMPACT_BYTES, PredictedToolError};
+pub use compact::{CompactCalibration, CompactError, CompactJoint, PredictedToolError};
 pub use covariance_file::{CovarianceTable, covariance_file, covariance_schema};
 pub use failed_joint::{FailedJointTable, PriorTable};
 pub use file_error::CalibrationFileError;

@@ -33,7 +33,7 @@ pub use event::OnlineEvent;
 pub use follower::{BeliefRow, Follower};
 pub use hypothesis::{Fault, TagSet};
 pub use oracle::{Oracle, OracleGain};
-pub use settings::{DriftModel, FaultSearch, OnlineSettings, online_model};
+pub use settings::{DriftModel, FaultSearch, OnlineSettings};
 pub use view_stream::ViewStream;
 
 #[cfg(test)]

@@ -20,10 +20,9 @@ mod search;
 mod tests;
 
 pub use gripper_tag::mount_by_gripper_tag;
-pub use joint_limits::{EndStopFit, fit_stops};
 pub use least_squares::{fisher_information, least_squares};
 pub use minimum_distance::minimum_distance;
-pub use minimum_variance::{Gauge, VarianceObjective, determined_by_variance};
+pub use minimum_variance::{Gauge, determined_by_variance};
 pub use observability::free_parameters;
 pub use position_method::PositionMethod;
 pub use search::{Interpolation, PositionSearch, Scaling, SearchOptions};

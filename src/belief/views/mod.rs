@@ -21,7 +21,7 @@ pub(crate) mod pooling;
 pub(crate) mod scale_identification;
 pub(crate) mod view;
 
-pub use association::{associate, associate_within, surveyed};
+pub use association::{associate, surveyed};
 pub use calibration_data::{CalibrationData, HeldOut};
 pub use conditions::ConditionHistory;
 pub use data_checks::check_joints;
