@@ -19,4 +19,3 @@ mod text;
 
 pub use content::{CompactCalibration, CompactJoint, PredictedToolError};
 pub use error::CompactError;
-pub use precision::MAX_COMPACT_BYTES;

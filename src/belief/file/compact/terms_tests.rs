@@ -2,6 +2,7 @@
 
 use rand::RngExt;
 
+use crate::file::compact::precision::MAX_COMPACT_BYTES;
 use crate::file::compact::*;
 use crate::fixture::{estimate, sample, titan, with_terms};
 use armcal_core::robot::Robot;

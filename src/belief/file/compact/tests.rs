@@ -4,7 +4,7 @@ use proptest::prelude::*;
 
 use crate::file::bare::bare;
 use crate::file::calibration::{Calibration, JointResult, Status};
-use crate::file::compact::precision::STEPS;
+use crate::file::compact::precision::{MAX_COMPACT_BYTES, STEPS};
 use crate::file::compact::*;
 use crate::file::covariance_file::CovarianceTable;
 use crate::file::metrics::HeldOutMetrics;
