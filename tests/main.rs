@@ -58,6 +58,7 @@ mod sim;
 mod slides;
 mod streams;
 mod support;
+mod tag_distances;
 mod tagmap;
 mod touch;
 mod two_tables;

@@ -1,0 +1,49 @@
+//! Distances between tags that robot.toml states, in a calibration by the program.
+
+use crate::support::texts::Texts;
+use crate::support::{Answer, answer, program, read, robot_copy, root, temp, write};
+
+/// The sample's calibration with these tables at the end of robot.toml.
+fn calibrated(tables: &str) -> (Answer, String) {
+    let folder = temp();
+    let robot = robot_copy(folder.path());
+    let file = robot.join("robot.toml");
+    write(&file, &format!("{}\n{tables}", read(&file)));
+    let out = folder.path().join("out");
+    let mut command = program();
+    command.arg("calibrate").arg(root().join("recordings/sample/run.mcap")).arg("--robot").arg(&robot);
+    let answer = answer(command.arg("--out").arg(&out));
+    let result = out.join("calibration.toml");
+    (answer, if result.exists() { read(&result) } else { String::new() })
+}
+
+fn distance(tags: [u32; 2], distance_m: f64, std_m: f64) -> String {
+    format!("[[geometry.tag_distance]]\ntags = {tags:?}\ndistance_m = {distance_m:?}\nstd_m = {std_m:?}\n")
+}
+
+/// Of the centres of tags 0 and 3 in robots/titan4, m.
+const APART_M: f64 = 1.9078;
+
+#[test]
+fn a_distance_that_the_views_confirm_is_a_check_and_one_that_they_contradict_refuses() {
+    let _texts = Texts::of("a_distance_that_the_views_confirm_is_a_check_and_one_that_they_contradict_refuses");
+    let (answer, result) = calibrated(&distance([0, 3], APART_M, 0.003));
+    answer.expect("as it is", 0, &["ACCEPTED"]);
+    assert!(result.contains("the distance of tags 0 and 3: sigmas"), "{result}");
+    let (answer, _) = calibrated(&distance([0, 3], APART_M + 0.03, 0.002));
+    answer.expect("3 cm more", 4, &["REFUSED: the distance of tags 0 and 3 is 1937.8 mm", "[length_contradicted]"]);
+    let (answer, _) = calibrated(&distance([0, 99], 0.5, 0.002));
+    answer.expect("no such tag", 0, &["the distance of tags 0 and 99 is not used", "[length_unused]"]);
+}
+
+#[test]
+fn distances_that_cannot_be_meant_are_refused_by_their_key() {
+    for (tables, words) in [
+        (distance([3, 3], 0.5, 0.002), "must be two tags"),
+        (distance([0, 3], -0.5, 0.002), "distance_m: -0.5 is outside"),
+        (distance([0, 3], 0.5, 0.0), "std_m: 0 is outside"),
+        ("[[geometry.tag_distance]]\ntags = [0, 3]\ndistance_m = 0.5\n".to_owned(), "std_m"),
+    ] {
+        calibrated(&tables).0.expect(words, 2, &["robot.toml", words]);
+    }
+}
