@@ -118,7 +118,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let folder = tempfile::tempdir()?;
     let header = RecordingHeader::new(robot.joint_names());
     let mut recorder = Recorder::new(RecordingWriter::create(folder.path().join("run.mcap"), header)?);
-    let inputs = SessionInputs { robot: &robot, vehicle: &vehicle, routine: &routine, seed: routine.seed };
+    let method = armcal::calib::calibration_method(routine.method);
+    let inputs = SessionInputs { robot: &robot, vehicle: &vehicle, routine: &routine, method, seed: routine.seed };
     let outcome = run(&inputs, &mut arm, &mut recorder, &mut Unwatched)?;
     recorder.into_writer().finish()?;
 

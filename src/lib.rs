@@ -65,7 +65,7 @@
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]
 
-pub use armcal_belief::{calib, judge, model, plan, say, session, tagmap, verify};
+pub use armcal_belief::{judge, model, plan, say, session, tagmap, verify};
 pub use armcal_core::{
     codes, input, joints, kinematics, log, optics, robot, routine, sensor, spatial, stats, streams, time,
 };
@@ -77,7 +77,6 @@ pub use armcal_sim as sim;
 
 pub use front::{CalibrateError, Calibrator, Measurements, PoseAtRest};
 
-pub use armcal_belief::calib::{CalibError, CalibratedArm, Calibration, Status, calibrate, interim_estimate};
 pub use armcal_belief::plan::{ClearanceModel, JointErrorBounds, PathError, PathPlanner, Timing};
 pub use armcal_belief::session::{Outcome, Progress, Recorder, SessionError, SessionInputs, Unwatched};
 pub use armcal_core::joints::{JointAngles, JointCounts};
@@ -87,6 +86,9 @@ pub use armcal_core::routine::{Method, Routine, load as load_routine};
 pub use armcal_core::sensor::ArmSensors;
 pub use armcal_core::streams::{Arm, ArmError, Message, Sink, SinkError};
 pub use armcal_core::time::Stamp;
+pub use calib::{CalibError, CalibratedArm, Calibration, Status, calibrate, interim_estimate};
+
+pub mod calib;
 
 // For the command line, the tests and the benches.
 #[cfg(feature = "viewer")]

@@ -11,11 +11,8 @@ pub use crate::file::{
     VerdictTable, ViewContainment, calibration_schema, covariance_file, covariance_schema, metric,
 };
 pub use crate::judge::baseline_comparison::BaselineComparison;
-pub use crate::methods::{
-    Gauge, Interpolation, PositionMethod, PositionSearch, Scaling, SearchOptions, determined_by_variance,
-    fisher_information, free_parameters, least_squares, minimum_distance, mount_by_gripper_tag,
-};
-pub use crate::positions::{MountEstimate, PositionProblem, Solution, Unobservable};
+pub use crate::methods::{CalibrationMethod, PositionSolution, PositionSolver, free_parameters, mount_by_gripper_tag};
+pub use crate::positions::{MountEstimate, PositionProblem, Solution, TagResidual, Unobservable};
 pub use crate::say::geometry_error::{ErrorKind, GeometryError};
 pub use crate::say::reading_error::{JointZero, MisreadReadings, ReadingError};
 pub use crate::say::refusal::{InnovationQuantity, Refusal, in_files as refusals_in_files, with_advice};

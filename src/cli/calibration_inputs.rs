@@ -8,6 +8,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 
+use crate::calib::{
+    Calibration, CalibrationData, CalibrationFileError, Status, View, calibrate_data, check_joints, prepare_pooled,
+    read_marked,
+};
 use crate::cli::exit::UsageError;
 use crate::cli::file_kind::{FileKind, expect_kind, expect_option, expect_recording};
 use crate::cli::losses::{warn_of_external, warn_of_losses};
@@ -16,10 +20,6 @@ use crate::cli::waiting::Waiting;
 use crate::front::Calibrator;
 use crate::front::measurements::add_lens;
 use armcal_belief::calib::online::{Batch, Follower, OnlineEvent, OnlineSettings};
-use armcal_belief::calib::{
-    Calibration, CalibrationData, CalibrationFileError, Status, View, calibrate_data, check_joints, prepare_pooled,
-    read_marked,
-};
 use armcal_belief::tagmap::files::{LandmarkFile, read_landmarks};
 #[cfg(not(feature = "images"))]
 use armcal_core::input::read_external;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use armcal_belief::calib::{
+use crate::calib::{
     Calibration, CalibrationData, ExternalContext, PlainLandmark, calibrate, calibrate_data, calibrate_with_survey,
     prepare_external, prepare_pooled,
 };

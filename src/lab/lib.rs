@@ -3,9 +3,8 @@
 //! `detection`: tags at set ranges and incidences in three kinds of water, at rest and in motion (`scenes`), rendered,
 //! detected and compared with the projection (`trials`). From that: rates and errors by condition (`tables`), and the
 //! model of corner noise and detection that the geometric camera may draw from (`noise_fit`).
-//! tests/oracle/compare_detectors.py runs other detectors on the same images. `paper`: the paper's comparison of
-//! methods, and `sensitivity` its Figures 4 and 7; `poses`: error over poses and the arm's time, by how the poses are
-//! chosen; armcal-charts draws them. `falsified`: the verdict where drawing, survey or a sensor is wrong. `edges`:
+//! tests/oracle/compare_detectors.py runs other detectors on the same images. `poses`: error over poses and the arm's
+//! time, by how the poses are chosen; armcal-charts draws it. The paper's study is armcal-paper's. `falsified`: the verdict where drawing, survey or a sensor is wrong. `edges`:
 //! certified edges against brute force; `paths`: planning between random poses; `worlds`: closed loops in any world
 //! allowed; `bound`: closed loops against the Bayesian bound of their views; `dive`: the online belief over a dive,
 //! `dive_faults`: when it names what happens there.
@@ -16,11 +15,9 @@ mod dive_faults;
 mod edges;
 mod falsified;
 mod noise_fit;
-pub mod paper;
 mod paths;
 mod poses;
 mod scenes;
-mod sensitivity;
 mod tables;
 mod trials;
 mod worlds;
@@ -39,7 +36,6 @@ pub use noise_fit::{FittedNoise, fit_noise};
 pub use paths::{Belief, PathQueries, PathRow, PathSite, PathStudy, path_study, paths_csv, problem_json, queries_json};
 pub use poses::{PoseGrid, PoseRow, PoseStudyError, pose_study, poses_csv, poses_figure, poses_table};
 pub use scenes::{Condition, TAG_SIZE_M, conditions, water_name};
-pub use sensitivity::{Sensitivity, SensitivityPoint, sensitivity};
 pub use tables::{conditions_csv, report, trials_csv, truth_csv};
 pub use trials::{DetectionStudy, Outcome, StudyError, TagTrial, Watcher, detection_study};
 pub use worlds::{DrawnWorld, drawn_world};

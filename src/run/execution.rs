@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use crate::calib::{Calibration, calibration_method};
 use crate::output::{AcceptedKept, OutputError, OutputFolder, accepted_kept};
 #[cfg(feature = "viewer")]
 use crate::report::markdown;
 use crate::report::{About, AssertSummary, HeldJointSummary, OnlineSummary, RenewalSummary, Report, RunSummary, html};
 use crate::run::describe::describe;
 use crate::run::{Failure, RunError, RunInputs, Stage, corner_scatter_px};
-use armcal_belief::calib::Calibration;
 use armcal_belief::session::{
     self, AssertResult, BelievedFrames, EstimateUpdate, HeldJoint, MessageListener, Outcome, Progress, Recorder,
     SessionInputs,
@@ -138,8 +138,13 @@ impl Run<'_> {
         let inputs = self.inputs;
         let recorder = self.recorder(arm.now()).map_err(Failure::at(Stage::World))?;
         let mut recorder = recorder.with_listener(listener);
-        let setup =
-            SessionInputs { robot: &inputs.robot, vehicle: &inputs.vehicle, routine: &inputs.routine, seed: self.seed };
+        let setup = SessionInputs {
+            robot: &inputs.robot,
+            vehicle: &inputs.vehicle,
+            routine: &inputs.routine,
+            method: calibration_method(inputs.routine.method),
+            seed: self.seed,
+        };
         match session::run(&setup, arm, &mut recorder, progress) {
             Ok(outcome) => Ok((outcome, recorder)),
             Err(error) => {

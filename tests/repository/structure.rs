@@ -8,7 +8,7 @@ use super::expect_none;
 use crate::support::{files_below, root};
 
 /// Folders of the members below `src/`; the rest of `src/` is the root crate.
-const MEMBERS: [&str; 9] = ["core", "belief", "detect", "sim", "replay", "charts", "lab", "live", "python"];
+const MEMBERS: [&str; 10] = ["core", "belief", "paper", "detect", "sim", "replay", "charts", "lab", "live", "python"];
 const MAX_LINE: usize = 120;
 /// Lines of a mod.rs or lib.rs beside its documentation.
 const MAX_MODULE_ROOT: usize = 60;

@@ -11,6 +11,7 @@ use crate::batch::rounds::{BundleCalibration, EstimateListener, EstimatePurpose}
 use crate::batch::slips_since::slips_since;
 use crate::file::calibration::{Calibration, Status};
 use crate::methods::calibration::calibrate_positions;
+use crate::methods::calibration_method::CalibrationMethod;
 use crate::methods::end_stops;
 use crate::views::association::{associate_within, declared_failed, surveyed};
 use crate::views::calibration_data::{CalibrationData, HeldOut, hash_of, used_by};
@@ -28,7 +29,7 @@ use crate::views::view::CaptureData;
 ///
 /// # Errors
 /// [`CalibError`] when the recording holds nothing to fit. A doubtful fit is returned with [`Status::Refused`].
-pub fn calibrate(recording: &Recording, robot: &Robot, method: Method) -> Result<Calibration, CalibError> {
+pub fn calibrate(recording: &Recording, robot: &Robot, method: CalibrationMethod) -> Result<Calibration, CalibError> {
     calibrate_with_survey(recording, &surveyed(recording, robot), method)
 }
 
@@ -36,7 +37,11 @@ pub fn calibrate(recording: &Recording, robot: &Robot, method: Method) -> Result
 ///
 /// # Errors
 /// As [`calibrate`].
-pub fn calibrate_with_survey(recording: &Recording, robot: &Robot, method: Method) -> Result<Calibration, CalibError> {
+pub fn calibrate_with_survey(
+    recording: &Recording,
+    robot: &Robot,
+    method: CalibrationMethod,
+) -> Result<Calibration, CalibError> {
     check_joints(recording, robot)?;
     check_order(recording)?;
     let mut run = MarkedRun { recording, robot, method, used: Vec::new() };
@@ -78,7 +83,7 @@ fn marked_calibrations(recording: &Recording) -> Vec<MarkedCalibration> {
 struct MarkedRun<'a> {
     recording: &'a Recording,
     robot: &'a Robot,
-    method: Method,
+    method: CalibrationMethod,
     /// Messages used so far, ascending.
     used: Vec<usize>,
 }
@@ -90,9 +95,9 @@ impl MarkedRun<'_> {
         accepted: Option<&Calibration>,
     ) -> Result<Calibration, CalibError> {
         let data = self.data(marked)?;
-        let is_reused = |prior: &&Calibration| self.method == Method::Bundle && rests_on(prior, &data.data);
+        let is_reused = |prior: &&Calibration| self.method.method() == Method::Bundle && rests_on(prior, &data.data);
         let prior = accepted.filter(|prior| marked.is_warm && !is_reused(prior));
-        if self.method != Method::Bundle || prior.is_none() {
+        if self.method.method() != Method::Bundle || prior.is_none() {
             return calibrate_data(data, self.method, prior);
         }
         let warm = calibrate_data(data.clone(), self.method, prior)?;
@@ -124,10 +129,10 @@ impl MarkedRun<'_> {
         self.used.extend(data.used.iter().chain(of_gripper_tag).chain(&marked.message_idx));
         self.used.sort_unstable();
         self.used.dedup();
-        if data.n_marks == 0 && self.method != Method::JointLimits {
+        if data.n_marks == 0 && self.method.method() != Method::JointLimits {
             return Err(CalibError::NoCaptures { recording: name });
         }
-        let messages_hash = hash_of(self.recording, &used_by(self.method, &self.used, &data));
+        let messages_hash = hash_of(self.recording, &used_by(self.method.method(), &self.used, &data));
         let held_out = HeldOut::AsMarked;
         Ok(CalibrationData { name, messages_hash, data, gripper_tag_data, held_out, robot, identified })
     }
@@ -152,23 +157,23 @@ fn rests_on(prior: &Calibration, data: &CaptureData) -> bool {
 /// As [`calibrate`].
 pub fn calibrate_data(
     data: CalibrationData,
-    method: Method,
+    method: CalibrationMethod,
     prior: Option<&Calibration>,
 ) -> Result<Calibration, CalibError> {
     if data.robot.is_watched() && prior.is_some_and(|prior| prior.sag.is_some()) {
         return Err(CalibError::PriorSag { recording: data.name });
     }
     match method {
-        Method::JointLimits => end_stops::calibrate(data, prior),
-        Method::Bundle => {
+        CalibrationMethod::JointLimits => end_stops::calibrate(data, prior),
+        CalibrationMethod::Bundle => {
             check_views(&data)?;
             BundleCalibration::new(data, prior, EstimatePurpose::Final)?.calibrate()
         }
-        Method::MinimumDistance | Method::MinimumVariance => {
+        CalibrationMethod::Positions { method, solve } => {
             let mut data = data;
             data.data.keep_first_camera();
             check_views(&data)?;
-            calibrate_positions(data, method, prior)
+            calibrate_positions(data, (method, solve), prior)
         }
     }
 }

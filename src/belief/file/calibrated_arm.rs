@@ -68,8 +68,8 @@ mod tests {
     use super::*;
     use crate::file::covariance_file::CovarianceTable;
     use crate::fixture::titan;
+    use crate::methods::CalibrationMethod;
     use armcal_core::log::read_recording;
-    use armcal_core::routine::Method;
 
     /// With offsets as the only parameters, the tool's covariance is that of finite differences of its pose by them,
     /// and what the datasheet leaves of the others comes on top.
@@ -78,7 +78,8 @@ mod tests {
         let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
         let robot = titan();
         let recording = read_recording(root.join("recordings/sample/run.mcap")).unwrap();
-        let mut calibration = crate::batch::marked_calibrations::calibrate(&recording, &robot, Method::Bundle).unwrap();
+        let mut calibration =
+            crate::batch::marked_calibrations::calibrate(&recording, &robot, CalibrationMethod::Bundle).unwrap();
         let is_offset = |name: &String| name.ends_with(" offset");
         let kept: Vec<usize> = (0..calibration.covariance.parameters.len())
             .filter(|row| is_offset(&calibration.covariance.parameters[*row]))

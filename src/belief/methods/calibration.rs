@@ -1,6 +1,4 @@
-//! One calibration by a method on tag positions: the paper's minimum distance and minimum variance.
-
-use nalgebra::DMatrix;
+//! One calibration by a method on tag positions.
 
 use crate::checks::assemble::{Evidence, Fit, Provenance, assemble, held_out_metrics};
 use crate::checks::cross_validation::{compared, cross_validate};
@@ -9,18 +7,14 @@ use crate::file::calibration::Calibration;
 use crate::file::camera_mount::CameraMount;
 use crate::file::map_table::MapResult;
 use crate::file::metrics::HeldOutMetrics;
+use crate::methods::calibration_method::{PositionSolution, PositionSolver};
 use crate::methods::gripper_tag::mount_by_gripper_tag;
-use crate::methods::minimum_distance::minimum_distance;
-use crate::methods::minimum_variance::{determined_by_variance, variance_covariance};
 use crate::methods::observability::free_parameters;
-use crate::methods::position_method::PositionMethod;
-use crate::methods::search::SearchOptions;
 use crate::model::parameters::{JointParameters, Parameter};
 use crate::positions::mount_estimate::MountEstimate;
 use crate::positions::position_problem::PositionProblem;
-use crate::positions::solution::Solution;
-use crate::positions::unobservable::{Unobservable, grouped_names};
-use crate::solve::covariance::{CommonErrors, ParameterCovariance, linearity_scale, predict_tool_error};
+use crate::positions::unobservable::grouped_names;
+use crate::solve::covariance::{CommonErrors, linearity_scale, predict_tool_error};
 use crate::tagmap::tag_mapping::map_unknown_tags;
 use crate::views::calibration_data::{CalibrationData, HeldOut};
 use crate::views::error::CalibError;
@@ -45,7 +39,7 @@ struct Start {
 /// [`CalibError`] where the views make no map or determine no parameter.
 pub(crate) fn calibrate_positions(
     mut data: CalibrationData,
-    method: Method,
+    (method, solver): (Method, PositionSolver),
     prior: Option<&Calibration>,
 ) -> Result<Calibration, CalibError> {
     let start = start(&mut data, prior)?;
@@ -58,13 +52,13 @@ pub(crate) fn calibrate_positions(
     if free.is_empty() {
         return Err(nothing());
     }
-    let solved = solve(method, &problem, &mut free, &start).ok_or_else(nothing)?;
+    let solved = solve(solver, &problem, &mut free, &start).ok_or_else(nothing)?;
     unobservable.extend(solved.unobservable);
     unobservable.sort_by_key(|u| u.parameter);
-    let Solved { solution, covariance, .. } = solved;
+    let PositionSolution { solution, covariance, .. } = solved;
     let held_out_problem = PositionProblem::new(&start.robot, &data.data.held_out);
     let linearity_scale = linearity_scale(&problem, &held_out_problem, &solution.parameters, free.len());
-    let held_out = held_out(&data, method, &start, (&free, &solution.parameters));
+    let held_out = held_out(&data, solver, &start, (&free, &solution.parameters));
     let as_found = start.robot.clone().with_linearity(linearity_scale);
     let predicted = predict_tool_error(&as_found, &solution.parameters, &covariance, data.data.task_rests());
     let source = Provenance {
@@ -89,7 +83,7 @@ pub(crate) fn calibrate_positions(
 /// Held-out views by `at`, the calibration of `free`, and by mount and map alone.
 fn held_out(
     data: &CalibrationData,
-    method: Method,
+    solver: PositionSolver,
     start: &Start,
     (free, at): (&[Parameter], &JointParameters),
 ) -> HeldOutMetrics {
@@ -106,7 +100,7 @@ fn held_out(
         HeldOut::CrossValidation => {
             let fit = |views: &[View]| {
                 let part = PositionProblem::new(&start.robot, views);
-                solve(method, &part, &mut free.to_vec(), start).map(|solved| solved.solution.parameters)
+                solve(solver, &part, &mut free.to_vec(), start).map(|solved| solved.solution.parameters)
             };
             cross_validate(&start.robot, views, fit, by_baseline)
         }
@@ -137,33 +131,15 @@ fn start(data: &mut CalibrationData, prior: Option<&Calibration>) -> Result<Star
     Ok(Start { robot, guess, errors, map, mount, determined })
 }
 
-struct Solved {
-    solution: Solution,
-    covariance: ParameterCovariance,
-    /// What the method itself cannot determine.
-    unobservable: Vec<Unobservable>,
-}
-
-/// The answer of a method on positions and its covariance. Takes out of `free` what the method cannot determine; `None`
-/// if nothing is left.
-fn solve(method: Method, problem: &PositionProblem<'_>, free: &mut Vec<Parameter>, start: &Start) -> Option<Solved> {
-    let (guess, errors) = (&start.guess, &start.errors);
-    let mut unobservable = Vec::new();
-    let (solution, covariance, by_mount): (Solution, ParameterCovariance, DMatrix<f64>);
-    if method == Method::MinimumVariance {
-        (*free, unobservable) = determined_by_variance(problem, free, guess);
-        if free.is_empty() {
-            return None;
-        }
-        solution = PositionMethod::MinimumVariance.solve(problem, free, guess, &SearchOptions::default());
-        (covariance, by_mount) = variance_covariance(problem, free, &solution.parameters, errors);
-    } else {
-        solution = minimum_distance(problem, free, guess);
-        (covariance, by_mount) = ParameterCovariance::estimate(problem, free, &solution.parameters, errors);
-    }
-    let covariance = match &start.mount {
-        Ok(Some(mount)) => covariance.with_gripper_tag(mount, &start.determined, &by_mount),
-        _ => covariance,
-    };
-    Some(Solved { solution, covariance, unobservable })
+/// The solver's answer, its covariance with what the tag on the gripper determines; `None` if nothing is left.
+fn solve(
+    solver: PositionSolver,
+    problem: &PositionProblem<'_>,
+    free: &mut Vec<Parameter>,
+    start: &Start,
+) -> Option<PositionSolution> {
+    let solved = solver(problem, free, &start.guess, &start.errors)?;
+    let Ok(Some(mount)) = &start.mount else { return Some(solved) };
+    let covariance = solved.covariance.with_gripper_tag(mount, &start.determined, &solved.by_mount);
+    Some(PositionSolution { covariance, ..solved })
 }

@@ -16,23 +16,9 @@ pub(crate) mod joint_limits {
     pub(crate) const LEAST_TRAVEL_SHARE: f64 = 0.1;
 }
 
-pub(crate) mod minimum_variance {
-    /// Below this share of the largest, an eigenvalue of the objective's curvature is zero as far as rounding can tell.
-    pub(crate) const NULL_SHARE: f64 = 1e-12;
-    /// A parameter with more than this share of a null direction takes part in it.
-    pub(crate) const PART_OF_NULL: f64 = 1e-6;
-}
-
 pub(crate) mod observability {
     /// Assumed error of one seen tag position per axis before any residual is known, m: what 0.3 px corners, a mount
     /// off by 2 mm and a survey off by 1 mm come to at 1 m. It decides only what is hopeless, so its exact size matters
     /// little.
     pub(crate) const POSITION_STD_M: f64 = 0.004;
-}
-
-pub(crate) mod search {
-    /// Half-width of the search box in units of prior sigma; beyond it a sensor is broken, not out of calibration.
-    pub(crate) const BOUND_SIGMAS: f64 = 6.0;
-    /// Share of the box beyond which a parameter counts as resting on its bound.
-    pub(crate) const ON_BOUND: f64 = 0.999;
 }

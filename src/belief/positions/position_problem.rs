@@ -6,7 +6,7 @@
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Point3, Vector2, Vector3};
 
 use crate::model::parameters::{JointParameters, Parameter};
-use crate::views::view::{TagMeasurement, View};
+use crate::views::view::{TagMeasurement, TagObservation, View};
 use armcal_core::kinematics::LinkPoses;
 use armcal_core::robot::{Robot, SurveyedTag};
 use armcal_core::sensor::ConditionChange;
@@ -23,13 +23,18 @@ pub struct PositionProblem<'a> {
 }
 
 /// One observation's residual, with all that Jacobians need.
-pub(crate) struct TagResidual<'a> {
+pub struct TagResidual<'a> {
+    /// Index of the view.
     pub view_idx: usize,
-    pub tag: &'a crate::views::view::TagObservation,
+    /// Tag of the view.
+    pub tag: &'a TagObservation,
+    /// Its view.
     pub view: &'a View,
     /// Of the view from the parameters' reference.
     pub departure: ConditionChange,
+    /// Links as predicted, in the frame of the tags.
     pub poses: &'a LinkPoses,
+    /// The camera as predicted, in the same frame.
     pub base_from_camera: &'a Isometry3<f64>,
     /// The tag's centre in the base frame as predicted.
     pub predicted_m: Vector3<f64>,
@@ -45,7 +50,7 @@ impl<'a> PositionProblem<'a> {
     }
 
     /// Calls `f` for every tag of every view.
-    pub(crate) fn each(&self, parameters: &JointParameters, mut f: impl FnMut(&TagResidual<'_>)) {
+    pub fn each(&self, parameters: &JointParameters, mut f: impl FnMut(&TagResidual<'_>)) {
         let are_straight = parameters.are_linear();
         for (view_idx, view) in self.views.iter().enumerate() {
             if view.tags.is_empty() {
@@ -174,7 +179,8 @@ impl<'a> PositionProblem<'a> {
 
     /// d(residual)/d(parameter): a joint turns everything behind it, `axis x (point - origin)` times
     /// d(angle)/d(parameter).
-    pub(crate) fn derivative(&self, o: &TagResidual<'_>, parameter: Parameter) -> Vector3<f64> {
+    #[must_use]
+    pub fn derivative(&self, o: &TagResidual<'_>, parameter: Parameter) -> Vector3<f64> {
         if parameter.joint >= self.robot.n_joints_seen_by(self.robot.camera_at(o.view.camera)) {
             return Vector3::zeros();
         }
@@ -187,7 +193,8 @@ impl<'a> PositionProblem<'a> {
     }
 
     /// d(residual)/d(camera mount), perturbed on the right of `link_from_camera`: (translation m, rotation rad).
-    pub(crate) fn mount_derivative(o: &TagResidual<'_>) -> (Matrix3<f64>, Matrix3<f64>) {
+    #[must_use]
+    pub fn mount_derivative(o: &TagResidual<'_>) -> (Matrix3<f64>, Matrix3<f64>) {
         let rotation = *o.base_from_camera.rotation.to_rotation_matrix().matrix();
         (rotation, -rotation * skew(&o.tag.center_in_camera_m))
     }

@@ -1,5 +1,6 @@
 //! Inputs of a session.
 
+use crate::methods::CalibrationMethod;
 use armcal_core::robot::{Robot, Vehicle};
 use armcal_core::routine::Routine;
 
@@ -11,6 +12,8 @@ pub struct SessionInputs<'a> {
     pub vehicle: &'a Vehicle,
     /// Script, scene, task and settings.
     pub routine: &'a Routine,
+    /// How the routine's calibrations are made: its method, with the solver of those that go by positions.
+    pub method: CalibrationMethod,
     /// Seed of planning; a simulated arm has its own.
     pub seed: u64,
 }

@@ -295,7 +295,7 @@ impl ScriptRunner<'_, '_> {
 
     fn calibrate_marked(&mut self, recording: &Recording) -> Result<Option<String>, SessionError> {
         let began_s = self.driver.progress.wall_s();
-        let calibrated = calibrate(recording, self.setup.robot, self.setup.routine.method);
+        let calibrated = calibrate(recording, self.setup.robot, self.setup.method);
         self.tally.calibration_wall_s += self.driver.progress.wall_s() - began_s;
         let calibration = calibrated?;
         self.driver.log(LogLevel::Info, &verdict_line(&calibration))?;

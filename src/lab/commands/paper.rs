@@ -9,7 +9,7 @@ use clap::Args;
 use armcal::cli::Exit;
 use armcal::cli::{note, say};
 use armcal::output;
-use armcal_lab::paper::{Tier, experiments, paper_csv, paper_figures, paper_markdown, run_experiment};
+use armcal_paper::study::{Tier, experiments, paper_csv, paper_figures, paper_markdown, run_experiment};
 
 #[derive(Debug, Args)]
 pub(super) struct PaperArgs {

@@ -14,7 +14,7 @@ use armcal::cli::{Exit, UsageError};
 use armcal::output;
 use armcal_belief::plan::ClearanceModel;
 use armcal_core::routine;
-use armcal_lab as lab;
+use armcal_paper::study;
 
 #[derive(Debug, Args)]
 pub(super) struct SensitivityArgs {
@@ -43,7 +43,7 @@ pub(super) fn sensitivity(args: &SensitivityArgs) -> Result<Exit> {
     output::check_takes_files(&args.out)?;
     let clearance = ClearanceModel::new(&robot, &vehicle, &routine.scene);
     let (poses, min_tags) = (usize::from(args.poses), usize::from(args.min_tags));
-    let found = lab::sensitivity(&robot, &clearance, poses, min_tags, args.seed.unwrap_or(routine.seed))
+    let found = study::sensitivity(&robot, &clearance, poses, min_tags, args.seed.unwrap_or(routine.seed))
         .map_err(|problem| UsageError::new(Code::UsageInvalid, format!("{}: {problem}", args.routine.display())))?;
     let statement = found.statement();
     output::make_folder(&args.out)?;

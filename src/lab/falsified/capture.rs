@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use crate::falsified::cases::{Case, CaseKind};
 use crate::falsified::error::FalsifiedError;
 use crate::falsified::perturbation::{CaptureHalf, SensorFault, SoundReading};
-use armcal_belief::calib::surveyed;
+use armcal_belief::calib::{CalibrationMethod, surveyed};
 use armcal_belief::session::{self, Recorder, SessionInputs, Unwatched};
 use armcal_core::log::{Recording, RecordingHeader, RecordingWriter, read_recording};
 use armcal_core::robot::{Robot, Vehicle};
@@ -66,7 +66,13 @@ impl Capture {
         let header = RecordingHeader::new(scene.robot.joint_names());
         let writer = RecordingWriter::create(&run, header).map_err(FalsifiedError::of("recording"))?;
         let mut recorder = Recorder::new(writer);
-        let inputs = SessionInputs { robot: scene.robot, vehicle: scene.vehicle, routine: &routine, seed };
+        let inputs = SessionInputs {
+            robot: scene.robot,
+            vehicle: scene.vehicle,
+            routine: &routine,
+            method: CalibrationMethod::Bundle,
+            seed,
+        };
         session::run(&inputs, &mut world, &mut recorder, &mut Unwatched)?;
         world.finish_truth()?;
         recorder.into_writer().finish().map_err(FalsifiedError::of("recording"))?;

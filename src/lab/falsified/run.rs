@@ -9,13 +9,13 @@ use crate::falsified::error::FalsifiedError;
 use crate::falsified::naming::{causes_of_finding, first_causes, right_causes};
 use crate::falsified::oracle::{Oracle, OracleEffect};
 use crate::falsified::perturbation::{Perturbation, falsified_robot};
-use armcal_belief::calib::{Calibration, Status, calibrate_with_survey};
+use armcal_belief::calib::{Calibration, CalibrationMethod, Status, calibrate_with_survey};
 use armcal_belief::say::{Finding, FindingKind};
 use armcal_belief::verify::{Belief, reaches};
 use armcal_core::kinematics::LinkCorrections;
 use armcal_core::log::Recording;
 use armcal_core::robot::{Robot, Vehicle};
-use armcal_core::routine::{Method, Routine};
+use armcal_core::routine::Routine;
 use armcal_core::stats::Summary;
 
 /// A reservation's length per unit counts as right within this share.
@@ -193,7 +193,7 @@ fn row(oracle: &Oracle<'_>, classes: &EquivalenceClasses, case: &Case) -> Falsif
     let is_nameable = !right.is_empty();
     right.extend(classes.of(&perturbations));
     let is_named = |first: &[String]| is_nameable.then(|| first.iter().any(|cause| right.contains(cause)));
-    match calibrate_with_survey(&recording, &robot, Method::Bundle) {
+    match calibrate_with_survey(&recording, &robot, CalibrationMethod::Bundle) {
         Err(error) => FalsifiedRow { reason: error.to_string(), is_named: is_named(&[]), ..blank },
         Ok(calibration) => {
             let named_first = first_causes(&robot, &calibration);

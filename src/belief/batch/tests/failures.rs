@@ -10,6 +10,7 @@ use crate::explain::drawing::Drawing;
 use crate::explain::failure_detection::{FailureSearch, is_suspicious};
 use crate::explain::failures::{Failure, FailureAdjusted, FailureSource, SensorUse};
 use crate::file::calibration::Calibration;
+use crate::methods::CalibrationMethod;
 use crate::model::parameters::JointParameters;
 use crate::model::scales::Hyperparameters;
 use crate::say::refusal::Refusal;
@@ -19,7 +20,6 @@ use crate::solve::model_for_views::model_for;
 use crate::views::calibration_data::{CalibrationData, HeldOut};
 use crate::views::view::{CaptureData, View};
 use armcal_core::robot::{FailedKind, Robot};
-use armcal_core::routine::Method;
 use armcal_core::spatial::Pose;
 
 const N_VIEWS: usize = 20;
@@ -41,7 +41,7 @@ impl Case {
             robot: self.robot,
             identified: Vec::new(),
         };
-        calibrate_data(data, Method::Bundle, None).expect("a result")
+        calibrate_data(data, CalibrationMethod::Bundle, None).expect("a result")
     }
 }
 

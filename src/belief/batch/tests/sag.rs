@@ -7,6 +7,7 @@ use crate::batch::tests::drawing::{Case, case_changed, tool_errors_m};
 use crate::batch::tests::score_test::input;
 use crate::explain::drawing::Drawing;
 use crate::file::calibration::{Calibration, Status};
+use crate::methods::CalibrationMethod;
 use crate::model::blocks::Block;
 use crate::model::estimated::Model;
 use crate::say::finding::FindingKind;
@@ -20,7 +21,6 @@ use armcal_core::joints::JointAngles;
 use armcal_core::kinematics::Sag;
 use armcal_core::numeric::Outcome;
 use armcal_core::robot::Robot;
-use armcal_core::routine::Method;
 use armcal_core::sensor::{ArmSensors, ConditionChange};
 use armcal_core::stats::quantile;
 
@@ -199,11 +199,11 @@ fn soft_arms_are_accepted(n_seeds: usize, most_unnamed: usize) {
     let ([mut n_accepted, mut n_stiff, mut n_bent, mut n_named], mut nees, mut n) = ([0; 4], 0.0, 0.0);
     for seed in 0..n_seeds as u64 {
         let case = soft_case(&robot, soft(&robot, 1e-5, 500.0, seed), seed);
-        let found = calibrate_data(data(&robot, &case.views), Method::Bundle, None).expect("a result");
+        let found = calibrate_data(data(&robot, &case.views), CalibrationMethod::Bundle, None).expect("a result");
         n_accepted += usize::from(found.status == Status::Accepted);
         n_named += usize::from(found.findings.first().is_some_and(|finding| finding.kind == FindingKind::Sag));
         let straight = soft_case(&robot, Sag::default(), seed);
-        let stiff = calibrate_data(data(&robot, &straight.views), Method::Bundle, None).expect("a result");
+        let stiff = calibrate_data(data(&robot, &straight.views), CalibrationMethod::Bundle, None).expect("a result");
         n_stiff += usize::from(stiff.status == Status::Accepted);
         n_bent += usize::from(stiff.sag.is_some());
         let other = found.refusals.iter().find(|refusal| !matches!(refusal, Refusal::Overfitted { .. }));
@@ -245,8 +245,8 @@ fn a_warm_start_knows_the_sag() {
     let robot = titan();
     let case = soft_case(&robot, soft(&robot, 1e-5, 500.0, 3), 3);
     let (before, since) = case.views.split_at(22);
-    let first = calibrate_data(data(&robot, before), Method::Bundle, None).expect("a result");
-    let warm = calibrate_data(data(&robot, since), Method::Bundle, Some(&first)).expect("a result");
+    let first = calibrate_data(data(&robot, before), CalibrationMethod::Bundle, None).expect("a result");
+    let warm = calibrate_data(data(&robot, since), CalibrationMethod::Bundle, Some(&first)).expect("a result");
     let prior = warm.prior.as_ref().expect("a prior");
     assert!(prior.agrees, "{:?}", warm.refusal);
     let [first, warm] = [&first, &warm].map(|found| found.sag.as_ref().expect("bends").joint[1].clone());

@@ -2,11 +2,11 @@
 
 use nalgebra::Point3;
 
-use crate::paper::PaperStudyError;
-use crate::paper::contender::MethodVariant;
-use crate::paper::scene::{Draw, Setting};
-use crate::paper::trials::PaperRow;
-use armcal_belief::calib::Gauge;
+use crate::minimum_variance::Gauge;
+use crate::study::PaperStudyError;
+use crate::study::contender::MethodVariant;
+use crate::study::scene::{Draw, Setting};
+use crate::study::trials::PaperRow;
 use armcal_belief::model::JointParameters;
 use armcal_charts::{Axis, Panel, Series, Style, svg};
 use armcal_core::robot::Robot;

@@ -6,9 +6,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::model::parameters::{JointParameters, Parameter};
-use crate::positions::position_problem::PositionProblem;
-use crate::positions::solution::Solution;
+use armcal_belief::calib::PositionProblem;
+use armcal_belief::calib::Solution;
+use armcal_belief::model::{JointParameters, Parameter};
 use armcal_core::numeric::{Damping, LeastSquares, Proposal, StopRule, minimize};
 
 const DAMPING: Damping = Damping { first: 1e-6, min: 1e-15, max: 1e12, down: 0.1, up: 10.0, min_after_rejection: 0.0 };

@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 
-use crate::paper::experiments::Experiment;
-use crate::paper::scene::{Guess, PoseSampling, Readings};
-use crate::paper::trials::PaperRow;
+use crate::study::experiments::Experiment;
+use crate::study::scene::{Guess, PoseSampling, Readings};
+use crate::study::trials::PaperRow;
 
 fn mm(metres: f64) -> String {
     let mm = 1e3 * metres;

@@ -3,11 +3,12 @@
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use crate::paper::PaperStudyError;
-use crate::paper::contender::MethodVariant;
-use crate::paper::experiments::Experiment;
-use crate::paper::scene::{Draw, Setting};
-use armcal_belief::calib::{PositionProblem, fisher_information};
+use crate::least_squares::fisher_information;
+use crate::study::PaperStudyError;
+use crate::study::contender::MethodVariant;
+use crate::study::experiments::Experiment;
+use crate::study::scene::{Draw, Setting};
+use armcal_belief::calib::PositionProblem;
 use armcal_core::numeric::Outcome;
 use armcal_core::robot::Robot;
 use armcal_core::stats::quantile;

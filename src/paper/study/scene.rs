@@ -5,7 +5,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::paper::PaperStudyError;
+use crate::study::PaperStudyError;
 use armcal_belief::calib::{TagMeasurement, TagObservation, View};
 use armcal_belief::model::{JointParameters, Parameter, ParameterKind};
 use armcal_core::joints::JointAngles;

@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::sync::LazyLock;
 
-use crate::paper::*;
-use armcal_belief::calib::Gauge;
+use crate::minimum_variance::Gauge;
+use crate::study::*;
 use armcal_core::robot::{Robot, load};
 
 fn titan() -> Robot {

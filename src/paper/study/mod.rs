@@ -2,13 +2,14 @@
 //!
 //! `scene` draws an arm, landmarks, poses and readings; `contender` is a method with its settings; `trials` runs
 //! contenders on the same draws and measures the tool; `experiments` lists what is compared, with the paper's own
-//! figures; `tables` and `figures` show it. Draws run in parallel and are gathered in order, so that threads do not
-//! show.
+//! figures; `tables` and `figures` show it. `sensitivity` is its Figures 4 and 7. Draws run in parallel and are gathered
+//! in order, so that threads do not show.
 
 mod contender;
 mod experiments;
 mod figures;
 mod scene;
+mod sensitivity;
 mod tables;
 #[cfg(test)]
 mod tests;
@@ -18,6 +19,7 @@ pub use contender::{MethodVariant, Solver};
 pub use experiments::{Experiment, Tier, experiments};
 pub use figures::paper_figures;
 pub use scene::{Draw, Guess, PoseSampling, Readings, Setting};
+pub use sensitivity::{Sensitivity, SensitivityPoint, sensitivity};
 pub use tables::{paper_csv, paper_markdown};
 pub use trials::{PaperRow, run_experiment};
 

@@ -1,11 +1,11 @@
 //! The interface of the paper's methods: which equation, and what its solver found.
 
-use crate::methods::least_squares::{least_squares, sum_of_squares_m2};
-use crate::methods::minimum_variance::VarianceObjective;
-use crate::methods::search::{self, PositionSearch, SearchOptions};
-use crate::model::parameters::{JointParameters, Parameter};
-use crate::positions::position_problem::PositionProblem;
-use crate::positions::solution::Solution;
+use crate::least_squares::{least_squares, sum_of_squares_m2};
+use crate::minimum_variance::VarianceObjective;
+use crate::search::{self, PositionSearch, SearchOptions};
+use armcal_belief::calib::PositionProblem;
+use armcal_belief::calib::Solution;
+use armcal_belief::model::{JointParameters, Parameter};
 
 /// An equation over landmark positions in the base frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,8 +1,11 @@
 //! A method with its settings.
 
-use crate::paper::scene::{Draw, Guess, Setting};
+use crate::minimum_variance::Gauge;
+use crate::position_method::PositionMethod;
+use crate::search::{PositionSearch, Scaling, SearchOptions};
+use crate::study::scene::{Draw, Guess, Setting};
 use armcal_belief::calib::bundle::{BundleInput, HyperparameterMode, estimate};
-use armcal_belief::calib::{Gauge, PositionMethod, PositionProblem, PositionSearch, Scaling, SearchOptions, Solution};
+use armcal_belief::calib::{PositionProblem, Solution};
 use armcal_belief::model::{Hyperparameters, JointParameters, Model, Parameter, ParameterKind};
 use armcal_core::numeric::Outcome;
 

@@ -7,13 +7,13 @@
 //! direction but an exact freedom of gauge, which noise has nothing to do with. The offset is held,
 //! and so is everything else that the views leave without any effect.
 
-use crate::methods::constants::minimum_variance::{NULL_SHARE, PART_OF_NULL};
+use crate::constants::minimum_variance::{NULL_SHARE, PART_OF_NULL};
 use nalgebra::{Const, DMatrix, DVector, Dyn, OMatrix, Vector3};
 
-use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
-use crate::positions::position_problem::{PositionProblem, TagResidual};
-use crate::positions::unobservable::Unobservable;
-use crate::solve::covariance::{CommonErrors, ParameterCovariance};
+use armcal_belief::calib::Unobservable;
+use armcal_belief::calib::{CommonErrors, ParameterCovariance};
+use armcal_belief::calib::{PositionProblem, TagResidual};
+use armcal_belief::model::{JointParameters, Parameter, ParameterKind};
 use armcal_core::robot::Robot;
 
 /// What becomes of the first joint's offset under minimum variance.

@@ -8,7 +8,8 @@ use std::fmt::Write as _;
 use nalgebra::Point3;
 use rand::RngExt;
 
-use armcal_belief::calib::{PositionMethod, PositionProblem, TagMeasurement, TagObservation, View};
+use crate::position_method::PositionMethod;
+use armcal_belief::calib::{PositionProblem, TagMeasurement, TagObservation, View};
 use armcal_belief::model::JointParameters;
 use armcal_belief::plan::{ClearanceModel, VisibilityModel};
 use armcal_charts::{Axis, Panel, Series, Style, svg};

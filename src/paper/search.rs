@@ -4,13 +4,13 @@
 //! one; bounds keep them within what a sensor of that datasheet can be. Without it the search runs on the numbers of
 //! the paper's equation 1, `theta = k1 eta + k2`, as they are: rad per count and rad.
 
-use crate::methods::constants::search::{BOUND_SIGMAS, ON_BOUND};
+use crate::constants::search::{BOUND_SIGMAS, ON_BOUND};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
-use crate::positions::position_problem::PositionProblem;
-use crate::positions::solution::Solution;
+use armcal_belief::calib::PositionProblem;
+use armcal_belief::calib::Solution;
+use armcal_belief::model::{JointParameters, Parameter, ParameterKind};
 use armcal_core::numeric::Outcome;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::wrap_symmetric;

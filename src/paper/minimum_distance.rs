@@ -1,11 +1,11 @@
 //! The paper's proposed method: least sum of distances between seen and surveyed landmarks, over all landmarks, by
 //! BOBYQA.
 
-use crate::methods::position_method::PositionMethod;
-use crate::methods::search::SearchOptions;
-use crate::model::parameters::{JointParameters, Parameter};
-use crate::positions::position_problem::PositionProblem;
-use crate::positions::solution::Solution;
+use crate::position_method::PositionMethod;
+use crate::search::SearchOptions;
+use armcal_belief::calib::PositionProblem;
+use armcal_belief::calib::Solution;
+use armcal_belief::model::{JointParameters, Parameter};
 
 /// Minimizes [`PositionProblem::sum_of_distances_m`] over `free`, from `guess`; the other parameters stay there.
 #[must_use]

@@ -1,8 +1,10 @@
 //! What is compared, and what the paper says of it.
 
-use crate::paper::contender::{MethodVariant, Solver};
-use crate::paper::scene::{Guess, PoseSampling, Readings, Setting};
-use armcal_belief::calib::{Gauge, PositionMethod, SearchOptions};
+use crate::minimum_variance::Gauge;
+use crate::position_method::PositionMethod;
+use crate::search::SearchOptions;
+use crate::study::contender::{MethodVariant, Solver};
+use crate::study::scene::{Guess, PoseSampling, Readings, Setting};
 
 /// How many draws.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

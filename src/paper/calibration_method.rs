@@ -1,0 +1,48 @@
+//! The paper's methods as the estimator calls them.
+
+use armcal_belief::calib::{CalibrationMethod, CommonErrors, ParameterCovariance, PositionProblem, PositionSolution};
+use armcal_belief::model::{JointParameters, Parameter};
+use armcal_core::routine::Method;
+
+use crate::minimum_distance::minimum_distance;
+use crate::minimum_variance::{determined_by_variance, variance_covariance};
+use crate::position_method::PositionMethod;
+use crate::search::SearchOptions;
+
+/// How a calibration by `method` is made.
+#[must_use]
+pub fn calibration_method(method: Method) -> CalibrationMethod {
+    match method {
+        Method::Bundle => CalibrationMethod::Bundle,
+        Method::JointLimits => CalibrationMethod::JointLimits,
+        Method::MinimumDistance => CalibrationMethod::Positions { method, solve: by_distance },
+        Method::MinimumVariance => CalibrationMethod::Positions { method, solve: by_variance },
+    }
+}
+
+fn by_distance(
+    problem: &PositionProblem<'_>,
+    free: &mut Vec<Parameter>,
+    guess: &JointParameters,
+    errors: &CommonErrors,
+) -> Option<PositionSolution> {
+    let solution = minimum_distance(problem, free, guess);
+    let (covariance, by_mount) = ParameterCovariance::estimate(problem, free, &solution.parameters, errors);
+    Some(PositionSolution { solution, covariance, by_mount, unobservable: Vec::new() })
+}
+
+fn by_variance(
+    problem: &PositionProblem<'_>,
+    free: &mut Vec<Parameter>,
+    guess: &JointParameters,
+    errors: &CommonErrors,
+) -> Option<PositionSolution> {
+    let (determined, unobservable) = determined_by_variance(problem, free, guess);
+    *free = determined;
+    if free.is_empty() {
+        return None;
+    }
+    let solution = PositionMethod::MinimumVariance.solve(problem, free, guess, &SearchOptions::default());
+    let (covariance, by_mount) = variance_covariance(problem, free, &solution.parameters, errors);
+    Some(PositionSolution { solution, covariance, by_mount, unobservable })
+}
