@@ -22,27 +22,26 @@ pub fn calibration_method(method: Method) -> CalibrationMethod {
 
 fn by_distance(
     problem: &PositionProblem<'_>,
-    free: &mut Vec<Parameter>,
+    free: &[Parameter],
     guess: &JointParameters,
     errors: &CommonErrors,
 ) -> Option<PositionSolution> {
     let solution = minimum_distance(problem, free, guess);
     let (covariance, by_mount) = ParameterCovariance::estimate(problem, free, &solution.parameters, errors);
-    Some(PositionSolution { solution, covariance, by_mount, unobservable: Vec::new() })
+    Some(PositionSolution { determined: free.to_vec(), solution, covariance, by_mount, unobservable: Vec::new() })
 }
 
 fn by_variance(
     problem: &PositionProblem<'_>,
-    free: &mut Vec<Parameter>,
+    free: &[Parameter],
     guess: &JointParameters,
     errors: &CommonErrors,
 ) -> Option<PositionSolution> {
     let (determined, unobservable) = determined_by_variance(problem, free, guess);
-    *free = determined;
-    if free.is_empty() {
+    if determined.is_empty() {
         return None;
     }
-    let solution = PositionMethod::MinimumVariance.solve(problem, free, guess, &SearchOptions::default());
-    let (covariance, by_mount) = variance_covariance(problem, free, &solution.parameters, errors);
-    Some(PositionSolution { solution, covariance, by_mount, unobservable })
+    let solution = PositionMethod::MinimumVariance.solve(problem, &determined, guess, &SearchOptions::default());
+    let (covariance, by_mount) = variance_covariance(problem, &determined, &solution.parameters, errors);
+    Some(PositionSolution { determined, solution, covariance, by_mount, unobservable })
 }

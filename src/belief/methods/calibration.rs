@@ -44,7 +44,7 @@ pub(crate) fn calibrate_positions(
 ) -> Result<Calibration, CalibError> {
     let start = start(&mut data, prior)?;
     let problem = PositionProblem::new(&start.robot, &data.data.fit);
-    let (mut free, mut unobservable) = free_parameters(&problem, &start.guess);
+    let (free, mut unobservable) = free_parameters(&problem, &start.guess);
     let n_camera_joints = start.robot.n_seen_joints();
     let n_parameters = free.len() + unobservable.iter().filter(|u| u.parameter.joint < n_camera_joints).count();
     unobservable.retain(|u| !start.determined.contains(&u.parameter));
@@ -52,13 +52,13 @@ pub(crate) fn calibrate_positions(
     if free.is_empty() {
         return Err(nothing());
     }
-    let solved = solve(solver, &problem, &mut free, &start).ok_or_else(nothing)?;
+    let solved = solve(solver, &problem, &free, &start).ok_or_else(nothing)?;
     unobservable.extend(solved.unobservable);
     unobservable.sort_by_key(|u| u.parameter);
-    let PositionSolution { solution, covariance, .. } = solved;
+    let PositionSolution { determined, solution, covariance, .. } = solved;
     let held_out_problem = PositionProblem::new(&start.robot, &data.data.held_out);
-    let linearity_scale = linearity_scale(&problem, &held_out_problem, &solution.parameters, free.len());
-    let held_out = held_out(&data, solver, &start, (&free, &solution.parameters));
+    let linearity_scale = linearity_scale(&problem, &held_out_problem, &solution.parameters, determined.len());
+    let held_out = held_out(&data, solver, &start, (&determined, &solution.parameters));
     let as_found = start.robot.clone().with_linearity(linearity_scale);
     let predicted = predict_tool_error(&as_found, &solution.parameters, &covariance, data.data.task_rests());
     let source = Provenance {
@@ -100,7 +100,7 @@ fn held_out(
         HeldOut::CrossValidation => {
             let fit = |views: &[View]| {
                 let part = PositionProblem::new(&start.robot, views);
-                solve(solver, &part, &mut free.to_vec(), start).map(|solved| solved.solution.parameters)
+                solve(solver, &part, free, start).map(|solved| solved.solution.parameters)
             };
             cross_validate(&start.robot, views, fit, by_baseline)
         }
@@ -135,7 +135,7 @@ fn start(data: &mut CalibrationData, prior: Option<&Calibration>) -> Result<Star
 fn solve(
     solver: PositionSolver,
     problem: &PositionProblem<'_>,
-    free: &mut Vec<Parameter>,
+    free: &[Parameter],
     start: &Start,
 ) -> Option<PositionSolution> {
     let solved = solver(problem, free, &start.guess, &start.errors)?;

@@ -25,16 +25,17 @@ pub enum CalibrationMethod {
     },
 }
 
-/// Solves for the free parameters from a guess, under errors that all views share. Takes those out of the free ones
-/// that it cannot determine; `None` where nothing is left.
+/// Solves for the free parameters from a guess, under errors that all views share; `None` where it determines none.
 pub type PositionSolver =
-    fn(&PositionProblem<'_>, &mut Vec<Parameter>, &JointParameters, &CommonErrors) -> Option<PositionSolution>;
+    fn(&PositionProblem<'_>, &[Parameter], &JointParameters, &CommonErrors) -> Option<PositionSolution>;
 
 /// Answer of a [`PositionSolver`].
 pub struct PositionSolution {
+    /// Those of the free parameters that it determines.
+    pub determined: Vec<Parameter>,
     /// The parameters, and how the search went.
     pub solution: Solution,
-    /// Of the free parameters.
+    /// Of the determined parameters.
     pub covariance: ParameterCovariance,
     /// d(parameter)/d(mount), six columns: translation m, rotation rad, on the right.
     pub by_mount: DMatrix<f64>,

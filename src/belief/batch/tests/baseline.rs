@@ -28,7 +28,7 @@ const BY_POSITIONS: CalibrationMethod =
 
 fn least_squares(
     problem: &PositionProblem<'_>,
-    free: &mut Vec<Parameter>,
+    free: &[Parameter],
     guess: &JointParameters,
     errors: &CommonErrors,
 ) -> Option<PositionSolution> {
@@ -42,7 +42,7 @@ fn least_squares(
     let (cost_initial, cost_final) = (cost(guess), cost(&parameters));
     let solution = Solution { parameters, outcome: Outcome::Converged, evaluations: 10, cost_initial, cost_final };
     let (covariance, by_mount) = ParameterCovariance::estimate(problem, free, &parameters, errors);
-    Some(PositionSolution { solution, covariance, by_mount, unobservable: Vec::new() })
+    Some(PositionSolution { determined: free.to_vec(), solution, covariance, by_mount, unobservable: Vec::new() })
 }
 
 /// What the sensors of an arm are.
