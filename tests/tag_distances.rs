@@ -31,17 +31,17 @@ fn a_distance_that_the_views_confirm_is_a_check_and_one_that_they_contradict_ref
     answer.expect("as it is", 0, &["ACCEPTED"]);
     assert!(result.contains("the distance of tags 0 and 3: sigmas"), "{result}");
     let (answer, _) = calibrated(&distance([0, 3], APART_M + 0.03, 0.002));
-    answer.expect("3 cm more", 4, &["REFUSED: the distance of tags 0 and 3 is 1937.8 mm", "[length_contradicted]"]);
+    answer.expect("3 cm more", 4, &["1937.8 mm", "[length_contradicted]"]);
     let (answer, _) = calibrated(&distance([0, 99], 0.5, 0.002));
-    answer.expect("no such tag", 0, &["the distance of tags 0 and 99 is not used", "[length_unused]"]);
+    answer.expect("no such tag", 0, &["[length_unused]"]);
 }
 
 #[test]
 fn distances_that_cannot_be_meant_are_refused_by_their_key() {
     for (tables, words) in [
-        (distance([3, 3], 0.5, 0.002), "must be two tags"),
-        (distance([0, 3], -0.5, 0.002), "distance_m: -0.5 is outside"),
-        (distance([0, 3], 0.5, 0.0), "std_m: 0 is outside"),
+        (distance([3, 3], 0.5, 0.002), "[value_invalid]"),
+        (distance([0, 3], -0.5, 0.002), "[value_out_of_range]"),
+        (distance([0, 3], 0.5, 0.0), "[value_out_of_range]"),
         ("[[geometry.tag_distance]]\ntags = [0, 3]\ndistance_m = 0.5\n".to_owned(), "std_m"),
     ] {
         calibrated(&tables).0.expect(words, 2, &["robot.toml", words]);

@@ -4,10 +4,10 @@
 //! detected and compared with the projection (`trials`). From that: rates and errors by condition (`tables`), and the
 //! model of corner noise and detection that the geometric camera may draw from (`noise_fit`).
 //! tests/oracle/compare_detectors.py runs other detectors on the same images. `poses`: error over poses and the arm's
-//! time, by how the poses are chosen; armcal-charts draws it. The paper's study is armcal-paper's. `falsified`: the verdict where drawing, survey or a sensor is wrong. `edges`:
-//! certified edges against brute force; `paths`: planning between random poses; `worlds`: closed loops in any world
-//! allowed; `bound`: closed loops against the Bayesian bound of their views; `dive`: the online belief over a dive,
-//! `dive_faults`: when it names what happens there.
+//! time, by how the poses are chosen; armcal-charts draws it. The paper's study is armcal-paper's. `falsified`: the
+//! verdict where drawing, survey or a sensor is wrong. `edges`: certified edges against brute force; `paths`: planning
+//! between random poses; `worlds`: closed loops in any world allowed; `bound`: closed loops against the Bayesian bound
+//! of their views; `dive`: the online belief over a dive, `dive_faults`: when it names what happens there.
 
 mod bound;
 mod dive;

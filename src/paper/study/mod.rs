@@ -2,8 +2,8 @@
 //!
 //! `scene` draws an arm, landmarks, poses and readings; `contender` is a method with its settings; `trials` runs
 //! contenders on the same draws and measures the tool; `experiments` lists what is compared, with the paper's own
-//! figures; `tables` and `figures` show it. `sensitivity` is its Figures 4 and 7. Draws run in parallel and are gathered
-//! in order, so that threads do not show.
+//! figures; `tables` and `figures` show it. `sensitivity` is its Figures 4 and 7. Draws run in parallel and are
+//! gathered in order, so that threads do not show.
 
 mod contender;
 mod experiments;
