@@ -489,7 +489,6 @@ impl Refusal {
     }
 }
 
-/// Cause, evidence, what to do next, and the code.
 /// Those whose advice counts: all, or the first one where it explains the others.
 #[must_use]
 pub fn with_advice(refusals: &[Refusal]) -> &[Refusal] {
@@ -497,6 +496,7 @@ pub fn with_advice(refusals: &[Refusal]) -> &[Refusal] {
     if explains { &refusals[..1] } else { refusals }
 }
 
+/// Cause, evidence, what to do next, and the code.
 impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.fmt_cause(f)?;
