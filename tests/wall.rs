@@ -198,6 +198,7 @@ fn belief_does_not_depend_on_the_simulator_nor_truth_on_belief() {
         ("core", &["armcal-libm"][..]),
         ("detect", &["armcal-core"]),
         ("belief", &["armcal-core"]),
+        ("paper", &["armcal-core", "armcal-belief", "armcal-charts"]),
         ("sim", &["armcal-core", "armcal-detect"]),
         ("replay", &["armcal-core", "armcal-belief"]),
     ] {
@@ -239,7 +240,7 @@ fn only_drive_discover_and_serve_reach_an_arm() {
         assert!(is_free || !sockets.iter().any(|socket| text.contains(socket)), "{path} opens a socket");
     }
     // No other crate depends on what speaks over a network.
-    for manifest in ["", "src/core", "src/belief", "src/detect", "src/sim", "src/lab"] {
+    for manifest in ["", "src/core", "src/belief", "src/paper", "src/detect", "src/sim", "src/lab"] {
         let file = root().join(manifest).join("Cargo.toml");
         let table: toml::Table = read(&file).parse().expect("TOML");
         let dependencies = table["dependencies"].as_table().expect("a table");
