@@ -37,7 +37,7 @@ impl Identity {
         let still = format!("tag_frame: {:?}, ", Attachment::base());
         let families = ["tag_family: Tag36h11, ", "family: Some(Tag36h11), ", "family: Tag36h11, "];
         let turning = ["moves: Revolute, ", "kind: Revolute, "];
-        let absent = ["gripper_tag: None, ", "lights: [], ", "links: {}, ", &still];
+        let absent = ["gripper_tag: None, ", "lights: [], ", "links: {}, ", "tag_distances: [], ", &still];
         let drawings =
             absent.iter().chain(&families).chain(&turning).fold(drawings, |text, part| text.replace(part, ""));
         hasher.update(drawings.as_bytes());
