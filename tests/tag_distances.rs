@@ -1,6 +1,5 @@
 //! Distances between tags that robot.toml states, in a calibration by the program.
 
-use crate::support::texts::Texts;
 use crate::support::{Answer, answer, program, read, robot_copy, root, temp, write};
 
 /// The sample's calibration with these tables at the end of robot.toml.
@@ -31,7 +30,6 @@ const APART_M: f64 = 1.9078;
 
 #[test]
 fn a_distance_that_the_views_confirm_is_a_check_and_one_that_they_contradict_refuses() {
-    let _texts = Texts::of("a_distance_that_the_views_confirm_is_a_check_and_one_that_they_contradict_refuses");
     let (answer, result) = calibrated(&distance([0, 3], APART_M, 0.003));
     answer.expect("as it is", 0, &["ACCEPTED"]);
     assert_eq!(n_checks(&result), n_checks(&calibrated("").1) + 1);
