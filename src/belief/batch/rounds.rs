@@ -81,11 +81,11 @@ enum Round {
     Done(Box<Calibration>),
 }
 
-/// How the views are taken from the next round on.
+/// A change of the views for the next round.
 enum Otherwise {
-    /// The joints' clock is off by this.
+    /// Joint readings are moved by the offset of their clock.
     ReadLater { offset_s: f64 },
-    /// Survey or drawing are others, the tags' sizes among them.
+    /// Survey or drawing changed, and with them the tags' sizes.
     Resized,
 }
 
@@ -207,14 +207,14 @@ impl<'a> BundleCalibration<'a> {
         self.finish(estimated).map(|calibration| Round::Done(Box::new(calibration)))
     }
 
-    /// What an estimate may show to be taken otherwise; the first that does ends the round.
+    /// Searches for a cause that needs a new estimate. The first that finds one ends the round.
     const REVISIONS: [fn(&mut Self, &Estimated<'_>) -> Option<Otherwise>; 2] =
         [Self::find_clock, Self::revise_survey_and_drawing];
 
-    /// What is added to the estimate of the last round.
+    /// Additions to the estimate of the last round.
     const REFINEMENTS: [for<'e> fn(&Self, Estimated<'e>) -> Estimated<'e>; 2] = [Self::add_walks, Self::add_touches];
 
-    /// What is said of the estimate. Each looks at what those before it wrote: the last may put a cause before theirs.
+    /// Checks and reports. Each reads what those before it wrote; the last may put another cause first.
     const STATEMENTS: [fn(&Self, &Estimated<'_>, &Diagnosis, &mut Calibration); 6] = [
         Self::judge_by_views,
         Self::judge_by_touches,
@@ -608,7 +608,7 @@ impl<'a> BundleCalibration<'a> {
 }
 
 impl Otherwise {
-    /// Takes `views` so; `sizes_m` were the tags' before.
+    /// Changes `views`; `sizes_m` are the tags' sizes before the change.
     fn take(self, views: &mut [View], sizes_m: &[f64], robot: &Robot) {
         match self {
             Self::ReadLater { offset_s } => views.iter_mut().for_each(|view| view.read_later(offset_s)),

@@ -30,15 +30,14 @@ impl LengthInnovation {
     }
 }
 
-/// Of the lengths that `input.robot` states and that have columns in `found`.
-pub(crate) fn length_innovations(input: &BundleInput<'_>, found: &Estimate<'_>) -> Vec<LengthInnovation> {
+/// Innovations of the lengths that are in the fit `found`; `None` where the views have no estimate without them.
+pub(crate) fn length_innovations(input: &BundleInput<'_>, found: &Estimate<'_>) -> Option<Vec<LengthInnovation>> {
     let lengths = &found.problem.block_measurements;
     if lengths.is_empty() {
-        return Vec::new();
+        return Some(Vec::new());
     }
     let robot = &BlockMeasurement::none_of(input.robot);
-    let by_views = estimate(&BundleInput { robot, model: found.model.clone(), ..input.clone() });
-    let Some(by_views) = by_views else { return Vec::new() };
+    let by_views = estimate(&BundleInput { robot, model: found.model.clone(), ..input.clone() })?;
     let innovation = |measurement: &BlockMeasurement| {
         let of = measurement.predicted(&by_views.solved.state.blocks);
         let mut row = DVector::zeros(by_views.problem.layout.n);
@@ -53,7 +52,7 @@ pub(crate) fn length_innovations(input: &BundleInput<'_>, found: &Estimate<'_>) 
             std_m: (of.std_m.powi(2) + by_views_m2).sqrt(),
         })
     };
-    lengths.iter().filter_map(innovation).collect()
+    Some(lengths.iter().filter_map(innovation).collect())
 }
 
 impl VerdictInput<'_> {
@@ -70,7 +69,11 @@ impl VerdictInput<'_> {
             let text = format!("{what} is not used: the views do not show both ends");
             table.warnings.push(Warning::new(Code::LengthUnused, text));
         }
-        let all = length_innovations(self.input, self.found);
+        let Some(all) = length_innovations(self.input, self.found) else {
+            let text = "measured lengths are not tested: the views have no estimate without them";
+            table.warnings.push(Warning::new(Code::LengthUnused, text));
+            return None;
+        };
         let worst = all.iter().max_by(|a, b| a.sigmas().total_cmp(&b.sigmas()))?;
         let limit = chi_square_quantile(1.0 - FALSE_ALARM / all.len() as f64, 1).sqrt();
         let (what, key) = worst.measurement.name();

@@ -11,13 +11,13 @@ use crate::solve::input::HyperparameterMode;
 use armcal_core::robot::Robot;
 use armcal_core::robot::geometry::TagDistance;
 
-/// Few, so that the tags are not known better than a tape tells.
+/// Few views, so that a tape measures better than they do.
 const N_VIEWS: usize = 6;
 const SEEDS: std::ops::Range<u64> = 7100..7140;
 const STD_M: f64 = 5e-4;
-/// Of a wrong one.
+/// Error of a wrong distance, m.
 const OFF_M: f64 = 0.04;
-/// Of the survey, which the views then have to replace.
+/// Sigma of the survey, m: so large that the views decide.
 const SURVEY_STD_M: f64 = 0.03;
 
 fn roughly_surveyed() -> Robot {
@@ -72,11 +72,9 @@ fn a_taped_distance_is_recovered_within_its_sigma() {
                 assert!(std_m < STD_M, "seed {seed}: {std_m}");
                 within += usize::from((estimated_m - true_m).abs() < std_m);
                 n += 1;
-                innovations.extend(
-                    length_innovations(&input(&case, &case.views, HyperparameterMode::Fitted), &found)
-                        .iter()
-                        .map(|of| of.sigmas().powi(2)),
-                );
+                let input = input(&case, &case.views, HyperparameterMode::Fitted);
+                let all = length_innovations(&input, &found).expect("an estimate");
+                innovations.extend(all.iter().map(|of| of.sigmas().powi(2)));
             }
         }
     }
@@ -87,7 +85,7 @@ fn a_taped_distance_is_recovered_within_its_sigma() {
         "{n} seeds: distance {without_mm:.2} mm off rms (sigma {std_without_mm:.2}), taped {with_mm:.2} (sigma \
          {std_with_mm:.2}), {within} within one sigma; mean squared innovation {mean:.2}"
     );
-    // Of 40 seeds 27 are expected within one sigma; less than 18 or more than 36 would be chance once in a thousand.
+    // 27 of 40 are expected. Fewer than 18 or more than 36 happen by chance once in a thousand times.
     assert!((18..=36).contains(&within), "{within} of {n}");
     assert!(with_mm < 0.7 * without_mm, "{with_mm} {without_mm}");
     assert!(innovations.len() == n && (0.4..2.0).contains(&mean), "{mean} of {}", innovations.len());
@@ -103,7 +101,7 @@ fn a_wrong_distance_is_told_by_everything_else() {
         case.robot = &wrong;
         let input = input(&case, &case.views, HyperparameterMode::Fitted);
         let found = estimate(&input).expect("solved");
-        let [innovation] = &length_innovations(&input, &found)[..] else { panic!("one length") };
+        let [innovation] = &length_innovations(&input, &found).expect("an estimate")[..] else { panic!("one length") };
         assert!(innovation.sigmas() > 6.0, "seed {seed}: {}", innovation.sigmas());
         assert!((innovation.off_m - OFF_M).abs() < 4.0 * innovation.std_m, "seed {seed}: {}", innovation.off_m);
     }
