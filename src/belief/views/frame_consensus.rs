@@ -2,7 +2,7 @@
 //!
 //! The arm stands still, so a tag's corners stay where they are but for noise. A detector that reads one id wrongly in
 //! one frame puts another tag's corners under this id: the mean of all frames would be off by a share of the distance
-//! between the two tags.
+//! between the two tags. A frame with the numbers of another is the same image, delivered twice: it tells nothing more.
 
 use crate::views::constants::frame_consensus::{CLOSE_SIGMAS, ELSEWHERE_SIGMAS, USUAL_DISTANCES};
 use crate::views::view::MeanCorners;
@@ -62,21 +62,32 @@ fn spread_px(frames: &[Corners]) -> f64 {
     (0..4).flat_map(|corner| [range(corner, 0), range(corner, 1)]).fold(0.0, f64::max)
 }
 
-fn mean<'a>(frames: impl Iterator<Item = &'a Corners> + Clone) -> Option<MeanCorners> {
+fn mean<'a>(frames: impl Iterator<Item = &'a Corners>) -> Option<MeanCorners> {
+    let frames = different(frames);
     let (mut sums, mut n_frames) = ([[0.0; 2]; 4], 0);
-    for frame in frames.clone() {
+    for frame in &frames {
         for (sum, value) in sums.iter_mut().flatten().zip(frame.iter().flatten()) {
             *sum += value;
         }
         n_frames += 1;
     }
     let corners_px = sums.map(|corner| corner.map(|sum: f64| sum / n_frames as f64));
-    let squares = frames.map(|frame| {
+    let squares = frames.iter().map(|frame| {
         let pairs = frame.iter().flatten().zip(corners_px.iter().flatten());
         pairs.map(|(value, mean)| (value - mean).powi(2)).sum::<f64>()
     });
     let scatter_px2 = squares.sum();
     (n_frames > 0).then_some(MeanCorners { corners_px, n_frames, scatter_px2 })
+}
+
+/// What repeats another one to the bit counts once.
+pub(crate) fn different<'a, Points: Copy + PartialEq + 'a>(frames: impl Iterator<Item = &'a Points>) -> Vec<Points> {
+    frames.fold(Vec::new(), |mut different, frame| {
+        if !different.contains(frame) {
+            different.push(*frame);
+        }
+        different
+    })
 }
 
 #[cfg(test)]
@@ -122,6 +133,18 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// A camera that stands still delivers the same image again: no noise, and no more than one frame tells.
+    #[test]
+    fn an_image_that_is_delivered_again_counts_once() {
+        let once = frames(5, 300.0, STD_PX, 1);
+        let again: Vec<Corners> = once.iter().flat_map(|frame| [*frame; 4]).collect();
+        let [alone, repeated] = [&once, &again].map(|frames| agreeing_mean(frames, STD_PX).0.expect("a mean"));
+        assert_eq!((repeated.n_frames, repeated.corners_px), (5, alone.corners_px));
+        assert_eq!(repeated.scatter_px2, alone.scatter_px2);
+        let frozen = agreeing_mean(&[once[0]; 40], STD_PX).0.expect("a mean");
+        assert_eq!((frozen.n_frames, frozen.scatter_px2), (1, 0.0));
     }
 
     #[test]

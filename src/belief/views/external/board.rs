@@ -8,6 +8,7 @@ use std::sync::Arc;
 use nalgebra::{Point3, Vector2};
 
 use crate::views::association::MAX_SQUARE_RMS_PX;
+use crate::views::frame_consensus::different;
 use crate::views::view::{BoardPoint, BoardPoints, ObservationRejection};
 use armcal_core::optics::{BoardPose, CameraModel, Chessboard, SquareError, solve_board};
 
@@ -38,14 +39,15 @@ pub(crate) fn mean_board(
         };
         let middle = [0, 1].map(|axis| median(frames.iter().map(|pixel| pixel[axis]).collect()));
         let is_near = |pixel: &&[f64; 2]| (0..2).all(|axis| (pixel[axis] - middle[axis]).abs() <= gate_px);
-        let near: Vec<&[f64; 2]> = frames.iter().filter(is_near).collect();
-        n_apart += frames.len() - near.len();
-        if 2 * near.len() <= frames.len() {
+        let n_near = frames.iter().filter(is_near).count();
+        n_apart += frames.len() - n_near;
+        if 2 * n_near <= frames.len() {
             continue;
         }
+        let near = different(frames.iter().filter(is_near));
         let n = near.len() as f64;
         let pixel = [0, 1].map(|axis| near.iter().map(|pixel| pixel[axis]).sum::<f64>() / n);
-        scatter_px2 += near.iter().map(|at| (Vector2::from(**at) - Vector2::from(pixel)).norm_squared()).sum::<f64>();
+        scatter_px2 += near.iter().map(|at| (Vector2::from(*at) - Vector2::from(pixel)).norm_squared()).sum::<f64>();
         points.push(BoardPoint { on_board, pixel, n_frames: near.len() });
     }
     let n_free = points.iter().map(|point: &BoardPoint| 2 * (point.n_frames - 1)).sum();
@@ -117,7 +119,7 @@ mod tests {
             for number in 0..BOARD.n_corners() {
                 let on_board = BOARD.corner(number).expect("a corner");
                 let pixel = lens().project(&(pose * on_board).coords).expect("in view");
-                let off = 0.02 * f64::from((7 * number + 5 * frame) % 5) - 0.04;
+                let off = 0.02 * f64::from((7 * number + 3 * frame) % 5) - 0.04;
                 out.push((number, [pixel.x + off, pixel.y - off]));
             }
         }
