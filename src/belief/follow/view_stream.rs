@@ -38,8 +38,8 @@ pub struct ViewStream {
     images: VecDeque<Stamp>,
     /// Travel at the last view of a moving arm.
     moved_at: Option<JointAngles>,
-    /// What ends before this has been looked at.
-    used_until: Stamp,
+    /// End of the last rest or marked span that a view was made of.
+    rests_until: Stamp,
     n_views: u32,
 }
 
@@ -65,7 +65,7 @@ impl ViewStream {
             ended: None,
             images: VecDeque::new(),
             moved_at: None,
-            used_until: Stamp { nanos: i64::MIN },
+            rests_until: Stamp { nanos: i64::MIN },
             n_views: 0,
         }
     }
@@ -89,7 +89,7 @@ impl ViewStream {
             }
             Message::Rejects(_) | Message::Temperature(_) | Message::Pressure(_) => self.keep(log_time, message),
             Message::Mark(Mark { start, end, kind: MarkKind::Capture { pose_idx, .. } }) => {
-                views.extend(self.marked(*start, *end, *pose_idx));
+                views.extend(self.marked((*start, *end), *pose_idx));
             }
             _ => {}
         }
@@ -124,8 +124,8 @@ impl ViewStream {
         self.last = Some(*stamp);
         let has_moved = self.rest.is_none_or(|rest| self.leaves(&rest, counts));
         if has_moved {
-            if let Some(rest) = self.rest.filter(|rest| !rest.is_used) {
-                self.ended = Some((rest.since, *stamp));
+            if let Some(rest) = self.rest.filter(|rest| !rest.is_used && stamp.since_s(rest.since) >= SHORTEST_REST_S) {
+                views.extend(self.ended.replace((rest.since, *stamp)).and_then(|span| self.rested(span)));
             }
             let anchor = self.sensors.travel_rad(counts);
             self.rest = Some(Rest { since: *stamp, anchor, is_used: false });
@@ -137,7 +137,8 @@ impl ViewStream {
             self.rest = Some(Rest { is_used: true, ..rest });
             views.extend(self.rested((rest.since, *stamp)));
         }
-        while self.images.front().is_some_and(|image| stamp.since_s(*image) > ABOUT_IMAGE_S) {
+        // Views come in the order of time: what moves waits for the rest before it.
+        while self.ended.is_none() && self.images.front().is_some_and(|image| stamp.since_s(*image) > ABOUT_IMAGE_S) {
             let image = self.images.pop_front();
             views.extend(image.and_then(|image| self.moving(image)));
         }
@@ -152,19 +153,20 @@ impl ViewStream {
         })
     }
 
-    /// The view of a marked span, unless it was looked at already.
-    fn marked(&mut self, start: Stamp, end: Stamp, pose_idx: u32) -> Option<View> {
-        if start < self.used_until {
-            return None;
+    /// The view of a marked span, unless it was looked at already, behind that of a rest that ended before it.
+    fn marked(&mut self, (start, end): (Stamp, Stamp), pose_idx: u32) -> Vec<View> {
+        if start < self.rests_until {
+            return Vec::new();
         }
-        self.ended = self.ended.filter(|(_, rest_end)| *rest_end <= start);
+        let before = self.ended.take().filter(|(_, rest_end)| *rest_end <= start);
+        let before = before.and_then(|span| self.rested(span));
         self.rest = self.rest.map(|rest| Rest { is_used: rest.is_used || rest.since < end, ..rest });
-        self.view(pose_idx, (start, end))
+        before.into_iter().chain(self.view(pose_idx, (start, end))).collect()
     }
 
     /// The view of a rest; nothing where it is short or was looked at already.
     fn rested(&mut self, (since, end): (Stamp, Stamp)) -> Option<View> {
-        let (start, end) = (since.plus_s(SETTLE_S).max(self.used_until), end.plus_s(-0.1));
+        let (start, end) = (since.plus_s(SETTLE_S).max(self.rests_until), end.plus_s(-0.1));
         if end.since_s(start) < SHORTEST_REST_S {
             return None;
         }
@@ -178,7 +180,7 @@ impl ViewStream {
         }
         self.window.make_contiguous();
         let view = view_of_span(self.window.as_slices().0, &self.robot, pose_idx, span)?;
-        self.used_until = span.1;
+        self.rests_until = span.1;
         self.n_views += 1;
         // An arm settles from both sides: which way its sensors' shafts are turned is known in motion alone.
         Some(View { approach: [0.0; MAX_JOINTS], ..view })
@@ -206,7 +208,7 @@ impl ViewStream {
     /// The view of one image of a moving arm.
     fn moving(&mut self, image: Stamp) -> Option<View> {
         let (start, end) = (image.plus_s(-ABOUT_IMAGE_S), image.plus_s(ABOUT_IMAGE_S));
-        if start < self.used_until {
+        if start < self.rests_until {
             return None;
         }
         let belongs = |(_, message): &&(Stamp, Message)| match message {
@@ -228,7 +230,6 @@ impl ViewStream {
             *approach = if rate.abs() < 0.5 * SLOWEST_RAD_S { 0.0 } else { rate.signum() };
         }
         self.moved_at = Some(view.travel_rad);
-        self.used_until = image;
         self.n_views += 1;
         Some(view)
     }
