@@ -36,7 +36,7 @@ pub const MOUNT_ROWS: [&str; 6] =
 
 /// An earlier calibration as the estimator takes it.
 pub struct CalibrationPrior {
-    /// With the camera where the prior found it.
+    /// With the camera where the prior found it, and its lens as the prior has it.
     pub robot: Robot,
     /// What the new views tell, and all that the prior knows.
     pub model: Model,
@@ -102,7 +102,7 @@ impl CalibrationPrior {
     /// `None` where the prior's covariance is no covariance.
     pub fn new(prior: &Calibration, applied: &FailureAdjusted) -> Option<Self> {
         let views = &applied.views;
-        let mut robot = applied.robot.clone();
+        let mut robot = prior.with_lenses(&applied.robot);
         let mut guess = prior.parameters(&robot);
         if guess.reference == Conditions::default() {
             guess.reference = reference(views);
@@ -122,11 +122,16 @@ impl CalibrationPrior {
                 scales.joint_std_rad[parameter.joint] = std_rad[parameter.joint].max(1e-5);
             }
         }
-        let model = Model {
+        let mut model = Model {
             n_links: prior.link.len(),
             n_compliant: prior.sag.as_ref().map_or(0, |sag| sag.joint.len()),
             ..model(applied, &guess.reference, &known.parameters)
         };
+        let has_lens = |number: usize| {
+            let name = number.checked_sub(1).map(|further| &robot.further_cameras[further].name);
+            prior.lens.iter().any(|lens| lens.camera.as_ref() == name) && robot.camera_at(number).lens.is_known()
+        };
+        model.blocks.extend((0..=robot.further_cameras.len()).filter(|number| has_lens(*number)).map(Block::Lens));
         let mount = prior.camera_mount.as_ref().and_then(|table| Some((table.link_from_camera()?, mount_rows(prior)?)));
         let mount = mount.filter(|_| model.has(Block::Mount(0)));
         if let Some((link_from_camera, rows)) = &mount {

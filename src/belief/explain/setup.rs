@@ -40,7 +40,11 @@ pub(crate) fn declared(robot: &Robot, views: &[View]) -> Vec<Failure> {
 impl BundleSetup {
     pub(crate) fn new(robot: &Robot, views: &[View], failed: &[Failure], prior: Option<&Calibration>) -> Self {
         let at = prior.map_or_else(JointParameters::default, |prior| prior.parameters(robot));
-        let applied = FailureAdjusted::new(robot, views, failed, &at);
+        let mut applied = FailureAdjusted::new(robot, views, failed, &at);
+        if let Some(prior) = prior.filter(|prior| !prior.lens.is_empty()) {
+            let seen_by = prior.with_lenses(robot);
+            applied.views.iter_mut().for_each(|view| view.see_through(&seen_by));
+        }
         let prior = prior.map(|prior| CalibrationPrior::new(prior, &applied).ok_or(Refusal::PriorSingular));
         Self { applied, prior, drawing: Drawing::default(), clocks: Clocks::AsStamped }
     }

@@ -176,7 +176,7 @@ impl Calibration {
         self.with_lenses(&robot)
     }
 
-    /// `robot` with its lenses as calibrated.
+    /// `robot` with its lenses and their sigmas as calibrated.
     #[must_use]
     pub fn with_lenses(&self, robot: &Robot) -> Robot {
         let mut robot = robot.clone();
@@ -187,7 +187,7 @@ impl Calibration {
                 Some(name) => further.find(|camera| camera.name == *name),
             };
             if let Some(camera) = camera.filter(|camera| camera.lens.is_known()) {
-                camera.lens = found.applied_to(&camera.lens);
+                found.apply(camera);
             }
         }
         robot

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use armcal_core::optics::CameraModel;
-use armcal_core::robot::FileIssue;
+use armcal_core::robot::{CameraSpec, FileIssue, LensPriors};
 
 /// A lens that was estimated, where the views contradict the one that robot.toml states.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -53,10 +53,16 @@ impl LensResult {
         Ok(())
     }
 
-    /// `drawn` with these intrinsics.
-    pub(crate) fn applied_to(&self, drawn: &CameraModel) -> CameraModel {
+    /// Gives `camera` this lens and its sigmas, of axes and coefficients the largest.
+    pub(crate) fn apply(&self, camera: &mut CameraSpec) {
         let ([fx, fy], [cx, cy], [a, b, c, d]) = (self.focal_px, self.center_px, self.distortion);
-        drawn.with_intrinsics([fx, fy, cx, cy, a, b, c, d])
+        camera.lens = camera.lens.with_intrinsics([fx, fy, cx, cy, a, b, c, d]);
+        let largest = |std: &[f64]| std.iter().copied().fold(0.0, f64::max);
+        camera.lens_priors = LensPriors {
+            focal_std: largest(&[self.focal_std_px[0] / fx, self.focal_std_px[1] / fy]),
+            center_std_px: largest(&self.center_std_px),
+            distortion_std: largest(&self.distortion_std),
+        };
     }
 }
 
@@ -78,7 +84,10 @@ mod tests {
         let read: LensResult = toml::from_str(&toml::to_string(&table).expect("it writes")).expect("it reads");
         assert_eq!(read, table);
         // How far the lens sees stays the nominal one's, as in the estimate.
-        assert_eq!(read.applied_to(&nominal).intrinsics(), found.intrinsics());
+        let mut camera = CameraSpec { lens: nominal, ..crate::fixture::titan().camera };
+        read.apply(&mut camera);
+        assert_eq!(camera.lens.intrinsics(), found.intrinsics());
+        assert_eq!(camera.lens_priors.center_std_px, 0.1);
     }
 
     #[test]

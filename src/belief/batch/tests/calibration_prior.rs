@@ -2,13 +2,15 @@
 
 use nalgebra::Vector3;
 
-use crate::batch::tables::camera_mount_table;
+use crate::batch::tables::{camera_mount_table, lens_tables};
 use crate::batch::tests::data::{Noise, Truth, normal, rng, titan, views};
 use crate::explain::calibration_prior::{CalibrationPrior, MOUNT_ROWS, PriorConsistency, with_mount_rows};
 use crate::explain::failures::FailureAdjusted;
+use crate::explain::setup::BundleSetup;
 use crate::file::bare::bare;
 use crate::file::calibration::{Calibration, JointResult};
 use crate::file::covariance_file::CovarianceTable;
+use crate::file::lens_table::LensResult;
 use crate::file::terms_table::{ReferenceTable, TermsTable};
 use crate::file::valid_range::ValidRange;
 use crate::model::parameters::JointParameters;
@@ -125,6 +127,36 @@ fn calibration(robot: &Robot, found: &Estimate<'_>, views: &[View]) -> Calibrati
 fn agreement(case: &Case) -> PriorConsistency {
     let applied = FailureAdjusted::new(&case.robot, &case.later, &[], &JointParameters::default());
     CalibrationPrior::new(&case.prior, &applied).expect("a covariance").consistency(&case.later).expect("solved")
+}
+
+/// The earlier calibration found another lens than robot.toml has: what follows starts from that lens, and keeps it.
+#[test]
+fn the_lens_of_the_prior_is_taken_up() {
+    const STD: [f64; 8] = [0.5, 0.5, 0.5, 0.5, 5e-4, 5e-4, 5e-4, 5e-4];
+    for seed in 0..10 {
+        let Case { robot, mut prior, later, .. } = case(seed, None, 12);
+        let mut rng = rng(seed, "lens");
+        let real = robot.camera.lens.intrinsics();
+        let found = std::array::from_fn(|k| real[k] + STD[k] * normal(&mut rng));
+        prior.lens = vec![LensResult::new(None, &robot.camera.lens.with_intrinsics(found), STD)];
+        let mut drawn = robot;
+        let [fx, fy, rest @ ..] = real;
+        let [cx, cy, a, b, c, d] = rest;
+        drawn.camera.lens = drawn.camera.lens.with_intrinsics([1.03 * fx, 1.03 * fy, cx, cy, a, b, c, d]);
+        let setup = BundleSetup::new(&drawn, &later, &[], Some(&prior));
+        let with_lens = setup.prior().expect("a prior").as_ref().expect("a covariance");
+        assert!(!with_lens.consistency(&later).expect("solved").is_beyond_chance(), "seed {seed}");
+        let (warm, _) = setup.estimate().expect("solved");
+        let table = &lens_tables(&drawn, &warm)[0];
+        for axis in 0..2 {
+            let off = (table.focal_px[axis] - real[axis]).abs() / table.focal_std_px[axis];
+            assert!(off < 4.0 && table.focal_std_px[axis] <= 0.5, "seed {seed}: {table:?}");
+        }
+        prior.lens.clear();
+        let applied = FailureAdjusted::new(&drawn, &later, &[], &JointParameters::default());
+        let without = CalibrationPrior::new(&prior, &applied).expect("a covariance").consistency(&later);
+        assert!(without.is_none_or(|of| of.is_beyond_chance()), "seed {seed}: 3 % are no chance");
+    }
 }
 
 #[test]
