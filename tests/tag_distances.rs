@@ -33,8 +33,9 @@ fn a_distance_that_the_views_confirm_is_a_check_and_one_that_they_contradict_ref
     let (answer, result) = calibrated(&distance([0, 3], APART_M, 0.003));
     answer.expect("as it is", 0, &["ACCEPTED"]);
     assert_eq!(n_checks(&result), n_checks(&calibrated("").1) + 1);
-    let (answer, _) = calibrated(&distance([0, 3], APART_M + 0.03, 0.002));
+    let (answer, result) = calibrated(&distance([0, 3], APART_M + 0.03, 0.002));
     answer.expect("3 cm more", 4, &["1937.8 mm", "[length_contradicted]"]);
+    assert!(!result.is_empty() && !result.contains("tag_moved"), "a tag is blamed for the tape");
     let (answer, _) = calibrated(&distance([0, 99], 0.5, 0.002));
     answer.expect("no such tag", 0, &["[length_unused]"]);
 }

@@ -7,6 +7,7 @@ use crate::batch::tables::{
     outlier_name, prior_table, unobservable, with_datasheets,
 };
 use crate::checks::assemble::{Evidence, Fit, Provenance, assemble, is_near, noise_dof, refusal_by_priors};
+use crate::checks::block_measurements::{LengthInnovation, length_innovations};
 use crate::checks::consistency::VerdictInput;
 use crate::checks::cross_validation::{FoldSums, cross_validate_with_innovations};
 use crate::checks::innovations::Innovations;
@@ -98,6 +99,8 @@ struct Estimated<'a> {
     failures: &'a [Failure],
     estimate: Estimate<'a>,
     selections: Vec<Selection>,
+    /// Of the measured lengths.
+    lengths: Vec<LengthInnovation>,
     touches: Option<Touched<'a>>,
 }
 
@@ -192,7 +195,8 @@ impl<'a> BundleCalibration<'a> {
             (&second, second.estimate())
         };
         let (estimate, selections) = estimated.ok_or_else(|| self.nothing_observable())?;
-        let mut estimated = Estimated { setup, failures: &failures, estimate, selections, touches: None };
+        let mut estimated =
+            Estimated { setup, failures: &failures, estimate, selections, lengths: Vec::new(), touches: None };
         if self.purpose == EstimatePurpose::Final {
             if let Some(otherwise) = Self::REVISIONS.iter().find_map(|revise| revise(self, &estimated)) {
                 drop(estimated);
@@ -212,7 +216,8 @@ impl<'a> BundleCalibration<'a> {
         [Self::find_clock, Self::revise_survey_and_drawing];
 
     /// Additions to the estimate of the last round.
-    const REFINEMENTS: [for<'e> fn(&Self, Estimated<'e>) -> Estimated<'e>; 2] = [Self::add_walks, Self::add_touches];
+    const REFINEMENTS: [for<'e> fn(&Self, Estimated<'e>) -> Estimated<'e>; 3] =
+        [Self::add_walks, Self::add_lengths, Self::add_touches];
 
     /// Checks and reports. Each reads what those before it wrote; the last may put another cause first.
     const STATEMENTS: [fn(&Self, &Estimated<'_>, &Diagnosis, &mut Calibration); 6] = [
@@ -245,6 +250,12 @@ impl<'a> BundleCalibration<'a> {
         let (estimate, walks) = estimated.estimate.with_walks(&setup.input(), |joint| !setup.has_no_sensor(joint));
         estimated.selections.extend(walks);
         Estimated { estimate, ..estimated }
+    }
+
+    fn add_lengths<'e>(&self, estimated: Estimated<'e>) -> Estimated<'e> {
+        let lengths = length_innovations(&estimated.estimate);
+        let estimate = estimated.estimate.with_lengths(&estimated.setup.input(), &lengths);
+        Estimated { estimate, lengths, ..estimated }
     }
 
     /// Takes the touches in, if there are enough and every joint up to the tool has a sensor.
@@ -289,9 +300,9 @@ impl<'a> BundleCalibration<'a> {
     /// Checks of the estimate by the views.
     fn judge_by_views(&self, estimated: &Estimated<'_>, diagnosis: &Diagnosis, calibration: &mut Calibration) {
         let input = &BundleInput { views: &diagnosis.views, ..estimated.setup.input() };
-        let (found, innovations) = (estimated.by_views(), &diagnosis.innovations[..]);
+        let (found, innovations, lengths) = (estimated.by_views(), &diagnosis.innovations[..], &estimated.lengths[..]);
         let (task, tag_noise) = (self.data.data.task_rests(), self.data.data.tag_noise);
-        VerdictInput { input, found, innovations, task, tag_noise }.judge(calibration);
+        VerdictInput { input, found, innovations, lengths, task, tag_noise }.judge(calibration);
     }
 
     fn judge_by_touches(&self, estimated: &Estimated<'_>, _: &Diagnosis, calibration: &mut Calibration) {

@@ -1,14 +1,15 @@
 //! Measured lengths against what the views say of them.
 //!
-//! A wrong length would hide in the noise that is fitted with it, so the views are solved without any. With the
-//! variance v of their prediction and the length's own s^2, measured less predicted has the variance `s^2 + v`.
+//! Causes are searched by the views without any length, for a wrong one would hide in the noise that is fitted with it
+//! or look like a tag that moved. With the variance v of what they predict and the length's own s^2, measured less
+//! predicted has the variance `s^2 + v`. Lengths that hold are in the last estimate.
 
 use crate::checks::consistency::VerdictInput;
 use crate::file::verdict_tables::{Check, VerdictTable};
 use crate::judge::constants::FALSE_ALARM;
 use crate::measure::BlockMeasurement;
 use crate::say::refusal::Refusal;
-use crate::solve::estimate::{Estimate, estimate};
+use crate::solve::estimate::{Estimate, estimate_with_lengths};
 use crate::solve::input::BundleInput;
 use armcal_core::codes::{Code, Warning};
 use armcal_core::stats::chi_square_quantile;
@@ -16,7 +17,7 @@ use nalgebra::DVector;
 
 /// A measured length, and what the views say of it.
 pub(crate) struct LengthInnovation {
-    measurement: BlockMeasurement,
+    pub(crate) measurement: BlockMeasurement,
     measured_m: f64,
     /// Measured less predicted.
     pub(crate) off_m: f64,
@@ -30,15 +31,9 @@ impl LengthInnovation {
     }
 }
 
-/// Innovations of the lengths that are in the fit `found`; `None` where the views have no estimate without them.
-pub(crate) fn length_innovations(input: &BundleInput<'_>, found: &Estimate<'_>) -> Option<Vec<LengthInnovation>> {
-    let lengths = &found.problem.block_measurements;
-    if lengths.is_empty() {
-        return Some(Vec::new());
-    }
-    let robot = &BlockMeasurement::none_of(input.robot);
-    let by_views = estimate(&BundleInput { robot, model: found.model.clone(), ..input.clone() })?;
-    let innovation = |measurement: &BlockMeasurement| {
+/// Innovations of robot.toml's lengths between blocks that the views show.
+pub(crate) fn length_innovations(by_views: &Estimate<'_>) -> Vec<LengthInnovation> {
+    let innovation = |measurement: BlockMeasurement| {
         let of = measurement.predicted(&by_views.solved.state.blocks);
         let mut row = DVector::zeros(by_views.problem.layout.n);
         for (block, by) in of.by {
@@ -46,13 +41,30 @@ pub(crate) fn length_innovations(input: &BundleInput<'_>, found: &Estimate<'_>) 
         }
         let by_views_m2 = row.dot(&(&by_views.posterior.covariance * &row));
         Some(LengthInnovation {
-            measurement: *measurement,
+            measurement,
             measured_m: of.measured_m,
             off_m: of.measured_m - of.predicted_m,
             std_m: (of.std_m.powi(2) + by_views_m2).sqrt(),
         })
     };
-    Some(lengths.iter().filter_map(innovation).collect())
+    BlockMeasurement::all(by_views.problem.robot).into_iter().flatten().filter_map(innovation).collect()
+}
+
+/// The length that the views contradict most, and how many sigmas chance has at most.
+fn worst(all: &[LengthInnovation]) -> Option<(&LengthInnovation, f64)> {
+    let worst = all.iter().max_by(|a, b| a.sigmas().total_cmp(&b.sigmas()))?;
+    Some((worst, chi_square_quantile(1.0 - FALSE_ALARM / all.len() as f64, 1).sqrt()))
+}
+
+impl<'a> Estimate<'a> {
+    /// The estimate by these lengths, too; this one where the views contradict any.
+    pub(crate) fn with_lengths(self, input: &BundleInput<'a>, all: &[LengthInnovation]) -> Self {
+        if worst(all).is_none_or(|(worst, limit)| worst.sigmas() > limit) {
+            return self;
+        }
+        let lengths: Vec<BlockMeasurement> = all.iter().map(|of| of.measurement).collect();
+        estimate_with_lengths(&self.with_found_terms(input), &lengths).unwrap_or(self)
+    }
 }
 
 impl VerdictInput<'_> {
@@ -69,13 +81,7 @@ impl VerdictInput<'_> {
             let text = format!("{what} is not used: the views do not show both ends");
             table.warnings.push(Warning::new(Code::LengthUnused, text));
         }
-        let Some(all) = length_innovations(self.input, self.found) else {
-            let text = "measured lengths are not tested: the views have no estimate without them";
-            table.warnings.push(Warning::new(Code::LengthUnused, text));
-            return None;
-        };
-        let worst = all.iter().max_by(|a, b| a.sigmas().total_cmp(&b.sigmas()))?;
-        let limit = chi_square_quantile(1.0 - FALSE_ALARM / all.len() as f64, 1).sqrt();
+        let (worst, limit) = worst(self.lengths)?;
         let (what, key) = worst.measurement.name();
         let check = Check::at_most(format!("{what}: sigmas from what the views say"), worst.sigmas(), limit);
         let refusal = (!check.holds).then(|| Refusal::Length {

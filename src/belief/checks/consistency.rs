@@ -1,6 +1,7 @@
 //! Whether joint sensors explain the data of a calibration by `bundle`: score test of the link geometry, size of the
 //! sensors' errors, outliers, and innovations of held-out views.
 
+use crate::checks::block_measurements::LengthInnovation;
 use crate::checks::constants::consistency::{
     FAR_BEYOND, HELD, LEAST, MAX_NONLINEARITY, MAX_OVER_LINEARITY, MAX_UNCONFIRMED, NAMED_WALK_NATS, WALK_SIGNIFICANCE,
     WALKED, WORN, WORTH_M,
@@ -40,6 +41,7 @@ pub(crate) struct VerdictInput<'a> {
     pub found: &'a Estimate<'a>,
     /// Of each fold.
     pub innovations: &'a [Innovations],
+    pub lengths: &'a [LengthInnovation],
     pub task: Option<TaskRests<'a>>,
     /// Noise of positions and poses that the input map states.
     pub tag_noise: Option<TagNoise>,

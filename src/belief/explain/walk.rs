@@ -50,10 +50,7 @@ impl<'a> Estimate<'a> {
         if !is_quick && warmth < WARMTH_WORTH_A_FIT && !self.walks_seem_likely(input.views, span) {
             return (self, None);
         }
-        let mut wider = BundleInput { model: self.model.clone(), ..input.clone() };
-        if self.scales().camera_error_std.is_some() {
-            wider.scales.camera_error_std = self.scales().camera_error_std;
-        }
+        let mut wider = self.with_found_terms(input);
         let p_value = self.walk_p_values(input.views, span);
         wider.model.walk = Some(Walk { span, p_value, gain_nats: 0.0 });
         wider.scales.walk_std_rad = self.first_walk_std_rad(input.views);

@@ -32,13 +32,6 @@ impl BlockMeasurement {
         tag_distance::all(robot).map(|stated| stated.map(Self::TagDistance)).collect()
     }
 
-    /// `robot` without any.
-    pub(crate) fn none_of(robot: &Robot) -> Robot {
-        let mut robot = robot.clone();
-        robot.geometry.tag_distances.clear();
-        robot
-    }
-
     /// The two poses that it is between.
     pub(crate) fn blocks(self) -> [Block; 2] {
         match self {

@@ -1,6 +1,7 @@
 //! The estimate from start to end: a robust start, what does not belong left out, the scales by evidence, the rest by
 //! least squares.
 
+use crate::measure::BlockMeasurement;
 use crate::solve::constants::estimate::{CONSISTENT_COST, CONVERGED_CHANGE, CORNER_WIDTH, MAX_ROUNDS};
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Vector6};
 
@@ -51,8 +52,15 @@ pub struct Estimate<'a> {
 /// Estimates; `None` where the views determine nothing at all (no cost that is finite).
 #[must_use]
 pub fn estimate<'a>(input: &BundleInput<'a>) -> Option<Estimate<'a>> {
+    estimate_with_lengths(input, &[])
+}
+
+/// The same with lengths between blocks that have columns.
+#[must_use]
+pub(crate) fn estimate_with_lengths<'a>(input: &BundleInput<'a>, lengths: &[BlockMeasurement]) -> Option<Estimate<'a>> {
     let RobustStart { parameters: start, steps, mut iterations } = robust_start(input);
     let mut problem = BundleProblem::new(input, input.prior());
+    problem.block_measurements = lengths.to_vec();
     let first_state = problem.start(&input.guess);
     let mut state = problem.start(&start);
     problem.set_steps(&mut state, &steps);
@@ -206,6 +214,14 @@ impl Estimate<'_> {
     #[must_use]
     pub fn outcome(&self) -> Outcome {
         self.solved.outcome
+    }
+
+    /// `input` with the terms that were selected since.
+    pub(crate) fn with_found_terms<'b>(&self, input: &BundleInput<'b>) -> BundleInput<'b> {
+        let mut scales = input.scales.clone();
+        scales.camera_error_std = self.scales().camera_error_std.or(scales.camera_error_std);
+        scales.walk_std_rad = self.scales().walk_std_rad;
+        BundleInput { model: self.model.clone(), scales, ..input.clone() }
     }
 
     /// The scales at the end.

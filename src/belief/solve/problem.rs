@@ -67,16 +67,12 @@ pub(crate) const N_VIEW_PARAMETERS: usize = MAX_JOINTS + 6;
 pub(crate) type Own = SMatrix<f64, N_VIEW_PARAMETERS, N_VIEW_PARAMETERS>;
 
 impl<'a> BundleProblem<'a> {
-    /// With what is measured of its blocks.
+    /// With columns of what the views show.
     pub(crate) fn new(input: &BundleInput<'a>, prior: Prior) -> Self {
-        let mut problem = Self::with_layout(input, input.layout(), prior);
-        let has_columns = |block: &Block| problem.layout.at(*block).is_some();
-        let all = BlockMeasurement::all(input.robot).into_iter().flatten();
-        problem.block_measurements = all.filter(|of| of.blocks().iter().all(has_columns)).collect();
-        problem
+        Self::with_layout(input, input.layout(), prior)
     }
 
-    /// Only the views, with columns that may be more than their own.
+    /// With columns that may be more than the views' own.
     pub(crate) fn with_layout(input: &BundleInput<'a>, layout: Layout, prior: Prior) -> Self {
         let BundleInput { robot, views, model, scales, .. } = input;
         let (robot, scales) = (*robot, scales.clone());

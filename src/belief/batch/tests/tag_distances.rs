@@ -64,7 +64,10 @@ fn a_taped_distance_is_recovered_within_its_sigma() {
         let taped = with_tape(&robot, between, true_m + STD_M * normal(&mut rng(seed, "tape")));
         for (k, robot) in [&robot, &taped].into_iter().enumerate() {
             case.robot = robot;
-            let found = estimate(&input(&case, &case.views, HyperparameterMode::Fitted)).expect("solved");
+            let input = input(&case, &case.views, HyperparameterMode::Fitted);
+            let by_views = estimate(&input).expect("solved");
+            let lengths = length_innovations(&by_views);
+            let found = by_views.with_lengths(&input, &lengths);
             let [estimated_m, std_m] = distance_m(&found, between);
             squares[k] += (estimated_m - true_m).powi(2);
             sigmas[k] += std_m;
@@ -72,9 +75,7 @@ fn a_taped_distance_is_recovered_within_its_sigma() {
                 assert!(std_m < STD_M, "seed {seed}: {std_m}");
                 within += usize::from((estimated_m - true_m).abs() < std_m);
                 n += 1;
-                let input = input(&case, &case.views, HyperparameterMode::Fitted);
-                let all = length_innovations(&input, &found).expect("an estimate");
-                innovations.extend(all.iter().map(|of| of.sigmas().powi(2)));
+                innovations.extend(lengths.iter().map(|of| of.sigmas().powi(2)));
             }
         }
     }
@@ -101,8 +102,12 @@ fn a_wrong_distance_is_told_by_everything_else() {
         case.robot = &wrong;
         let input = input(&case, &case.views, HyperparameterMode::Fitted);
         let found = estimate(&input).expect("solved");
-        let [innovation] = &length_innovations(&input, &found).expect("an estimate")[..] else { panic!("one length") };
+        let lengths = length_innovations(&found);
+        let [innovation] = &lengths[..] else { panic!("one length") };
         assert!(innovation.sigmas() > 6.0, "seed {seed}: {}", innovation.sigmas());
         assert!((innovation.off_m - OFF_M).abs() < 4.0 * innovation.std_m, "seed {seed}: {}", innovation.off_m);
+        let [before_m, _] = distance_m(&found, between);
+        let [after_m, _] = distance_m(&found.with_lengths(&input, &lengths), between);
+        assert_eq!(before_m, after_m, "seed {seed}: a length that does not hold is in the estimate");
     }
 }
