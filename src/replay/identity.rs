@@ -6,11 +6,10 @@ use std::path::PathBuf;
 use crate::error::ReplayError;
 use crate::scene::ReplayInput;
 use armcal_core::files;
-use armcal_core::kinematics::Attachment;
 use armcal_core::log::MessageHasher;
 use armcal_core::robot::{Robot, Vehicle};
 
-/// Recording id in the viewer: a hash of all data that shape the file.
+/// Recording id in the viewer: a hash of all data that shape the file. Another version of the program may give another.
 pub(super) struct Identity {
     pub recording_id: String,
 }
@@ -32,15 +31,7 @@ impl Identity {
         // Where files lie, and how that is spelled, is not part of the identity.
         let robot = Robot { folder: PathBuf::new(), links: BTreeMap::new(), ..input.robot.clone() };
         let vehicle = input.vehicle.map(|vehicle| Vehicle { file: PathBuf::new(), ..vehicle.clone() });
-        // Optional parts that are absent, tags of the usual family, and joints that turn are not part of the identity.
-        let drawings = format!("{robot:?}{vehicle:?}{:?}", input.scene);
-        let still = format!("tag_frame: {:?}, ", Attachment::base());
-        let families = ["tag_family: Tag36h11, ", "family: Some(Tag36h11), ", "family: Tag36h11, "];
-        let turning = ["moves: Revolute, ", "kind: Revolute, "];
-        let absent = ["gripper_tag: None, ", "lights: [], ", "links: {}, ", "tag_distances: [], ", &still];
-        let drawings =
-            absent.iter().chain(&families).chain(&turning).fold(drawings, |text, part| text.replace(part, ""));
-        hasher.update(drawings.as_bytes());
+        hasher.update(format!("{robot:?}{vehicle:?}{:?}", input.scene).as_bytes());
         hasher.update(input.summary_markdown.unwrap_or_default().as_bytes());
         Ok(Self { recording_id: hasher.finalize().to_hex()[..32].to_owned() })
     }
