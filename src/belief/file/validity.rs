@@ -52,9 +52,9 @@ impl<'a> Extrapolation<'a> {
     pub(crate) fn new(calibration: &'a Calibration, robot: &Robot, postures: &'a [(u32, JointAngles)]) -> Self {
         let tool = |angles: &JointAngles| robot.chain.frame(angles, &robot.tool.mount).translation.vector;
         let moves = |angles: &JointAngles, joint: usize| {
-            let mut moved = *angles;
-            moved[joint] += 1e-3;
-            robot.sensors[joint].moves.is_slide() || (tool(&moved) - tool(angles)).norm() > 1e-3 * MIN_LEVER_M
+            let (mut moved, by_rad) = (*angles, 1e-3);
+            moved[joint] += by_rad;
+            robot.sensors[joint].moves.is_slide() || (tool(&moved) - tool(angles)).norm() > by_rad * MIN_LEVER_M
         };
         let of_posture =
             |(_, angles): &(u32, JointAngles)| (0..angles.len()).map(|joint| moves(angles, joint)).collect();

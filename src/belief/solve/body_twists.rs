@@ -13,6 +13,7 @@ pub(crate) fn body_twists(problem: &BundleProblem<'_>, group: &Group<'_>, correc
     let mut twists = BodyTwists::zeros();
     let layout = &problem.layout;
     let n_links = layout.links.len();
+    let n_linked = n_links / 6;
     if !layout.sag.is_empty() {
         let at = SagPoint::new(&problem.loads(group.view_idx), &corrections.sag, group.poses);
         for (k, column) in layout.sag.clone().enumerate() {
@@ -20,7 +21,7 @@ pub(crate) fn body_twists(problem: &BundleProblem<'_>, group: &Group<'_>, correc
             twists.set_column(n_links + k, &twist);
         }
     }
-    for joint in group.joints.clone().take_while(|joint| 6 * joint < n_links) {
+    for joint in group.joints.clone().take_while(|&joint| joint < n_linked) {
         let by_turn = left_jacobian(&corrections[joint].turn_rad);
         for axis in 0..3 {
             let shift = Vector3::ith(axis, group.sign);

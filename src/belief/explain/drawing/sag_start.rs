@@ -15,8 +15,8 @@ use crate::solve::schur::Group;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::kinematics::Sag;
 
-/// Columns: the joints' compliances, then the base's.
-const N_TRIALS: usize = MAX_JOINTS + 3;
+/// Columns: the joints' compliances, then the base's three.
+type Trials = SMatrix<f64, 6, { MAX_JOINTS + 3 }>;
 
 /// Where the sizes of compliances start from.
 #[derive(Clone, Debug, PartialEq)]
@@ -66,9 +66,9 @@ impl Estimate<'_> {
         (best.1, best.0)
     }
 
-    fn sag_trials(&self, group: &Group<'_>) -> SMatrix<f64, 6, N_TRIALS> {
+    fn sag_trials(&self, group: &Group<'_>) -> Trials {
         let at = SagPoint::new(&self.problem.loads(group.view_idx), &Sag::default(), group.poses);
-        let mut trials = SMatrix::<f64, 6, N_TRIALS>::zeros();
+        let mut trials = Trials::zeros();
         let of_joints = group.joints.clone().map(|joint| (joint, Parameter::all_of_sag(joint + 1).nth(joint)));
         let of_base = (0..3).map(|axis| (MAX_JOINTS + axis, Parameter::all_of_sag(0).nth(axis)));
         for (column, parameter) in of_joints.chain(of_base) {

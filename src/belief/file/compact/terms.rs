@@ -34,7 +34,7 @@ pub struct CompactReference {
 }
 
 /// As [`Terms`].
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct CompactTerms {
     pub nonlinearity_rad: [f64; N_SHAPE],
     pub offset_rad_per_k: f64,
@@ -76,7 +76,7 @@ impl CompactReference {
         };
         let time = self.after_time_s.map_or_else(|| "x".to_owned(), |after| after.to_string());
         let (oil, pressure) = (steps(self.oil_c, OIL_STEPS), steps(self.pressure_pa, PRESSURE_STEPS));
-        format!("c{oil}/{pressure}/{time}/{:.0}", self.shape_step_rad * 1e6)
+        format!("c{oil}/{pressure}/{time}/{}", step_in_words(self.shape_step_rad))
     }
 
     pub(crate) fn from_text(word: &str) -> Result<Self, CompactError> {
@@ -89,7 +89,7 @@ impl CompactReference {
             (size, None) => whole(size).map(Some).ok_or_else(wrong),
         };
         let scaled = |part: &str, per_unit: f64| Ok(number(part)?.map(|steps| steps as f64 / per_unit));
-        let is_step = |known: &f64| format!("{:.0}", known * 1e6) == step;
+        let is_step = |known: &f64| step_in_words(*known) == step;
         Ok(Self {
             oil_c: scaled(oil, OIL_STEPS)?,
             pressure_pa: scaled(pressure, PRESSURE_STEPS)?,
@@ -110,21 +110,17 @@ fn scalars(terms: &mut CompactTerms) -> [(&mut f64, f64); 5] {
     ]
 }
 
+/// In 1e-6 rad.
+fn step_in_words(step_rad: f64) -> String {
+    format!("{:.0}", step_rad * 1e6)
+}
+
 /// A whole number, so that what is read looks as it was written.
 fn per_rad(step_rad: f64) -> f64 {
     (1.0 / step_rad).round()
 }
 
 impl CompactTerms {
-    const ZERO: Self = Self {
-        nonlinearity_rad: [0.0; N_SHAPE],
-        offset_rad_per_k: 0.0,
-        gain_per_k: 0.0,
-        offset_rad_per_mpa: 0.0,
-        drift_rad_per_h: 0.0,
-        half_backlash_rad: 0.0,
-    };
-
     /// Rounded as the text will be.
     pub(crate) fn of(terms: &Terms, shape_step_rad: f64, joint: &str) -> Result<Self, CompactError> {
         let Terms {
@@ -199,7 +195,7 @@ impl CompactTerms {
             steps.push(value as f64);
             left = rest;
         }
-        let mut terms = Self::ZERO;
+        let mut terms = Self::default();
         let (scalar_steps, shape_steps) = steps.split_at_checked(5)?;
         for ((value, per_unit), steps) in scalars(&mut terms).into_iter().zip(scalar_steps) {
             *value = steps / per_unit;

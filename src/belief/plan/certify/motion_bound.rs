@@ -29,7 +29,7 @@ pub(crate) struct ArmRegion {
 }
 
 /// A moving shape at the middle of a region, and what bounds its motion within.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub(crate) struct ShapeMotion {
     pub placed: Placed,
     /// For each joint that moves it, a bound on its distance from that joint's axis over the region, m.
@@ -53,7 +53,7 @@ pub(crate) enum Split {
 }
 
 /// The most that the joints move one shape against another within a region.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct MotionBound {
     pub total_m: f64,
     /// To first order alone.
@@ -69,21 +69,7 @@ pub(crate) struct Trend {
     pub split: Split,
 }
 
-impl MotionBound {
-    pub(crate) const NONE: Self = Self { total_m: 0.0, first_m: 0.0 };
-}
-
 impl ShapeMotion {
-    pub(crate) const NOWHERE: Self = Self {
-        placed: Placed::NOWHERE,
-        levers_m: [0.0; MAX_JOINTS],
-        coarse_m: [0.0; MAX_JOINTS + 1],
-        bent_m: [0.0; MAX_JOINTS + 1],
-        stretch_m: 0.0,
-        station_bound_m: 0.0,
-        most_sway_m: 0.0,
-    };
-
     /// The most that the joints from `first_joint` on can move any point of the shape, m (Schwarzer, Saha and Latombe).
     pub(crate) fn coarse_m(&self, first_joint: usize) -> f64 {
         self.coarse_m[first_joint]

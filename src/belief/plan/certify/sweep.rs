@@ -94,7 +94,7 @@ impl Sweep<'_> {
     pub(crate) fn verdict(&self) -> Certificate {
         let mut search = Search {
             sweep: self,
-            moved: vec![ShapeMotion::NOWHERE; self.model.n_moving()],
+            moved: vec![ShapeMotion::default(); self.model.n_moving()],
             open: Vec::with_capacity(2 * self.model.pairs().len()),
             stretches: Vec::with_capacity(64),
             n_regions: 0,
@@ -173,8 +173,13 @@ impl Sweep<'_> {
         if gap_m - outer.coarse_m(between.first_joint) >= needed_m {
             return Finding::Clear;
         }
-        let open =
-            OpenPair { pair: open.pair, direction, lacking_m: needed_m - gap_m, drift: MotionBound::NONE, is_exact };
+        let open = OpenPair {
+            pair: open.pair,
+            direction,
+            lacking_m: needed_m - gap_m,
+            drift: MotionBound::default(),
+            is_exact,
+        };
         open.drifting(spot.drift(between, outer, direction)).map_or(Finding::Clear, Finding::Open)
     }
 
@@ -215,8 +220,13 @@ impl Search<'_> {
         if is_edge && let Some(found) = [1.0, 0.0].into_iter().find_map(|share| self.probe(share)) {
             return Some(found);
         }
-        let all =
-            |pair| OpenPair { pair, direction: Vec3::ZERO, lacking_m: 0.0, drift: MotionBound::NONE, is_exact: false };
+        let all = |pair| OpenPair {
+            pair,
+            direction: Vec3::ZERO,
+            lacking_m: 0.0,
+            drift: MotionBound::default(),
+            is_exact: false,
+        };
         let may_be = |pair: &usize| !model.never_within(*pair, model.needed_m(model.pair(*pair), sweep.margin_m));
         self.open.extend((0..model.pairs().len()).filter(may_be).map(all));
         self.stretches

@@ -60,6 +60,12 @@ pub(crate) struct Separation {
     pub gap_m: f64,
 }
 
+impl Default for Placed {
+    fn default() -> Self {
+        Self::NOWHERE
+    }
+}
+
 impl Placed {
     pub(crate) const NOWHERE: Self = Self {
         pose: Pose3::IDENTITY,

@@ -39,10 +39,6 @@ struct LazyGains {
     is_fresh: Vec<bool>,
 }
 
-impl LazyGains {
-    const PICKED: f64 = -1.0;
-}
-
 /// Picks in the order of their tour.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Picks {
@@ -94,7 +90,7 @@ impl ViewSelector<'_> {
             let candidate = &self.candidates[best];
             design.take(&self.whitened_views[best], &mut scratch);
             picks.insert(places[best].0, best, candidate.angles);
-            gains.bounds[best] = LazyGains::PICKED;
+            gains.bounds[best] = f64::NEG_INFINITY;
         }
         picks
     }
