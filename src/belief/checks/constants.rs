@@ -28,8 +28,6 @@ pub(crate) mod drawing_report {
 }
 
 pub(crate) mod innovations {
-    /// Probability of the region that a view is compared with; U95 has the same.
-    pub(crate) const CONTAINED: f64 = 0.95;
     /// Size of a camera's error that says nothing of its pose, m and rad.
     pub(crate) const FREE_CAMERA: f64 = 100.0;
     /// The share of its prior variance that a view must tell of a joint's error, for it to be looked at.
@@ -67,8 +65,6 @@ pub(crate) mod refusal_conditions {
     /// Held-out observations without a stated noise may be off by this share of the arm's reach: 19 mm for an arm of
     /// 1.9 m. Assumed; recordings of real arms have 0.1 to 0.9 %.
     pub(crate) const MAX_SHARE_OF_REACH: f64 = 0.01;
-    /// A held-out error that a stated noise has with a smaller probability contradicts it.
-    pub(crate) const CONTRADICTION: f64 = 1e-4;
     /// Each view adds about three numbers that do not share its camera-pose error; fewer views than parameters overfit.
     pub const MIN_VIEWS_PER_PARAMETER: f64 = 1.0;
 }

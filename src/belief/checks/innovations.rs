@@ -7,10 +7,11 @@
 //! camera of each view free, what is left is the noise within the views; the difference is chi-square with six numbers
 //! a view: how well cameras are foretold.
 
-use crate::checks::constants::innovations::{CONTAINED, FREE_CAMERA, TOLD};
+use crate::checks::constants::innovations::{FREE_CAMERA, TOLD};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::file::metrics::ViewContainment;
+use crate::judge::coverage::COVERAGE;
 use crate::measure::{ObservationTerm, WeightedMeasurement};
 use crate::model::state::State;
 use crate::solve::estimate::Estimate;
@@ -107,7 +108,7 @@ impl Estimate<'_> {
                 within_95.views += 1;
                 let observations = observations_of(&problem, view_idx).cloned().collect();
                 let chi2 = self.chi2_of_view(input, &views[view_idx..=view_idx], observations)?;
-                within_95.within += usize::from(chi2 <= chi_square_quantile(CONTAINED, dof));
+                within_95.within += usize::from(chi2 <= chi_square_quantile(COVERAGE, dof));
             }
         }
         problem.scales.camera_error_std = Some([FREE_CAMERA; 2]);

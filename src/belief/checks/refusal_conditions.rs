@@ -1,10 +1,9 @@
 //! Accept or refuse: the held-out views decide, never the fit's own residuals.
 
-use crate::checks::constants::refusal_conditions::{
-    CONTRADICTION, HARMLESS_HELD_OUT_M, MAX_HELD_OUT_OVER_FIT, MAX_SHARE_OF_REACH,
-};
+use crate::checks::constants::refusal_conditions::{HARMLESS_HELD_OUT_M, MAX_HELD_OUT_OVER_FIT, MAX_SHARE_OF_REACH};
 pub use crate::checks::constants::refusal_conditions::{MIN_HELD_OUT_VIEWS, MIN_VIEWS_PER_PARAMETER};
 use crate::judge::baseline_comparison::BaselineComparison;
+use crate::judge::constants::FALSE_ALARM;
 use crate::say::refusal::{HeldOutLimitSource, Refusal};
 use armcal_core::numeric::Outcome;
 use armcal_core::robot::Robot;
@@ -45,12 +44,12 @@ impl HeldOutLimit {
         tolerance_m.map_or(by_reach, |limit_m| Self { limit_m, source: HeldOutLimitSource::Tolerance })
     }
 
-    /// Limit that `n_views` exceed with a probability of 1e-4, if a tag is off by `expected_m`, root mean square, for
-    /// its noise and the estimate's uncertainty. The tags of a view share most of it.
+    /// Limit that `n_views` exceed with the probability of a false alarm, if a tag is off by `expected_m`, root mean
+    /// square, for its noise and the estimate's uncertainty. The tags of a view share most of it.
     #[must_use]
     pub fn by_noise(expected_m: f64, n_views: usize) -> Self {
         let dof = 3 * n_views.max(1);
-        let ratio = (chi_square_quantile(1.0 - CONTRADICTION, dof) / dof as f64).sqrt();
+        let ratio = (chi_square_quantile(1.0 - FALSE_ALARM, dof) / dof as f64).sqrt();
         Self { limit_m: expected_m * ratio, source: HeldOutLimitSource::StatedNoise }
     }
 }

@@ -211,9 +211,8 @@ pub(crate) mod tags_departure {
 }
 
 pub(crate) mod tags_freed {
-    /// Prior of a freed tag: anywhere.
-    pub(crate) const FREED_STD_M: f64 = 1.0;
-    pub(crate) const FREED_STD_RAD: f64 = 1.0;
+    /// Prior of a freed tag, m and rad: anywhere.
+    pub(crate) const FREED_STD: f64 = 1.0;
     /// Tags that must stay where the survey has them.
     pub(crate) const MIN_TRUSTED: usize = 3;
 }
@@ -222,8 +221,6 @@ pub(crate) mod tags_group {
     /// One sigma of each tag's pose while all are freed: no tag is farther off by far.
     pub(crate) const LOOSE_STD_M: f64 = 0.1;
     pub(crate) const LOOSE_STD_RAD: f64 = 0.2;
-    /// So many tags must stay, and more than half of those seen.
-    pub(crate) const MIN_STAYING: usize = 3;
     /// Up to so many tags every three are tried.
     pub(crate) const MAX_TRIED_ALL: usize = 16;
     /// What a tag's departure must save, chi-square of 6: by chance once in a hundred.

@@ -147,8 +147,6 @@ pub(crate) mod image_noise {
 pub(crate) mod member {
     /// Evidence of views of before counts less by this factor a view.
     pub(crate) const FORGETTING: f64 = 0.98;
-    /// From so many views on the batch fits the scales.
-    pub(crate) const VIEWS_FOR_EVIDENCE: usize = 12;
     /// After a pause this long the first views are over, however many they were, s.
     pub(crate) const START_PAUSE_S: f64 = 300.0;
     /// Views of a moving arm that make a start where no view at rest comes.

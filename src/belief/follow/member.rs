@@ -1,8 +1,7 @@
 //! The estimator under one lag of the sensors' temperature behind the thermometer's.
 
-use crate::follow::constants::member::{
-    FORGETTING, MOVING_FOR_START, N_STARTS_OF_DRIFTING, START_AT, START_PAUSE_S, VIEWS_FOR_EVIDENCE,
-};
+use crate::batch::constants::rounds::MIN_VIEWS_FOR_EVIDENCE;
+use crate::follow::constants::member::{FORGETTING, MOVING_FOR_START, N_STARTS_OF_DRIFTING, START_AT, START_PAUSE_S};
 use std::sync::Arc;
 
 use crate::follow::branch::{Branch, Step};
@@ -191,7 +190,7 @@ impl Member {
         let reference = self.first[0].conditions;
         let (scales, evidence) = match &self.settings.scales {
             Some(scales) => (scales.clone(), HyperparameterMode::Given),
-            None if self.first.len() < VIEWS_FOR_EVIDENCE => (dive_scales(&self.robot), HyperparameterMode::Given),
+            None if self.first.len() < MIN_VIEWS_FOR_EVIDENCE => (dive_scales(&self.robot), HyperparameterMode::Given),
             None => (dive_scales(&self.robot), HyperparameterMode::Fitted),
         };
         let input = BundleInput {

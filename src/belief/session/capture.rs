@@ -1,5 +1,6 @@
 //! Plans views and visits them, and plans anew as they come in.
 
+use crate::batch::marked_calibrations::MIN_VIEWS;
 use crate::checks::refusal_conditions::fewest_views;
 use crate::file::calibration::Calibration;
 use crate::plan::{
@@ -7,7 +8,7 @@ use crate::plan::{
     VisibilityModel, choose_poses,
 };
 use crate::session::SessionError;
-use crate::session::constants::capture::{FIRST_RENEWAL, LEAST_VIEWS, MOST_IN_VAIN, SPARE_TRIES, TRUST_IN_ADVANCE};
+use crate::session::constants::capture::{FIRST_RENEWAL, MOST_IN_VAIN, SPARE_TRIES, TRUST_IN_ADVANCE};
 use crate::session::outcome::{EstimateUpdate, Visit};
 use crate::session::runner::ScriptRunner;
 use armcal_core::robot::Robot;
@@ -218,7 +219,7 @@ impl ScriptRunner<'_, '_> {
                     self.driver.phase(Phase::Plan)?;
                     match self.choose(&views) {
                         Ok(plan) => plan,
-                        Err(why) if views.n_fit >= LEAST_VIEWS && replans => break why.to_string(),
+                        Err(why) if views.n_fit >= MIN_VIEWS && replans => break why.to_string(),
                         Err(why) if views.blind > 0 => {
                             return Err(SessionError::NothingSeen { poses: views.blind, why: why.to_string() });
                         }
@@ -250,7 +251,7 @@ impl ScriptRunner<'_, '_> {
         self.capture_ended = Some(why.clone());
         let captured = views.captured();
         self.tally.poses += captured;
-        let are_too_few = views.wanted() != [0, 0] && (self.poses_marked as usize) < LEAST_VIEWS;
+        let are_too_few = views.wanted() != [0, 0] && (self.poses_marked as usize) < MIN_VIEWS;
         if captured > 0 && !are_too_few {
             return Ok(());
         }

@@ -19,8 +19,6 @@ pub(crate) mod capture {
     pub(crate) const MOST_IN_VAIN: usize = 6;
     /// Sightings as predicted that a tag is given in advance.
     pub(crate) const TRUST_IN_ADVANCE: f64 = 2.0;
-    /// With fewer views no calibration begins: then it is the reason why there are no more that matters.
-    pub(crate) const LEAST_VIEWS: usize = 3;
 }
 
 pub(crate) mod contact {
@@ -88,8 +86,6 @@ pub(crate) mod grip {
 }
 
 pub(crate) mod held_joint {
-    /// A bound is this many sigma.
-    pub(crate) const BOUND_SIGMAS: f64 = 4.0;
     /// How far a joint may creep while its valve is shut, one sigma: 1 deg an hour. Assumed.
     pub(crate) const CREEP_RAD_PER_S: f64 = 4.85e-6;
     /// Where a joint was found this long ago is looked for again where it matters, s.

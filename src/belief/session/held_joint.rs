@@ -5,7 +5,8 @@
 //! everything for all angles that it may have.
 
 use crate::plan::JointErrorBounds;
-use crate::session::constants::held_joint::{BOUND_SIGMAS, CREEP_RAD_PER_S, OLD_S};
+use crate::plan::constants::bounds_estimate_bounds::SIGMAS;
+use crate::session::constants::held_joint::{CREEP_RAD_PER_S, OLD_S};
 use armcal_core::robot::{FailedKind, Robot};
 use armcal_core::sensor::{ArmSensors, Correction, Terms};
 use armcal_core::streams::{JointAngles, JointCounts};
@@ -33,7 +34,7 @@ pub struct HeldJoint {
 impl HeldJoint {
     /// One sigma of where a joint stands whose sensor still tells, rad.
     pub(crate) fn locked_std_rad(&self) -> Option<f64> {
-        (self.kind == FailedKind::Locked && self.is_located).then_some(self.bound_rad / BOUND_SIGMAS)
+        (self.kind == FailedKind::Locked && self.is_located).then_some(self.bound_rad / SIGMAS)
     }
 }
 
@@ -101,7 +102,7 @@ pub(crate) struct StandingJoint {
 
 impl StandingJoint {
     pub(crate) fn new(held: &HeldJoint, since: Stamp) -> Self {
-        Self { joint: held.joint, found_std_rad: held.bound_rad / BOUND_SIGMAS, since }
+        Self { joint: held.joint, found_std_rad: held.bound_rad / SIGMAS, since }
     }
 
     /// Whether it was found long ago.

@@ -1,6 +1,6 @@
 //! Tags that were found moved: freed of their survey, estimated with the rest, and reported.
 
-use crate::explain::constants::tags_freed::{FREED_STD_M, FREED_STD_RAD, MIN_TRUSTED};
+use crate::explain::constants::tags_freed::{FREED_STD, MIN_TRUSTED};
 use nalgebra::{Isometry3, Translation3};
 
 use crate::explain::drawing::Drawing;
@@ -56,7 +56,7 @@ impl MovedTags {
         if self.has_given_up {
             return false;
         }
-        let trusted = robot.tags.iter().filter(|tag| tag.position_std_m < FREED_STD_M).count();
+        let trusted = robot.tags.iter().filter(|tag| tag.position_std_m < FREED_STD).count();
         let has_room = self.freed.len() < robot.tags.len() / 4 && trusted > MIN_TRUSTED;
         let Some(moved) = estimate.moved_tag() else {
             return has_room && self.free_rejected(estimate, views, robot);
@@ -168,7 +168,7 @@ impl MovedTags {
 fn free(robot: &mut Robot, tags: &[usize]) {
     for &tag in tags {
         let tag = &mut robot.tags[tag];
-        (tag.position_std_m, tag.rotation_std_rad) = (FREED_STD_M, FREED_STD_RAD);
+        (tag.position_std_m, tag.rotation_std_rad) = (FREED_STD, FREED_STD);
     }
 }
 

@@ -6,7 +6,8 @@
 //! to blame, and a departure of its own of each tag i that was moved. Generalized least squares; the tags that save
 //! most of `d^T V^-1 d` were moved, while each saves enough. The evidence decides whether they stay.
 
-use crate::explain::constants::tags_group::{LEAST_SAVING, LOOSE_STD_M, LOOSE_STD_RAD, MAX_TRIED_ALL, MIN_STAYING};
+use crate::explain::constants::tags_freed::MIN_TRUSTED;
+use crate::explain::constants::tags_group::{LEAST_SAVING, LOOSE_STD_M, LOOSE_STD_RAD, MAX_TRIED_ALL};
 use nalgebra::{Cholesky, DMatrix, DVector, Vector3};
 
 use crate::explain::tags::identity::{NEARER, TagFault};
@@ -141,9 +142,9 @@ impl Departures {
     }
 }
 
-/// Of `n` tags so many may have moved.
+/// Of `n` tags so many may have moved: more than half of them stay.
 fn most_moved(n: usize) -> usize {
-    n.saturating_sub(MIN_STAYING).min(n.saturating_sub(1) / 2)
+    n.saturating_sub(MIN_TRUSTED).min(n.saturating_sub(1) / 2)
 }
 
 /// All pairs and threes that may have moved together, of `n` tags.

@@ -16,6 +16,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use crate::measure::WeightedMeasurement;
 use crate::model::blocks::Block;
 use crate::solve::estimate::Estimate;
+use crate::views::constants::external_board::SIGMA_OF_MEDIAN;
 use crate::views::view::{TagObservation, View};
 use armcal_core::robot::Robot;
 use armcal_core::spatial::Pose;
@@ -184,7 +185,7 @@ pub(crate) fn common_size_ratio(views: &[View], robot: &Robot) -> Option<f64> {
     }
     let ratio = quantile(&ratios, 0.5)?;
     let spread: Vec<f64> = ratios.iter().map(|r| (r - ratio).abs()).collect();
-    let std = 1.4826 * quantile(&spread, 0.5)? / f64::from(n_views).sqrt();
+    let std = SIGMA_OF_MEDIAN * quantile(&spread, 0.5)? / f64::from(n_views).sqrt();
     ((ratio - 1.0).abs() > LEAST_RATIO.max(SURE_SIGMAS * std)).then_some(ratio)
 }
 
@@ -227,7 +228,7 @@ impl SeenTag {
             .collect();
         let ratio = quantile(&ratios, 0.5)?;
         let spread: Vec<f64> = ratios.iter().map(|r| (r - ratio).abs()).collect();
-        let std = 1.4826 * quantile(&spread, 0.5)? / (ratios.len() as f64).sqrt();
+        let std = SIGMA_OF_MEDIAN * quantile(&spread, 0.5)? / (ratios.len() as f64).sqrt();
         let distance_m = |ratio: f64| {
             let off = self.observations.iter().map(|(base_from_camera, at)| {
                 (base_from_camera * Point3::from(at * ratio) - Point3::from(survey)).norm()
