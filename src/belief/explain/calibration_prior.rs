@@ -7,11 +7,12 @@
 //! Agreement: the views are fitted once more under P1 = P0 + W, where W lets each offset slip as far as the datasheet's
 //! own sigma. With the posterior covariance C and `A = I - C P1^-1`, the estimate moves from the prior by d, which has
 //! the covariance `S = A P0 A^T + A C` if the prior holds (linear Gaussian model); `d^T S^+ d` is then chi-square with
-//! as many degrees of freedom as S has eigenvalues above `LEAST_SHARE` in units of P0.
+//! as many degrees of freedom as S has eigenvalues above `TOLD_SHARE` in units of P0.
 
 use crate::explain::constants::calibration_prior::{
-    LEAST_SHARE, LEAST_SLIP_STD_RAD, ROUNDING, USUAL_DRIFT_STD_RAD_PER_SQRT_H, Z_999, Z_OF_JOINTS,
+    LEAST_SLIP_STD_RAD, MAX_ROUNDING, ROUNDING, USUAL_DRIFT_STD_RAD_PER_SQRT_H, Z_999, Z_OF_JOINTS,
 };
+use crate::explain::constants::tags_departure::TOLD_SHARE;
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen, Vector6};
 
 use crate::explain::failures::{Failure, FailureAdjusted};
@@ -240,7 +241,7 @@ impl CalibrationPrior {
         let eigen = SymmetricEigen::new(0.5 * (&inner + inner.transpose()));
         let (mut chi2, mut n) = (0.0, 0);
         for (value, direction) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
-            if *value > LEAST_SHARE {
+            if *value > TOLD_SHARE {
                 chi2 += direction.dot(&whitened).powi(2) / value;
                 n += 1;
             }
@@ -341,7 +342,7 @@ pub(crate) fn drift_std_rad_per_sqrt_h(spec: &JointSensorSpec) -> f64 {
 fn regular(matrix: DMatrix<f64>) -> Option<DMatrix<f64>> {
     let symmetric = 0.5 * (&matrix + matrix.transpose());
     let mut share = ROUNDING;
-    while share < 0.1 {
+    while share < MAX_ROUNDING {
         let mut raised = symmetric.clone();
         for k in 0..raised.nrows() {
             raised[(k, k)] = raised[(k, k)] * (1.0 + share) + 1e-20;

@@ -26,11 +26,11 @@ pub(crate) mod calibration_prior {
     /// The file's numbers are rounded to seven digits: this share of the variances is added so that the matrix has an
     /// inverse.
     pub(crate) const ROUNDING: f64 = 1e-6;
-    /// Directions of which the views tell less than this, in units of the prior's variance, are not tested.
-    pub(crate) const LEAST_SHARE: f64 = 0.1;
     /// The normal's 0.999 quantile, and that of 0.001 shared by some eight joints' two sides.
     pub(crate) const Z_999: f64 = 3.090;
     pub(crate) const Z_OF_JOINTS: f64 = 3.9;
+    /// From this share on, in tenfold steps, no more is added and the matrix has no inverse. Assumed.
+    pub(crate) const MAX_ROUNDING: f64 = 0.1;
 }
 
 pub(crate) mod drawing {
@@ -56,8 +56,6 @@ pub(crate) mod failure_detection {
     pub(crate) const PER_READING: f64 = 14.0;
     /// What a step costs: 2 ln(0.1 rad / 1 mrad).
     pub(crate) const PER_STEP: f64 = 9.0;
-    /// A observation costs no more than this per coordinate: beyond it, it is rejected.
-    pub(crate) const MAX_PER_COORDINATE: f64 = 7.5;
     /// The evidence that a failure needs: odds of e^15 to one.
     pub(crate) const MARGIN: f64 = 30.0;
     /// At most this many failures are looked for beyond those that the readings alone show.
@@ -91,6 +89,10 @@ pub(crate) mod failure_pattern {
     pub(crate) const STUCK_SIGMAS: f64 = 5.0;
     pub(crate) const ROUNDS: usize = 60;
     pub(crate) const FLOOR_RAD: f64 = 1e-5;
+    /// A step that lasts is larger than this many sigma of what it leaves.
+    pub(crate) const STEP_SIGMAS: f64 = 3.0;
+    /// Readings that are all alike have no line: the determinant's share of the squares is rounding.
+    pub(crate) const ALL_ALIKE: f64 = 1e-12;
 }
 
 pub(crate) mod failures {
@@ -166,9 +168,13 @@ pub(crate) mod reading_search {
 }
 
 pub(crate) mod score_test {
+    use armcal_core::joints::MAX_JOINTS;
+
     /// Size of an error of geometry that is worth a look: what the data cannot tell to that is not tested.
     pub(crate) const SIZE_M: f64 = 0.01;
     pub(crate) const SIZE_RAD: f64 = 0.0175;
+    /// First trial column of the mount: behind six of each joint.
+    pub(crate) const MOUNT: usize = 6 * MAX_JOINTS;
 }
 
 pub(crate) mod slips {
@@ -285,6 +291,14 @@ pub(crate) mod wrong_input {
     pub(crate) const MAX_VIEWS: usize = 40;
     /// A size within this of the stated one is not called wrong.
     pub(crate) const SIZE_TOLERANCE: f64 = 0.03;
+}
+
+pub(crate) mod wrong_input_map {
+    /// Units that a survey may be in, and how many make a metre.
+    pub(crate) const UNITS: [(&str, f64); 4] =
+        [("mm", 1e3), ("cm", 1e2), ("inches", 1.0 / 0.0254), ("feet", 1.0 / 0.3048)];
+    /// A ratio of sizes within this of that of a print to its border is that one, relative.
+    pub(crate) const PRINT_TOLERANCE: f64 = 0.02;
 }
 
 pub(crate) mod wrong_input_pairs {

@@ -26,7 +26,7 @@ use crate::explain::score_test::Score;
 use crate::explain::tags::group::moved_group;
 use crate::explain::tags::identity::{TagFault, common_size_ratio};
 use crate::model::blocks::Block;
-use crate::model::scales::MAX_CAMERAS;
+use crate::model::constants::scales::{AS_STATED, MAX_CAMERAS};
 use crate::solve::estimate::{Estimate, estimate};
 use crate::solve::evidence::SCALE_BOUNDS;
 use crate::solve::input::BundleInput;
@@ -221,7 +221,7 @@ impl Estimate<'_> {
         let mut start = LinkStart {
             n_links,
             multiples: [[1.0; 2]; MAX_JOINTS],
-            mount_scale: [[1.0; 2]; MAX_CAMERAS],
+            mount_scale: [[AS_STATED; 2]; MAX_CAMERAS],
             beyond_stated_nats: gain - by_stated,
         };
         match element {

@@ -7,7 +7,7 @@
 //! of the evidence, MacKay 1992, with a round figure), must fall by `MARGIN`.
 
 use crate::explain::constants::failure_detection::{
-    LARGE_STD_RAD, MANY_REJECTED, MARGIN, MAX_FOUND, MAX_PER_COORDINATE, PER_READING, PER_STEP,
+    LARGE_STD_RAD, MANY_REJECTED, MARGIN, MAX_FOUND, PER_READING, PER_STEP,
 };
 use crate::explain::drawing::Drawing;
 use crate::explain::failure_pattern::{FailurePattern, MIN_STILL_VIEWS, Readings, n_still};
@@ -17,9 +17,11 @@ use crate::explain::setup::BundleSetup;
 use crate::file::calibration::Calibration;
 use crate::measure::ObservationTerm;
 use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
+use crate::solve::constants::outliers::LIMITS;
 use crate::solve::estimate::{Estimate, estimate};
 use crate::solve::input::HyperparameterMode;
 use crate::solve::outliers::rejected;
+use crate::views::constants::external_board::SIGMA_OF_MEDIAN;
 use crate::views::view::View;
 use armcal_core::robot::{FailedKind, Robot};
 use armcal_core::stats::quantile;
@@ -251,9 +253,10 @@ fn explains_most(without: &Estimate<'_>, better: &Estimate<'_>) -> bool {
 pub(crate) fn score(found: &Estimate<'_>) -> f64 {
     let problem = &found.problem;
     let observations = problem.observations.iter().zip(&found.solved.normal.chi2);
+    let [limit, _] = LIMITS;
     let of_observation = |(seen, chi2): (&ObservationTerm, &f64)| {
         let of_corners = if seen.is_used { rejected(seen).chi2 } else { 0.0 };
-        chi2.min(MAX_PER_COORDINATE * seen.data.n_coordinates() as f64) + of_corners
+        chi2.min(limit * seen.data.n_coordinates() as f64) + of_corners
     };
     let mut sum: f64 = observations.map(of_observation).sum();
     let off = &found.solved.state.joint - &problem.prior.joint_mean;
@@ -322,7 +325,7 @@ pub(crate) fn is_suspicious(found: &Estimate<'_>) -> bool {
             let views = problem.views.iter().zip(&found.solved.state.joint_error);
             let errors: Vec<f64> =
                 views.filter(|(view, _)| !view.is_free[joint]).map(|(_, errors)| errors[joint].abs()).collect();
-            let sigma = 1.4826 * quantile(&errors, 0.5).unwrap_or(0.0);
+            let sigma = SIGMA_OF_MEDIAN * quantile(&errors, 0.5).unwrap_or(0.0);
             errors.iter().any(|error| *error > FAR_RAD.max(FAR_SIGMAS * sigma))
         })
 }

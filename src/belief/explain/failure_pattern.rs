@@ -2,8 +2,8 @@
 
 pub(crate) use crate::explain::constants::failure_pattern::MIN_STILL_VIEWS;
 use crate::explain::constants::failure_pattern::{
-    FLOOR_RAD, FOLLOWS, LEAST_GAIN_STD, LOCKED_RAD, LOCKED_SIGMAS, MAX_SINGLE, MIN_SIDE, RIGHT_SIGMAS, ROUNDS,
-    STEP_LEAVES, STILL_SIGMAS, STRAIGHT, STUCK_SIGMAS, WHOLE_TURN_RAD,
+    ALL_ALIKE, FLOOR_RAD, FOLLOWS, LEAST_GAIN_STD, LOCKED_RAD, LOCKED_SIGMAS, MAX_SINGLE, MIN_SIDE, RIGHT_SIGMAS,
+    ROUNDS, STEP_LEAVES, STEP_SIGMAS, STILL_SIGMAS, STRAIGHT, STUCK_SIGMAS, WHOLE_TURN_RAD,
 };
 use std::f64::consts::{PI, TAU};
 
@@ -11,6 +11,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::explain::failures::{FAR_RAD, FAR_SIGMAS, SensorLine, SensorUse, slip_in_words};
 use crate::solve::estimate::Estimate;
+use crate::views::constants::external_board::SIGMA_OF_MEDIAN;
 use crate::views::view::View;
 use armcal_core::robot::{FailedKind, JointSensorSpec, Robot};
 use armcal_core::sensor::wrap_symmetric;
@@ -104,15 +105,15 @@ impl Readings {
         let (off_rad, line) = self.off_line(spec.center_rad);
         let slope = line.slope;
         let sizes: Vec<f64> = off_rad.iter().map(|off| off.abs()).collect();
-        let is_straight = 1.4826 * quantile(&sizes, 0.5)? < STRAIGHT * spread_rad;
+        let is_straight = SIGMA_OF_MEDIAN * quantile(&sizes, 0.5)? < STRAIGHT * spread_rad;
         if is_straight && (slope - 1.0).abs() > FAR_SIGMAS * spec.gain_std.max(LEAST_GAIN_STD) {
             return Some(if slope < 0.0 { FailurePattern::Reversed(line) } else { FailurePattern::Scaled(line) });
         }
         if let Some(step) = self.step() {
             return Some(step);
         }
-        let sigma_rad = (1.4826 * quantile(&sizes, 0.5)?).max(own_rad);
-        if 1.4826 * quantile(&sizes, 0.5)? > FOLLOWS * spread_rad || !(0.7..1.3).contains(&slope) {
+        let sigma_rad = (SIGMA_OF_MEDIAN * quantile(&sizes, 0.5)?).max(own_rad);
+        if SIGMA_OF_MEDIAN * quantile(&sizes, 0.5)? > FOLLOWS * spread_rad || !(0.7..1.3).contains(&slope) {
             return Some(FailurePattern::Dead);
         }
         let far = |(_, off): &(&usize, &f64)| off.abs() > FAR_RAD.max(FAR_SIGMAS * sigma_rad);
@@ -142,7 +143,7 @@ impl Readings {
         let (at, (squares, step_rad)) = best;
         let sigma_rad = (squares / n.saturating_sub(3).max(1) as f64).sqrt();
         let is_clear = squares < STEP_LEAVES * without
-            && step_rad.abs() > FAR_RAD.max(3.0 * sigma_rad)
+            && step_rad.abs() > FAR_RAD.max(STEP_SIGMAS * sigma_rad)
             && sigma_rad < FOLLOWS * deviation(&self.angle_rad);
         is_clear.then(|| FailurePattern::Lasting { since: self.view_idx[at], step_rad })
     }
@@ -173,7 +174,7 @@ impl Readings {
             let (w, t, tt) = (sum(&|_| 1.0), sum(&|k| self.travel_rad[k]), sum(&|k| self.travel_rad[k].powi(2)));
             let (a, at) = (sum(&|k| self.angle_rad[k]), sum(&|k| self.angle_rad[k] * self.travel_rad[k]));
             let determinant = w * tt - t * t;
-            if determinant <= 1e-12 * w * tt {
+            if determinant <= ALL_ALIKE * w * tt {
                 break;
             }
             slope = (w * at - t * a) / determinant;

@@ -6,7 +6,7 @@
 //! ask for, `s^T I^-1 s` is chi-square under the model. Directions that the data tell less of than [`SIZE_M`] or
 //! [`SIZE_RAD`] do not count.
 
-use crate::explain::constants::score_test::{SIZE_M, SIZE_RAD};
+use crate::explain::constants::score_test::{MOUNT, SIZE_M, SIZE_RAD};
 use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, Vector3, Vector6};
 
 use crate::model::blocks::Block;
@@ -14,19 +14,13 @@ use crate::model::parameters::{JointParameters, Parameter};
 use crate::say::geometry_error::ErrorKind;
 use crate::solve::body_twists::link_twist;
 use crate::solve::estimate::Estimate;
-use crate::solve::problem::N_VIEW_PARAMETERS;
 use crate::solve::schur::Group;
 use crate::views::view::View;
-use armcal_core::joints::{JointAngles, MAX_JOINTS};
+use armcal_core::joints::JointAngles;
 use armcal_core::kinematics::LinkPoses;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::{ArmSensors, ConditionChange};
 use armcal_core::stats::chi_square_above;
-
-/// Trial columns: of each joint's place in its parent link three of translation, then three of rotation; then the
-/// mount's six.
-const N_TRIALS: usize = 6 * MAX_JOINTS + 6;
-const MOUNT: usize = 6 * MAX_JOINTS;
 
 /// An element of the geometry that is tested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,7 +50,9 @@ pub struct ScoreTestResult {
     pub tool_m: f64,
 }
 
-type Trials = SMatrix<f64, 6, N_TRIALS>;
+/// Trial columns: of each joint's place in its parent link three of translation, then three of rotation; then the
+/// mount's six.
+type Trials = SMatrix<f64, 6, { MOUNT + 6 }>;
 
 /// Score and information of all trials, and how the common parameters follow them.
 pub(crate) struct Score {
@@ -299,5 +295,3 @@ pub(crate) fn columns(element: GeometryElement, error: ErrorKind) -> (usize, f64
 fn left_times<const N: usize>(trials: &SMatrix<f64, 6, N>, pull: &Vector6<f64>) -> DVector<f64> {
     DVector::from_iterator(N, trials.column_iter().map(|column| column.dot(pull)))
 }
-
-const _: () = assert!(N_VIEW_PARAMETERS == MAX_JOINTS + 6, "a view's own parameters are joints and camera");

@@ -87,6 +87,8 @@ pub(crate) mod filter {
     pub(crate) const SHORTER: f64 = 0.3;
     /// Of the place of a tag that nobody surveyed, m and rad: no view of it is used.
     pub(crate) const UNKNOWN_STD: f64 = 100.0;
+    /// A step this short ends the search even where the cost does not fall, in the parameters' units.
+    pub(crate) const SHORTEST_STEP: f64 = 1e-12;
 }
 
 pub(crate) mod follower {
@@ -121,18 +123,19 @@ pub(crate) mod hindsight {
 }
 
 pub(crate) mod hypothesis {
-    /// How far a sensor may slip, a tag or the camera be knocked aside: one sigma. Assumed: wide, the views tell it.
-    pub(crate) const SLIP_STD_RAD: f64 = 0.1;
+    /// How far a tag, the camera or the base may be knocked aside: one sigma, m and rad. Assumed: wide, the views tell
+    /// it.
     pub(crate) const TAG_STD: [f64; 2] = [0.03, 0.06];
     pub(crate) const MOUNT_STD: [f64; 2] = [0.02, 0.1];
     pub(crate) const BASE_STD: [f64; 2] = [0.1, 0.1];
-    pub(crate) const GAIN_STD: f64 = 1.0;
     pub(crate) const DRIFT_STD_RAD: f64 = 1.5e-3;
     pub(crate) const LN_PRIOR_OF_DRIFT: f64 = -2.0;
     pub(crate) const LN_PRIOR: f64 = -7.0;
     /// Less than a slip's by what a tighter height makes up for, and by the lead over the same sensor: where all views
     /// are at one place it is a slip.
     pub(crate) const LN_PRIOR_OF_WORN: f64 = -10.5;
+    /// Tags that may have moved together; more are not told apart from a moved base.
+    pub(crate) const MOST_TAGS: usize = 12;
 }
 
 pub(crate) mod image_noise {
@@ -179,9 +182,10 @@ pub(crate) mod settings {
 }
 
 pub(crate) mod view_stream {
-    /// A joint that leaves this, and so many sigma of its noise, moves, rad.
+    use crate::views::constants::conditions::{BACK_S, NEAR_S};
+
+    /// A joint that leaves this, beyond what its noise makes of it, moves, rad.
     pub(crate) const REST_RAD: f64 = 0.003;
-    pub(crate) const REST_SIGMAS: f64 = 8.0;
     /// What comes after a motion before the arm counts as at rest, s.
     pub(crate) const SETTLE_S: f64 = 0.5;
     /// A rest of which less than this is left is none, s.
@@ -202,4 +206,6 @@ pub(crate) mod view_stream {
     pub(crate) const WAITING_IMAGES: usize = 1000;
     /// Messages kept at most, whatever their rate.
     pub(crate) const WINDOW_MESSAGES: usize = 100_000;
+    /// What is kept of the past: a rest, with what was read before it, s.
+    pub(crate) const WINDOW_S: f64 = LONGEST_REST_S + BACK_S + NEAR_S + 10.0;
 }

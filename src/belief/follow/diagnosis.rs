@@ -12,6 +12,7 @@ use crate::follow::constants::diagnosis::{
 use crate::follow::filter::{Filter, Scores, ViewUpdate, WalkScore};
 use crate::follow::hypothesis::{Fault, TagSet};
 use crate::follow::view_stream::is_moving;
+use crate::model::constants::parameters::SPOT_WIDTH_RAD;
 use crate::model::parameters::WornSpot;
 use crate::views::view::View;
 use armcal_core::joints::MAX_JOINTS;
@@ -227,7 +228,7 @@ impl Race {
     fn nearer_spot(&self, robot: &Robot) -> Option<Branch> {
         let spots = self.branches.iter().filter_map(|branch| Some((branch, branch.worn_spot()?)));
         let (found, (joint, spot)) = spots.max_by(|(a, _), (b, _)| a.nats.total_cmp(&b.nats))?;
-        let aside = [-0.5, 0.5].map(|by| WornSpot::about(spot.at_rad() + by * WornSpot::WIDTH_RAD));
+        let aside = [-0.5, 0.5].map(|by| WornSpot::about(spot.at_rad() + by * SPOT_WIDTH_RAD));
         let branches = aside.map(|spot| Some(Fault::Worn(joint, spot))).into_iter();
         let new = branches.filter(|fault| self.of(*fault).is_none()).map(|fault| self.branch(robot, fault));
         new.filter(|branch| branch.nats > found.nats + NEARER_NATS).max_by(|a, b| a.nats.total_cmp(&b.nats))

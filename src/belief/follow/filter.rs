@@ -5,7 +5,7 @@
 //! information. Between views what drifts is widened, `(W^-1 + Q)^-1` by the matrix inversion lemma. Time and memory of
 //! a view do not depend on how many came before.
 
-use crate::follow::constants::filter::{LAST_GAIN, MAX_STEPS, SHORTER, UNKNOWN_STD};
+use crate::follow::constants::filter::{LAST_GAIN, MAX_STEPS, SHORTER, SHORTEST_STEP, UNKNOWN_STD};
 use crate::solve::constants::estimate::CORNER_WIDTH;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Isometry3, Matrix3, SVector, Vector3};
 
@@ -464,7 +464,7 @@ impl ViewSolver {
                 }
                 self.trial.update(problem, &trial, loss);
                 // Not a number is no gain.
-                if self.trial.cost <= cost + LAST_GAIN || step.norm() < 1e-12 {
+                if self.trial.cost <= cost + LAST_GAIN || step.norm() < SHORTEST_STEP {
                     break;
                 }
                 step *= SHORTER;

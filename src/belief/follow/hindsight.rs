@@ -12,6 +12,7 @@ use nalgebra::{Matrix3, Vector3};
 use crate::follow::branch::{Branch, Step, speaks};
 use crate::follow::filter::{Filter, Scores};
 use crate::follow::hypothesis::Fault;
+use crate::model::constants::parameters::SPOT_WIDTH_RAD;
 use crate::model::parameters::WornSpot;
 use crate::views::view::View;
 use armcal_core::joints::MAX_JOINTS;
@@ -173,7 +174,7 @@ impl Hindsight {
         let joints = filter.offsets().map(|(joint, _)| joint);
         let open = joints.filter(|joint| !last.is_free[*joint] && !filter.has_bump(*joint));
         let of_joint = |joint: usize| {
-            let middles = MIDDLES.map(|by| last.travel_rad[joint] + by * WornSpot::WIDTH_RAD);
+            let middles = MIDDLES.map(|by| last.travel_rad[joint] + by * SPOT_WIDTH_RAD);
             let all = middles.into_iter().filter_map(|at_rad| self.of_place(joint, WornSpot::about(at_rad)));
             all.reduce(|near, far| if far.chi2 > near.chi2 + FARTHER_BY { far } else { near })
         };

@@ -1,11 +1,13 @@
 //! What may have happened to the arm between two views: each is a belief that is widened where it re-opens.
 
+use crate::explain::constants::failures::OTHER_GAIN_STD;
 use crate::follow::constants::hypothesis::{
-    BASE_STD, DRIFT_STD_RAD, GAIN_STD, LN_PRIOR, LN_PRIOR_OF_DRIFT, LN_PRIOR_OF_WORN, MOUNT_STD, SLIP_STD_RAD, TAG_STD,
+    BASE_STD, DRIFT_STD_RAD, LN_PRIOR, LN_PRIOR_OF_DRIFT, LN_PRIOR_OF_WORN, MOST_TAGS, MOUNT_STD, TAG_STD,
 };
 use nalgebra::{DMatrix, Matrix6};
 
 use crate::follow::filter::Filter;
+use crate::model::constants::scales::STEP_STD_RAD;
 use crate::model::parameters::{Parameter, ParameterKind, WornSpot};
 use crate::say;
 use crate::say::finding::FindingKind;
@@ -17,25 +19,22 @@ use armcal_core::spatial::adjoint;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct TagSet {
     /// In rising order, those in use first.
-    indices: [u16; Self::MOST],
+    indices: [u16; MOST_TAGS],
     n: u8,
 }
 
 impl TagSet {
-    /// More are not told apart from a moved base.
-    pub const MOST: usize = 12;
-
     /// One tag; `None` beyond the index that fits.
     #[must_use]
     pub fn of(tag: usize) -> Option<Self> {
-        Self { indices: [0; Self::MOST], n: 0 }.with(tag)
+        Self { indices: [0; MOST_TAGS], n: 0 }.with(tag)
     }
 
     /// With one more; `None` where it is among them, or there are too many.
     #[must_use]
     pub fn with(mut self, tag: usize) -> Option<Self> {
         let (tag, n) = (u16::try_from(tag).ok()?, usize::from(self.n));
-        if n == Self::MOST || self.indices[..n].contains(&tag) {
+        if n == MOST_TAGS || self.indices[..n].contains(&tag) {
             return None;
         }
         self.indices[n] = tag;
@@ -116,11 +115,11 @@ impl Fault {
         match self {
             Self::Slip(joint) => {
                 let columns: Vec<_> = column(filter, joint, ParameterKind::Offset).into_iter().collect();
-                filter.widen(&columns.iter().map(|at| (*at, SLIP_STD_RAD.powi(2))).collect::<Vec<_>>());
+                filter.widen(&columns.iter().map(|at| (*at, STEP_STD_RAD.powi(2))).collect::<Vec<_>>());
             }
             Self::Scale(joint) => {
-                let gain = column(filter, joint, ParameterKind::Gain).map(|at| (at, GAIN_STD.powi(2)));
-                let offset = column(filter, joint, ParameterKind::Offset).map(|at| (at, SLIP_STD_RAD.powi(2)));
+                let gain = column(filter, joint, ParameterKind::Gain).map(|at| (at, OTHER_GAIN_STD.powi(2)));
+                let offset = column(filter, joint, ParameterKind::Offset).map(|at| (at, STEP_STD_RAD.powi(2)));
                 filter.widen(&gain.into_iter().chain(offset).collect::<Vec<_>>());
             }
             Self::Drift => {

@@ -7,22 +7,20 @@
 //! window of messages, whatever the length of the stream.
 
 use crate::follow::constants::view_stream::{
-    ABOUT_IMAGE_S, APART_RAD, LONGEST_REST_S, MARK_DELAY_S, MOVES_RAD, REST_RAD, REST_SIGMAS, SETTLE_S,
-    SHORTEST_REST_S, SLOWEST_RAD_S, WAITING_IMAGES, WINDOW_MESSAGES,
+    ABOUT_IMAGE_S, APART_RAD, LONGEST_REST_S, MARK_DELAY_S, MOVES_RAD, REST_RAD, SETTLE_S, SHORTEST_REST_S,
+    SLOWEST_RAD_S, WAITING_IMAGES, WINDOW_MESSAGES, WINDOW_S,
 };
 use std::collections::{BTreeMap, VecDeque};
 
 use crate::views::association::view_of_span;
-use crate::views::conditions::{BACK_S, NEAR_S, apart_rad};
+use crate::views::conditions::apart_rad;
+use crate::views::constants::conditions::{CLEAR_SIGMAS, MIN_READINGS_OF_RATE};
 use crate::views::view::{FASTEST_RAD_S, View};
 use armcal_core::joints::{JointAngles, JointCounts, MAX_JOINTS};
 use armcal_core::robot::Robot;
 use armcal_core::sensor::ArmSensors;
 use armcal_core::streams::{JointSensorSample, Mark, MarkKind, Message, TagDetections};
 use armcal_core::time::Stamp;
-
-/// What is kept of the past: a rest, with what was read before it.
-const WINDOW_S: f64 = LONGEST_REST_S + BACK_S + NEAR_S + 10.0;
 
 /// Turns the messages of an arm into views as they come.
 #[derive(Clone)]
@@ -149,7 +147,7 @@ impl ViewStream {
             let spec = &model.spec;
             let noise_rad = spec.noise_std_counts.max(0.5) / spec.counts_per_rad.abs();
             let by_rad = apart_rad(spec, model.nominal_travel_rad(counts[joint]), rest.anchor[joint]);
-            by_rad.abs() > REST_RAD + REST_SIGMAS * noise_rad
+            by_rad.abs() > REST_RAD + CLEAR_SIGMAS * noise_rad
         })
     }
 
@@ -220,7 +218,8 @@ impl ViewStream {
         let about: Vec<(Stamp, Message)> = self.window.iter().filter(belongs).cloned().collect();
         let mut view = view_of_span(&about, &self.robot, self.n_views, (start, end))?;
         let is_slow_enough = view.rate_rad_s.iter().all(|rate| rate.abs() < FASTEST_RAD_S);
-        let is_usable = view.n_readings >= 3 && is_moving(&view) && is_slow_enough && !view.tags.is_empty();
+        let is_usable =
+            view.n_readings >= MIN_READINGS_OF_RATE && is_moving(&view) && is_slow_enough && !view.tags.is_empty();
         if !is_usable || !self.is_apart(&view.travel_rad) {
             return None;
         }

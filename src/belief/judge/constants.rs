@@ -20,4 +20,14 @@ pub(crate) mod coverage {
     pub(crate) const INFINITE_DOF: f64 = 500.0;
     pub(crate) const STEPS: usize = 60;
     pub(crate) const NEWTON_STEPS: usize = 6;
+    /// Share of U95 to which it is known: the search for it ends there.
+    pub(crate) const KNOWN_TO: f64 = 1e-6;
+}
+
+pub(crate) mod decision {
+    use crate::judge::constants::coverage::COVERAGE;
+
+    /// Largest probability, at any target, that the tool is off by more than the tolerance: the specific risk of JCGM
+    /// 106.
+    pub const MAX_RISK: f64 = 1.0 - COVERAGE;
 }

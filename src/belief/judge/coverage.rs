@@ -6,7 +6,7 @@
 //! octant: Gauss-Legendre in `s_1`, the midpoint rule in the angle about that axis.
 
 pub use crate::judge::constants::coverage::COVERAGE;
-use crate::judge::constants::coverage::{ANGLES, INFINITE_DOF, NEWTON_STEPS, NODES, STEPS};
+use crate::judge::constants::coverage::{ANGLES, INFINITE_DOF, KNOWN_TO, NEWTON_STEPS, NODES, STEPS};
 use armcal_core::stats::{chi_square_above, student_t_above};
 use nalgebra::Matrix3;
 
@@ -71,7 +71,7 @@ impl ErrorDistribution {
             } else {
                 high_m = middle_m
             }
-            if high_m - low_m < 1e-6 * high_m {
+            if high_m - low_m < KNOWN_TO * high_m {
                 break;
             }
         }

@@ -6,10 +6,9 @@ use nalgebra::Matrix3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::judge::coverage::{COVERAGE, ErrorDistribution};
+pub use crate::judge::constants::decision::MAX_RISK;
+use crate::judge::coverage::ErrorDistribution;
 
-/// Largest probability, at any target, that the tool is off by more than the tolerance: the specific risk of JCGM 106.
-pub const MAX_RISK: f64 = 1.0 - COVERAGE;
 /// The rule as files and reports state it.
 pub const RULE: &str = "P(error > tolerance) <= 5 % at every target";
 

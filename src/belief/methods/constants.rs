@@ -1,10 +1,16 @@
 //! Constants that decide something in `methods`: unit, source and effect of each, by the file that uses it.
 
 pub(crate) mod gripper_tag {
-    /// Fewer views than this are left to the priors.
-    pub(crate) const MIN_VIEWS: usize = 4;
+    use armcal_core::numeric::{Damping, StopRule};
+
     /// Mount and tag this many sigma of their priors off: one of them was knocked, or it is another tag.
     pub(crate) const MAX_PRIOR_SIGMAS: f64 = 6.0;
+    /// Undamped until a step does not help.
+    pub(crate) const DAMPING: Damping =
+        Damping { first: 0.0, min: 0.0, max: f64::INFINITY, down: 0.1, up: 10.0, min_after_rejection: 1.0 };
+    /// A step this small in units of the priors' sigma changes nothing. The views' weights change a little with the
+    /// state: the cost may grow by a share without a step being wrong.
+    pub(crate) const STOP: StopRule = StopRule { step_length: 1e-5, slack: 1e-3, ..StopRule::after(50) };
 }
 
 pub(crate) mod joint_limits {
@@ -21,4 +27,6 @@ pub(crate) mod observability {
     /// off by 2 mm and a survey off by 1 mm come to at 1 m. It decides only what is hopeless, so its exact size matters
     /// little.
     pub(crate) const POSITION_STD_M: f64 = 0.004;
+    /// A parameter with more than this share of the square of a direction that nothing determines is open.
+    pub(crate) const OPEN_SHARE: f64 = 1e-6;
 }

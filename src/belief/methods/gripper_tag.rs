@@ -9,8 +9,9 @@
 //! `R = sigma^2 / n_frames * I + sum_j (d u / d theta_j) (d u / d theta_j)^T linearity_j^2` for the eight coordinates
 //! `u` of a view.
 
-use crate::methods::constants::gripper_tag::{MAX_PRIOR_SIGMAS, MIN_VIEWS};
+use crate::methods::constants::gripper_tag::{DAMPING, MAX_PRIOR_SIGMAS, STOP};
 use crate::model::constants::prior::MIN_STD;
+use crate::solve::constants::model_for_views::MIN_GRIPPER_VIEWS;
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, SMatrix, SVector, Vector2, Vector6};
@@ -19,17 +20,11 @@ use crate::measure::ImagePoint;
 use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::positions::mount_estimate::MountEstimate;
 use crate::views::view::{MeanCorners, View};
-use armcal_core::numeric::{Damping, LeastSquares, Outcome, Proposal, StopRule, minimize};
+use armcal_core::numeric::{LeastSquares, Outcome, Proposal, minimize};
 use armcal_core::optics::square_corners;
 use armcal_core::robot::{GripperTag, Robot};
 use armcal_core::spatial::{adjoint, exp, log};
 use armcal_core::streams::JointAngles;
-
-const DAMPING: Damping =
-    Damping { first: 0.0, min: 0.0, max: f64::INFINITY, down: 0.1, up: 10.0, min_after_rejection: 1.0 };
-/// A step this small in units of the priors' sigma changes nothing. The views' weights change a little with the state:
-/// the cost may grow by a share without a step being wrong.
-const STOP: StopRule = StopRule { step_length: 1e-5, slack: 1e-3, ..StopRule::after(50) };
 
 /// Solves for mount and joints; an error says why the tag is left out.
 ///
@@ -43,8 +38,8 @@ pub fn mount_by_gripper_tag(
 ) -> Result<MountEstimate, String> {
     let seen: Vec<(&JointAngles, &MeanCorners)> =
         views.iter().filter_map(|view| Some((&view.travel_rad, view.gripper_tag.as_ref()?))).collect();
-    if seen.len() < MIN_VIEWS {
-        return Err(format!("the tag on the gripper was seen in {} views; {MIN_VIEWS} are needed", seen.len()));
+    if seen.len() < MIN_GRIPPER_VIEWS {
+        return Err(format!("the tag on the gripper was seen in {} views; {MIN_GRIPPER_VIEWS} are needed", seen.len()));
     }
     let problem = Problem { robot, tag, joints: tag.joints(&robot.camera.mount), seen };
     let (state, normal) = problem.solve(guess).ok_or("the tag on the gripper fits no camera mount")?;

@@ -5,7 +5,7 @@
 //! datasheet's value, and its name and reason go into the result; the worst goes first, for leaving it out may settle
 //! the others.
 
-use crate::methods::constants::observability::POSITION_STD_M;
+use crate::methods::constants::observability::{OPEN_SHARE, POSITION_STD_M};
 use nalgebra::DMatrix;
 
 use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
@@ -75,7 +75,7 @@ fn data_std_in_prior_units(problem: &PositionProblem<'_>, free: &[Parameter], gu
                 let weight = eigen.eigenvectors[(row, k)].powi(2);
                 if value > floor {
                     variance += weight / value;
-                } else if weight > 1e-6 {
+                } else if weight > OPEN_SHARE {
                     variance = f64::INFINITY;
                 }
             }

@@ -13,6 +13,11 @@ pub(crate) mod blocks_value {
 pub(crate) mod parameters {
     /// How far a spot's middle and its width are from the bump's, in widths. Assumed: tracks wear as they are used.
     pub(crate) const SHAPE_STD: f64 = 0.3;
+    /// Standard width of a worn spot, rad. Assumed: some three degrees; a narrower one is seen at its middle alone, a
+    /// wider one takes two places.
+    pub(crate) const SPOT_WIDTH_RAD: f64 = 0.05;
+    /// What happens farther from a spot's middle than this, in widths, is about something else.
+    pub(crate) const FAR_WIDTHS: f64 = 3.0;
 }
 
 pub(crate) mod prior {
@@ -21,6 +26,8 @@ pub(crate) mod prior {
 }
 
 pub(crate) mod scales {
+    use armcal_core::robot::MAX_FURTHER_CAMERAS;
+
     /// Correlation length of a sensor's nonlinearity, half ranges. Assumed: four waves over the range are then still
     /// half as likely as one.
     pub const SHAPE_LENGTH: f64 = 0.16;
@@ -30,6 +37,24 @@ pub(crate) mod scales {
     pub(crate) const STEP_STD_RAD: f64 = 0.1;
     /// Height of a worn spot's bump, rad. Assumed: wide, the views tell it.
     pub(crate) const BUMP_STD_RAD: f64 = 0.03;
+    /// Cameras of an arm: the first and all further ones.
+    pub const MAX_CAMERAS: usize = 1 + MAX_FURTHER_CAMERAS;
+    /// A scale over what robot.toml states, as long as the views say nothing else.
+    pub(crate) const AS_STATED: f64 = 1.0;
+    /// Error of a joint whose sensor says nothing, rad. Assumed: wide, the views tell it.
+    pub(crate) const FREE_JOINT_STD_RAD: f64 = 1.0;
+    /// Change of an offset with the oil temperature where no datasheet states it, rad/K. Assumed; the views correct it.
+    pub(crate) const OFFSET_STD_RAD_PER_K: f64 = 3e-4;
+    /// Change of a gain with the oil temperature, 1/K. Assumed; the views correct it.
+    pub(crate) const GAIN_STD_PER_K: f64 = 3e-5;
+    /// Change of an offset with the ambient pressure, rad/MPa. Assumed; the views correct it.
+    pub(crate) const OFFSET_STD_RAD_PER_MPA: f64 = 1e-4;
+    /// Drift of an offset, rad/h. Assumed; the views correct it.
+    pub(crate) const DRIFT_STD_RAD_PER_H: f64 = 1e-3;
+    /// Half of the backlash between joint and sensor shaft, rad. Assumed; the views correct it.
+    pub(crate) const HALF_PLAY_STD_RAD: f64 = 2e-4;
+    /// Of positions and rotations that a recording gives in place of corners, m and rad. Assumed; the views correct it.
+    pub(crate) const POSE_STD: [f64; 2] = [0.005, 0.02];
 }
 
 pub(crate) mod walk_modes {

@@ -4,7 +4,7 @@
 //! `theta_j = center_j + gain_j * travel_j + offset_j` (the paper's equation 2), and the terms of
 //! [`armcal_core::sensor`].
 
-use crate::model::constants::parameters::SHAPE_STD;
+use crate::model::constants::parameters::{FAR_WIDTHS, SHAPE_STD, SPOT_WIDTH_RAD};
 use armcal_core::kinematics::LinkCorrections;
 use armcal_core::robot::{JointSensorSpec, Robot};
 use armcal_core::sensor::{
@@ -215,10 +215,6 @@ pub struct WornSpot {
 }
 
 impl WornSpot {
-    /// Its standard width, rad. Assumed: some three degrees; a narrower one is seen at its middle alone, a wider one
-    /// takes two places.
-    pub const WIDTH_RAD: f64 = 0.05;
-
     /// About `travel_rad` from the middle of the joint's range.
     #[must_use]
     pub fn about(travel_rad: f64) -> Self {
@@ -234,33 +230,33 @@ impl WornSpot {
     /// As high as that.
     #[must_use]
     pub fn bump(self, height_rad: f64) -> Bump {
-        Bump { at_rad: self.at_rad(), width_rad: Self::WIDTH_RAD, height_rad }
+        Bump { at_rad: self.at_rad(), width_rad: SPOT_WIDTH_RAD, height_rad }
     }
 
     /// What a track that is worn otherwise is off at a travel from the middle of the range, one sigma, as a share of
     /// the height: by the bump's slopes along its middle and its width, about a spot half as wide again.
     #[must_use]
     pub fn shape_error_share(self, travel_rad: f64) -> f64 {
-        let widths = (travel_rad - self.at_rad()) / (1.5 * Self::WIDTH_RAD);
+        let widths = (travel_rad - self.at_rad()) / (1.5 * SPOT_WIDTH_RAD);
         SHAPE_STD * widths.abs() * (1.0 + widths * widths).sqrt() * (-0.5 * widths * widths).exp()
     }
 
     /// Whether a travel from the middle of the range is on it.
     #[must_use]
     pub fn is_about(self, travel_rad: f64) -> bool {
-        (travel_rad - self.at_rad()).abs() < Self::WIDTH_RAD
+        (travel_rad - self.at_rad()).abs() < SPOT_WIDTH_RAD
     }
 
     /// Whether a view at a travel from the middle of the range tells of it: more than a tenth of its height.
     #[must_use]
     pub fn is_seen_from(self, travel_rad: f64) -> bool {
-        (travel_rad - self.at_rad()).abs() < 2.0 * Self::WIDTH_RAD
+        (travel_rad - self.at_rad()).abs() < 2.0 * SPOT_WIDTH_RAD
     }
 
     /// Whether what happens at a travel from the middle of the range is about something else.
     #[must_use]
     pub fn is_far_from(self, travel_rad: f64) -> bool {
-        (travel_rad - self.at_rad()).abs() > 3.0 * Self::WIDTH_RAD
+        (travel_rad - self.at_rad()).abs() > FAR_WIDTHS * SPOT_WIDTH_RAD
     }
 }
 

@@ -1,15 +1,16 @@
 //! How large the things are that are not known exactly: standard deviations that the data themselves may tell.
 
-pub use crate::model::constants::scales::SHAPE_LENGTH;
+use crate::model::constants::scales::{
+    AS_STATED, DRIFT_STD_RAD_PER_H, FREE_JOINT_STD_RAD, GAIN_STD_PER_K, HALF_PLAY_STD_RAD, OFFSET_STD_RAD_PER_K,
+    OFFSET_STD_RAD_PER_MPA, POSE_STD,
+};
 pub(crate) use crate::model::constants::scales::{BUMP_STD_RAD, STEP_STD_RAD, TIME_JITTER_STD_S};
+pub use crate::model::constants::scales::{MAX_CAMERAS, SHAPE_LENGTH};
 use crate::model::parameters::ParameterKind;
 use crate::model::walk_modes::mode_std;
 use armcal_core::joints::MAX_JOINTS;
-use armcal_core::robot::{JointSensorSpec, MAX_FURTHER_CAMERAS, Robot};
+use armcal_core::robot::{JointSensorSpec, Robot};
 use armcal_core::sensor::shape_prior;
-
-/// The first and all further ones.
-pub const MAX_CAMERAS: usize = 1 + MAX_FURTHER_CAMERAS;
 
 /// Standard deviations that the data themselves may tell.
 #[derive(Clone, Debug, PartialEq)]
@@ -67,15 +68,16 @@ impl Hyperparameters {
             shape_std_rad[joint] = spec.linearity_std_rad.max(1e-5);
             known_per_k = known_per_k.max(spec.temperature_std_rad_per_k);
         }
+        let [position_std_m, rotation_std_rad] = POSE_STD;
         Self {
             joint_std_rad,
-            free_joint_std_rad: 1.0,
+            free_joint_std_rad: FREE_JOINT_STD_RAD,
             shape_std_rad,
-            offset_std_rad_per_k: if known_per_k > 0.0 { known_per_k } else { 3e-4 },
-            gain_std_per_k: 3e-5,
-            offset_std_rad_per_mpa: 1e-4,
-            drift_std_rad_per_h: 1e-3,
-            half_play_std_rad: 2e-4,
+            offset_std_rad_per_k: if known_per_k > 0.0 { known_per_k } else { OFFSET_STD_RAD_PER_K },
+            gain_std_per_k: GAIN_STD_PER_K,
+            offset_std_rad_per_mpa: OFFSET_STD_RAD_PER_MPA,
+            drift_std_rad_per_h: DRIFT_STD_RAD_PER_H,
+            half_play_std_rad: HALF_PLAY_STD_RAD,
             walk_std_rad: joint_std_rad,
             link_std: [[robot.geometry.link_position_std_m, robot.geometry.link_rotation_std_rad]; MAX_JOINTS],
             compliance_std: [
@@ -83,11 +85,11 @@ impl Hyperparameters {
                 robot.geometry.mount_compliance_std_rad_per_nm,
             ],
             tool_load_std_n: robot.geometry.tool_load_std_n,
-            mount_scale: [[1.0; 2]; MAX_CAMERAS],
-            lens_scale: 1.0,
-            noise: 1.0,
-            position_std_m: 0.005,
-            rotation_std_rad: 0.02,
+            mount_scale: [[AS_STATED; 2]; MAX_CAMERAS],
+            lens_scale: AS_STATED,
+            noise: AS_STATED,
+            position_std_m,
+            rotation_std_rad,
             camera_error_std: None,
             time_jitter_std_s: 0.0,
         }

@@ -86,6 +86,8 @@ pub(crate) mod clearance_sight {
     /// A ray that passes a shape's box or sphere by more than this does not meet the shape, however its distance is
     /// rounded.
     pub(crate) const MISS_M: f64 = 1e-3;
+    /// A ray that comes along an axis of a box by less than this share of its way runs beside it.
+    pub(crate) const BESIDE: f64 = 1e-9;
 }
 
 pub(crate) mod file {
@@ -100,6 +102,11 @@ pub(crate) mod motion_edge {
     /// How much longer than needed an edge may take: what the joints stray by goes with their rates, so that a slower
     /// arm keeps clear where a quick one would not.
     pub(crate) const SLOWNESS: [f64; 5] = [1.0, 1.4, 2.0, 2.8, 4.0];
+    /// The largest of them.
+    pub(crate) const SLOWEST: f64 = {
+        let [.., slowest] = SLOWNESS;
+        slowest
+    };
 }
 
 pub(crate) mod motion_timing {
@@ -157,10 +164,13 @@ pub(crate) mod targets {
     pub(crate) const RANDOM_SEEDS: usize = 24;
     /// A target of the task that none of those leads to is tried so many times more, from draws of its own.
     pub(crate) const SPARE_TRIES: usize = 8;
+    /// Targets are reached to this, m; a joint whose axis passes the tool point as near as this does not move it.
     pub(crate) const IK_TOLERANCE_M: f64 = 1e-6;
 }
 
 pub(crate) mod view_planning_camera_ik {
+    use armcal_core::numeric::Damping;
+
     /// Most steps of the inverse kinematics of the camera.
     pub(crate) const STEPS: usize = 12;
     /// Longest step of a joint, rad.
@@ -170,6 +180,9 @@ pub(crate) mod view_planning_camera_ik {
     pub(crate) const RANGES_M: [f64; 2] = [0.35, 1.5];
     /// How far the optical axis may point beside the tag, rad.
     pub(crate) const BESIDE_RAD: f64 = 0.6;
+    /// Added to the normal matrix, m^2/rad^2.
+    pub(crate) const DAMPING: Damping =
+        Damping { first: 1e-2, min: 1e-6, max: f64::INFINITY, down: 0.3, up: 8.0, min_after_rejection: 0.0 };
 }
 
 pub(crate) mod view_planning_candidates {
@@ -192,6 +205,13 @@ pub(crate) mod view_planning_candidates {
     pub(crate) const R8: f64 = 1.085_070_245_491_45;
 }
 
+pub(crate) mod view_planning_criterion {
+    use armcal_core::streams::MAX_JOINTS;
+
+    /// Gains and offsets of the joints before the camera.
+    pub(crate) const MAX_LINEAR: usize = 2 * MAX_JOINTS;
+}
+
 pub(crate) mod view_planning_forecast {
     /// What the joints at the edges of their reachable ranges count beside the task. Assumed: little, so that the task
     /// decides.
@@ -203,10 +223,14 @@ pub(crate) mod view_planning_forecast {
 }
 
 pub(crate) mod view_planning_parameter_prior {
+    use armcal_core::sensor::N_SHAPE;
+
     /// Camera mount and survey.
     pub(crate) const N_COMMON: usize = 12;
     /// One sigma of what nobody knows at all: m and rad. Assumed; larger than any arm's site.
     pub(crate) const UNKNOWN_STD: f64 = 3.0;
+    /// Parameters of one joint: gain, offset, nonlinearity.
+    pub(crate) const WIDTH: usize = 2 + N_SHAPE;
 }
 
 pub(crate) mod view_planning_pool {
@@ -250,4 +274,11 @@ pub(crate) mod view_planning_visit_order {
 pub(crate) mod visibility {
     /// Left out before a tag's corner, where its own plate is, m.
     pub(crate) const SIGHT_END_M: f64 = 0.01;
+    /// Nearest and farthest tags that are read, m. A 0.15 m tag 2 m away spans 29 px: below that corners suffer.
+    pub(crate) const RANGE_M: [f64; 2] = [0.25, 2.0];
+    /// Between a tag's normal and the line to the camera, rad. Beyond 65 deg it is foreshortened to 0.4.
+    pub(crate) const MAX_INCIDENCE_RAD: f64 = 1.13;
+    /// Kept free at the edge of the lens's field of view, rad, and at the border of the image, px. Assumed.
+    pub(crate) const EDGE_RAD: f64 = 0.1;
+    pub(crate) const BORDER_PX: f64 = 12.0;
 }

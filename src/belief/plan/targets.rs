@@ -179,5 +179,5 @@ fn random_seed(robot: &Robot, settings: &IkSettings, rng: &mut ChaCha8Rng) -> Jo
 fn on_tool_axis(robot: &Robot) -> bool {
     let last = &robot.chain.joints()[robot.tool.mount.n_joints - 1];
     let point = robot.tool.mount.link_from_frame.translation.vector;
-    last.axis.cross(&point).norm() < 1e-6
+    last.axis.cross(&point).norm() < IK_TOLERANCE_M
 }

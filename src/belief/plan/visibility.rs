@@ -1,6 +1,6 @@
 //! Which tags a pose is expected to see.
 
-use crate::plan::constants::visibility::SIGHT_END_M;
+use crate::plan::constants::visibility::{BORDER_PX, EDGE_RAD, MAX_INCIDENCE_RAD, RANGE_M, SIGHT_END_M};
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::plan::clearance::ClearanceModel;
@@ -31,9 +31,17 @@ impl Default for VisibilityModel {
 }
 
 impl VisibilityModel {
-    /// A 0.15 m tag 2 m away spans 29 px: below that corners suffer. Beyond 65 deg it is foreshortened to 0.4.
-    pub const USUAL: Self =
-        Self { max_range_m: 2.0, min_range_m: 0.25, max_incidence_rad: 1.13, edge_rad: 0.1, border_px: 12.0 };
+    /// Of a usual detector and a usual image.
+    pub const USUAL: Self = {
+        let [min_range_m, max_range_m] = RANGE_M;
+        Self {
+            max_range_m,
+            min_range_m,
+            max_incidence_rad: MAX_INCIDENCE_RAD,
+            edge_rad: EDGE_RAD,
+            border_px: BORDER_PX,
+        }
+    };
 
     /// Indices of the surveyed tags that `robot` at `angles` sees, occlusion not yet considered.
     pub fn in_view<'a>(&'a self, robot: &'a Robot, poses: &LinkPoses) -> impl Iterator<Item = usize> + use<'a> {

@@ -1,8 +1,18 @@
 //! Constants that decide something in `say`: unit, source and effect of each, by the file that uses it.
 
+pub(crate) mod reading_error {
+    /// Real part of a unit quaternion from which on it turns nothing: less than 0.2 deg is rounding.
+    pub(crate) const UNTURNED: f64 = 1.0 - 1e-6;
+}
+
 pub(crate) mod refusal {
     /// A smaller share of used observations means that the views fit nothing near the prior.
     pub(crate) const MIN_USED_SHARE: f64 = 0.6;
+}
+
+pub(crate) mod refusal_words {
+    /// Probabilities in percent and slopes below this are said with more digits.
+    pub(crate) const MORE_DIGITS_BELOW: f64 = 0.1;
 }
 
 pub(crate) mod repair {

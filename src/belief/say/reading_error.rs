@@ -5,6 +5,7 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::say::constants::reading_error::UNTURNED;
 use crate::say::wrong_input_words::turn_in_words;
 use armcal_core::codes::{Code, Coded};
 use armcal_core::kinematics::JointKind;
@@ -142,7 +143,7 @@ impl fmt::Display for ReadingError {
 }
 
 fn is_turned(turn: &[f64; 4]) -> bool {
-    turn[0].abs() < 1.0 - 1e-6
+    turn[0].abs() < UNTURNED
 }
 
 impl fmt::Display for MisreadReadings {

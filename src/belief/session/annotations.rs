@@ -1,12 +1,9 @@
 //! The tags found in an image, as marks on it for viewers.
 
-use crate::session::constants::annotations::LINE_LOOP;
-use armcal_core::log::ros::{Color, ImageAnnotations, PixelPoint, PointsAnnotation, TextAnnotation, Time};
+use crate::session::constants::annotations::{LINE_LOOP, OUTLINE};
+use armcal_core::log::ros::{ImageAnnotations, PixelPoint, PointsAnnotation, TextAnnotation, Time};
 use armcal_core::streams::{Message, TagDetection, TagDetections};
 use armcal_core::time::Stamp;
-
-const OUTLINE: Color = Color { r: 0.1, g: 0.9, b: 0.3, a: 1.0 };
-const NOTHING: Color = Color { r: 0.0, g: 0.0, b: 0.0, a: 0.0 };
 
 /// Brings an image and its detections together, whichever comes first.
 #[derive(Default)]
@@ -54,7 +51,6 @@ fn name(timestamp: Time, tag: &TagDetection) -> TextAnnotation {
         text: tag.id.to_string(),
         font_size: 18.0,
         text_color: OUTLINE,
-        background_color: NOTHING,
         ..TextAnnotation::default()
     }
 }

@@ -1,7 +1,7 @@
 //! An operator's word before each motion.
 
 use crate::plan::Path;
-use crate::session::constants::approval::HOLD_S;
+use crate::session::constants::approval::{HOLD_S, TOLD_RAD};
 use crate::session::motion::Driver;
 use crate::session::{Approval, MotionAhead, SessionError};
 use armcal_core::streams::LogLevel;
@@ -35,7 +35,7 @@ impl Driver<'_> {
 impl std::fmt::Display for MotionAhead {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let moved = self.joints.iter().zip(self.from.iter().zip(self.to.iter()));
-        let moved = moved.filter(|(_, (from, to))| (*to - *from).abs() > 5e-4);
+        let moved = moved.filter(|(_, (from, to))| (*to - *from).abs() > TOLD_RAD);
         let words: Vec<String> = moved
             .map(|(joint, (from, to))| format!("{joint} {:.1} to {:.1} deg", from.to_degrees(), to.to_degrees()))
             .collect();

@@ -1,13 +1,19 @@
 //! Constants that decide something in `session`: unit, source and effect of each, by the file that uses it.
 
 pub(crate) mod annotations {
+    use armcal_core::log::ros::Color;
+
     /// A closed line.
     pub(crate) const LINE_LOOP: u8 = 2;
+    /// Colour of a found tag's outline and number; shares of red, green, blue and opacity.
+    pub(crate) const OUTLINE: Color = Color { r: 0.1, g: 0.9, b: 0.3, a: 1.0 };
 }
 
 pub(crate) mod approval {
     /// How long a held arm waits before it asks again, s.
     pub(crate) const HOLD_S: f64 = 5.0;
+    /// An operator is told of the joints that move by more, rad: less is nothing at the digits that are told.
+    pub(crate) const TOLD_RAD: f64 = 5e-4;
 }
 
 pub(crate) mod capture {
@@ -71,9 +77,12 @@ pub(crate) mod following {
     pub(crate) const FLICKERS: u32 = 30;
     /// Suspected contacts of a joint that has not moved, after which it is probed.
     pub(crate) const SUSPECTED: u32 = 2;
-    /// A joint that has not moved while its set-point went so far, and three times as far as noise does, is locked,
-    /// rad.
+    /// A joint that has not moved while its set-point went so far, rad, and so many times as far as noise does, is
+    /// locked.
     pub(crate) const DECISIVE_RAD: f64 = 0.1;
+    pub(crate) const DECISIVE_OVER_NOISE: f64 = 3.0;
+    /// A set-point that changes by less in a period stands, counts.
+    pub(crate) const SET_STANDS_COUNTS: f64 = 1e-6;
 }
 
 pub(crate) mod grip {
@@ -123,6 +132,8 @@ pub(crate) mod scale_identification {
     pub(crate) const SIGMAS: f64 = 3.0;
     /// An excursion that is not clear is tried again at this share of its size.
     pub(crate) const SHRINK: f64 = 0.75;
+    /// An excursion of no more than this share of its wanted size tells no scale.
+    pub(crate) const LEAST_SHARE: f64 = 0.1;
 }
 
 pub(crate) mod script {

@@ -7,7 +7,8 @@
 //! set-point that has gone far: at the third the joint is probed, and the contact not obeyed until it moves or has not.
 
 use crate::session::constants::following::{
-    DECISIVE_RAD, FLICKERS, LEAPT_S, LEFT_RAD, NOISE_SIGMAS, NOISY_COUNTS, REACHABLE, REST_S, SAME_S, SUSPECTED,
+    DECISIVE_OVER_NOISE, DECISIVE_RAD, FLICKERS, LEAPT_S, LEFT_RAD, NOISE_SIGMAS, NOISY_COUNTS, REACHABLE, REST_S,
+    SAME_S, SET_STANDS_COUNTS, SUSPECTED,
 };
 use crate::session::constants::settling::NEAR_RAD;
 use armcal_core::robot::{FailedKind, Robot};
@@ -112,7 +113,8 @@ impl JointFollow {
     fn is_locked(&self) -> bool {
         let gone_counts =
             self.last.map_or(0.0, |(set, _)| wrap_symmetric(set - self.set_at_rest, self.wrap_counts).abs());
-        self.has_rested && gone_counts > (DECISIVE_RAD * self.counts_per_rad).max(3.0 * self.rest_counts)
+        self.has_rested
+            && gone_counts > (DECISIVE_RAD * self.counts_per_rad).max(DECISIVE_OVER_NOISE * self.rest_counts)
     }
 
     fn update(&mut self, set: f64, word: f64, period_s: f64) -> Option<FailedKind> {
@@ -124,7 +126,7 @@ impl JointFollow {
         let (off_counts, leap_counts) = (apart(set, word), apart(word, last_word));
         let left_counts = apart(set, self.set_at_same);
         let (moved_counts, near_counts) = (apart(word, self.anchor), NEAR_RAD * self.counts_per_rad);
-        let set_stands = apart(set, last_set) < 1e-6;
+        let set_stands = apart(set, last_set) < SET_STANDS_COUNTS;
         (self.same_s, self.set_at_same) =
             if word == last_word { (self.same_s + period_s, self.set_at_same) } else { (0.0, set) };
         self.set_still_s = if set_stands { self.set_still_s + period_s } else { 0.0 };

@@ -3,7 +3,7 @@
 
 use crate::plan::{JointErrorBounds, Path, UnknownScale};
 use crate::session::SessionError;
-use crate::session::constants::scale_identification::{DWELL_S, LOCAL_SLOPE, SHRINK, SIGMAS};
+use crate::session::constants::scale_identification::{DWELL_S, LEAST_SHARE, LOCAL_SLOPE, SHRINK, SIGMAS};
 use crate::session::motion::MotionOutcome;
 use crate::session::runner::ScriptRunner;
 use crate::views::association::associate;
@@ -64,7 +64,7 @@ impl ScriptRunner<'_, '_> {
         let at = self.driver.set_point();
         let mut excursion_rad = wanted_rad;
         let mut nearest = String::new();
-        while excursion_rad > 0.1 * wanted_rad {
+        while excursion_rad > LEAST_SHARE * wanted_rad {
             // The error box at the end of the excursion holds every angle that the joint may pass on the way.
             let end = JointAngles::from_fn(at.len(), |j| {
                 if j == unknown.joint { unknown.rest_rad + excursion_rad } else { at[j] }

@@ -15,6 +15,8 @@ pub(crate) mod estimate {
     pub(crate) const MAX_ROUNDS: usize = 40;
     /// Change of the scales in a round below which they have settled.
     pub(crate) const CONVERGED_CHANGE: f64 = 0.01;
+    /// Rounds after the last new scales, in which outliers may still come and go.
+    pub(crate) const LAST_ROUNDS: usize = 5;
 }
 
 pub(crate) mod evidence {
@@ -36,6 +38,8 @@ pub(crate) mod evidence {
 }
 
 pub(crate) mod levenberg_marquardt {
+    use armcal_core::numeric::{Damping, StopRule};
+
     /// Near the end a step may cost a few last digits; relative error of a sum of thousands of squares.
     pub(crate) const SLACK: f64 = 1e-13;
     pub(crate) const ROUNDING: f64 = 1e-11;
@@ -46,22 +50,62 @@ pub(crate) mod levenberg_marquardt {
     pub(crate) const OVERSHOT: f64 = 1.5;
     /// Cosine of the angle between two steps, the second of which goes back along the first.
     pub(crate) const GOES_BACK: f64 = -0.9;
+    /// A step that should gain less, relative, tells nothing of the curvature: the gain is in the last digits of the
+    /// sum.
+    pub(crate) const TELLING_GAIN: f64 = 1e2 * ROUNDING;
+    /// Of the normal equations' diagonal, relative.
+    pub(crate) const DAMPING: Damping =
+        Damping { first: 1e-6, min: 1e-14, max: 1e12, down: 0.1, up: 10.0, min_after_rejection: 0.0 };
+    /// Until one more step would save nothing that a sum of squares could show.
+    pub(crate) const TIGHT: StopRule =
+        StopRule { predicted_gain: 1e-15, slack: SLACK, rounding: ROUNDING, ..StopRule::after(100) };
+    /// While scales or weights still change.
+    pub(crate) const LOOSE: StopRule = StopRule { max_iterations: 20, predicted_gain: 1e-6, ..TIGHT };
 }
 
 pub(crate) mod model_for_views {
     /// Fewer views of the tag on the gripper are not used.
     pub const MIN_GRIPPER_VIEWS: usize = 4;
+    /// Changes of the oil's temperature, K, and of the pressure, Pa (20 m of water), over the views from which on they
+    /// tell of their effects. Assumed.
+    pub(crate) const WARMED_K: f64 = 0.5;
+    pub(crate) const DIVED_PA: f64 = 2e5;
+}
+
+pub(crate) mod outliers {
+    /// Chi-square per coordinate above which an observation belongs elsewhere, and below which it belongs here.
+    pub(crate) const LIMITS: [f64; 2] = [7.5, 5.0];
+    /// Chi-square of a corner: that one of four normal corners is beyond these is as likely (5e-10, 3e-6) as that an
+    /// observation with eight coordinates is beyond its own, `4 exp(-x / 2) = P(chi-square of 8 > 60, 40)`.
+    pub(crate) const CORNER_LIMITS: [f64; 2] = [45.7, 28.1];
+    /// A tag of which fewer corners belong is elsewhere, or another one.
+    pub(crate) const MIN_CORNERS: usize = 3;
 }
 
 pub(crate) mod problem {
+    use armcal_core::joints::MAX_JOINTS;
+
     /// Degrees of freedom that the corner noise by robot.toml counts for, beside the scatter between a view's frames.
     pub(crate) const CORNER_PRIOR_DOF: f64 = 16.0;
+    /// A view's own parameters: an error of each joint, then the camera's six.
+    pub(crate) const N_VIEW_PARAMETERS: usize = MAX_JOINTS + 6;
 }
 
 pub(crate) mod robust_start {
     /// Standard deviations of the tags' positions in the robust start, one after the other, m.
     pub(crate) const START_STD_M: [f64; 3] = [0.3, 0.1, 0.03];
     pub(crate) const START_WIDTH: f64 = 1.0;
+}
+
+pub(crate) mod schur {
+    use armcal_core::joints::MAX_JOINTS;
+
+    /// Directions of the common parameters: each joint, the mount's six, time offset.
+    pub(crate) const MOUNT: usize = MAX_JOINTS;
+    pub(crate) const TIME: usize = MOUNT + 6;
+    pub(crate) const N_DIRECTIONS: usize = TIME + 1;
+    /// Columns of all links that an arm may have, of their compliances, the base's and a load at the tool.
+    pub(crate) const N_BODY_COLUMNS: usize = 7 * MAX_JOINTS + 4;
 }
 
 pub(crate) mod time_error {

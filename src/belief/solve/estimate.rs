@@ -2,7 +2,7 @@
 //! least squares.
 
 use crate::measure::BlockMeasurement;
-use crate::solve::constants::estimate::{CONSISTENT_COST, CONVERGED_CHANGE, CORNER_WIDTH, MAX_ROUNDS};
+use crate::solve::constants::estimate::{CONSISTENT_COST, CONVERGED_CHANGE, CORNER_WIDTH, LAST_ROUNDS, MAX_ROUNDS};
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Vector6};
 
 use crate::measure::{ObservationTerm, WeightedMeasurement};
@@ -11,10 +11,11 @@ use crate::model::estimated::Model;
 use crate::model::parameters::{JointParameters, Parameter};
 use crate::model::scales::Hyperparameters;
 use crate::model::state::State;
+use crate::solve::constants::levenberg_marquardt::{LOOSE, TIGHT};
 use crate::solve::details::FitDetails;
 use crate::solve::evidence::{Marginal, Posterior, ScaleTarget, change, updated};
 use crate::solve::input::{BundleInput, HyperparameterMode};
-use crate::solve::levenberg_marquardt::{LOOSE, Solved, TIGHT, solve, until};
+use crate::solve::levenberg_marquardt::{Solved, solve, until};
 use crate::solve::outliers::{Outlier, outliers, reject};
 use crate::solve::problem::{BundleProblem, parameters_of};
 use crate::solve::robust_start::{RobustStart, robust_start, straight_sensor_std};
@@ -91,7 +92,7 @@ pub(crate) fn estimate_with_lengths<'a>(input: &BundleInput<'a>, lengths: &[Bloc
             }
         }
         round += 1;
-        if (settled && round > 1) || round > MAX_ROUNDS + 5 {
+        if (settled && round > 1) || round > MAX_ROUNDS + LAST_ROUNDS {
             break;
         }
     }

@@ -4,7 +4,7 @@
 //! its steps overshoot to and fro along one direction, each by the same share. So what a step gained tells the
 //! curvature along it, and the next step is as much shorter, if it only goes back (the secant's rule along a line).
 
-use crate::solve::constants::levenberg_marquardt::{COST_AT_PRIORS, GOES_BACK, OVERSHOT, ROUNDING, SLACK};
+use crate::solve::constants::levenberg_marquardt::{COST_AT_PRIORS, DAMPING, GOES_BACK, OVERSHOT, TELLING_GAIN, TIGHT};
 use nalgebra::{Cholesky, DMatrix, DVector, Vector6};
 
 use crate::model::state::State;
@@ -12,18 +12,12 @@ use crate::solve::linearize::NormalEquations;
 use crate::solve::problem::BundleProblem;
 use crate::solve::schur::SchurBlock;
 use armcal_core::joints::MAX_JOINTS;
-use armcal_core::numeric::{Damping, LeastSquares, Loss, Outcome, Proposal, StopRule, minimize};
+use armcal_core::numeric::{LeastSquares, Loss, Outcome, Proposal, StopRule, minimize};
 use armcal_core::spatial::exp;
-
-const DAMPING: Damping = Damping { first: 1e-6, min: 1e-14, max: 1e12, down: 0.1, up: 10.0, min_after_rejection: 0.0 };
-
-pub(crate) const TIGHT: StopRule = until(100, 1e-15);
-/// While scales or weights still change.
-pub(crate) const LOOSE: StopRule = until(20, 1e-6);
 
 /// Until one more step would save less than `predicted_gain` of the cost.
 pub(crate) const fn until(max_iterations: usize, predicted_gain: f64) -> StopRule {
-    StopRule { predicted_gain, slack: SLACK, rounding: ROUNDING, ..StopRule::after(max_iterations) }
+    StopRule { max_iterations, predicted_gain, ..TIGHT }
 }
 
 /// The state at the end, its normal equations, and how it went.
@@ -99,7 +93,7 @@ impl LeastSquares for Solver<'_, '_> {
         // The gain of a share s of a step that should save P, under the curvature c: (2 s - s^2 c) P.
         let (share, gain) = (self.share, self.normal.cost - self.trial_normal.cost);
         // A gain of the sum's last digits tells nothing.
-        if self.predicted_gain > 1e2 * ROUNDING * self.normal.cost {
+        if self.predicted_gain > TELLING_GAIN * self.normal.cost {
             self.last.curvature = (2.0 * share - gain / self.predicted_gain) / (share * share);
         }
         self.last.square = share * self.step.dot(&self.normal.right);

@@ -4,6 +4,7 @@ use crate::model::blocks::{Block, Shown};
 use crate::model::estimated::Model;
 use crate::model::parameters::ParameterKind;
 pub use crate::solve::constants::model_for_views::MIN_GRIPPER_VIEWS;
+use crate::solve::constants::model_for_views::{DIVED_PA, WARMED_K};
 use crate::views::view::View;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::{Conditions, N_SHAPE};
@@ -21,8 +22,8 @@ pub fn model_for(robot: &Robot, views: &[View]) -> Model {
         let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
         if high > low { high - low } else { 0.0 }
     };
-    let warmed = spread(&|c| c.oil_c) > 0.5;
-    let dived = spread(&|c| c.pressure_pa) > 2e5;
+    let warmed = spread(&|c| c.oil_c) > WARMED_K;
+    let dived = spread(&|c| c.pressure_pa) > DIVED_PA;
     let gripper_tag = views.iter().filter(|view| view.gripper_tag.is_some()).count() >= MIN_GRIPPER_VIEWS;
     let from_both_sides =
         |joint: usize| [-1.0, 1.0].iter().all(|side| views.iter().any(|v| v.approach[joint] == *side));

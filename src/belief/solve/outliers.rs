@@ -5,6 +5,7 @@
 //! such corners, or chi-square of all without any, are a tag that is elsewhere or another one: all four go.
 
 use crate::measure::{ObservationTerm, WeightedMeasurement};
+use crate::solve::constants::outliers::{CORNER_LIMITS, LIMITS, MIN_CORNERS};
 use crate::solve::levenberg_marquardt::Solved;
 use crate::solve::linearize::NormalEquations;
 use crate::solve::problem::BundleProblem;
@@ -23,23 +24,9 @@ pub struct Outlier {
     pub sigmas: f64,
 }
 
-/// Chi-square per coordinate above which an observation belongs elsewhere, and below which it belongs here.
-const LIMITS: Limits = Limits { reject: 7.5, readmit: 5.0 };
-/// Chi-square of a corner: that one of four normal corners is beyond these is as likely (5e-10, 3e-6) as that an
-/// observation with eight coordinates is beyond its own, `4 exp(-x / 2) = P(chi-square of 8 > 60, 40)`.
-const CORNER_LIMITS: Limits = Limits { reject: 45.7, readmit: 28.1 };
-
-/// What is rejected beyond the one comes back below the other.
-struct Limits {
-    reject: f64,
-    readmit: f64,
-}
-
-impl Limits {
-    /// Of each by whether it was used so far.
-    fn of<const N: usize>(&self, used: [bool; N]) -> [f64; N] {
-        used.map(|is_used| if is_used { self.reject } else { self.readmit })
-    }
+/// What is rejected beyond the one comes back below the other: the limit of each by whether it was used so far.
+fn limits_of<const N: usize>(used: [bool; N], [reject, readmit]: [f64; 2]) -> [f64; N] {
+    used.map(|is_used| if is_used { reject } else { readmit })
 }
 
 /// Marks what does not belong; whether anything changed.
@@ -57,7 +44,7 @@ pub(crate) fn reject_by(problem: &mut BundleProblem<'_>, normal: &NormalEquation
             _ => {
                 let n = observation.data.n_coordinates() as f64;
                 let excess = noise_excess(&observation.data);
-                LIMITS.of(before).map(|limit| normal.chi2[at] < limit * n * excess)
+                limits_of(before, LIMITS).map(|limit| normal.chi2[at] < limit * n * excess)
             }
         };
         changed |= used != before;
@@ -68,12 +55,12 @@ pub(crate) fn reject_by(problem: &mut BundleProblem<'_>, normal: &NormalEquation
 
 /// The corners that belong: all, three, or none.
 fn fitting_corners(before: [bool; 4], chi2: &[f64; 4]) -> [bool; 4] {
-    let limits = CORNER_LIMITS.of(before);
+    let limits = limits_of(before, CORNER_LIMITS);
     let used = [0, 1, 2, 3].map(|corner| chi2[corner] < limits[corner]);
     let n = used.iter().filter(|is_used| **is_used).count();
     let sum: f64 = chi2.iter().zip(used).filter(|(_, is_used)| *is_used).map(|(chi2, _)| chi2).sum();
-    let [limit] = LIMITS.of([before.contains(&true)]);
-    if n >= 3 && sum < limit * 2.0 * n as f64 { used } else { [false; 4] }
+    let [limit] = limits_of([before.contains(&true)], LIMITS);
+    if n >= MIN_CORNERS && sum < limit * 2.0 * n as f64 { used } else { [false; 4] }
 }
 
 /// What is rejected of an observation.
@@ -85,12 +72,13 @@ pub(crate) struct Rejected {
 
 pub(crate) fn rejected(observation: &ObservationTerm) -> Rejected {
     let data = &observation.data;
+    let ([limit, _], [corner_limit, _]) = (LIMITS, CORNER_LIMITS);
     if !observation.is_used {
         let n_coordinates = data.n_coordinates();
-        return Rejected { n_coordinates, chi2: LIMITS.reject * n_coordinates as f64 * noise_excess(data) };
+        return Rejected { n_coordinates, chi2: limit * n_coordinates as f64 * noise_excess(data) };
     }
     let n_corners = observation.used().iter().filter(|is_used| !**is_used).count();
-    Rejected { n_coordinates: 2 * n_corners, chi2: CORNER_LIMITS.reject * n_corners as f64 }
+    Rejected { n_coordinates: 2 * n_corners, chi2: corner_limit * n_corners as f64 }
 }
 
 /// Positions and poses come with a standard deviation that is a guess until the scales are fitted.

@@ -1,6 +1,7 @@
 //! What is solved: views and observations in the form that the loops want, with columns and priors.
 
 use crate::solve::constants::problem::CORNER_PRIOR_DOF;
+pub(crate) use crate::solve::constants::problem::N_VIEW_PARAMETERS;
 use std::ops::Range;
 
 use nalgebra::{DVector, Isometry3, SMatrix, Vector3};
@@ -61,8 +62,6 @@ pub(crate) struct BundleProblem<'a> {
     pub n_seen_joints: usize,
 }
 
-/// A view's own parameters: an error of each joint, then the camera's six.
-pub(crate) const N_VIEW_PARAMETERS: usize = MAX_JOINTS + 6;
 /// Of a view's own parameters by one another.
 pub(crate) type Own = SMatrix<f64, N_VIEW_PARAMETERS, N_VIEW_PARAMETERS>;
 

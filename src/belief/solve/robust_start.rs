@@ -3,9 +3,10 @@
 use crate::model::estimated::Model;
 use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::model::scales::Hyperparameters;
+use crate::solve::constants::levenberg_marquardt::LOOSE;
 use crate::solve::constants::robust_start::{START_STD_M, START_WIDTH};
 use crate::solve::input::BundleInput;
-use crate::solve::levenberg_marquardt::{LOOSE, solve};
+use crate::solve::levenberg_marquardt::solve;
 use crate::solve::problem::{BundleProblem, parameters_of};
 use crate::views::view::TagMeasurement;
 use armcal_core::joints::MAX_JOINTS;

@@ -7,21 +7,15 @@ use nalgebra::{Const, DMatrix, DVector, Isometry3, Matrix6, Matrix6xX, SMatrix, 
 use crate::model::blocks::Block;
 use crate::model::layout::Layout;
 use crate::model::state::State;
+pub(crate) use crate::solve::constants::schur::{MOUNT, N_BODY_COLUMNS, N_DIRECTIONS, TIME};
 use crate::solve::problem::{BundleProblem, N_VIEW_PARAMETERS, Own, ViewData};
 use crate::solve::time_error::TimeError;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::kinematics::LinkPoses;
 use armcal_core::spatial::adjoint;
 
-/// Directions of the common parameters: each joint, mount, time offset.
-pub(crate) const N_DIRECTIONS: usize = MAX_JOINTS + 7;
-pub(crate) const MOUNT: usize = MAX_JOINTS;
-pub(crate) const TIME: usize = MAX_JOINTS + 6;
-
 pub(crate) type Directions = SMatrix<f64, 6, N_DIRECTIONS>;
 
-/// Columns of all links that an arm may have, of their compliances, the base's and a load at the tool.
-pub(crate) const N_BODY_COLUMNS: usize = 7 * MAX_JOINTS + 4;
 /// Twists of the camera (right, camera frame) by each column of links and sag, in the order of [`Layout::body`].
 pub(crate) type BodyTwists = SMatrix<f64, 6, N_BODY_COLUMNS>;
 

@@ -6,18 +6,16 @@
 
 pub(super) use crate::tagmap::constants::adjust::MAX_STEPS;
 use crate::tagmap::constants::adjust::{
-    AT_REST, CAUCHY_WIDTH, CONVERGED, FIRST_WIDTH, HUBER_WIDTH, MAX_ITERATIONS, MEDIAN_OF_LENGTH, ROUGHLY, ROUNDING,
-    SCALE_BOUNDS,
+    AT_REST, CAUCHY_WIDTH, CONVERGED, DAMPING, FIRST_WIDTH, HUBER_WIDTH, MAX_ITERATIONS, MEDIAN_OF_LENGTH, ROUGHLY,
+    ROUNDING, SCALE_BOUNDS,
 };
 use nalgebra::{Isometry3, Vector6};
 
 use crate::tagmap::linearize::{cost, squares};
 use crate::tagmap::normal_equations::{NormalEquations, Reduced};
 use crate::tagmap::problem::{Block, MapProblem};
-use armcal_core::numeric::{self, Damping, LeastSquares, Loss, Outcome, Proposal, Stop, StopRule};
+use armcal_core::numeric::{self, LeastSquares, Loss, Outcome, Proposal, Stop, StopRule};
 use armcal_core::spatial::exp;
-
-const DAMPING: Damping = Damping { first: 1e-6, min: 1e-12, max: 1e12, down: 0.1, up: 10.0, min_after_rejection: 1e-6 };
 
 /// Lowers the cost from the state of `problem` on; whether it came to rest.
 pub(super) fn minimize(problem: &mut MapProblem<'_>, loss: Loss, converged: f64) -> bool {

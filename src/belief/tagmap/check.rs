@@ -4,10 +4,8 @@ use std::collections::BTreeSet;
 
 use armcal_core::robot::MAX_TAGS;
 
+pub(super) use crate::tagmap::constants::check::SIZE_RANGE_M;
 use crate::tagmap::types::{MapInput, MapSettings, TagMapError};
-
-/// Sizes of tags, m.
-pub(super) const SIZE_RANGE_M: std::ops::RangeInclusive<f64> = 1e-3..=10.0;
 
 pub(super) fn check(input: &MapInput<'_>, settings: &MapSettings) -> Result<(), TagMapError> {
     let positive = [

@@ -1,6 +1,8 @@
 //! Constants that decide something in `tagmap`: unit, source and effect of each, by the file that uses it.
 
 pub(crate) mod adjust {
+    use armcal_core::numeric::Damping;
+
     /// Width of the Cauchy loss, in standard deviations found (Zhang 1997: 2.385 costs 5 % of efficiency; it is the
     /// start alone).
     pub(crate) const CAUCHY_WIDTH: f64 = 2.385;
@@ -27,11 +29,19 @@ pub(crate) mod adjust {
     pub(crate) const ROUGHLY: f64 = 1e-3;
     /// Below this share of the cost it is rounding, not the model, that stands in the way.
     pub(crate) const ROUNDING: f64 = 1e-12;
+    /// Of the normal equations' diagonal, relative.
+    pub(crate) const DAMPING: Damping =
+        Damping { first: 1e-6, min: 1e-12, max: 1e12, down: 0.1, up: 10.0, min_after_rejection: 1e-6 };
 }
 
 pub(crate) mod assemble {
     /// Chi-square of 6 degrees of freedom, 99.99 %.
     pub(crate) const FAR_FROM_KNOWN: f64 = 27.86;
+}
+
+pub(crate) mod check {
+    /// Sizes of tags, m. Assumed: others are in another unit.
+    pub(crate) const SIZE_RANGE_M: std::ops::RangeInclusive<f64> = 1e-3..=10.0;
 }
 
 pub(crate) mod files_landmark {
@@ -65,9 +75,14 @@ pub(crate) mod linearize {
 }
 
 pub(crate) mod localize {
+    use armcal_core::numeric::Damping;
+
     /// Width of the Cauchy loss by which starts are compared, px: a start is a few pixels off, a wrong one tens.
     pub(crate) const COMPARE_PX: f64 = 5.0;
     pub(crate) const MAX_IMAGES: usize = 40;
+    /// Undamped: a few steps make a start for the adjustment, and one that does not help ends them.
+    pub(crate) const UNDAMPED: Damping =
+        Damping { first: 0.0, min: 0.0, max: 0.0, down: 0.0, up: 0.0, min_after_rejection: 1.0 };
 }
 
 pub(crate) mod normal_equations {
@@ -79,6 +94,8 @@ pub(crate) mod normal_equations {
 pub(crate) mod recording {
     /// Longest gap between attitudes that is bridged, s.
     pub(crate) const MAX_GAP_S: f64 = 0.2;
+    /// A quaternion whose length is off by more is no attitude. Assumed.
+    pub(crate) const UNIT_TOLERANCE: f64 = 0.01;
 }
 
 pub(crate) mod scale {
@@ -90,6 +107,10 @@ pub(crate) mod scale {
     pub(crate) const EXPLAINS: f64 = 0.5;
     pub(crate) const MAX_SAMPLES: usize = 400;
     pub(crate) const MAX_ROOTS: usize = 60;
+    /// A tag whose place is less sure than this share of its size tells no distance.
+    pub(crate) const SURE_SHARE: f64 = 0.25;
+    /// Tags nearer to each other are at one place and tell no scale, m.
+    pub(crate) const ONE_PLACE_M: f64 = 1e-6;
 }
 
 pub(crate) mod solve {
@@ -97,6 +118,8 @@ pub(crate) mod solve {
     pub(crate) const MAX_ROUNDS: usize = 8;
     /// A pose found anew replaces one that fits worse by this factor.
     pub(crate) const MUCH_WORSE: f64 = 1.25;
+    /// Residuals with fewer degrees of freedom tell no noise: the corners' is as given.
+    pub(crate) const MIN_FREEDOM: usize = 8;
 }
 
 pub(crate) mod tag_mapping {
@@ -108,6 +131,17 @@ pub(crate) mod tag_mapping {
 pub(crate) mod tag_pairs {
     /// The least share of a pair's images that must agree.
     pub(crate) const MIN_SHARE: f64 = 0.3;
+}
+
+pub(crate) mod types {
+    /// Of a corner in each direction, where neither detections nor settings say it, px. Assumed.
+    pub(crate) const CORNER_STD_PX: f64 = 0.3;
+    /// Detections whose corners are farther off than this many standard deviations (rms) are rejected. Assumed.
+    pub(crate) const REJECT_SIGMAS: f64 = 5.0;
+    /// Images in which two groups of tags must be seen together to become one. Assumed.
+    pub(crate) const MIN_LINK_VIEWS: usize = 2;
+    /// Of an attitude where the settings do not say it, rad. Assumed.
+    pub(crate) const ATTITUDE_STD_RAD: f64 = 0.01;
 }
 
 pub(crate) mod vote {

@@ -1,12 +1,12 @@
 //! Where the camera was, by the tags of one image whose places are known; and the same for a tag by its images.
 
-use crate::tagmap::constants::localize::{COMPARE_PX, MAX_IMAGES};
+use crate::tagmap::constants::localize::{COMPARE_PX, MAX_IMAGES, UNDAMPED};
 use nalgebra::{Isometry3, Matrix6, Point3, Vector6};
 
 use crate::measure::{ImagePoint, TwistSums};
 use crate::tagmap::linearize::squares;
 use crate::tagmap::problem::Observation;
-use armcal_core::numeric::{Damping, LeastSquares, Loss, Proposal, StopRule, minimize};
+use armcal_core::numeric::{LeastSquares, Loss, Proposal, StopRule, minimize};
 use armcal_core::optics::CameraModel;
 use armcal_core::spatial::{adjoint, exp};
 
@@ -43,9 +43,6 @@ pub(super) fn localize(
     }
     Some(refined(at, least, 8, total, |pose| step(cameras, seen, pose)))
 }
-
-/// Undamped: a few steps make a start for the adjustment, and one that does not help ends them.
-const UNDAMPED: Damping = Damping { first: 0.0, min: 0.0, max: 0.0, down: 0.0, up: 0.0, min_after_rejection: 1.0 };
 
 /// A pose under a cost with its Gauss-Newton step, perturbed on the right.
 struct PoseSearch<C, S> {

@@ -1,6 +1,6 @@
 //! Views from recordings, ours and others'.
 
-use crate::tagmap::constants::recording::MAX_GAP_S;
+use crate::tagmap::constants::recording::{MAX_GAP_S, UNIT_TOLERANCE};
 use armcal_core::codes::{Code, Coded};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -100,7 +100,7 @@ impl Contents {
         {
             let [w, x, y, z] = imu.orientation.wxyz();
             let quaternion = Quaternion::new(w, x, y, z);
-            if (quaternion.norm() - 1.0).abs() < 0.01 {
+            if (quaternion.norm() - 1.0).abs() < UNIT_TOLERANCE {
                 self.attitudes.push((stamp, UnitQuaternion::from_quaternion(quaternion)));
             }
         }

@@ -4,7 +4,9 @@
 //! of sight. So with two tags of known distance D at p_a and p_b (camera frame), `|s_a p_a - s_b p_b| = D` tells the
 //! factors s by which the sizes must be multiplied: 1 where they are right.
 
-use crate::tagmap::constants::scale::{EXPLAINS, FARTHEST, LEAST_FACTOR, MAX_ROOTS, MAX_SAMPLES};
+use crate::tagmap::constants::scale::{
+    EXPLAINS, FARTHEST, LEAST_FACTOR, MAX_ROOTS, MAX_SAMPLES, ONE_PLACE_M, SURE_SHARE,
+};
 use nalgebra::Vector3;
 
 use crate::tagmap::screen::Screened;
@@ -120,7 +122,7 @@ fn samples(input: &MapInput<'_>, screened: &Screened) -> Vec<Sample> {
     let place = |id: u32| {
         let tag = input.tags.iter().find(|tag| tag.id == id)?;
         // A place that is hardly known tells no distance.
-        let is_sure = tag.std.is_none_or(|std| std[..3].iter().all(|std| *std < 0.25 * tag.size_m));
+        let is_sure = tag.std.is_none_or(|std| std[..3].iter().all(|std| *std < SURE_SHARE * tag.size_m));
         let pose = tag.pose.filter(|_| is_sure)?;
         let body = &input.bodies[tag.body];
         Some((tag.body, body.pose.map(|body| body * pose), pose))
@@ -143,7 +145,7 @@ fn samples(input: &MapInput<'_>, screened: &Screened) -> Vec<Sample> {
                 };
                 let (a, b, at_a, at_b) = (screened.tags[a.tag].id, screened.tags[b.tag].id, center(a), center(b));
                 let distance_m = between.norm();
-                if distance_m > 1e-6 {
+                if distance_m > ONE_PLACE_M {
                     samples.push(Sample { a, b, at_a, at_b, distance_m });
                 }
             }

@@ -4,7 +4,7 @@ use crate::tagmap::adjust::{approach, finish, select};
 use crate::tagmap::assemble::assemble;
 use crate::tagmap::attitude::{self, Wanted};
 use crate::tagmap::check::check;
-use crate::tagmap::constants::solve::{MAX_ROUNDS, MUCH_WORSE};
+use crate::tagmap::constants::solve::{MAX_ROUNDS, MIN_FREEDOM, MUCH_WORSE};
 use crate::tagmap::groups::{Group, build};
 use crate::tagmap::initial_guess::lay_out;
 use crate::tagmap::localize::{localize, place_tag, tag_cost, view_cost};
@@ -167,7 +167,7 @@ fn repair(problem: &mut MapProblem<'_>) -> bool {
 /// Makes the corners' standard deviations what the residuals show; the factor.
 fn rescale(problem: &mut MapProblem<'_>) -> f64 {
     let freedom = adjust::degrees_of_freedom(problem);
-    if freedom < 8 {
+    if freedom < MIN_FREEDOM {
         return 1.0;
     }
     let chi_square = linearize::cost(problem, Loss::Square);

@@ -3,6 +3,8 @@
 use armcal_core::codes::{Code, Coded};
 use nalgebra::{Isometry3, Matrix2, UnitQuaternion};
 
+use crate::tagmap::constants::types::{ATTITUDE_STD_RAD, CORNER_STD_PX, MIN_LINK_VIEWS, REJECT_SIGMAS};
+use crate::views::constants::association::MAX_SQUARE_RMS_PX;
 use armcal_core::optics::CameraModel;
 use armcal_core::robot::MAX_TAGS;
 use armcal_core::time::Stamp;
@@ -111,14 +113,14 @@ impl Default for MapSettings {
         Self {
             mode: MapMode::default(),
             base_tag: None,
-            corner_std_px: 0.3,
+            corner_std_px: CORNER_STD_PX,
             noise: NoiseScale::default(),
             default_tag: None,
-            max_square_rms_px: 3.0,
-            reject_beyond_sigmas: 5.0,
-            min_link_views: 2,
+            max_square_rms_px: MAX_SQUARE_RMS_PX,
+            reject_beyond_sigmas: REJECT_SIGMAS,
+            min_link_views: MIN_LINK_VIEWS,
             attitude_body: None,
-            attitude_std_rad: 0.01,
+            attitude_std_rad: ATTITUDE_STD_RAD,
         }
     }
 }

@@ -5,7 +5,7 @@
 //! line between the nearest before and after it. All is found by the messages' own stamps.
 
 pub(crate) use crate::views::constants::conditions::{BACK_S, NEAR_S, ROUNDING_COUNTS};
-use crate::views::constants::conditions::{CLEAR_READINGS, CLEAR_SIGMAS};
+use crate::views::constants::conditions::{CLEAR_READINGS, CLEAR_SIGMAS, MIN_READINGS_OF_RATE};
 use crate::views::message_index::MessageIndex;
 use armcal_core::input::{ConditionKind, ConditionReading};
 use armcal_core::log::Recording;
@@ -161,10 +161,10 @@ impl TravelRate {
         }
     }
 
-    /// rad/s; zero with fewer than three readings, or all at one time.
+    /// rad/s; zero with too few readings, or all at one time.
     pub fn rad_s(&self, n_joints: usize) -> JointAngles {
         let spread_s2 = self.sum_s2 - self.sum_s * self.sum_s / self.n.max(1) as f64;
-        if self.n < 3 || spread_s2 <= 0.0 {
+        if self.n < MIN_READINGS_OF_RATE || spread_s2 <= 0.0 {
             return JointAngles::zeros(n_joints);
         }
         let mean_s = self.sum_s / self.n as f64;

@@ -10,12 +10,15 @@ pub(crate) mod conditions {
     pub(crate) const NEAR_S: f64 = 60.0;
     /// How far back a joint's last motion is looked for, s.
     pub(crate) const BACK_S: f64 = 30.0;
-    /// A reading that is this many sigma of its noise from where the joint rests was taken before it came there.
+    /// A reading that is this many sigma of its noise from where the joint rests was taken before it came there, or
+    /// since it left.
     pub(crate) const CLEAR_SIGMAS: f64 = 8.0;
     /// Readings in a row that must agree: one alone may be a jump of the sensor.
     pub(crate) const CLEAR_READINGS: usize = 2;
     /// One sigma of rounding to whole counts.
     pub(crate) const ROUNDING_COUNTS: f64 = 0.288_675;
+    /// Fewer readings tell no rate.
+    pub(crate) const MIN_READINGS_OF_RATE: usize = 3;
 }
 
 pub(crate) mod data_checks {
@@ -83,6 +86,8 @@ pub(crate) mod pooling {
 }
 
 pub(crate) mod scale_identification {
+    use armcal_core::numeric::{Damping, StopRule};
+
     /// Fewer views have no residuals to speak of.
     pub(crate) const MIN_VIEWS: usize = 3;
     /// A slope less sure than this times its own size says nothing.
@@ -91,6 +96,12 @@ pub(crate) mod scale_identification {
     pub(crate) const DRAWING_STD: f64 = 1e-3;
     /// A camera's turn is not known better than this from corners a third of a pixel off, rad.
     pub(crate) const TURN_FLOOR_RAD: f64 = 3e-4;
+    /// Readings whose squared departures from their mean sum up to less never changed, rad^2.
+    pub(crate) const CONSTANT_RAD2: f64 = 1e-12;
+    /// Undamped: the start is a tag's own pose, near enough for Gauss-Newton, and twelve steps end in the last digits.
+    pub(crate) const DAMPING: Damping =
+        Damping { first: 0.0, min: 0.0, max: 0.0, down: 0.0, up: 0.0, min_after_rejection: 0.0 };
+    pub(crate) const STOP: StopRule = StopRule { slack: f64::INFINITY, ..StopRule::after(12) };
 }
 
 pub(crate) mod view {

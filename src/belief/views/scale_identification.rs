@@ -5,13 +5,15 @@
 //! in the camera. Each view's camera pose comes from all its tags' corners; the turn's common axis is the principal one
 //! of the rotation vectors, its direction the drawing's; the slope of the turn against the readings is the gain.
 
-use crate::views::constants::scale_identification::{DRAWING_STD, MAX_RELATIVE_STD, MIN_VIEWS, TURN_FLOOR_RAD};
+use crate::views::constants::scale_identification::{
+    CONSTANT_RAD2, DAMPING, DRAWING_STD, MAX_RELATIVE_STD, MIN_VIEWS, STOP, TURN_FLOOR_RAD,
+};
 use nalgebra::{DVector, Isometry3, Matrix3, Matrix6, Vector3, Vector6};
 
 use crate::measure::{ImagePoint, TwistSums};
 use crate::views::error::CalibError;
 use crate::views::view::{CaptureData, View};
-use armcal_core::numeric::{Damping, LeastSquares, Outcome, Proposal, StopRule, minimize};
+use armcal_core::numeric::{LeastSquares, Outcome, Proposal, minimize};
 use armcal_core::optics::{solve_square, square_corners};
 use armcal_core::robot::Robot;
 use armcal_core::spatial::exp;
@@ -77,7 +79,7 @@ fn identify(robot: &Robot, joint: usize, views: &[View]) -> Result<IdentifiedSca
 fn slope(x: &DVector<f64>, y: &DVector<f64>) -> Option<(f64, f64)> {
     let (x, y) = (x.add_scalar(-x.mean()), y.add_scalar(-y.mean()));
     let spread = x.norm_squared();
-    if spread < 1e-12 {
+    if spread < CONSTANT_RAD2 {
         return None;
     }
     let slope = x.dot(&y) / spread;
@@ -114,10 +116,6 @@ fn camera_pose(robot: &Robot, view: &View) -> Option<Isometry3<f64>> {
     let refined = starts.filter_map(|start| refine(robot, view, start));
     refined.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(pose, _)| pose)
 }
-
-/// Undamped: the start is a tag's own pose, near enough for Gauss-Newton, and twelve steps end in the last digits.
-const DAMPING: Damping = Damping { first: 0.0, min: 0.0, max: 0.0, down: 0.0, up: 0.0, min_after_rejection: 0.0 };
-const STOP: StopRule = StopRule { slack: f64::INFINITY, ..StopRule::after(12) };
 
 /// Pose, normal equations (perturbed on the right) and cost, px^2.
 struct Linearized {

@@ -7,15 +7,13 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use super::pairs::{PosedTag, mismatch_at, posed_tags};
 use super::recording::reordered;
 use super::{GOOD, SIZE_TOLERANCE};
+use crate::explain::constants::wrong_input_map::{PRINT_TOLERANCE, UNITS};
 use crate::say::wrong_input::WrongInputKind;
 use crate::views::view::View;
 use armcal_core::optics::{CameraModel, TagFamily};
 use armcal_core::robot::SurveyedTag;
 use armcal_core::spatial::Pose;
 use armcal_core::stats::quantile;
-
-/// Units that a survey may be in, and how many make a metre.
-pub(crate) const UNITS: [(&str, f64); 4] = [("mm", 1e3), ("cm", 1e2), ("inches", 1.0 / 0.0254), ("feet", 1.0 / 0.3048)];
 
 /// The map as it may be meant.
 pub(crate) fn readings(tags: &[SurveyedTag]) -> Vec<(WrongInputKind, Vec<SurveyedTag>)> {
@@ -41,7 +39,7 @@ pub(crate) fn unit_of(ratio: f64) -> Option<&'static str> {
 #[must_use]
 pub(crate) fn margin_hint(family: TagFamily, ratio: f64) -> Option<String> {
     let (border, whole) = (family.n_cells(), family.n_cells() + 2 * family.n_margin_cells());
-    let is = |of: usize, over: usize| (ratio / (of as f64 / over as f64) - 1.0).abs() < 0.02;
+    let is = |of: usize, over: usize| (ratio / (of as f64 / over as f64) - 1.0).abs() < PRINT_TOLERANCE;
     let [print, beyond, square] = match family {
         TagFamily::Tag16h5 | TagFamily::Tag25h9 | TagFamily::Tag36h11 => {
             ["the whole print with its white margin", "the margin", "black square"]
@@ -64,16 +62,15 @@ pub(crate) type SignedAxes = [(usize, f64); 3];
 /// Left-handed readings of a position, in words: one axis of the other sign, or two axes exchanged. What is
 /// right-handed turns the map as a whole, and the arm has a part in it.
 pub(crate) fn other_axes() -> impl Iterator<Item = (String, SignedAxes)> {
-    const READINGS: [SignedAxes; 6] = [
-        [(0, -1.0), (1, 1.0), (2, 1.0)],
-        [(0, 1.0), (1, -1.0), (2, 1.0)],
-        [(0, 1.0), (1, 1.0), (2, -1.0)],
-        [(1, 1.0), (0, 1.0), (2, 1.0)],
-        [(0, 1.0), (2, 1.0), (1, 1.0)],
-        [(2, 1.0), (1, 1.0), (0, 1.0)],
-    ];
+    let changed = |change: &dyn Fn(&mut SignedAxes)| {
+        let mut axes = [0, 1, 2].map(|axis| (axis, 1.0));
+        change(&mut axes);
+        axes
+    };
+    let mirrored = [0, 1, 2].map(|axis| changed(&|axes| axes[axis].1 = -1.0));
+    let exchanged = [(0, 1), (1, 2), (0, 2)].map(|(a, b)| changed(&|axes| axes.swap(a, b)));
     let word = |(axis, sign): (usize, f64)| format!("{}{}", if sign < 0.0 { "-" } else { "" }, ["x", "y", "z"][axis]);
-    READINGS.into_iter().map(move |axes| (format!("({})", axes.map(word).join(", ")), axes))
+    mirrored.into_iter().chain(exchanged).map(move |axes| (format!("({})", axes.map(word).join(", ")), axes))
 }
 
 /// The tag at its position read by these axes; its rotation stays.

@@ -6,9 +6,10 @@ use std::sync::LazyLock;
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
 use super::lens::{of_other_model, scaled};
-use super::map::{UNITS, margin_hint, other_axes};
+use super::map::{margin_hint, other_axes};
 use super::recording::reordered_back;
 use super::*;
+use crate::explain::constants::wrong_input_map::UNITS;
 use crate::fixture::titan;
 use crate::views::association::{associate, surveyed};
 use crate::views::view::TagMeasurement;

@@ -3,7 +3,7 @@
 //! Whether anything hides a tag is asked of many poses: shapes are placed once a pose, and one that stays clear of all
 //! rays to a tag's corners, or whose box a ray misses, is not asked for more.
 
-use crate::plan::constants::clearance_sight::{HOUSING_M, MISS_M};
+use crate::plan::constants::clearance_sight::{BESIDE, HOUSING_M, MISS_M};
 use nalgebra::{Isometry3, Point3, Vector3};
 use parry3d::math::Pose3;
 use parry3d::query;
@@ -56,7 +56,7 @@ impl Ray {
             let axis = half / length;
             let (at, rate) = (axis.dot(to_start), axis.dot(self.parry.dir));
             let most = length + MISS_M;
-            if rate.abs() < 1e-9 {
+            if rate.abs() < BESIDE {
                 if at.abs() > most + MISS_M {
                     return true;
                 }

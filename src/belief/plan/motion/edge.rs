@@ -1,9 +1,7 @@
 //! Paths and their edges: straight lines in joint space, each driven from rest to rest at a speed of its own.
 
-pub(crate) use crate::plan::constants::motion_edge::SLOWNESS;
+pub(crate) use crate::plan::constants::motion_edge::{SLOWEST, SLOWNESS};
 use armcal_core::streams::JointAngles;
-
-pub(crate) const SLOWEST: f64 = SLOWNESS[SLOWNESS.len() - 1];
 
 /// A straight motion from rest to rest.
 #[derive(Clone, Copy, Debug, PartialEq)]

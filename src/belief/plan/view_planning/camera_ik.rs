@@ -5,14 +5,14 @@
 //! weighted by the range, so that both count as displacements at the tag). The arm need not get there: what it comes to
 //! is tested like any other pose.
 
-use crate::plan::constants::view_planning_camera_ik::{BESIDE_RAD, MAX_STEP_RAD, RANGES_M, STEPS};
+use crate::plan::constants::view_planning_camera_ik::{BESIDE_RAD, DAMPING, MAX_STEP_RAD, RANGES_M, STEPS};
 use nalgebra::{SMatrix, SVector, UnitQuaternion, Vector3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use crate::plan::visibility::VisibilityModel;
 use armcal_core::kinematics::{Attachment, JointLimits};
-use armcal_core::numeric::{Damping, LeastSquares, Proposal, StopRule, minimize};
+use armcal_core::numeric::{LeastSquares, Proposal, StopRule, minimize};
 use armcal_core::robot::{Robot, SurveyedTag};
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
@@ -100,10 +100,6 @@ impl CameraGoal {
         out
     }
 }
-
-/// Added to the normal matrix, m^2/rad^2.
-const DAMPING: Damping =
-    Damping { first: 1e-2, min: 1e-6, max: f64::INFINITY, down: 0.3, up: 8.0, min_after_rejection: 0.0 };
 
 struct Search<'a> {
     goal: &'a CameraGoal,

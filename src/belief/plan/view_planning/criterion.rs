@@ -8,13 +8,12 @@
 use nalgebra::{Cholesky, DMatrix, Matrix6, SMatrix, SymmetricEigen};
 
 use crate::model::ParameterKind;
+use crate::plan::constants::view_planning_criterion::MAX_LINEAR;
 use crate::plan::view_planning::parameter_prior::{N_COMMON, N_DIRECTIONS, ParameterPrior, WIDTH, columns};
 use crate::plan::view_planning::view_information::{Twists, WhitenedView};
 use armcal_core::routine::PoseCriterion;
 use armcal_core::streams::MAX_JOINTS;
 
-/// Gains and offsets of the joints before the camera.
-const MAX_LINEAR: usize = 2 * MAX_JOINTS;
 type Linear = SMatrix<f64, MAX_LINEAR, MAX_LINEAR>;
 
 /// What is to become small.

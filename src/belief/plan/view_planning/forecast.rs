@@ -5,6 +5,7 @@
 //! its own errors take: `V (diag(1/s^2) + D^T H D)^-1 V^T`, `V = sum G_i^T H_i D`. These are the normal equations of
 //! `bundle` at what is believed.
 
+use crate::explain::constants::calibration_prior::{MAX_ROUNDING, ROUNDING};
 use crate::plan::constants::view_planning_forecast::{EDGE_SHARE, EDGES, MIN_STD};
 use nalgebra::{Cholesky, DMatrix, Matrix6, Vector3};
 
@@ -183,7 +184,7 @@ type SMatrixX = nalgebra::OMatrix<f64, nalgebra::Const<6>, nalgebra::Dyn>;
 /// With an inverse in spite of the rounding of a calibration's file.
 fn regular(matrix: DMatrix<f64>) -> Option<Cholesky<f64, nalgebra::Dyn>> {
     let mut share = 0.0;
-    while share < 0.1 {
+    while share < MAX_ROUNDING {
         let raised = DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, k| {
             let value = 0.5 * (matrix[(i, k)] + matrix[(k, i)]);
             if i == k { value * (1.0 + share) } else { value }
@@ -191,7 +192,7 @@ fn regular(matrix: DMatrix<f64>) -> Option<Cholesky<f64, nalgebra::Dyn>> {
         if let Some(factor) = Cholesky::new(raised) {
             return Some(factor);
         }
-        share = if share == 0.0 { 1e-6 } else { 10.0 * share };
+        share = if share == 0.0 { ROUNDING } else { 10.0 * share };
     }
     None
 }

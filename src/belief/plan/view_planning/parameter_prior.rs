@@ -5,8 +5,8 @@
 //! survey's common error (a twist of all tags together in their frame). The covariance is what the estimator `bundle`
 //! takes for its prior, or the running estimate's.
 
-pub(crate) use crate::plan::constants::view_planning_parameter_prior::N_COMMON;
 use crate::plan::constants::view_planning_parameter_prior::UNKNOWN_STD;
+pub(crate) use crate::plan::constants::view_planning_parameter_prior::{N_COMMON, WIDTH};
 use nalgebra::{DMatrix, Matrix6, Vector6};
 
 use crate::explain::calibration_prior::MOUNT_ROWS;
@@ -19,8 +19,6 @@ use armcal_core::sensor::{N_SHAPE, nonlinearity_basis};
 use armcal_core::spatial::adjoint;
 use armcal_core::streams::MAX_JOINTS;
 
-/// Parameters of one joint: gain, offset, nonlinearity.
-pub(crate) const WIDTH: usize = 2 + N_SHAPE;
 /// Ways that a view's camera can be moved by what is not known: each joint's angle, and the common ones.
 pub(crate) const N_DIRECTIONS: usize = MAX_JOINTS + N_COMMON;
 

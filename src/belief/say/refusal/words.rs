@@ -3,6 +3,7 @@
 use std::fmt;
 
 use crate::judge::baseline_comparison::SIGNIFICANCE;
+use crate::say::constants::refusal_words::MORE_DIGITS_BELOW;
 use crate::say::refusal::{HeldOutLimitSource, MIN_USED_SHARE, Refusal, with_advice};
 use crate::say::wrong_input_words::medium_of_lens;
 use armcal_core::codes::Coded;
@@ -261,7 +262,7 @@ impl Refusal {
             ),
             Self::SensorLine { joint, slope } => {
                 let what = if *slope < 0.0 { "is reversed" } else { "has another scale than its datasheet" };
-                let digits = if slope.abs() < 0.1 { 4 } else { 2 };
+                let digits = if slope.abs() < MORE_DIGITS_BELOW { 4 } else { 2 };
                 write!(
                     f,
                     "the sensor of {joint} {what}: the camera's angles follow it with a slope of {slope:.digits$}"
@@ -356,7 +357,7 @@ pub(crate) fn told_apart_mm(lengths_m: [f64; 2]) -> [String; 2] {
 
 /// A probability in percent, with no more digits than it needs.
 fn percent(probability: f64) -> String {
-    let digits = if probability < 0.1 { 1 } else { 0 };
+    let digits = if probability < MORE_DIGITS_BELOW { 1 } else { 0 };
     format!("{:.digits$} %", 100.0 * probability)
 }
 
