@@ -156,13 +156,14 @@ fn rests_on(prior: &Calibration, data: &CaptureData) -> bool {
 /// # Errors
 /// As [`calibrate`].
 pub fn calibrate_data(
-    data: CalibrationData,
+    mut data: CalibrationData,
     method: CalibrationMethod,
     prior: Option<&Calibration>,
 ) -> Result<Calibration, CalibError> {
     if data.robot.is_watched() && prior.is_some_and(|prior| prior.sag.is_some()) {
         return Err(CalibError::PriorSag { recording: data.name });
     }
+    data.data.leave_out_repeated();
     match method {
         CalibrationMethod::JointLimits => end_stops::calibrate(data, prior),
         CalibrationMethod::Bundle => {
@@ -170,7 +171,6 @@ pub fn calibrate_data(
             BundleCalibration::new(data, prior, EstimatePurpose::Final)?.calibrate()
         }
         CalibrationMethod::Positions { method, solve } => {
-            let mut data = data;
             data.data.keep_first_camera();
             check_views(&data)?;
             calibrate_positions(data, (method, solve), prior)

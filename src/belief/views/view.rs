@@ -53,6 +53,15 @@ impl View {
         (!view.tags.is_empty() || view.gripper_tag.is_some()).then_some(view)
     }
 
+    /// Whether readings and tags are those of `other` to the bit, as no second measurement has them.
+    fn repeats(&self, other: &Self) -> bool {
+        let of_tag = |seen: &TagObservation| (seen.tag_idx, seen.center_in_camera_m);
+        self.travel_rad == other.travel_rad
+            && self.camera == other.camera
+            && !self.tags.is_empty()
+            && self.tags.iter().map(of_tag).eq(other.tags.iter().map(of_tag))
+    }
+
     /// What the sensors read `by_s` later, at the rates of the view.
     pub(crate) fn read_later(&mut self, by_s: f64) {
         for (travel_rad, rate_rad_s) in self.travel_rad.iter_mut().zip(self.rate_rad_s.iter()) {
@@ -204,6 +213,8 @@ pub enum ObservationRejection {
     InconsistentFrame,
     /// The arm was on its way.
     ArmMoving,
+    /// Its view has the numbers of another one: the same data, recorded twice.
+    RepeatedView,
     /// It does not fit the other observations.
     Outlier,
     /// The detector itself did not believe it.
@@ -223,6 +234,7 @@ impl ObservationRejection {
             Self::InconsistentFrame => "inconsistent_frame",
             Self::Outlier => "outlier",
             Self::ArmMoving => "arm_moving",
+            Self::RepeatedView => "repeated_view",
             Self::Detector(reason) => reason.name(),
         }
     }
@@ -242,6 +254,7 @@ impl ObservationRejection {
             Self::NoReadings => "check that joint readings and tags are of the same time",
             Self::InconsistentFrame | Self::Outlier => "check the tag ids, and that no id is used twice",
             Self::ArmMoving => "record while the arm stands still",
+            Self::RepeatedView => "record each pose once more instead of copying its rows",
             Self::Detector(_) => "check the images: light, focus, size of the tags",
         }
     }
@@ -324,6 +337,22 @@ impl CaptureData {
             view.n_cameras = 1;
         }
         n_before - self.fit.len() - self.held_out.len()
+    }
+
+    /// Leaves out views that repeat an earlier one: they would count, and be held out, as if they told something more.
+    pub(crate) fn leave_out_repeated(&mut self) {
+        let all: Vec<&View> = self.fit.iter().chain(&self.held_out).collect();
+        let repeats = |(k, view): (usize, &&View)| all[..k].iter().any(|earlier| view.repeats(earlier));
+        let repeats: Vec<bool> = all.iter().enumerate().map(repeats).collect();
+        let n_tags: usize =
+            all.iter().zip(&repeats).filter(|(_, repeats)| **repeats).map(|(view, _)| view.tags.len()).sum();
+        let mut repeats = repeats.into_iter();
+        for views in [&mut self.fit, &mut self.held_out] {
+            views.retain(|_| repeats.next() == Some(false));
+        }
+        if n_tags > 0 {
+            self.reject(ObservationRejection::RepeatedView, n_tags);
+        }
     }
 
     pub(crate) fn reject(&mut self, why: ObservationRejection, n: usize) {

@@ -12,7 +12,7 @@ use crate::model::scales::Hyperparameters;
 use crate::solve::estimate::{Estimate, estimate};
 use crate::solve::input::{BundleInput, HyperparameterMode};
 use crate::solve::model_for_views::model_for;
-use crate::views::view::View;
+use crate::views::view::{CaptureData, ObservationRejection, View};
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::Robot;
 use armcal_core::stats::quantile;
@@ -93,6 +93,24 @@ fn measured(n_seeds: u64, n_views: usize, worse: [f64; 2]) -> [[f64; 3]; 2] {
         let ratios: Vec<f64> = figures.iter().map(|f| f[1]).collect();
         [nees, quantile(&ratios, 0.95).expect("seeds"), quantile(&ratios, 1.0).expect("seeds")]
     })
+}
+
+/// Copied rows are no further views: what is left are the recorded ones, whatever is fitted and held out.
+#[test]
+fn views_that_repeat_another_to_the_bit_are_left_out() {
+    let robot = titan();
+    let (_, views, _) = case(&robot, 1, 10, [1.0, 1.0]);
+    let later = views.iter().map(|view| View { pose_idx: view.pose_idx + 100, ..view.clone() });
+    let mut other = views[0].clone();
+    other.travel_rad[2] += 1e-9;
+    let fit: Vec<View> = views[..8].iter().cloned().chain(later).chain([other]).collect();
+    let mut data = CaptureData { fit, held_out: views[6..].to_vec(), ..CaptureData::default() };
+    data.leave_out_repeated();
+    let poses: Vec<u32> = data.fit.iter().map(|view| view.pose_idx).collect();
+    let first = views[..8].iter().map(|view| view.pose_idx);
+    let rest = views[8..].iter().map(|view| view.pose_idx + 100).chain([views[0].pose_idx]);
+    assert_eq!(poses, first.chain(rest).collect::<Vec<u32>>());
+    assert!(data.held_out.is_empty() && data.rejected[&ObservationRejection::RepeatedView] > 10);
 }
 
 /// Worn sensors: each datasheet figure is a quarter of the truth.
