@@ -173,6 +173,10 @@ pub(crate) mod score_test {
     /// Size of an error of geometry that is worth a look: what the data cannot tell to that is not tested.
     pub(crate) const SIZE_M: f64 = 0.01;
     pub(crate) const SIZE_RAD: f64 = 0.0175;
+    /// Of two elements whose chi-square differs by less neither explains more: a likelihood ratio of 20.
+    pub(crate) const ALIKE_CHI2: f64 = 6.0;
+    /// A sigma so many times smaller than another is the surer one. Assumed.
+    pub(crate) const SURER: f64 = 2.0;
     /// First trial column of the mount: behind six of each joint.
     pub(crate) const MOUNT: usize = 6 * MAX_JOINTS;
 }

@@ -6,7 +6,7 @@
 //! ask for, `s^T I^-1 s` is chi-square under the model. Directions that the data tell less of than [`SIZE_M`] or
 //! [`SIZE_RAD`] do not count.
 
-use crate::explain::constants::score_test::{MOUNT, SIZE_M, SIZE_RAD};
+use crate::explain::constants::score_test::{ALIKE_CHI2, MOUNT, SIZE_M, SIZE_RAD, SURER};
 use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, Vector3, Vector6};
 
 use crate::model::blocks::Block;
@@ -63,7 +63,8 @@ pub(crate) struct Score {
 }
 
 impl Estimate<'_> {
-    /// All that can be tested, the least likely by chance first; `task`: the arm's angles at the task's targets.
+    /// All that can be tested, the least likely by chance first; `task`: the arm's angles at the task's targets. A mount
+    /// that explains as much as a link, and is stated less surely, comes before it.
     #[must_use]
     pub fn score_tests(&self, task: &[JointAngles]) -> Vec<ScoreTestResult> {
         let score = self.score();
@@ -74,7 +75,28 @@ impl Estimate<'_> {
         let mut out: Vec<ScoreTestResult> =
             both.filter_map(|(element, error)| self.score_test(&score, element, error, &task)).collect();
         out.sort_by(|a, b| a.probability.total_cmp(&b.probability).then(b.chi2.total_cmp(&a.chi2)));
+        if let Some(mount) = self.likelier_mount(&out) {
+            out[..=mount].rotate_right(1);
+        }
         out
+    }
+
+    /// The mount among `results`, where it explains as much as the link that comes first: behind the last joint that
+    /// the views move no view tells them apart, and the stated sigmas do.
+    fn likelier_mount(&self, results: &[ScoreTestResult]) -> Option<usize> {
+        let first = results.first().filter(|first| matches!(first.element, GeometryElement::Joint(1..)))?;
+        let (links, camera) = (&self.problem.robot.geometry, &self.problem.robot.camera);
+        let (of_link, of_mount) = match first.error {
+            ErrorKind::Shift => (links.link_position_std_m, camera.mount_std_m),
+            ErrorKind::Turn => (links.link_rotation_std_rad, camera.mount_std_rad),
+        };
+        let is_likelier = |result: &ScoreTestResult| {
+            result.element == GeometryElement::Mount
+                && result.error == first.error
+                && result.chi2 > first.chi2 - ALIKE_CHI2
+                && of_mount > SURER * of_link
+        };
+        results.iter().position(is_likelier)
     }
 
     /// Joints, base first, that some view sees move.

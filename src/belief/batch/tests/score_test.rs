@@ -122,6 +122,20 @@ fn a_link_one_centimetre_longer_is_found_named_and_measured() {
     }
 }
 
+/// Along the axis of the last joint that moves the camera a link's shift does the same in all views.
+#[test]
+fn a_mount_that_is_off_along_the_last_axis_is_named_before_a_link() {
+    let robot = titan();
+    let axis = robot.chain.joints()[robot.camera.mount.n_joints - 1].axis.into_inner();
+    for seed in 0..6 {
+        let slid = |truth: &mut Truth| truth.mount.translation.vector += axis * (12.0 * robot.camera.mount_std_m);
+        let (views, model) = views_of_changed(&robot, &robot, seed, slid);
+        let results = score_tests(&estimate(&input(&robot, &views, &model)).expect("solved"));
+        assert!(is_alarm(&results[0], results.len()), "seed {seed}: {:?}", results[0]);
+        assert_eq!(results[0].element, GeometryElement::Mount, "seed {seed}: {:?}", &results[..3]);
+    }
+}
+
 #[test]
 fn a_link_twisted_by_one_degree_is_found() {
     let robot = titan();
