@@ -17,6 +17,7 @@ use crate::explain::drawing::Drawing;
 use crate::explain::failure_detection::FailureSearch;
 use crate::explain::failures::Failure;
 use crate::explain::model_selection::{OptionalTerm, Selection};
+use crate::explain::other_lens::lens_that_fits;
 use crate::explain::reading_search::ReadingSearch;
 use crate::explain::setup::{BundleSetup, Clocks, declared};
 use crate::explain::tags::freed::MovedTags;
@@ -186,6 +187,11 @@ impl<'a> BundleCalibration<'a> {
         let first = setup(&declared);
         self.check_observable(&first, &declared)?;
         let estimated = self.first_estimate(&first);
+        let lens = estimated.as_ref().and_then(|(found, _)| self.lens_that_fits(&first.input(), found));
+        if let Some(drawing) = lens {
+            self.drawing = drawing;
+            return Ok(Round::Revised(views));
+        }
         let failures = self.failures(&views, &declared, estimated.as_ref().map(|(estimate, _)| estimate));
         let second;
         let (setup, estimated) = if failures == declared {
@@ -357,6 +363,11 @@ impl<'a> BundleCalibration<'a> {
         let drawing = if calibration.refusals.iter().any(is_unbounded) { &nominal } else { &self.drawing };
         let search = ReadingSearch { robot: &self.data.robot, views: &self.as_read, failures, drawing };
         calibration.refuse_first_for(search.find().map(Refusal::MisreadReadings));
+    }
+
+    fn lens_that_fits(&self, input: &BundleInput<'_>, found: &Estimate<'_>) -> Option<Drawing> {
+        let is_final = self.purpose == EstimatePurpose::Final;
+        is_final.then(|| lens_that_fits(&self.drawing, input, found)).flatten()
     }
 
     /// The offset between the clocks, where it is found for the first time; from then on the readings are at the times

@@ -13,6 +13,7 @@ pub(crate) mod failure_detection;
 pub(crate) mod failure_pattern;
 pub(crate) mod failures;
 pub(crate) mod model_selection;
+pub(crate) mod other_lens;
 pub(crate) mod permutation_test;
 pub(crate) mod reading_search;
 pub(crate) mod score_test;

@@ -2,7 +2,9 @@
 
 use crate::batch::tests::corner_outliers::tool_error;
 use crate::batch::tests::data::titan;
-use crate::batch::tests::statistics::{case, input};
+use crate::batch::tests::statistics::{Case, case, input};
+use crate::explain::drawing::Drawing;
+use crate::explain::other_lens::lens_that_fits;
 use crate::solve::estimate::estimate;
 use crate::solve::input::HyperparameterMode;
 use armcal_core::numeric::Outcome;
@@ -66,6 +68,28 @@ fn a_flat_port_is_no_bias_where_it_is_in_the_model() {
     );
     assert!(with_m < 2e-3 && (1.8..4.5).contains(&nees), "{with_m} {nees}");
     assert!(without_m > 3.0 * with_m, "{without_m} {with_m}");
+}
+
+/// The centre 30 px from where robot.toml has it: the lens explains it, and no sensor's readings.
+#[test]
+fn a_centre_that_is_off_is_told_from_sensors_that_are() {
+    let real = titan();
+    let [fx, fy, cx, cy, k1, k2, k3, k4] = real.camera.lens.intrinsics();
+    let other = with_camera(real.camera.lens.with_intrinsics([fx, fy, cx + 30.0, cy, k1, k2, k3, k4]));
+    for seed in SEEDS.take(6) {
+        let mut case = case(&real, seed, N_VIEWS);
+        let lenses = |case: &Case<'_>| {
+            let input = input(case, &case.views, HyperparameterMode::Fitted);
+            let found = estimate(&input).expect("solved");
+            lens_that_fits(&Drawing::default(), &input, &found).map(|drawing| drawing.lenses)
+        };
+        assert_eq!(lenses(&case), None, "seed {seed}: as it is");
+        case.robot = &other;
+        assert_eq!(lenses(&case), Some(vec![0]), "seed {seed}: another centre");
+        case.robot = &real;
+        case.views[7].travel_rad[1] += 0.3;
+        assert_eq!(lenses(&case), None, "seed {seed}: a reading is off");
+    }
 }
 
 /// The farthest corner of all views lies a little beyond the edge of the field of view as robot.toml has it.
