@@ -43,7 +43,7 @@ struct TaskToml {
     #[serde(rename = "kind")]
     _kind: Option<Kind>,
     /// Largest distance between tool and target that counts as a hit.
-    #[schemars(range(min = 1e-6, max = 10.0))]
+    #[schemars(range(min = 1e-6, max = 1.0))]
     tolerance_m: f64,
     /// Tool positions in the base frame.
     #[serde(default)]
@@ -78,7 +78,7 @@ pub fn read_task(file: &Path) -> Result<TaskFile, RobotError> {
 /// As [`read_task`].
 pub fn parse_task(file: &Path, text: &str) -> Result<TaskFile, RobotError> {
     let raw: TaskToml = parse_file(Kind::Task, file, text)?;
-    FileIssue::check_range(file, "tolerance_m", raw.tolerance_m, 1e-6..=10.0)?;
+    FileIssue::check_range(file, "tolerance_m", raw.tolerance_m, 1e-6..=1.0)?;
     for (k, target) in raw.targets_m.iter().enumerate() {
         for value in target {
             FileIssue::check_range(file, &format!("targets_m[{k}]"), *value, -MAX_TARGET_M..=MAX_TARGET_M)?;
