@@ -319,6 +319,14 @@ impl Refusal {
             Self::PriorReused => write!(f, "the prior was made from the same messages, which must not count twice"),
             Self::PriorSingular => write!(f, "the prior's covariance has no inverse"),
             Self::PriorUntested => write!(f, "the views determine too little to be tested against the prior"),
+            Self::PriorContradicted { joints_off: 0, used_share, .. } if *used_share < MIN_USED_SHARE => {
+                let percent = 100.0 * used_share;
+                write!(
+                    f,
+                    "the new views contradict the prior: only {percent:.0} % of the tag observations fit near it, "
+                )?;
+                write!(f, "and no joint's change explains the others")
+            }
             Self::PriorContradicted { joint, off_rad, joints_off, moves, .. } => {
                 let off = moves.unit().shown(*off_rad, 2);
                 write!(f, "the new views contradict the prior: ")?;
