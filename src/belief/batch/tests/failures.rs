@@ -21,6 +21,7 @@ use crate::views::calibration_data::{CalibrationData, HeldOut};
 use crate::views::view::{CaptureData, View};
 use armcal_core::robot::{FailedKind, Robot};
 use armcal_core::spatial::Pose;
+use armcal_core::streams::ReachTask;
 
 const N_VIEWS: usize = 20;
 
@@ -32,17 +33,26 @@ pub(crate) struct Case {
 
 impl Case {
     pub(crate) fn calibrated(self) -> Calibration {
-        let data = CalibrationData {
-            name: "synthetic".to_owned(),
-            messages_hash: String::new(),
-            data: CaptureData { n_marks: self.views.len(), fit: self.views, ..CaptureData::default() },
-            gripper_tag_data: None,
-            held_out: HeldOut::CrossValidation,
-            robot: self.robot,
-            identified: Vec::new(),
-        };
-        calibrate_data(data, CalibrationMethod::Bundle, None).expect("a result")
+        calibrated(self.robot, self.views)
     }
+}
+
+/// The result of `views` without a task.
+pub(crate) fn calibrated(robot: Robot, views: Vec<View>) -> Calibration {
+    calibrated_for(robot, views, None)
+}
+
+fn calibrated_for(robot: Robot, views: Vec<View>, task: Option<ReachTask>) -> Calibration {
+    let data = CalibrationData {
+        name: "synthetic".to_owned(),
+        messages_hash: String::new(),
+        data: CaptureData { n_marks: views.len(), fit: views, task, ..CaptureData::default() },
+        gripper_tag_data: None,
+        held_out: HeldOut::CrossValidation,
+        robot,
+        identified: Vec::new(),
+    };
+    calibrate_data(data, CalibrationMethod::Bundle, None).expect("a result")
 }
 
 /// A sound arm; `locked`: a joint that stands still.
