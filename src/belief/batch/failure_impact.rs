@@ -57,7 +57,7 @@ impl FailureImpact<'_> {
         let joint = failure.joint;
         let pose = |&view_idx: &usize| self.views[view_idx].pose_idx;
         let is_locked = failure.kind.stands_still();
-        let has_no_sensor = failure.leaves_no_sensor();
+        let has_no_sensor = failure.has_no_sensor_now();
         let angle = self.locked_angle(failure);
         FailedJointTable {
             joint: self.robot.sensors[joint].joint.clone(),
@@ -139,7 +139,7 @@ impl FailureImpact<'_> {
                     }
                     robot = robot.with_failed(&[declared]);
                 }
-                AngleSource::AsItIs if failure.leaves_no_sensor() => {
+                AngleSource::AsItIs if failure.has_no_sensor_now() => {
                     // Uniform over the range.
                     (spec.offset_std_rad, spec.gain_std) = (0.0, 0.0);
                     residual_std_rad[j] = spec.half_range_rad / 3.0_f64.sqrt();
@@ -187,7 +187,7 @@ impl FailureImpact<'_> {
             size,
             unit,
             tool_error_m: None,
-            time_s: failure.since.and_then(|view_idx| self.since_first_view_s(view_idx)),
+            time_s: failure.since.or(failure.lost_since).and_then(|view_idx| self.since_first_view_s(view_idx)),
             repaired: is_repaired,
         }
     }
@@ -225,18 +225,20 @@ impl FailureImpact<'_> {
             return Some(Refusal::TooFewViewsSinceSlip { joint, evidence: self.evidence(failure), views });
         }
         let is_needed = failure.joint < self.robot.tool.mount.n_joints;
-        if !failure.leaves_no_sensor() || failure.kind.stands_still() || !is_needed {
+        if !failure.has_no_sensor_now() || failure.kind.stands_still() || !is_needed {
             return None;
         }
         let tolerance_m = self.task.map(|task| task.task.tolerance_m);
-        // Without a task every joint is needed, but for those that the user declares.
-        if tolerance_m.is_none() && failure.found == FailureSource::Declared {
+        // Without a task every joint is needed, but for those that the user declares to be without a sensor.
+        let is_known = failure.found == FailureSource::Declared && failure.lost_since.is_none();
+        if tolerance_m.is_none() && is_known {
             return None;
         }
         let table = self.table(failure);
         Some(Refusal::SensorFailed {
             joint,
             kind: failure.kind,
+            since_view: failure.lost_since.map(|view_idx| self.views[view_idx].pose_idx + 1),
             tool_error_m: table.tool_error_m.map(|s| s.p95),
             tool_error_by_camera_m: table.tool_error_by_camera_m.map(|s| s.p95),
             tolerance_m,

@@ -275,7 +275,7 @@ impl<'a> BundleCalibration<'a> {
             listener(&estimated.setup.input(), estimated.by_views());
         }
         // What no sensor told at a rest stays as it was stowed.
-        for failure in estimated.failures.iter().filter(|failure| failure.leaves_no_sensor()) {
+        for failure in estimated.failures.iter().filter(|failure| failure.has_no_sensor_now()) {
             let stowed_rad = self.data.robot.stowed[failure.joint];
             self.data.data.rests.values_mut().for_each(|rest| rest[failure.joint] = stowed_rad);
         }

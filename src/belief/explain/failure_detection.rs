@@ -202,6 +202,11 @@ impl FailureSearch<'_> {
                 let (kind, reading, views) = (FailedKind::Jumps, SensorUse::Used, views.clone());
                 Failure { kind, reading, views, evidence, ..all }
             }
+            FailurePattern::Lost { since, .. } => {
+                let (reading, first) = (SensorUse::Used, self.views[*since].end);
+                let views = (0..self.views.len()).filter(|&k| self.views[k].end >= first).collect();
+                Failure { reading, views, lost_since: Some(*since), evidence, ..all }
+            }
             FailurePattern::Lasting { since, step_rad } => Failure {
                 found,
                 ..Failure::slip((joint, self.robot.sensors[joint].unit()), *step_rad, self.views, *since)
@@ -215,7 +220,7 @@ impl FailureSearch<'_> {
             let found = self.hypothesis(known, joint, FailureSource::Declared);
             let Some(failure) = known.iter_mut().find(|failure| failure.joint == joint) else { continue };
             match found {
-                Some(found) if found.kind == FailedKind::Jumps => *failure = found,
+                Some(found) if found.kind == FailedKind::Jumps || found.lost_since.is_some() => *failure = found,
                 _ => "no view shows a jump".clone_into(&mut failure.evidence),
             }
         }

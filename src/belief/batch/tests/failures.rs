@@ -248,6 +248,48 @@ fn single_views_in_which_a_sensor_jumped_are_freed() {
     });
 }
 
+/// The sensor of `joint` is reversed in some views.
+fn reverse_in(case: &mut Case, joint: usize, views: std::ops::Range<usize>) {
+    for view in &mut case.views[views] {
+        view.travel_rad[joint] *= -1.0;
+    }
+}
+
+#[test]
+fn a_sensor_that_reads_wrongly_up_to_the_end_is_refused() {
+    for seed in 110..115 {
+        let joint = (seed % 5) as usize;
+        let mut case = case(seed, None);
+        reverse_in(&mut case, joint, 13..N_VIEWS);
+        let failures = found_failures(&case, &[]);
+        let [Failure { joint: found, kind: FailedKind::Dead, lost_since: Some(since), .. }] = failures[..] else {
+            panic!("seed {seed}: {failures:?}")
+        };
+        assert!(found == joint && (13..16).contains(&since), "seed {seed}: {found} since {since}");
+        let name = case.robot.sensors[joint].joint.clone();
+        let result = case.calibrated();
+        let is_named = |refusal: &Refusal| matches!(refusal, Refusal::SensorFailed { joint, .. } if *joint == name);
+        assert!(result.refusals.iter().any(is_named), "seed {seed}: {:?}", result.refusals);
+    }
+}
+
+#[test]
+fn a_sensor_that_reads_right_again_is_repaired() {
+    for seed in 115..120 {
+        let joint = (seed % 5) as usize;
+        let mut case = case(seed, None);
+        reverse_in(&mut case, joint, 6..12);
+        let failures = found_failures(&case, &[]);
+        assert!(
+            matches!(&failures[..], [only] if only.joint == joint && only.kind == FailedKind::Jumps),
+            "seed {seed}: {failures:?}"
+        );
+        let result = case.calibrated();
+        let is_needed = |refusal: &Refusal| matches!(refusal, Refusal::SensorFailed { .. });
+        assert!(!result.refusals.iter().any(is_needed), "seed {seed}: {:?}", result.refusals);
+    }
+}
+
 #[test]
 fn since_a_lasting_slip_the_sensor_is_calibrated_as_it_is_now() {
     check(FailedKind::Jumps, 50..55, |case, joint, _| {

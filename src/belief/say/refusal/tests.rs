@@ -147,6 +147,7 @@ fn measured() -> Vec<Refusal> {
         Refusal::SensorFailed {
             joint: joint(),
             kind: FailedKind::Dead,
+            since_view: Some(27),
             tool_error_m: Some(0.2),
             tool_error_by_camera_m: Some(0.01),
             tolerance_m: Some(0.02),
