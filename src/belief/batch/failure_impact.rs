@@ -4,15 +4,20 @@ use crate::batch::constants::failure_impact::{MIN_VIEWS_SINCE, UNIT_SHARE};
 use crate::explain::failure_detection::is_suspicious;
 use crate::explain::failures::{Failure, FailureSource, slip_in_words};
 use crate::file::failed_joint::FailedJointTable;
+use crate::judge::{TargetError, U95Table};
 use crate::model::parameters::JointParameters;
 use crate::say::finding::{Finding, FindingKind, FindingUnit};
 use crate::say::refusal::Refusal;
 use crate::solve::covariance::{ParameterCovariance, ToolErrorPrediction, predict_tool_error};
+use crate::solve::details::TargetPrediction;
 use crate::solve::estimate::Estimate;
 use crate::views::view::{TaskRests, View};
+use armcal_core::codes::Code;
 use armcal_core::kinematics::JointKind;
 use armcal_core::robot::{FailedJoint, FailedKind, Robot};
 use armcal_core::stats::Summary;
+use armcal_core::streams::ReachTask;
+use nalgebra::Matrix3;
 
 /// An estimate with failed joints, on the way to the tool.
 pub(crate) struct FailureImpact<'a> {
@@ -124,12 +129,16 @@ impl FailureImpact<'_> {
     }
 
     fn prediction_where(&self, joint: usize, known: AngleSource) -> Option<ToolErrorPrediction> {
+        self.prediction_by(|failure| if failure.joint == joint { known } else { AngleSource::AsItIs })
+    }
+
+    /// With the angle of each failed joint known as `source` says.
+    fn prediction_by(&self, source: impl Fn(&Failure) -> AngleSource) -> Option<ToolErrorPrediction> {
         let mut robot = self.robot.clone();
         let mut covariance = self.covariance.clone();
         let mut residual_std_rad = covariance.residual_std_rad?;
         for failure in self.failures {
-            let j = failure.joint;
-            let known = if j == joint { known } else { AngleSource::AsItIs };
+            let (j, known) = (failure.joint, source(failure));
             let spec = &mut robot.sensors[j];
             match known {
                 AngleSource::AsItIs if failure.kind.stands_still() => {
@@ -229,6 +238,9 @@ impl FailureImpact<'_> {
             return None;
         }
         let tolerance_m = self.task.map(|task| task.task.tolerance_m);
+        if self.is_within_tolerance_without(failure) {
+            return None;
+        }
         // Without a task every joint is needed, but for those that the user declares to be without a sensor.
         let is_known = failure.found == FailureSource::Declared && failure.lost_since.is_none();
         if tolerance_m.is_none() && is_known {
@@ -243,6 +255,28 @@ impl FailureImpact<'_> {
             tool_error_by_camera_m: table.tool_error_by_camera_m.map(|s| s.p95),
             tolerance_m,
         })
+    }
+}
+
+impl FailureImpact<'_> {
+    /// Whether the decision rule accepts all targets that can be judged without that sensor, the camera telling the
+    /// angles of other joints that have none.
+    fn is_within_tolerance_without(&self, failure: &Failure) -> bool {
+        let is_told = |other: &Failure| other.has_no_sensor_now() && !other.kind.stands_still();
+        let source = |other: &Failure| {
+            if other.joint != failure.joint && is_told(other) { AngleSource::ByCamera } else { AngleSource::AsItIs }
+        };
+        let Some((task, predicted)) = self.task.zip(self.prediction_by(source)) else { return false };
+        let error = |target: &TargetPrediction| TargetError {
+            index: target.target_idx,
+            by_data_m2: target.covariance_m2,
+            by_priors_m2: Matrix3::zeros(),
+        };
+        let errors: Vec<TargetError> = predicted.targets.iter().map(error).collect();
+        let ReachTask { targets_m, tolerance_m, .. } = task.task;
+        let decided =
+            U95Table::of_task(targets_m.len(), *tolerance_m, (&errors, f64::INFINITY), |_| Code::TargetOutOfReach);
+        decided.p_beyond_tolerance.is_some() && decided.beyond().is_none()
     }
 }
 

@@ -19,7 +19,8 @@ use crate::solve::input::HyperparameterMode;
 use crate::solve::model_for_views::model_for;
 use crate::views::calibration_data::{CalibrationData, HeldOut};
 use crate::views::view::{CaptureData, View};
-use armcal_core::robot::{FailedKind, Robot};
+use armcal_core::kinematics::Attachment;
+use armcal_core::robot::{FailedJoint, FailedKind, Robot};
 use armcal_core::spatial::Pose;
 use armcal_core::streams::ReachTask;
 
@@ -310,6 +311,38 @@ fn what_is_declared_is_believed_and_not_looked_for() {
     }
     let declared = [Failure::without_sensor(2, FailedKind::Dead, FailureSource::Declared, N_VIEWS)];
     assert_eq!(found_failures(&case, &declared), declared);
+}
+
+/// The tool point lies on the last axis before the camera, so that a task of positions does without this joint's
+/// sensor. It does not do without the second joint's.
+#[test]
+fn a_dead_sensor_is_refused_where_the_task_needs_it() {
+    for seed in 120..124 {
+        let mut case = case(seed, None);
+        let last = case.robot.n_seen_joints() - 1;
+        let on_axis = case.robot.chain.joints()[last].axis.into_inner() * 0.2;
+        let link_from_frame = Isometry3::from_parts(on_axis.into(), nalgebra::UnitQuaternion::identity());
+        case.robot.tool.mount = Attachment { n_joints: last + 1, link_from_frame };
+        let tool_m = |view: &View| {
+            let angles = case.truth.angles(&case.robot, view);
+            case.robot.chain.link_poses(&angles).frame(&case.robot.tool.mount).translation.vector.into()
+        };
+        let targets_m = case.views[..4].iter().map(tool_m).collect();
+        let task = ReachTask { stamp: Default::default(), targets_m, tolerance_m: 0.03 };
+        for (joint, declared, is_needed) in [(last, false, false), (last, true, false), (1, false, true)] {
+            let mut broken = Case { robot: case.robot.clone(), truth: case.truth.clone(), views: case.views.clone() };
+            random_words(&mut broken, joint, seed);
+            if declared {
+                broken.robot = broken.robot.with_failed(&[FailedJoint { joint, kind: FailedKind::Dead }]);
+            }
+            let name = broken.robot.sensors[joint].joint.clone();
+            let result = calibrated_for(broken.robot, broken.views, Some(task.clone()));
+            let rows: Vec<&String> = result.failed_joint.iter().map(|row| &row.joint).collect();
+            assert_eq!(rows, [&name], "seed {seed}");
+            let is_refused = result.refusals.iter().any(|refusal| matches!(refusal, Refusal::SensorFailed { .. }));
+            assert_eq!(is_refused, is_needed, "seed {seed}, {name}: {:?}", result.refusals);
+        }
+    }
 }
 
 /// The sensor of `joint` reads another line.
