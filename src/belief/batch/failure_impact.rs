@@ -6,11 +6,14 @@ use crate::explain::failures::{Failure, FailureSource, slip_in_words};
 use crate::file::failed_joint::FailedJointTable;
 use crate::judge::{TargetError, U95Table};
 use crate::model::parameters::JointParameters;
+use crate::positions::position_problem::PositionProblem;
 use crate::say::finding::{Finding, FindingKind, FindingUnit};
+use crate::say::reading_error::{MisreadReadings, ReadingError};
 use crate::say::refusal::Refusal;
 use crate::solve::covariance::{ParameterCovariance, ToolErrorPrediction, predict_tool_error};
 use crate::solve::details::TargetPrediction;
 use crate::solve::estimate::Estimate;
+use crate::views::data_checks::joint_with_same_readings;
 use crate::views::view::{TaskRests, View};
 use armcal_core::codes::Code;
 use armcal_core::kinematics::JointKind;
@@ -25,6 +28,8 @@ pub(crate) struct FailureImpact<'a> {
     /// As the estimate has it, camera and tags where they were found.
     pub robot: &'a Robot,
     pub views: &'a [View],
+    /// With the readings as they were read.
+    pub as_read: &'a [View],
     pub failures: &'a [Failure],
     pub found: &'a Estimate<'a>,
     pub parameters: &'a JointParameters,
@@ -54,8 +59,19 @@ impl FailureImpact<'_> {
 
     /// Of those that have a place in the result: reversed sensors and other scales are findings alone.
     pub(crate) fn tables(&self) -> Vec<FailedJointTable> {
-        let tabled = self.failures.iter().filter(|failure| failure.line.is_none());
+        let tabled = self.of_sensors().filter(|failure| failure.line.is_none());
         tabled.map(|failure| self.table(failure)).collect()
+    }
+
+    /// The failures of sensors: not those of joints that have another one's readings.
+    fn of_sensors(&self) -> impl Iterator<Item = &Failure> {
+        self.failures.iter().filter(|failure| self.joint_read(failure).is_none())
+    }
+
+    /// The joint whose readings a failed one has.
+    fn joint_read(&self, failure: &Failure) -> Option<usize> {
+        let is_detected = failure.found == FailureSource::Detected && !failure.is_step();
+        is_detected.then(|| joint_with_same_readings(self.as_read, self.robot, failure.joint)).flatten()
     }
 
     fn table(&self, failure: &Failure) -> FailedJointTable {
@@ -172,7 +188,7 @@ impl FailureImpact<'_> {
 
     /// Each failed joint as a finding: the estimate takes account of it.
     pub(crate) fn findings(&self) -> Vec<Finding> {
-        self.failures.iter().map(|failure| self.finding(failure)).collect()
+        self.of_sensors().map(|failure| self.finding(failure)).collect()
     }
 
     fn finding(&self, failure: &Failure) -> Finding {
@@ -218,6 +234,9 @@ impl FailureImpact<'_> {
 
     fn refusal(&self, failure: &Failure) -> Option<Refusal> {
         let joint = self.robot.sensors[failure.joint].joint.clone();
+        if let Some(with) = self.joint_read(failure) {
+            return Some(Refusal::MisreadReadings(self.alike(joint, with)));
+        }
         if let Some(line) = failure.line.filter(|_| !self.is_calibrated_anew(failure)) {
             return Some(Refusal::SensorLine { joint, slope: line.slope });
         }
@@ -259,6 +278,18 @@ impl FailureImpact<'_> {
 }
 
 impl FailureImpact<'_> {
+    /// The joint of that name has the readings of `with`.
+    fn alike(&self, joint: String, with: usize) -> MisreadReadings {
+        let as_drawn = PositionProblem::new(self.datasheet, self.as_read).rms_m(&JointParameters::default());
+        let (with, views) = (self.robot.sensors[with].joint.clone(), self.as_read.len());
+        MisreadReadings {
+            found: ReadingError::Alike { joint, with, views },
+            alternatives: Vec::new(),
+            tag_error_m: as_drawn.unwrap_or(0.0),
+            corrected_m: None,
+        }
+    }
+
     /// Whether the decision rule accepts all targets that can be judged without that sensor, the camera telling the
     /// angles of other joints that have none.
     fn is_within_tolerance_without(&self, failure: &Failure) -> bool {

@@ -38,7 +38,7 @@ use crate::tagmap::tag_mapping::map_unknown_tags;
 use crate::views::calibration_data::CalibrationData;
 use crate::views::error::CalibError;
 use crate::views::view::{ObservationRejection, View};
-use armcal_core::codes::Code;
+use armcal_core::codes::{Code, Coded};
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::{Robot, SurveyedTag};
 use armcal_core::routine::Method;
@@ -345,6 +345,9 @@ impl<'a> BundleCalibration<'a> {
             calibration.refuse_first_for([Refusal::WrongInput(wrong)]);
             return;
         }
+        if calibration.refusals.iter().any(|refusal| refusal.code() == Code::JointsAlike) {
+            return;
+        }
         // A scale or unit has been named, and explains all.
         let is_of_line = |refusal: &Refusal| matches!(refusal, Refusal::SensorLine { .. } | Refusal::SensorUnit { .. });
         let is_of_scale = |refusal: &Refusal| is_of_line(refusal) || matches!(refusal, Refusal::BeyondDatasheet { .. });
@@ -506,6 +509,7 @@ impl<'a> BundleCalibration<'a> {
             datasheet: &self.data.robot,
             robot: &diagnosis.robot,
             views: &diagnosis.views,
+            as_read: &self.as_read,
             failures: estimated.failures,
             found: &estimated.estimate,
             parameters,

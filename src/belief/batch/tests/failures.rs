@@ -13,6 +13,7 @@ use crate::file::calibration::Calibration;
 use crate::methods::CalibrationMethod;
 use crate::model::parameters::JointParameters;
 use crate::model::scales::Hyperparameters;
+use crate::say::reading_error::ReadingError;
 use crate::say::refusal::Refusal;
 use crate::solve::estimate::Estimate;
 use crate::solve::input::HyperparameterMode;
@@ -342,6 +343,25 @@ fn a_dead_sensor_is_refused_where_the_task_needs_it() {
             let is_refused = result.refusals.iter().any(|refusal| matches!(refusal, Refusal::SensorFailed { .. }));
             assert_eq!(is_refused, is_needed, "seed {seed}, {name}: {:?}", result.refusals);
         }
+    }
+}
+
+#[test]
+fn a_joint_with_the_readings_of_another_one_is_no_dead_sensor() {
+    for seed in 130..134 {
+        let (joint, with) = ((seed % 5) as usize, ((seed + 2) % 5) as usize);
+        let mut case = case(seed, None);
+        for view in &mut case.views {
+            view.travel_rad[joint] = view.travel_rad[with];
+        }
+        let [name, other] = [joint, with].map(|joint| case.robot.sensors[joint].joint.clone());
+        let result = case.calibrated();
+        let Some(Refusal::MisreadReadings(misread)) = result.refusals.first() else {
+            panic!("seed {seed}: {:?}", result.refusals)
+        };
+        let expected = ReadingError::Alike { joint: name, with: other, views: N_VIEWS };
+        assert_eq!(misread.found, expected, "seed {seed}");
+        assert!(result.failed_joint.is_empty(), "seed {seed}: {:?}", result.failed_joint);
     }
 }
 
