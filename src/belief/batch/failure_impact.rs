@@ -4,15 +4,23 @@ use crate::batch::constants::failure_impact::{MIN_VIEWS_SINCE, UNIT_SHARE};
 use crate::explain::failure_detection::is_suspicious;
 use crate::explain::failures::{Failure, FailureSource, slip_in_words};
 use crate::file::failed_joint::FailedJointTable;
+use crate::judge::{TargetError, U95Table};
 use crate::model::parameters::JointParameters;
+use crate::positions::position_problem::PositionProblem;
 use crate::say::finding::{Finding, FindingKind, FindingUnit};
+use crate::say::reading_error::{MisreadReadings, ReadingError};
 use crate::say::refusal::Refusal;
 use crate::solve::covariance::{ParameterCovariance, ToolErrorPrediction, predict_tool_error};
+use crate::solve::details::TargetPrediction;
 use crate::solve::estimate::Estimate;
+use crate::views::data_checks::joint_with_same_readings;
 use crate::views::view::{TaskRests, View};
+use armcal_core::codes::Code;
 use armcal_core::kinematics::JointKind;
 use armcal_core::robot::{FailedJoint, FailedKind, Robot};
 use armcal_core::stats::Summary;
+use armcal_core::streams::ReachTask;
+use nalgebra::Matrix3;
 
 /// An estimate with failed joints, on the way to the tool.
 pub(crate) struct FailureImpact<'a> {
@@ -20,6 +28,8 @@ pub(crate) struct FailureImpact<'a> {
     /// As the estimate has it, camera and tags where they were found.
     pub robot: &'a Robot,
     pub views: &'a [View],
+    /// With the readings as they were read.
+    pub as_read: &'a [View],
     pub failures: &'a [Failure],
     pub found: &'a Estimate<'a>,
     pub parameters: &'a JointParameters,
@@ -49,15 +59,26 @@ impl FailureImpact<'_> {
 
     /// Of those that have a place in the result: reversed sensors and other scales are findings alone.
     pub(crate) fn tables(&self) -> Vec<FailedJointTable> {
-        let tabled = self.failures.iter().filter(|failure| failure.line.is_none());
+        let tabled = self.of_sensors().filter(|failure| failure.line.is_none());
         tabled.map(|failure| self.table(failure)).collect()
+    }
+
+    /// The failures of sensors: not those of joints that have another one's readings.
+    fn of_sensors(&self) -> impl Iterator<Item = &Failure> {
+        self.failures.iter().filter(|failure| self.joint_read(failure).is_none())
+    }
+
+    /// The joint whose readings a failed one has.
+    fn joint_read(&self, failure: &Failure) -> Option<usize> {
+        let is_detected = failure.found == FailureSource::Detected && !failure.is_step();
+        is_detected.then(|| joint_with_same_readings(self.as_read, self.robot, failure.joint)).flatten()
     }
 
     fn table(&self, failure: &Failure) -> FailedJointTable {
         let joint = failure.joint;
         let pose = |&view_idx: &usize| self.views[view_idx].pose_idx;
         let is_locked = failure.kind.stands_still();
-        let has_no_sensor = failure.leaves_no_sensor();
+        let has_no_sensor = failure.has_no_sensor_now();
         let angle = self.locked_angle(failure);
         FailedJointTable {
             joint: self.robot.sensors[joint].joint.clone(),
@@ -124,12 +145,16 @@ impl FailureImpact<'_> {
     }
 
     fn prediction_where(&self, joint: usize, known: AngleSource) -> Option<ToolErrorPrediction> {
+        self.prediction_by(|failure| if failure.joint == joint { known } else { AngleSource::AsItIs })
+    }
+
+    /// With the angle of each failed joint known as `source` says.
+    fn prediction_by(&self, source: impl Fn(&Failure) -> AngleSource) -> Option<ToolErrorPrediction> {
         let mut robot = self.robot.clone();
         let mut covariance = self.covariance.clone();
         let mut residual_std_rad = covariance.residual_std_rad?;
         for failure in self.failures {
-            let j = failure.joint;
-            let known = if j == joint { known } else { AngleSource::AsItIs };
+            let (j, known) = (failure.joint, source(failure));
             let spec = &mut robot.sensors[j];
             match known {
                 AngleSource::AsItIs if failure.kind.stands_still() => {
@@ -139,7 +164,7 @@ impl FailureImpact<'_> {
                     }
                     robot = robot.with_failed(&[declared]);
                 }
-                AngleSource::AsItIs if failure.leaves_no_sensor() => {
+                AngleSource::AsItIs if failure.has_no_sensor_now() => {
                     // Uniform over the range.
                     (spec.offset_std_rad, spec.gain_std) = (0.0, 0.0);
                     residual_std_rad[j] = spec.half_range_rad / 3.0_f64.sqrt();
@@ -163,7 +188,7 @@ impl FailureImpact<'_> {
 
     /// Each failed joint as a finding: the estimate takes account of it.
     pub(crate) fn findings(&self) -> Vec<Finding> {
-        self.failures.iter().map(|failure| self.finding(failure)).collect()
+        self.of_sensors().map(|failure| self.finding(failure)).collect()
     }
 
     fn finding(&self, failure: &Failure) -> Finding {
@@ -187,7 +212,7 @@ impl FailureImpact<'_> {
             size,
             unit,
             tool_error_m: None,
-            time_s: failure.since.and_then(|view_idx| self.since_first_view_s(view_idx)),
+            time_s: failure.since.or(failure.lost_since).and_then(|view_idx| self.since_first_view_s(view_idx)),
             repaired: is_repaired,
         }
     }
@@ -209,6 +234,9 @@ impl FailureImpact<'_> {
 
     fn refusal(&self, failure: &Failure) -> Option<Refusal> {
         let joint = self.robot.sensors[failure.joint].joint.clone();
+        if let Some(with) = self.joint_read(failure) {
+            return Some(Refusal::MisreadReadings(self.alike(joint, with)));
+        }
         if let Some(line) = failure.line.filter(|_| !self.is_calibrated_anew(failure)) {
             return Some(Refusal::SensorLine { joint, slope: line.slope });
         }
@@ -225,22 +253,61 @@ impl FailureImpact<'_> {
             return Some(Refusal::TooFewViewsSinceSlip { joint, evidence: self.evidence(failure), views });
         }
         let is_needed = failure.joint < self.robot.tool.mount.n_joints;
-        if !failure.leaves_no_sensor() || failure.kind.stands_still() || !is_needed {
+        if !failure.has_no_sensor_now() || failure.kind.stands_still() || !is_needed {
             return None;
         }
         let tolerance_m = self.task.map(|task| task.task.tolerance_m);
-        // Without a task every joint is needed, but for those that the user declares.
-        if tolerance_m.is_none() && failure.found == FailureSource::Declared {
+        if self.is_within_tolerance_without(failure) {
+            return None;
+        }
+        // Without a task every joint is needed, but for those that the user declares to be without a sensor.
+        let is_known = failure.found == FailureSource::Declared && failure.lost_since.is_none();
+        if tolerance_m.is_none() && is_known {
             return None;
         }
         let table = self.table(failure);
         Some(Refusal::SensorFailed {
             joint,
             kind: failure.kind,
+            since_view: failure.lost_since.map(|view_idx| self.views[view_idx].pose_idx + 1),
             tool_error_m: table.tool_error_m.map(|s| s.p95),
             tool_error_by_camera_m: table.tool_error_by_camera_m.map(|s| s.p95),
             tolerance_m,
         })
+    }
+}
+
+impl FailureImpact<'_> {
+    /// The joint of that name has the readings of `with`.
+    fn alike(&self, joint: String, with: usize) -> MisreadReadings {
+        let as_drawn = PositionProblem::new(self.datasheet, self.as_read).rms_m(&JointParameters::default());
+        let (with, views) = (self.robot.sensors[with].joint.clone(), self.as_read.len());
+        MisreadReadings {
+            found: ReadingError::Alike { joint, with, views },
+            alternatives: Vec::new(),
+            tag_error_m: as_drawn.unwrap_or(0.0),
+            corrected_m: None,
+        }
+    }
+
+    /// Whether the decision rule accepts all targets that can be judged without that sensor, the camera telling the
+    /// angles of other joints that have none.
+    fn is_within_tolerance_without(&self, failure: &Failure) -> bool {
+        let is_told = |other: &Failure| other.has_no_sensor_now() && !other.kind.stands_still();
+        let source = |other: &Failure| {
+            if other.joint != failure.joint && is_told(other) { AngleSource::ByCamera } else { AngleSource::AsItIs }
+        };
+        let Some((task, predicted)) = self.task.zip(self.prediction_by(source)) else { return false };
+        let error = |target: &TargetPrediction| TargetError {
+            index: target.target_idx,
+            by_data_m2: target.covariance_m2,
+            by_priors_m2: Matrix3::zeros(),
+        };
+        let errors: Vec<TargetError> = predicted.targets.iter().map(error).collect();
+        let ReachTask { targets_m, tolerance_m, .. } = task.task;
+        let decided =
+            U95Table::of_task(targets_m.len(), *tolerance_m, (&errors, f64::INFINITY), |_| Code::TargetOutOfReach);
+        decided.p_beyond_tolerance.is_some() && decided.beyond().is_none()
     }
 }
 

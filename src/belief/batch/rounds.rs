@@ -39,7 +39,7 @@ use crate::tagmap::tag_mapping::map_unknown_tags;
 use crate::views::calibration_data::CalibrationData;
 use crate::views::error::CalibError;
 use crate::views::view::{ObservationRejection, View};
-use armcal_core::codes::Code;
+use armcal_core::codes::{Code, Coded};
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::{Robot, SurveyedTag};
 use armcal_core::routine::Method;
@@ -281,7 +281,7 @@ impl<'a> BundleCalibration<'a> {
             listener(&estimated.setup.input(), estimated.by_views());
         }
         // What no sensor told at a rest stays as it was stowed.
-        for failure in estimated.failures.iter().filter(|failure| failure.leaves_no_sensor()) {
+        for failure in estimated.failures.iter().filter(|failure| failure.has_no_sensor_now()) {
             let stowed_rad = self.data.robot.stowed[failure.joint];
             self.data.data.rests.values_mut().for_each(|rest| rest[failure.joint] = stowed_rad);
         }
@@ -349,6 +349,9 @@ impl<'a> BundleCalibration<'a> {
         }
         if let Some(wrong) = wrong_input(&self.data.data, &self.surveyed, &self.data.robot) {
             calibration.refuse_first_for([Refusal::WrongInput(wrong)]);
+            return;
+        }
+        if calibration.refusals.iter().any(|refusal| refusal.code() == Code::JointsAlike) {
             return;
         }
         // A scale or unit has been named, and explains all.
@@ -517,6 +520,7 @@ impl<'a> BundleCalibration<'a> {
             datasheet: &self.data.robot,
             robot: &diagnosis.robot,
             views: &diagnosis.views,
+            as_read: &self.as_read,
             failures: estimated.failures,
             found: &estimated.estimate,
             parameters,

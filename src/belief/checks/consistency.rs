@@ -297,12 +297,12 @@ impl VerdictInput<'_> {
     /// Gains and offsets beyond what a sensor of that datasheet can have: a joint that does not move, or another
     /// sensor.
     fn beyond_datasheet(&self, table: &mut VerdictTable) -> Option<Refusal> {
-        let (robot, at) = (self.input.robot, self.found.parameters());
+        let robot = self.input.robot;
         let linear = self.found.joint_parameters().iter().filter(|p| p.prior_std(robot) > 0.0);
         let of_sensor = linear.filter(|p| matches!(p.kind, ParameterKind::Gain | ParameterKind::Offset));
         let sigmas = of_sensor.map(|p| {
             let nominal = if p.kind == ParameterKind::Gain { 1.0 } else { 0.0 };
-            let off = at.get(*p) - nominal;
+            let off = self.found.before_slips(*p) - nominal;
             (*p, off.abs() / p.prior_std(robot), off)
         });
         let (worst, sigmas, off) = sigmas.max_by(|a, b| a.1.total_cmp(&b.1))?;

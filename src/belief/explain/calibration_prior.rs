@@ -20,7 +20,7 @@ use crate::file::calibration::Calibration;
 use crate::model::blocks::Block;
 use crate::model::estimated::Model;
 use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
-use crate::model::prior::JointPrior;
+use crate::model::prior::{JointPrior, steps_of};
 use crate::model::scales::Hyperparameters;
 use crate::say::refusal::{MIN_USED_SHARE, Refusal};
 use crate::solve::estimate::{Estimate, estimate};
@@ -323,6 +323,15 @@ fn covariances(prior: &Calibration, columns: &PriorColumns<'_>, elapsed_h: f64) 
             covariance[(k, k)] = scales.prior_std(spec, p.joint, p.kind).max(1e-9).powi(2);
         } else if p.kind == ParameterKind::Offset {
             covariance[(k, k)] += drift_std_rad_per_sqrt_h(spec).powi(2) * elapsed_h;
+        }
+    }
+    // The prior tells of an offset before the sensor slipped among the new views.
+    for (k, p) in parameters.iter().enumerate().filter(|(_, p)| p.kind == ParameterKind::Offset) {
+        for step in steps_of(parameters, p.joint) {
+            let step_rad2 = covariance[(step, step)];
+            covariance[(k, k)] += step_rad2;
+            covariance[(k, step)] -= step_rad2;
+            covariance[(step, k)] -= step_rad2;
         }
     }
     let mut widened = covariance.clone();

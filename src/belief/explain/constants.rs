@@ -77,6 +77,13 @@ pub(crate) mod failure_pattern {
     pub(crate) const MIN_SIDE: usize = 2;
     /// More single jumps than this share of the views are no exceptions.
     pub(crate) const MAX_SINGLE: f64 = 0.4;
+    /// A sensor is lost where its readings are off in so many views and in this share of those since the first of them.
+    /// Assumed: single jumps, of one view in five, are no such row in one of a hundred recordings.
+    pub(crate) const MIN_LOST: usize = 4;
+    pub(crate) const LOST_SHARE: f64 = 0.75;
+    /// So many right readings at the end show that the sensor is back. Assumed: a wrong one is right by chance in less
+    /// than a quarter of the views, three times on end in less than two of a hundred.
+    pub(crate) const MIN_BACK: usize = 3;
     /// A locked joint's sensor is right if it is off by less than this many of the datasheet's sigma.
     pub(crate) const RIGHT_SIGMAS: f64 = 4.0;
     /// A reading moved if it spans more sigma of its noise than this.

@@ -17,6 +17,7 @@ use crate::explain::setup::BundleSetup;
 use crate::file::calibration::Calibration;
 use crate::measure::ObservationTerm;
 use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
+use crate::model::prior::steps_of;
 use crate::solve::constants::outliers::LIMITS;
 use crate::solve::estimate::{Estimate, estimate};
 use crate::solve::input::HyperparameterMode;
@@ -201,6 +202,11 @@ impl FailureSearch<'_> {
                 let (kind, reading, views) = (FailedKind::Jumps, SensorUse::Used, views.clone());
                 Failure { kind, reading, views, evidence, ..all }
             }
+            FailurePattern::Lost { since, .. } => {
+                let (reading, first) = (SensorUse::Used, self.views[*since].end);
+                let views = (0..self.views.len()).filter(|&k| self.views[k].end >= first).collect();
+                Failure { reading, views, lost_since: Some(*since), evidence, ..all }
+            }
             FailurePattern::Lasting { since, step_rad } => Failure {
                 found,
                 ..Failure::slip((joint, self.robot.sensors[joint].unit()), *step_rad, self.views, *since)
@@ -214,7 +220,7 @@ impl FailureSearch<'_> {
             let found = self.hypothesis(known, joint, FailureSource::Declared);
             let Some(failure) = known.iter_mut().find(|failure| failure.joint == joint) else { continue };
             match found {
-                Some(found) if found.kind == FailedKind::Jumps => *failure = found,
+                Some(found) if found.kind == FailedKind::Jumps || found.lost_since.is_some() => *failure = found,
                 _ => "no view shows a jump".clone_into(&mut failure.evidence),
             }
         }
@@ -273,24 +279,29 @@ pub(crate) fn score(found: &Estimate<'_>) -> f64 {
 
 /// A gain or offset that no sensor of the datasheet has: a locked joint looks like one of gain zero.
 fn is_beyond_datasheet(robot: &Robot, found: &Estimate<'_>) -> bool {
-    let (sound, at) = (JointParameters::default(), found.parameters());
+    let sound = JointParameters::default();
     found.joint_parameters().iter().enumerate().any(|(column, p)| {
         let is_known = matches!(p.kind, ParameterKind::Gain | ParameterKind::Offset) && p.prior_std(robot) > 0.0;
         let limit = FAR_SIGMAS * p.prior_std(robot);
         // What the gain does not take up may have gone to the nonlinearity.
         let slope_off = if p.kind == ParameterKind::Gain { (found.slope(*p, column) - 1.0).abs() } else { 0.0 };
-        is_known && ((at.get(*p) - sound.get(*p)).abs() > limit || slope_off > limit)
+        is_known && ((found.before_slips(*p) - sound.get(*p)).abs() > limit || slope_off > limit)
     })
 }
 
 impl Estimate<'_> {
-    /// Of the joint's estimated angles by its readings; one where they do not move.
+    /// Of the joint's estimated angles, without what its sensor slipped by, by its readings; one where they do not
+    /// move.
     fn slope(&self, gain: Parameter, column: usize) -> f64 {
         let problem = &self.problem;
         let views = (0..problem.views.len()).filter(|&view_idx| self.uses(view_idx));
-        let points: Vec<[f64; 2]> = views
-            .map(|k| [problem.views[k].basis[column], problem.angles(k, &self.solved.state)[gain.joint]])
-            .collect();
+        let steps = steps_of(&problem.layout.parameters, gain.joint);
+        let point = |k: usize| {
+            let (basis, state) = (&problem.views[k].basis, &self.solved.state);
+            let slipped_rad: f64 = steps.iter().map(|&step| basis[step] * state.joint[step]).sum();
+            [basis[column], problem.angles(k, state)[gain.joint] - slipped_rad]
+        };
+        let points: Vec<[f64; 2]> = views.map(point).collect();
         let n = points.len().max(1) as f64;
         let mean = [0, 1].map(|axis| points.iter().map(|point| point[axis]).sum::<f64>() / n);
         let sum = |axis: usize| points.iter().map(|p| (p[0] - mean[0]) * (p[axis] - mean[axis])).sum::<f64>();

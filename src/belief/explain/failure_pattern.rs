@@ -2,14 +2,16 @@
 
 pub(crate) use crate::explain::constants::failure_pattern::MIN_STILL_VIEWS;
 use crate::explain::constants::failure_pattern::{
-    ALL_ALIKE, FLOOR_RAD, FOLLOWS, LEAST_GAIN_STD, LOCKED_RAD, LOCKED_SIGMAS, MAX_SINGLE, MIN_SIDE, RIGHT_SIGMAS,
-    ROUNDS, STEP_LEAVES, STEP_SIGMAS, STILL_SIGMAS, STRAIGHT, STUCK_SIGMAS, WHOLE_TURN_RAD,
+    ALL_ALIKE, FLOOR_RAD, FOLLOWS, LEAST_GAIN_STD, LOCKED_RAD, LOCKED_SIGMAS, LOST_SHARE, MAX_SINGLE, MIN_BACK,
+    MIN_LOST, MIN_SIDE, RIGHT_SIGMAS, ROUNDS, STEP_LEAVES, STEP_SIGMAS, STILL_SIGMAS, STRAIGHT, STUCK_SIGMAS,
+    WHOLE_TURN_RAD,
 };
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Matrix3, Vector3};
 
 use crate::explain::failures::{FAR_RAD, FAR_SIGMAS, SensorLine, SensorUse, slip_in_words};
+use crate::say;
 use crate::solve::estimate::Estimate;
 use crate::views::constants::external_board::SIGMA_OF_MEDIAN;
 use crate::views::view::View;
@@ -42,6 +44,8 @@ pub(crate) enum FailurePattern {
     Scaled(SensorLine),
     /// The readings of these views are off.
     Single(Vec<usize>),
+    /// The readings are off in so many views since one of them, nearly all, and up to the end.
+    Lost { since: usize, n_off: usize },
     /// The readings are off against each other before and since a view, by so much, rad.
     Lasting { since: usize, step_rad: f64 },
 }
@@ -116,12 +120,28 @@ impl Readings {
         if SIGMA_OF_MEDIAN * quantile(&sizes, 0.5)? > FOLLOWS * spread_rad || !(0.7..1.3).contains(&slope) {
             return Some(FailurePattern::Dead);
         }
-        let far = |(_, off): &(&usize, &f64)| off.abs() > FAR_RAD.max(FAR_SIGMAS * sigma_rad);
-        let single: Vec<usize> = self.view_idx.iter().zip(&off_rad).filter(far).map(|(k, _)| *k).collect();
-        let n = single.len();
-        let mut single = single;
+        let is_far: Vec<bool> = sizes.iter().map(|size| *size > FAR_RAD.max(FAR_SIGMAS * sigma_rad)).collect();
+        self.single(&is_far)
+    }
+
+    /// Single views whose readings are far off, or nearly all since one of them.
+    fn single(&self, is_far: &[bool]) -> Option<FailurePattern> {
+        let n_off = |from: usize| is_far[from..].iter().filter(|far| **far).count();
+        if let Some(from) = lost_from(is_far) {
+            return Some(FailurePattern::Lost { since: self.view_idx[from], n_off: n_off(from) });
+        }
+        let mut single: Vec<usize> =
+            self.view_idx.iter().zip(is_far).filter(|(_, far)| **far).map(|(k, _)| *k).collect();
         single.sort_unstable();
-        (n > 0 && n as f64 <= MAX_SINGLE * self.len() as f64).then_some(FailurePattern::Single(single))
+        let is_exception = n_off(0) as f64 <= MAX_SINGLE * self.len() as f64;
+        (is_exception && !single.is_empty()).then_some(FailurePattern::Single(single))
+    }
+
+    /// Returns true where the readings of these views are the same but for noise.
+    fn is_still_in(&self, views: &[usize], spec: &JointSensorSpec) -> bool {
+        let at = self.view_idx.iter().zip(&self.travel_rad).filter(|(k, _)| views.contains(k));
+        let travel_rad: Vec<f64> = at.map(|(_, travel_rad)| *travel_rad).collect();
+        travel_rad.len() >= MIN_STILL_VIEWS && n_still(&travel_rad, spec) == travel_rad.len()
     }
 
     /// Returns true where the sensor of a joint that stands still reads an angle that its datasheet allows.
@@ -227,11 +247,26 @@ impl Readings {
             ),
             FailurePattern::Single(of) => {
                 let numbers: Vec<String> = of.iter().map(|&k| number(k).to_string()).collect();
-                format!("the reading is off in {} of {n} views ({})", of.len(), numbers.join(", "))
+                let what = if self.is_still_in(of, spec) { "stands still" } else { "is off" };
+                say::reading_in_views(what, [of.len(), n], &numbers)
+            }
+            FailurePattern::Lost { since, n_off } => {
+                let n_since = n - self.view_idx.iter().position(|k| k == since).unwrap_or(0);
+                say::lost_reading([*n_off, n_since], number(*since))
             }
             FailurePattern::Lasting { since, step_rad } => slip_in_words(unit.shown(*step_rad, 2), views, *since),
         }
     }
+}
+
+/// From which view on nearly all are off, several and up to the end, if any is so; the views are in the order of time.
+fn lost_from(is_off: &[bool]) -> Option<usize> {
+    let n_back = is_off.iter().rev().take_while(|off| !**off).count();
+    let is_lost_from = |from: &usize| {
+        let n_off = is_off[*from..].iter().filter(|off| **off).count();
+        is_off[*from] && n_off >= MIN_LOST && n_off as f64 >= LOST_SHARE * (is_off.len() - from) as f64
+    };
+    if n_back >= MIN_BACK { None } else { (0..is_off.len()).find(is_lost_from) }
 }
 
 fn rms(values: &[f64]) -> f64 {
@@ -255,6 +290,66 @@ fn deviation(values: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fixture::titan;
+    use armcal_core::stats::stream_rng;
+    use rand::RngExt;
+
+    const JOINT: usize = 1;
+
+    /// Forty views of a joint whose sensor reads `reading` of the view and the angle.
+    fn readings(seed: u64, reading: impl Fn(usize, f64) -> f64) -> Readings {
+        let mut rng = stream_rng(seed, "patterns");
+        let angle_rad: Vec<f64> = (0..40).map(|_| rng.random_range(-1.0..1.0)).collect();
+        let noisy = |(k, angle_rad): (usize, &f64)| reading(k, *angle_rad) + 1e-6 * rng.random_range(-1.0..1.0);
+        let travel_rad = angle_rad.iter().enumerate().map(noisy).collect();
+        Readings { joint: JOINT, view_idx: (0..40).collect(), travel_rad, angle_rad, std_rad: vec![1e-4; 40] }
+    }
+
+    /// Another line, another joint's angle or no sense since a view. The first one that is off may read right by chance.
+    #[test]
+    fn a_sensor_that_reads_something_else_up_to_the_end_is_lost() {
+        let robot = titan();
+        for seed in 0..8 {
+            let other = |k: usize| (7.0 * k as f64 + seed as f64).sin();
+            let wrong: [&dyn Fn(usize, f64) -> f64; 3] =
+                [&|_, angle| 2.0 * angle, &|_, angle| -angle, &|k, _| other(k)];
+            for (kind, wrong) in wrong.iter().enumerate() {
+                for from in [29, 34] {
+                    let readings = readings(seed, |k, angle| if k < from { angle } else { wrong(k, angle) });
+                    let Some(FailurePattern::Lost { since, n_off }) = readings.pattern(&robot) else {
+                        panic!("seed {seed}, {kind}, {from}: {:?}", readings.pattern(&robot))
+                    };
+                    assert!((from..from + 3).contains(&since), "seed {seed}, {kind}: {since} for {from}");
+                    assert!(n_off >= MIN_LOST && n_off <= 40 - since, "seed {seed}, {kind}: {n_off}");
+                }
+            }
+        }
+    }
+
+    /// A block that ends, and scattered views.
+    #[test]
+    fn a_sensor_that_reads_right_again_jumped_in_single_views() {
+        let robot = titan();
+        for seed in 0..8 {
+            let mut rng = stream_rng(seed, "scattered");
+            let scattered: Vec<usize> = (0..6).map(|n| 6 * n + rng.random_range(0..6)).collect();
+            for off in [(20..30).collect(), (24..37).collect(), scattered] {
+                let readings =
+                    readings(seed, |k, angle| angle + if off.contains(&k) { 0.3 + 0.1 * angle } else { 0.0 });
+                assert_eq!(readings.pattern(&robot), Some(FailurePattern::Single(off)), "seed {seed}");
+            }
+        }
+    }
+
+    #[test]
+    fn readings_that_stand_still_for_a_while_are_told_from_others_that_are_off() {
+        let (robot, of) = (titan(), (12..22).collect::<Vec<usize>>());
+        let spec = &robot.sensors[JOINT];
+        let still = readings(1, |k, angle| if of.contains(&k) { 0.4 } else { angle });
+        let off = readings(1, |k, angle| if of.contains(&k) { angle + 0.3 } else { angle });
+        assert_eq!([&still, &off].map(|one| one.is_still_in(&of, spec)), [true, false]);
+        assert!(matches!(still.pattern(&robot), Some(FailurePattern::Single(_))), "{:?}", still.pattern(&robot));
+    }
 
     #[test]
     fn angles_that_are_one_but_for_whole_turns_become_one() {

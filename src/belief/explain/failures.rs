@@ -63,6 +63,8 @@ pub struct Failure {
     pub since: Option<usize>,
     /// By how much more it reads since, rad.
     pub step_rad: Option<f64>,
+    /// Of a sensor that reads something else up to the end: the first view in which it does.
+    pub lost_since: Option<usize>,
     /// Of a reversed sensor, whose reading is not used, and of one of another scale, whose gain is estimated.
     pub line: Option<SensorLine>,
     /// What shows it, in words.
@@ -81,6 +83,7 @@ impl Failure {
             views,
             since: None,
             step_rad: None,
+            lost_since: None,
             line: None,
             evidence: String::new(),
         }
@@ -116,6 +119,11 @@ impl Failure {
     pub fn n_views_since(&self, views: &[View]) -> Option<usize> {
         let since = views[self.since?].end;
         Some(views.iter().filter(|view| view.end >= since && !view.tags.is_empty()).count())
+    }
+
+    /// Whether nothing tells the joint's angle any more, now that the views are over.
+    pub fn has_no_sensor_now(&self) -> bool {
+        self.leaves_no_sensor() || self.lost_since.is_some()
     }
 
     /// Whether the joint's parameters have no data at all.

@@ -224,7 +224,9 @@ fn concerns_same(a: &ReadingError, b: &ReadingError) -> bool {
     let joints = |error: &ReadingError| match error {
         ReadingError::Exchanged { joints } => joints.to_vec(),
         ReadingError::Reversed { joints } | ReadingError::OtherTurns { joints, .. } => joints.clone(),
-        ReadingError::Coupled { joint, with, .. } => vec![joint.clone(), with.clone()],
+        ReadingError::Coupled { joint, with, .. } | ReadingError::Alike { joint, with, .. } => {
+            vec![joint.clone(), with.clone()]
+        }
         ReadingError::Zeros { joints } => joints.iter().map(|zero| zero.joint.clone()).collect(),
         ReadingError::Scaled { joint, .. } => vec![joint.clone()],
         ReadingError::Shifted { .. } | ReadingError::Camera { .. } => Vec::new(),

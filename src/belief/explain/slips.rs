@@ -14,6 +14,7 @@ use crate::explain::failures::Failure;
 use crate::explain::model_selection::log_evidence_of_all;
 use crate::explain::step_test::{MIN_SIDE, OffsetPrior, StepCandidate};
 use crate::model::parameters::{Parameter, ParameterKind};
+use crate::model::prior::steps_of;
 use crate::model::scales::STEP_STD_RAD;
 use crate::solve::estimate::Estimate;
 use crate::solve::problem::past_derivative;
@@ -107,6 +108,16 @@ impl Estimate<'_> {
         let step = Parameter { joint, kind: ParameterKind::StepBefore(since) };
         let column = self.problem.layout.parameters.iter().position(|p| *p == step)?;
         Some((self.solved.state.joint[column], self.posterior.covariance[(column, column)].max(0.0).sqrt()))
+    }
+
+    /// `parameter` as the sensor had it before it slipped: that is what its datasheet tells of.
+    pub(crate) fn before_slips(&self, parameter: Parameter) -> f64 {
+        let now = self.parameters().get(parameter);
+        if parameter.kind != ParameterKind::Offset {
+            return now;
+        }
+        let steps = steps_of(&self.problem.layout.parameters, parameter.joint);
+        now + steps.into_iter().map(|column| self.solved.state.joint[column]).sum::<f64>()
     }
 
     /// `views` with the readings that the sensors as they are at the last view would have had before they slipped or

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::model::blocks::{Block, MAX_COLUMNS, PerBlock, Std, Value};
 use crate::model::layout::Layout;
-use crate::model::parameters::{JointParameters, Parameter};
+use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::model::scales::Hyperparameters;
 use crate::model::state::State;
 use armcal_core::robot::Robot;
@@ -135,10 +135,59 @@ pub(crate) fn off_by(
 }
 
 /// Information on the joints' parameters by the datasheet, under `scales`.
+///
+/// The datasheet tells of the offset before the sensor slipped: of the offset as it is now plus all steps. Since the
+/// slip the offset is as uncertain as the slip is.
 fn joint_information(robot: &Robot, parameters: &[Parameter], scales: &Hyperparameters) -> DMatrix<f64> {
-    let info = parameters.iter().map(|p| {
+    let info = |p: &Parameter| {
         let std = scales.prior_std(&robot.sensors[p.joint], p.joint, p.kind);
         at_least(std).powi(-2)
-    });
-    DMatrix::from_diagonal(&DVector::from_iterator(parameters.len(), info))
+    };
+    let mut matrix = DMatrix::from_diagonal(&DVector::from_iterator(parameters.len(), parameters.iter().map(info)));
+    for (offset, p) in parameters.iter().enumerate().filter(|(_, p)| p.kind == ParameterKind::Offset) {
+        let steps = steps_of(parameters, p.joint);
+        for &step in &steps {
+            matrix[(offset, step)] += info(p);
+            matrix[(step, offset)] += info(p);
+            steps.iter().for_each(|&other| matrix[(step, other)] += info(p));
+        }
+    }
+    matrix
+}
+
+/// Columns of what the sensor of `joint` slipped by.
+pub(crate) fn steps_of(parameters: &[Parameter], joint: usize) -> Vec<usize> {
+    let is_step = |&column: &usize| parameters[column].joint == joint && parameters[column].is_step();
+    (0..parameters.len()).filter(is_step).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::titan;
+    use crate::model::scales::STEP_STD_RAD;
+    use armcal_core::time::SIMULATION_EPOCH;
+
+    /// Two slips of one sensor, and none of the next.
+    #[test]
+    fn the_datasheet_tells_of_the_offset_before_the_slips() {
+        let robot = titan();
+        let steps = [1.0, 2.0].map(|s| ParameterKind::StepBefore(SIMULATION_EPOCH.plus_s(s)));
+        let kinds = [ParameterKind::Gain, ParameterKind::Offset, steps[0], steps[1]];
+        let mut parameters = kinds.map(|kind| Parameter { joint: 1, kind }).to_vec();
+        parameters.push(Parameter { joint: 2, kind: ParameterKind::Offset });
+        let scales = Hyperparameters::datasheet(&robot);
+        let covariance = joint_information(&robot, &parameters, &scales).try_inverse().expect("regular");
+        let by = |weights: [f64; 5]| {
+            let by = DVector::from_row_slice(&weights);
+            (&covariance * &by).dot(&by).sqrt()
+        };
+        let is = |found: f64, expected: f64| assert!((found / expected - 1.0).abs() < 1e-6, "{found} {expected}");
+        let stated_rad = robot.sensors[1].offset_std_rad;
+        is(by([0.0, 1.0, 1.0, 1.0, 0.0]), stated_rad);
+        is(by([0.0, 1.0, 0.0, 0.0, 0.0]), stated_rad.hypot(2.0_f64.sqrt() * STEP_STD_RAD));
+        is(by([0.0, 0.0, 1.0, 0.0, 0.0]), STEP_STD_RAD);
+        is(by([1.0, 0.0, 0.0, 0.0, 0.0]), robot.sensors[1].gain_std);
+        is(by([0.0, 0.0, 0.0, 0.0, 1.0]), robot.sensors[2].offset_std_rad);
+    }
 }

@@ -107,6 +107,16 @@ pub(crate) fn slip(step: &str, [n_before, n]: [usize; 2], number: u32) -> String
     format!("the sensor slipped by {step} after {n_before} of {n} views, before view {number}")
 }
 
+/// `the reading is off in 3 of 20 views (2, 9, 15)`; `what`: what is wrong with it there.
+pub(crate) fn reading_in_views(what: &str, [n_there, n]: [usize; 2], numbers: &[String]) -> String {
+    format!("the reading {what} in {n_there} of {n} views ({})", numbers.join(", "))
+}
+
+/// `the reading is off in 13 of the last 14 views, since view 27`.
+pub(crate) fn lost_reading([n_off, n_since]: [usize; 2], number: u32) -> String {
+    format!("the reading is off in {n_off} of the last {n_since} views, since view {number}")
+}
+
 /// A walk of an offset, so large over the views (std), and its effect.
 pub(crate) fn offset_walks(joint: &str, walked: &str) -> String {
     format!(

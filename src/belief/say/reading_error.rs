@@ -47,6 +47,15 @@ pub enum ReadingError {
         /// 1 where it is added, -1 where it is subtracted.
         sign: f64,
     },
+    /// One joint has the readings of another one.
+    Alike {
+        /// Name of the joint in the URDF whose angles they are not.
+        joint: String,
+        /// The joint that they belong to.
+        with: String,
+        /// Views in which they are the same.
+        views: usize,
+    },
     /// Readings of 0 to 360 deg, of joints whose ranges lie about zero.
     OtherTurns {
         /// Their names in the URDF.
@@ -107,6 +116,9 @@ impl fmt::Display for ReadingError {
             Self::Coupled { joint, with, sign } => {
                 let (verb, preposition) = if *sign > 0.0 { ("added", "to") } else { ("subtracted", "from") };
                 write!(f, "the angle of {with} is {verb} {preposition} the reading of {joint}")
+            }
+            Self::Alike { joint, with, views } => {
+                write!(f, "{joint} and {with} have the same readings in all {views} views, those of {with}")
             }
             Self::Zeros { joints } => {
                 let one = |zero: &JointZero| {
@@ -175,6 +187,9 @@ impl MisreadReadings {
             ReadingError::Coupled { joint, with, .. } => {
                 format!("record the angle of {joint} relative to the link before it, without that of {with}")
             }
+            ReadingError::Alike { joint, .. } => {
+                format!("name the readings of {joint} in joint_sensors.names of the input map, or record them")
+            }
             ReadingError::OtherTurns { wrap_counts, .. } => {
                 format!("state in [[joint_sensor]] of robot.toml that the word repeats: wrap_counts = {wrap_counts:.6}")
             }
@@ -211,6 +226,7 @@ impl Coded for MisreadReadings {
         match self.found {
             ReadingError::Exchanged { .. } | ReadingError::Reversed { .. } => Code::JointsExchanged,
             ReadingError::Coupled { .. } => Code::JointsCoupled,
+            ReadingError::Alike { .. } => Code::JointsAlike,
             ReadingError::OtherTurns { .. } => Code::JointTurns,
             ReadingError::Zeros { .. } => Code::JointZeros,
             ReadingError::Scaled { .. } => Code::SensorLine,

@@ -338,6 +338,9 @@ pub enum Refusal {
         joint: String,
         /// What is wrong with its sensor.
         kind: FailedKind,
+        /// Number of the first view in which it is wrong; absent where all are.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        since_view: Option<u32>,
         /// Over the task's targets, 95th percentile, without the sensor; absent where nothing predicts it.
         tool_error_m: Option<f64>,
         /// The same while the camera shows the joint's angle.

@@ -22,6 +22,10 @@ pub(crate) mod conditions {
 }
 
 pub(crate) mod data_checks {
+    /// Readings of two joints this near to one straight line, as a share of what they span, are of one sensor, and so
+    /// many views show it. Assumed: rounding of a conversion is far below, noise of a sensor above.
+    pub(crate) const ALIKE_SHARE: f64 = 1e-7;
+    pub(crate) const MIN_ALIKE_VIEWS: usize = 5;
     /// The largest share of messages with numbers that are not finite. Assumed: a sensor that fails now and then still
     /// serves.
     pub(crate) const MAX_NOT_FINITE_SHARE: f64 = 0.01;

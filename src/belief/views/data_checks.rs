@@ -1,10 +1,10 @@
 //! Recordings that no method can make sense of, refused by name before anything is fitted.
 
-use crate::views::constants::data_checks::{MAX_NOT_FINITE_SHARE, MOVED_SIGMAS};
+use crate::views::constants::data_checks::{ALIKE_SHARE, MAX_NOT_FINITE_SHARE, MIN_ALIKE_VIEWS, MOVED_SIGMAS};
 use crate::views::error::CalibError;
-use crate::views::view::{CaptureData, ObservationRejection};
+use crate::views::view::{CaptureData, ObservationRejection, View};
 use armcal_core::log::{Recording, Stream};
-use armcal_core::robot::Robot;
+use armcal_core::robot::{JointSensorSpec, Robot};
 
 /// Refuses a recording of another arm.
 ///
@@ -85,8 +85,7 @@ pub(crate) fn check_pose_variation(name: &str, data: &CaptureData, robot: &Robot
     for (joint, spec) in robot.sensors.iter().enumerate().take(robot.n_seen_joints()) {
         let travel = views().map(|view| view.travel_rad[joint]);
         let (low, high) = travel.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), t| (l.min(t), h.max(t)));
-        let noise_rad = spec.noise_std_counts / spec.counts_per_rad.abs();
-        if high - low > MOVED_SIGMAS * noise_rad {
+        if high - low > least_motion_rad(spec) {
             return Ok(());
         }
         if most.is_none_or(|(_, moved)| high - low > moved) {
@@ -100,4 +99,66 @@ pub(crate) fn check_pose_variation(name: &str, data: &CaptureData, robot: &Robot
         joint: robot.sensors[joint].joint.clone(),
         moved: robot.sensors[joint].unit().shown(moved_rad, 3),
     })
+}
+
+/// What readings of a sensor span at least where its joint moved.
+fn least_motion_rad(spec: &JointSensorSpec) -> f64 {
+    MOVED_SIGMAS * spec.noise_std_counts / spec.counts_per_rad.abs()
+}
+
+/// The joint that has the same readings as `joint`, in whatever unit: they lie on one straight line in all views, and
+/// two sensors' noise would not let them.
+pub(crate) fn joint_with_same_readings(views: &[View], robot: &Robot, joint: usize) -> Option<usize> {
+    (0..robot.n_seen_joints()).find(|&other| other != joint && are_alike(views, robot, [joint, other]))
+}
+
+fn are_alike(views: &[View], robot: &Robot, [a, b]: [usize; 2]) -> bool {
+    let at = |view: &View| [a, b].map(|joint| view.travel_rad[joint]);
+    let by_first = |one: &&View, other: &&View| at(one)[0].total_cmp(&at(other)[0]);
+    let (Some(low), Some(high)) = (views.iter().min_by(by_first), views.iter().max_by(by_first)) else { return false };
+    let (low, high) = (at(low), at(high));
+    let span = [0, 1].map(|k| high[k] - low[k]);
+    let moved = [(span[0], a), (span[1], b)];
+    let is_still = moved.iter().any(|(span, joint)| span.abs() <= least_motion_rad(&robot.sensors[*joint]));
+    if is_still || views.len() < MIN_ALIKE_VIEWS {
+        return false;
+    }
+    let off = |[x, y]: [f64; 2]| (y - low[1] - span[1] / span[0] * (x - low[0])).abs();
+    views.iter().all(|view| off(at(view)) < ALIKE_SHARE * span[1].abs())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::titan;
+    use armcal_core::joints::JointAngles;
+    use armcal_core::stats::stream_rng;
+    use armcal_core::time::SIMULATION_EPOCH;
+    use rand::RngExt;
+
+    /// Readings of the third joint that are `third` of those of the second.
+    fn views(seed: u64, third: impl Fn(f64, f64) -> f64) -> Vec<View> {
+        let mut rng = stream_rng(seed, "alike");
+        let one = |number: u32| {
+            let mut travel_rad = JointAngles::from_fn(titan().n_joints(), |_| rng.random_range(-1.0..1.0));
+            travel_rad[2] = third(travel_rad[1], rng.random_range(-1.0..1.0));
+            View::of_reading(number, SIMULATION_EPOCH.plus_s(f64::from(number)), travel_rad)
+        };
+        (0..20).map(one).collect()
+    }
+
+    #[test]
+    fn readings_of_one_sensor_are_told_from_those_of_two() {
+        let robot = titan();
+        for seed in 0..8 {
+            let same = |third: &dyn Fn(f64, f64) -> f64| joint_with_same_readings(&views(seed, third), &robot, 2);
+            assert_eq!(same(&|second, _| second), Some(1));
+            // Another zero, unit or sign.
+            assert_eq!(same(&|second, _| 0.3 - 1e-3 * second.to_degrees()), Some(1));
+            // Moved alike, each with its own noise; moved by itself; not moved.
+            assert_eq!(same(&|second, noise| second + 1e-4 * noise), None);
+            assert_eq!(same(&|_, own| own), None);
+            assert_eq!(same(&|_, _| 0.2), None);
+        }
+    }
 }

@@ -141,6 +141,7 @@ codes! {
     SensorUnit = "sensor_unit",
     JointsExchanged = "joints_exchanged",
     JointsCoupled = "joints_coupled",
+    JointsAlike = "joints_alike",
     JointZeros = "joint_zeros",
     JointTurns = "joint_turns",
     ReadingsShifted = "readings_shifted",

@@ -288,7 +288,8 @@ pub struct InputMap {
 }
 
 impl InputMap {
-    /// Checks that `joint_sensors.names` and the cameras of `further_tags` are of this robot.
+    /// Checks that `joint_sensors.names` and the cameras of `further_tags` are of this robot, and that each joint has a
+    /// recorded name of its own.
     ///
     /// # Errors
     /// [`FileIssue`] naming `file`, the name and those that the robot has.
@@ -297,6 +298,9 @@ impl InputMap {
         if let Some(name) = self.joint_names.keys().find(|name| !joints.contains(name)) {
             let problem = format!("`{name}` is no joint of the robot; it has {joints:?}");
             return Err(FileIssue::new(Code::NameUnknown, file, "joint_sensors.names", problem));
+        }
+        if let Some(problem) = self.shared_name(robot) {
+            return Err(FileIssue::new(Code::ValueDuplicate, file, "joint_sensors.names", problem));
         }
         if let Some(lerobot) = &self.lerobot {
             let mut sensors = robot.sensors.iter();
@@ -310,6 +314,19 @@ impl InputMap {
                 Err(FileIssue::new(Code::NameUnknown, file, "further_tags.camera", problem))
             }
         }
+    }
+
+    /// What is wrong where two joints have one recorded name. A joint beyond the camera that nobody maps may lack
+    /// readings.
+    fn shared_name(&self, robot: &Robot) -> Option<String> {
+        let joints = robot.joint_names();
+        let is_read =
+            |(k, joint): &(usize, &String)| *k < robot.n_seen_joints() || self.joint_names.contains_key(*joint);
+        let read: Vec<&String> = joints.iter().enumerate().filter(is_read).map(|(_, joint)| joint).collect();
+        let mut pairs = read.iter().enumerate().flat_map(|(k, &a)| read[k + 1..].iter().map(move |&b| (a, b)));
+        let (a, b) = pairs.find(|(a, b)| self.recorded_name(a) == self.recorded_name(b))?;
+        let name = self.recorded_name(a);
+        Some(format!("gives `{a}` and `{b}` the same recorded name, `{name}`; name the readings of each joint"))
     }
 
     /// The raw reading that a recorded number stands for.

@@ -13,14 +13,17 @@ use crate::file::calibration::Calibration;
 use crate::methods::CalibrationMethod;
 use crate::model::parameters::JointParameters;
 use crate::model::scales::Hyperparameters;
+use crate::say::reading_error::ReadingError;
 use crate::say::refusal::Refusal;
 use crate::solve::estimate::Estimate;
 use crate::solve::input::HyperparameterMode;
 use crate::solve::model_for_views::model_for;
 use crate::views::calibration_data::{CalibrationData, HeldOut};
 use crate::views::view::{CaptureData, View};
-use armcal_core::robot::{FailedKind, Robot};
+use armcal_core::kinematics::Attachment;
+use armcal_core::robot::{FailedJoint, FailedKind, Robot};
 use armcal_core::spatial::Pose;
+use armcal_core::streams::ReachTask;
 
 const N_VIEWS: usize = 20;
 
@@ -32,17 +35,26 @@ pub(crate) struct Case {
 
 impl Case {
     pub(crate) fn calibrated(self) -> Calibration {
-        let data = CalibrationData {
-            name: "synthetic".to_owned(),
-            messages_hash: String::new(),
-            data: CaptureData { n_marks: self.views.len(), fit: self.views, ..CaptureData::default() },
-            gripper_tag_data: None,
-            held_out: HeldOut::CrossValidation,
-            robot: self.robot,
-            identified: Vec::new(),
-        };
-        calibrate_data(data, CalibrationMethod::Bundle, None).expect("a result")
+        calibrated(self.robot, self.views)
     }
+}
+
+/// The result of `views` without a task.
+pub(crate) fn calibrated(robot: Robot, views: Vec<View>) -> Calibration {
+    calibrated_for(robot, views, None)
+}
+
+fn calibrated_for(robot: Robot, views: Vec<View>, task: Option<ReachTask>) -> Calibration {
+    let data = CalibrationData {
+        name: "synthetic".to_owned(),
+        messages_hash: String::new(),
+        data: CaptureData { n_marks: views.len(), fit: views, task, ..CaptureData::default() },
+        gripper_tag_data: None,
+        held_out: HeldOut::CrossValidation,
+        robot,
+        identified: Vec::new(),
+    };
+    calibrate_data(data, CalibrationMethod::Bundle, None).expect("a result")
 }
 
 /// A sound arm; `locked`: a joint that stands still.
@@ -238,6 +250,48 @@ fn single_views_in_which_a_sensor_jumped_are_freed() {
     });
 }
 
+/// The sensor of `joint` is reversed in some views.
+fn reverse_in(case: &mut Case, joint: usize, views: std::ops::Range<usize>) {
+    for view in &mut case.views[views] {
+        view.travel_rad[joint] *= -1.0;
+    }
+}
+
+#[test]
+fn a_sensor_that_reads_wrongly_up_to_the_end_is_refused() {
+    for seed in 110..115 {
+        let joint = (seed % 5) as usize;
+        let mut case = case(seed, None);
+        reverse_in(&mut case, joint, 13..N_VIEWS);
+        let failures = found_failures(&case, &[]);
+        let [Failure { joint: found, kind: FailedKind::Dead, lost_since: Some(since), .. }] = failures[..] else {
+            panic!("seed {seed}: {failures:?}")
+        };
+        assert!(found == joint && (13..16).contains(&since), "seed {seed}: {found} since {since}");
+        let name = case.robot.sensors[joint].joint.clone();
+        let result = case.calibrated();
+        let is_named = |refusal: &Refusal| matches!(refusal, Refusal::SensorFailed { joint, .. } if *joint == name);
+        assert!(result.refusals.iter().any(is_named), "seed {seed}: {:?}", result.refusals);
+    }
+}
+
+#[test]
+fn a_sensor_that_reads_right_again_is_repaired() {
+    for seed in 115..120 {
+        let joint = (seed % 5) as usize;
+        let mut case = case(seed, None);
+        reverse_in(&mut case, joint, 6..12);
+        let failures = found_failures(&case, &[]);
+        assert!(
+            matches!(&failures[..], [only] if only.joint == joint && only.kind == FailedKind::Jumps),
+            "seed {seed}: {failures:?}"
+        );
+        let result = case.calibrated();
+        let is_needed = |refusal: &Refusal| matches!(refusal, Refusal::SensorFailed { .. });
+        assert!(!result.refusals.iter().any(is_needed), "seed {seed}: {:?}", result.refusals);
+    }
+}
+
 #[test]
 fn since_a_lasting_slip_the_sensor_is_calibrated_as_it_is_now() {
     check(FailedKind::Jumps, 50..55, |case, joint, _| {
@@ -258,6 +312,57 @@ fn what_is_declared_is_believed_and_not_looked_for() {
     }
     let declared = [Failure::without_sensor(2, FailedKind::Dead, FailureSource::Declared, N_VIEWS)];
     assert_eq!(found_failures(&case, &declared), declared);
+}
+
+/// The tool point lies on the last axis before the camera, so that a task of positions does without this joint's
+/// sensor. It does not do without the second joint's.
+#[test]
+fn a_dead_sensor_is_refused_where_the_task_needs_it() {
+    for seed in 120..124 {
+        let mut case = case(seed, None);
+        let last = case.robot.n_seen_joints() - 1;
+        let on_axis = case.robot.chain.joints()[last].axis.into_inner() * 0.2;
+        let link_from_frame = Isometry3::from_parts(on_axis.into(), nalgebra::UnitQuaternion::identity());
+        case.robot.tool.mount = Attachment { n_joints: last + 1, link_from_frame };
+        let tool_m = |view: &View| {
+            let angles = case.truth.angles(&case.robot, view);
+            case.robot.chain.link_poses(&angles).frame(&case.robot.tool.mount).translation.vector.into()
+        };
+        let targets_m = case.views[..4].iter().map(tool_m).collect();
+        let task = ReachTask { stamp: Default::default(), targets_m, tolerance_m: 0.03 };
+        for (joint, declared, is_needed) in [(last, false, false), (last, true, false), (1, false, true)] {
+            let mut broken = Case { robot: case.robot.clone(), truth: case.truth.clone(), views: case.views.clone() };
+            random_words(&mut broken, joint, seed);
+            if declared {
+                broken.robot = broken.robot.with_failed(&[FailedJoint { joint, kind: FailedKind::Dead }]);
+            }
+            let name = broken.robot.sensors[joint].joint.clone();
+            let result = calibrated_for(broken.robot, broken.views, Some(task.clone()));
+            let rows: Vec<&String> = result.failed_joint.iter().map(|row| &row.joint).collect();
+            assert_eq!(rows, [&name], "seed {seed}");
+            let is_refused = result.refusals.iter().any(|refusal| matches!(refusal, Refusal::SensorFailed { .. }));
+            assert_eq!(is_refused, is_needed, "seed {seed}, {name}: {:?}", result.refusals);
+        }
+    }
+}
+
+#[test]
+fn a_joint_with_the_readings_of_another_one_is_no_dead_sensor() {
+    for seed in 130..134 {
+        let (joint, with) = ((seed % 5) as usize, ((seed + 2) % 5) as usize);
+        let mut case = case(seed, None);
+        for view in &mut case.views {
+            view.travel_rad[joint] = view.travel_rad[with];
+        }
+        let [name, other] = [joint, with].map(|joint| case.robot.sensors[joint].joint.clone());
+        let result = case.calibrated();
+        let Some(Refusal::MisreadReadings(misread)) = result.refusals.first() else {
+            panic!("seed {seed}: {:?}", result.refusals)
+        };
+        let expected = ReadingError::Alike { joint: name, with: other, views: N_VIEWS };
+        assert_eq!(misread.found, expected, "seed {seed}");
+        assert!(result.failed_joint.is_empty(), "seed {seed}: {:?}", result.failed_joint);
+    }
 }
 
 /// The sensor of `joint` reads another line.

@@ -5,15 +5,18 @@ use std::ops::Range;
 use rand::RngExt;
 
 use crate::batch::tests::data::{Noise, Truth, reference, rng, titan, views};
+use crate::batch::tests::failures::calibrated;
 use crate::explain::drawing::Drawing;
-use crate::explain::failure_detection::FailureSearch;
+use crate::explain::failure_detection::{FailureSearch, is_suspicious};
 use crate::explain::failures::{Failure, FailureAdjusted};
 use crate::model::parameters::JointParameters;
 use crate::model::scales::Hyperparameters;
+use crate::say::finding::FindingKind;
 use crate::solve::estimate::Estimate;
 use crate::solve::input::HyperparameterMode;
 use crate::solve::model_for_views::model_for;
 use crate::views::view::View;
+use armcal_core::codes::{Code, Coded};
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::ConditionChange;
@@ -157,6 +160,35 @@ fn slips_are_found(n_seeds: u64, sizes_deg: &[f64], sigma_limits: Range<f64>) {
         assert!(sigma_limits.contains(&sigmas), "{size_deg} deg: {sigmas}");
     }
     assert!(all_named as f64 >= 0.95 * all_strong as f64, "{all_named} of {all_strong}");
+}
+
+/// Slips far beyond what the datasheet says of an offset: as large ones they are slips, and turn no link.
+#[test]
+fn a_large_slip_is_no_turn_of_a_link() {
+    for (seed, size_deg) in [(0, 20.0), (1, -25.0), (2, 12.0), (3, 30.0)] {
+        let (joint, since) = (1 + seed as usize % 4, 18);
+        let by_rad = f64::to_radians(size_deg);
+        let mut case = case(3000 + seed, 30);
+        slip(&mut case, joint, since, by_rad);
+        let failures = found_failures(&case);
+        assert!(
+            matches!(&failures[..], [only] if only.joint == joint && only.since == Some(since)),
+            "seed {seed}: {failures:?}"
+        );
+        with_estimate(&case, &failures, |found| {
+            let (size_rad, _) = found.step(joint, case.views[since].end).expect("a column");
+            assert!((size_rad - by_rad).abs() < 0.005, "seed {seed}: {size_rad} {by_rad}");
+            assert!(!is_suspicious(found), "seed {seed}");
+        });
+        let name = case.robot.sensors[joint].joint.clone();
+        let found = calibrated(case.robot, case.views);
+        let codes: Vec<Code> = found.refusals.iter().map(Coded::code).collect();
+        let of_links = [Code::RepairTooLarge, Code::GeometryContradicted, Code::BeyondDatasheet];
+        assert!(!codes.iter().any(|code| of_links.contains(code)), "seed {seed}: {codes:?}");
+        assert!(found.findings.iter().all(|finding| finding.kind != FindingKind::Link), "seed {seed}");
+        let slips = found.findings.iter().filter(|finding| finding.kind == FindingKind::SensorSlip);
+        assert_eq!(slips.map(|finding| &finding.name).collect::<Vec<_>>(), [&name], "seed {seed}");
+    }
 }
 
 /// Which of so many good arms are said to have slipped.

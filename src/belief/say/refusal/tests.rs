@@ -91,6 +91,17 @@ fn misread(found: ReadingError) -> Refusal {
     Refusal::MisreadReadings(MisreadReadings { found, alternatives, tag_error_m: 0.9, corrected_m: Some(0.002) })
 }
 
+fn sensor_failed() -> Refusal {
+    Refusal::SensorFailed {
+        joint: "wrist_yaw".to_owned(),
+        kind: FailedKind::Dead,
+        since_view: Some(27),
+        tool_error_m: Some(0.2),
+        tool_error_by_camera_m: Some(0.01),
+        tolerance_m: Some(0.02),
+    }
+}
+
 /// One of each kind that says something measured.
 fn measured() -> Vec<Refusal> {
     let joint = || "wrist_yaw".to_owned();
@@ -135,6 +146,7 @@ fn measured() -> Vec<Refusal> {
         misread(ReadingError::Exchanged { joints: ["shoulder".to_owned(), joint()] }),
         misread(ReadingError::Reversed { joints: vec!["shoulder".to_owned(), joint()] }),
         misread(ReadingError::Coupled { joint: joint(), with: "shoulder".to_owned(), sign: -1.0 }),
+        misread(ReadingError::Alike { joint: joint(), with: "shoulder".to_owned(), views: 40 }),
         misread(ReadingError::OtherTurns { joints: vec![joint()], wrap_counts: 16_560.0 }),
         misread(ReadingError::Zeros {
             joints: vec![JointZero { joint: joint(), off_rad: 1.57, moves: JointKind::Revolute, offset_counts: -1.57 }],
@@ -144,13 +156,7 @@ fn measured() -> Vec<Refusal> {
         misread(ReadingError::Camera { link: None, turn: [0.5, -0.5, 0.5, -0.5] }),
         Refusal::TagSizeRepair { element: "tag 3".to_owned(), ratio: 0.015, stated_m: 9.9 },
         Refusal::TooFewViewsSinceSlip { joint: joint(), evidence: "it slipped".to_owned(), views: 4 },
-        Refusal::SensorFailed {
-            joint: joint(),
-            kind: FailedKind::Dead,
-            tool_error_m: Some(0.2),
-            tool_error_by_camera_m: Some(0.01),
-            tolerance_m: Some(0.02),
-        },
+        sensor_failed(),
     ]
 }
 

@@ -7,6 +7,7 @@ use crate::say::constants::refusal_words::MORE_DIGITS_BELOW;
 use crate::say::refusal::{HeldOutLimitSource, MIN_USED_SHARE, Refusal, with_advice};
 use crate::say::wrong_input_words::medium_of_lens;
 use armcal_core::codes::Coded;
+use armcal_core::robot::FailedKind;
 
 /// A refusal without its remedy.
 struct Cause<'a>(&'a Refusal);
@@ -61,14 +62,15 @@ impl Refusal {
 
     fn fmt_of_failed_sensor(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::SensorFailed { joint, kind, tolerance_m: None, .. } => write!(
+            Self::SensorFailed { joint, kind, since_view, tolerance_m: None, .. } => write!(
                 f,
                 "the sensor of {joint} {}; without a task each joint up to the tool is needed",
-                kind.predicate()
+                failed_since(*kind, *since_view)
             ),
             Self::SensorFailed {
                 joint,
                 kind,
+                since_view,
                 tool_error_m,
                 tool_error_by_camera_m,
                 tolerance_m: Some(tolerance_m),
@@ -78,7 +80,7 @@ impl Refusal {
                     f,
                     "the sensor of {joint} {}, and the task needs this joint: without it the tool error is {:.0} mm, \
                      the tolerance {:.1} mm; while the camera sees tags the error is {:.1} mm",
-                    kind.predicate(),
+                    failed_since(*kind, *since_view),
                     mm(*tool_error_m),
                     tolerance_m * 1e3,
                     mm(*tool_error_by_camera_m)
@@ -355,6 +357,12 @@ impl Refusal {
         }
         write!(f, ")")
     }
+}
+
+/// `is dead since view 27`.
+fn failed_since(kind: FailedKind, since_view: Option<u32>) -> String {
+    let since = since_view.map_or_else(String::new, |number| format!(" since view {number}"));
+    format!("{}{since}", kind.predicate())
 }
 
 /// Two lengths in mm, with the fewest decimals, 1 to 4, that make them differ.

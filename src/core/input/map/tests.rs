@@ -69,3 +69,26 @@ fn corners_need_no_frames() {
     assert_eq!((map.while_moving, map.not_finite), (WhileMoving::Use, NotFinite::LeaveOut));
     assert_eq!(map.joint_names["elbow"], "j3");
 }
+
+/// Two names of one map, and a name that is another joint's own. Exchanged names and a distal joint without readings
+/// are no mistake.
+#[test]
+fn each_joint_has_a_recorded_name_of_its_own() {
+    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots/titan4");
+    let robot = crate::robot::load(&folder).expect("the robot reads");
+    let joints = robot.joint_names();
+    let [a, b] = [&joints[1], &joints[2]];
+    let last = joints.last().expect("joints");
+    assert!(robot.n_seen_joints() < joints.len(), "the last joint is beyond the camera");
+    let checked = |names: String| {
+        let map = parse(&GOOD.replace("[tags]", &format!("names = {{ {names} }}\n[tags]"))).expect("a map");
+        map.check_robot(Path::new("map.toml"), &robot)
+    };
+    for shared in [format!("{a} = \"{b}\""), format!("{a} = \"q\", {b} = \"q\""), format!("{last} = \"{b}\"")] {
+        let issue = checked(shared.clone()).expect_err(&shared);
+        assert_eq!((issue.code, issue.key.as_str()), (Code::ValueDuplicate, "joint_sensors.names"), "{issue}");
+    }
+    for good in [format!("{a} = \"{b}\", {b} = \"{a}\""), format!("{a} = \"{last}\""), String::new()] {
+        assert!(checked(good.clone()).is_ok(), "{good}");
+    }
+}
