@@ -23,6 +23,7 @@
 //! camera_frame = "fisheye"
 //! child_frame = "tag36h11:{id}"      # or a plain name, for one landmark
 //! use = "position"                   # "position" | "pose" | "corners" | "board_corners"
+//! corner_order = "apriltag"          # optional, detections alone: or "opencv", clockwise from the top left
 //! family = "36h11"                   # optional, images alone: "Standard41h12" ..; absent: that of the robot's tags
 //! image_period_s = 0.2               # optional, images alone: time between two that are looked at; absent: all
 //! camera_info = "/camera_info"       # optional, images alone: sensor_msgs/msg/CameraInfo, for robots without a lens
@@ -280,6 +281,8 @@ pub struct InputMap {
     pub tag_family: Option<TagFamily>,
     /// What of a tag's measurement counts.
     pub tag_use: TagUse,
+    /// Order of the corners in recorded detections.
+    pub corner_order: CornerOrder,
     /// Stated noise of positions and poses of tags, where there is one.
     pub tag_noise: Option<TagNoise>,
     /// Largest gap between a tag message and the nearest joint reading; a tag farther off is left out.
@@ -410,6 +413,8 @@ struct TagsToml {
     camera_frame: Option<String>,
     /// Frame of a tag, such as `tag36h11:{id}`, or the plain name of one landmark.
     child_frame: Option<String>,
+    /// Order of a tag's corners in detections; of a table, in `columns`.
+    corner_order: Option<CornerOrder>,
     /// Part of a tag's measurement that counts.
     #[serde(rename = "use")]
     tag_use: TagUse,
@@ -501,6 +506,10 @@ fn checked(file: &Path, raw: MapToml) -> Result<InputMap, RobotError> {
     if raw.table.is_some() {
         check_no_topics(file, &raw)?;
     }
+    if raw.tags.corner_order.is_some() && raw.tags.tag_use != TagUse::Corners {
+        let problem = "is for corners of tags; set use = \"corners\"";
+        return Err(FileIssue::new(Code::KeysConflict, file, "tags.corner_order", problem).into());
+    }
     if raw.tags.tag_use == TagUse::BoardCorners && !matches!(child_frame, Some(ChildFrame::Plain(_))) {
         let problem = "must be the plain name of the board in the tag map; its corners have numbers of their own";
         return Err(FileIssue::new(Code::ValueInvalid, file, "tags.child_frame", problem).into());
@@ -534,6 +543,7 @@ fn checked(file: &Path, raw: MapToml) -> Result<InputMap, RobotError> {
         child_frame,
         tag_family: tag_family.transpose()?,
         tag_use: raw.tags.tag_use,
+        corner_order: raw.tags.corner_order.unwrap_or_default(),
         tag_noise,
         max_gap_s: FileIssue::check_range(file, "max_gap_s", raw.max_gap_s, 1e-6..=60.0)?,
         while_moving: raw.while_moving,
@@ -554,6 +564,7 @@ fn check_no_topics(file: &Path, raw: &MapToml) -> Result<(), FileIssue> {
         ("conditions.attitude", &raw.conditions.attitude),
     ];
     let given = given.into_iter().find(|(_, value)| value.is_some()).map(|(key, _)| key);
+    let given = given.or(raw.tags.corner_order.is_some().then_some("tags.corner_order"));
     match given.or((!raw.further_tags.is_empty()).then_some("further_tags")) {
         Some(key) => Err(FileIssue::new(
             Code::KeysConflict,
