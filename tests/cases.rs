@@ -94,6 +94,19 @@ fn one_joint_in_degrees_is_named_with_its_unit() {
     assert_eq!((&refused["code"], &refused["joint"]), (&"sensor_unit".into(), &"j6".into()), "{refused}");
 }
 
+/// The same readings, stated as angles: the line of robot.toml has no effect on them, that of the input map has.
+#[test]
+fn one_joint_in_degrees_among_stated_angles_is_put_right_by_the_advice() {
+    let case = Case::new("one_joint_in_degrees");
+    edit(&case.file("input.toml"), "[joint_sensors]\n", "[joint_sensors]\nunit = \"rad\"\n");
+    let refused = case.refused("task.toml");
+    assert_eq!((&refused["code"], &refused["joint"]), (&"sensor_unit".into(), &"j6".into()), "{refused}");
+    let text = refused["text"].as_str().expect("text");
+    let line = text.rsplit("input map: ").next().expect("a line");
+    edit(&case.file("input.toml"), "[joint_sensors]\n", &format!("[joint_sensors]\n{line}\n"));
+    case.accepted();
+}
+
 #[test]
 fn exchanged_readings_are_named_and_the_advice_works() {
     let case = Case::new("joint_names_swapped");

@@ -22,5 +22,6 @@ pub(crate) fn exact_sensor(counts_per_rad: f64, max_rate_rad_s: f64) -> JointSen
         temperature_std_rad_per_k: 0.0,
         drift_std_rad_per_sqrt_h: 0.0,
         max_rate_rad_s,
+        stated: None,
     }
 }

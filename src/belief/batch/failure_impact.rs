@@ -233,19 +233,21 @@ impl FailureImpact<'_> {
     }
 
     fn refusal(&self, failure: &Failure) -> Option<Refusal> {
-        let joint = self.robot.sensors[failure.joint].joint.clone();
+        let spec = &self.robot.sensors[failure.joint];
+        let (joint, moves) = (spec.joint.clone(), spec.moves);
         if let Some(with) = self.joint_read(failure) {
             return Some(Refusal::MisreadReadings(self.alike(joint, with)));
         }
+        let input_factor = |slope: f64| Some(slope * spec.stated?.factor);
         if let Some(line) = failure.line.filter(|_| !self.is_calibrated_anew(failure)) {
-            return Some(Refusal::SensorLine { joint, slope: line.slope });
+            return Some(Refusal::SensorLine { joint, slope: line.slope, input_factor: input_factor(line.slope) });
         }
         let gain = self.parameters.gain[failure.joint];
-        if failure.line.is_some() && is_of_another_unit(self.robot.sensors[failure.joint].moves, gain) {
-            return Some(Refusal::SensorUnit { joint, gain, moves: self.robot.sensors[failure.joint].moves });
+        if failure.line.is_some() && is_of_another_unit(moves, gain) {
+            return Some(Refusal::SensorUnit { joint, gain, moves, input_factor: input_factor(gain) });
         }
         if failure.line.is_some() {
-            return Some(Refusal::SensorLine { joint, slope: gain });
+            return Some(Refusal::SensorLine { joint, slope: gain, input_factor: input_factor(gain) });
         }
         if let Some(views) = failure.n_views_since(self.views)
             && views < MIN_VIEWS_SINCE

@@ -340,7 +340,11 @@ impl<'a> BundleCalibration<'a> {
                 has_moved_tags.then(|| wrong_input(&self.data.data, &self.surveyed, &self.data.robot)).flatten();
             if let Some(wrong) = wrong.filter(WrongInput::is_of_all_tags) {
                 calibration.refuse_first_for([Refusal::WrongInput(wrong)]);
+                return;
             }
+            let (robot, views, drawing) = (&self.data.robot, &self.as_read[..], &self.drawing);
+            let search = ReadingSearch { robot, views, failures, drawing };
+            calibration.refuse_first_for(search.find_other_turns().map(Refusal::MisreadReadings));
             return;
         }
         let is_of_lens = calibration.refusals.iter().any(|refusal| matches!(refusal, Refusal::Lens { .. }));

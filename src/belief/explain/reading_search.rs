@@ -14,6 +14,7 @@ use crate::explain::constants::reading_search::{
 use std::f64::consts::TAU;
 
 use crate::explain::angles_by_camera::distance_cost;
+use crate::explain::constants::reading_search_hypothesis::NEXT_TURN_RAD;
 use crate::explain::drawing::Drawing;
 use crate::explain::failure_detection::{is_suspicious, score};
 use crate::explain::failures::{Failure, FailureAdjusted};
@@ -25,7 +26,7 @@ use crate::solve::estimate::{Estimate, estimate};
 use crate::solve::input::HyperparameterMode;
 use crate::views::view::View;
 use armcal_core::joints::JointAngles;
-use armcal_core::robot::Robot;
+use armcal_core::robot::{JointSensorSpec, Robot};
 use armcal_core::sensor::wrap_symmetric;
 
 /// A hypothesis and what it explains.
@@ -57,13 +58,7 @@ impl ReadingSearch<'_> {
         let as_read = self.score_as_read(&views, stride);
         let turned = Hypothesis::other_turns(self.robot, self.views).and_then(|hypothesis| self.attempt(hypothesis));
         if let Some(turned) = turned.filter(|turned| turned.fits && turned.score < as_read) {
-            let (found, alternatives) = (self.named(&turned), Vec::new());
-            return Some(MisreadReadings {
-                found,
-                alternatives,
-                tag_error_m: before_m,
-                corrected_m: turned.tag_error_m,
-            });
+            return Some(self.misread_turns(&turned, before_m));
         }
         let tried = self.likely().into_iter().filter_map(|hypothesis| self.attempt(hypothesis));
         let mut tried: Vec<Tried> =
@@ -80,6 +75,19 @@ impl ReadingSearch<'_> {
             }
         }
         Some(MisreadReadings { found, alternatives, tag_error_m: before_m, corrected_m: best.tag_error_m })
+    }
+
+    /// Joints that are beyond their limits in most views, and on a turn within them fit as well.
+    pub(crate) fn find_other_turns(&self) -> Option<MisreadReadings> {
+        let hypothesis = Hypothesis::other_turns_in_most(self.robot, self.views)?;
+        let before_m = PositionProblem::new(self.robot, self.views).rms_m(&JointParameters::default())?;
+        let turned = self.attempt(hypothesis).filter(|turned| turned.fits)?;
+        Some(self.misread_turns(&turned, before_m))
+    }
+
+    fn misread_turns(&self, turned: &Tried, tag_error_m: f64) -> MisreadReadings {
+        let (found, alternatives) = (self.named(turned), Vec::new());
+        MisreadReadings { found, alternatives, tag_error_m, corrected_m: turned.tag_error_m }
     }
 
     /// One view of so many is looked at.
@@ -194,14 +202,21 @@ impl ReadingSearch<'_> {
             Hypothesis::Zeros(zeros) => {
                 let zero = |(joint, off_rad): &(usize, f64)| {
                     let spec = &self.robot.sensors[*joint];
-                    let off_rad = wrap_symmetric(off_rad + tried.sensors.offset_rad[*joint], TAU);
+                    let off_rad = on_turn_within_limits(
+                        spec,
+                        self.views.iter().map(|view| view.travel_rad[*joint]),
+                        off_rad + tried.sensors.offset_rad[*joint],
+                    );
                     let offset_counts = spec.offset_counts - spec.counts_per_rad * off_rad;
-                    JointZero { joint: name(*joint), off_rad, moves: spec.moves, offset_counts }
+                    let input_zero = spec.stated.map(|stated| stated.recorded(-off_rad));
+                    JointZero { joint: name(*joint), off_rad, moves: spec.moves, offset_counts, input_zero }
                 };
                 ReadingError::Zeros { joints: zeros.iter().map(zero).collect() }
             }
             Hypothesis::Scaled { joint, factor } => {
-                ReadingError::Scaled { joint: name(*joint), factor: factor * tried.sensors.gain[*joint] }
+                let factor = factor * tried.sensors.gain[*joint];
+                let input_factor = self.robot.sensors[*joint].stated.map(|stated| factor * stated.factor);
+                ReadingError::Scaled { joint: name(*joint), factor, input_factor }
             }
             Hypothesis::Shifted(views) => ReadingError::Shifted { views: *views as i32 },
             Hypothesis::Camera { n_joints, turn } => {
@@ -211,6 +226,23 @@ impl ReadingSearch<'_> {
             }
         }
     }
+}
+
+/// Of zero errors that differ by whole turns the one that puts most angles within the joint's limits; of equals the
+/// smallest.
+fn on_turn_within_limits(spec: &JointSensorSpec, travel_rad: impl Iterator<Item = f64> + Clone, off_rad: f64) -> f64 {
+    let nearest_rad = wrap_symmetric(off_rad, TAU);
+    if !spec.is_limited() || spec.moves.is_slide() {
+        return nearest_rad;
+    }
+    let wrap_rad = spec.wrap_counts / spec.counts_per_rad.abs();
+    let n_beyond = |off_rad: f64| {
+        let travel_rad = travel_rad.clone().map(|read_rad| wrap_symmetric(read_rad + off_rad, wrap_rad));
+        travel_rad.filter(|travel_rad| travel_rad.abs() > spec.half_range_rad + NEXT_TURN_RAD).count()
+    };
+    let turn_rad = TAU.copysign(nearest_rad);
+    let by_size = [nearest_rad, nearest_rad - turn_rad, nearest_rad + turn_rad];
+    by_size.into_iter().min_by_key(|&off_rad| n_beyond(off_rad)).unwrap_or(nearest_rad)
 }
 
 /// Root mean square distance between predicted and surveyed tags.
@@ -232,4 +264,40 @@ fn concerns_same(a: &ReadingError, b: &ReadingError) -> bool {
         ReadingError::Shifted { .. } | ReadingError::Camera { .. } => Vec::new(),
     };
     std::mem::discriminant(a) == std::mem::discriminant(b) && joints(a) == joints(b)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use super::*;
+    use crate::fixture::titan;
+
+    /// Readings half a turn off, of a joint that is limited to less than a turn, from any part of its range.
+    #[test]
+    fn the_zero_is_on_the_turn_on_which_the_angles_are_within_the_limits() {
+        for seed in 0..20 {
+            let half_range_rad = 2.6 + 0.025 * f64::from(seed);
+            let spec = JointSensorSpec { half_range_rad, wrap_counts: 1e12, ..titan().sensors[3].clone() };
+            for true_rad in [-PI - 0.02, PI + 0.02, -PI + 0.02, PI - 0.02, -TAU, TAU, 0.5] {
+                let travel_rad = |k: i32| half_range_rad * (0.09 * f64::from(k) - 0.9);
+                let read_rad = (0..=20).map(|k| travel_rad(k) - true_rad);
+                let found_rad = on_turn_within_limits(&spec, read_rad, wrap_symmetric(true_rad, TAU));
+                assert!((found_rad - true_rad).abs() < 1e-9, "seed {seed}: {found_rad}, {true_rad}");
+            }
+        }
+    }
+
+    /// The reading repeats: zeros that differ by a turn are the same.
+    #[test]
+    fn of_zeros_that_mean_the_same_the_smallest_is_advised() {
+        let titan = titan();
+        let wrap_counts = (TAU * titan.sensors[3].counts_per_rad).abs();
+        let spec = JointSensorSpec { half_range_rad: 3.0, wrap_counts, ..titan.sensors[3].clone() };
+        for true_rad in [-3.0, -1.0, 2.0, 3.1] {
+            let read_rad = (0..=20).map(|k| wrap_symmetric(0.3 * f64::from(k) - 3.0 - true_rad, TAU));
+            let found_rad = on_turn_within_limits(&spec, read_rad, true_rad);
+            assert!((found_rad - true_rad).abs() < 1e-9, "{found_rad}, {true_rad}");
+        }
+    }
 }

@@ -20,6 +20,13 @@ pub(crate) mod repair {
     pub(crate) const LEAST_FOCAL: f64 = 1e-3;
 }
 
+pub(crate) mod sensor_keys {
+    /// A reversed sensor whose slope is within this of -1 has the scale of its datasheet. Assumed: gears differ by more.
+    pub(crate) const SIGN_ALONE: f64 = 0.1;
+    /// Digits of a scale, for files: what they leave is below the sigma of any stated gain. Assumed.
+    pub(crate) const SIGNIFICANT_DIGITS: i32 = 6;
+}
+
 pub(crate) mod wrong_input_words {
     /// Refractive index of sea water (Treibitz et al. 2012).
     pub(crate) const WATER: f64 = 1.34;

@@ -2,7 +2,7 @@
 //!
 //! `finding` is what was found to be other than stated, `refusal` why a result must not be used (`wrong_input`,
 //! `reading_error`, `geometry_error` are causes), `reservation` its limits. `repair` says what to do about a
-//! finding. Their words are in this room and nowhere else.
+//! finding, `sensor_keys` which lines correct a reading. Their words are in this room and nowhere else.
 
 pub(crate) mod constants;
 pub(crate) mod finding;
@@ -12,6 +12,7 @@ pub(crate) mod reading_error;
 pub(crate) mod refusal;
 pub(crate) mod repair;
 pub(crate) mod reservation;
+pub(crate) mod sensor_keys;
 pub(crate) mod sentence;
 pub(crate) mod wrong_input;
 pub(crate) mod wrong_input_words;

@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::say::constants::reading_error::UNTURNED;
+use crate::say::sensor_keys::Rescaled;
 use crate::say::wrong_input_words::turn_in_words;
 use armcal_core::codes::{Code, Coded};
 use armcal_core::kinematics::JointKind;
@@ -22,6 +23,9 @@ pub struct JointZero {
     pub moves: JointKind,
     /// The reading at angle zero that explains the views.
     pub offset_counts: f64,
+    /// `zero` of the input map that explains the views; absent: readings are counts.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub input_zero: Option<f64>,
 }
 
 /// One way in which readings differ from the angles that they are read as.
@@ -74,6 +78,9 @@ pub enum ReadingError {
         joint: String,
         /// Angle over reading.
         factor: f64,
+        /// `factor` of the input map with that slope; absent: readings are counts.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        input_factor: Option<f64>,
     },
     /// Each view has the readings of another view.
     Shifted {
@@ -129,7 +136,7 @@ impl fmt::Display for ReadingError {
                 let all: Vec<String> = joints.iter().map(one).collect();
                 write!(f, "joint zeros differ: {}", all.join(", "))
             }
-            Self::Scaled { joint, factor } => {
+            Self::Scaled { joint, factor, .. } => {
                 write!(
                     f,
                     "the sensor of {joint} has another scale than its datasheet: {joint} moves {factor:.4} times as \
@@ -194,16 +201,19 @@ impl MisreadReadings {
                 format!("state in [[joint_sensor]] of robot.toml that the word repeats: wrap_counts = {wrap_counts:.6}")
             }
             ReadingError::Zeros { joints } => {
-                let one = |zero: &JointZero| format!("{}: offset_counts = {:.5}", zero.joint, zero.offset_counts);
+                let one = |zero: &JointZero| match zero.input_zero {
+                    Some(input_zero) => format!("zero.{} = {input_zero:.5}", zero.joint),
+                    None => format!("{}: offset_counts = {:.5}", zero.joint, zero.offset_counts),
+                };
                 let lines: Vec<String> = joints.iter().map(one).collect();
-                format!("set the zeros in [[joint_sensor]] of robot.toml, if the URDF is right: {}", lines.join("; "))
+                let is_of_map = joints.iter().all(|zero| zero.input_zero.is_some());
+                let table =
+                    if is_of_map { "[joint_sensors] of the input map" } else { "[[joint_sensor]] of robot.toml" };
+                format!("set the zeros in {table}, if the URDF is right: {}", lines.join("; "))
             }
-            ReadingError::Scaled { joint, factor } => {
-                format!(
-                    "correct the unit of {joint} in the input map, or its scale: multiply scale_counts_per_deg (of a \
-                     slide, scale_counts_per_mm) in robot.toml by {:.4}",
-                    1.0 / factor
-                )
+            ReadingError::Scaled { joint, factor, input_factor } => {
+                let found = Rescaled { joint, slope: *factor, input_factor: *input_factor };
+                format!("correct the unit of {joint} in the input map, or its scale: {}", found.line())
             }
             ReadingError::Shifted { .. } => {
                 "give each view the joint readings of its own pose: check the rows of the table, or the stamps"

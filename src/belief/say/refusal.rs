@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::say::finding::FindingUnit;
 use crate::say::geometry_error::GeometryError;
 use crate::say::reading_error::MisreadReadings;
+use crate::say::sensor_keys::Rescaled;
 use crate::say::wrong_input::WrongInput;
 
 pub(crate) mod words;
@@ -206,6 +207,9 @@ pub enum Refusal {
         /// Turns or slides.
         #[serde(default, skip_serializing_if = "JointKind::is_turning")]
         moves: JointKind,
+        /// `factor` of the input map with that gain; absent: readings are counts.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        input_factor: Option<f64>,
     },
     /// A sensor is farther from a straight line than one of its datasheet can be.
     Nonlinearity {
@@ -331,6 +335,9 @@ pub enum Refusal {
         joint: String,
         /// Of the angle by the reading, 1 by the datasheet.
         slope: f64,
+        /// `factor` of the input map with that slope; absent: readings are counts.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        input_factor: Option<f64>,
     },
     /// A sensor failed whose joint the task needs.
     SensorFailed {
@@ -419,12 +426,14 @@ impl Refusal {
         match self {
             Self::MisreadReadings(misread) => misread.remedy().into(),
             Self::WrongInput(wrong) => wrong.remedy(),
-            Self::SensorLine { joint, slope } if *slope > 0.0 => format!(
-                "correct the scale of {joint}: multiply scale_counts_per_deg (of a slide, scale_counts_per_mm) in \
-                 robot.toml by {:.4}, or correct the unit of its readings",
-                1.0 / slope
-            )
-            .into(),
+            Self::SensorLine { joint, slope, input_factor } => {
+                let found = Rescaled { joint, slope: *slope, input_factor: *input_factor };
+                remedy_of_line(found.with_own_scale_if_reversed()).into()
+            }
+            Self::SensorUnit { joint, gain, moves, input_factor } => {
+                let found = Rescaled { joint, slope: *gain, input_factor: *input_factor };
+                format!("convert the readings of {joint}, or {}", found.of_another_unit(*moves).line()).into()
+            }
             Self::Lens { focal_px: [x, y], .. } => format!(
                 "measure the intrinsics in the water or air that the arm works in; these views show focal_px = \
                  [{x:.1}, {y:.1}] for [camera] of robot.toml"
@@ -437,7 +446,11 @@ impl Refusal {
     /// Advice without figures of this result.
     fn usual_remedy(&self) -> &'static str {
         match self {
-            Self::MisreadReadings(_) | Self::WrongInput(_) | Self::Lens { .. } => "",
+            Self::MisreadReadings(_)
+            | Self::WrongInput(_)
+            | Self::Lens { .. }
+            | Self::SensorLine { .. }
+            | Self::SensorUnit { .. } => "",
             Self::TooFewViews { .. } | Self::PriorUntested => "capture more views",
             Self::TooFewViewsSinceSlip { .. } => "fasten the sensor on its shaft, then capture more views",
             Self::NotSolved { .. } => "capture views that move each joint over more of its range",
@@ -465,14 +478,12 @@ impl Refusal {
             Self::RotationNoise { .. } => {
                 "check rotation form, order and direction in the input map, or use the positions only (tags.use)"
             }
-            Self::SensorUnit { .. } => "convert the readings of this joint to the unit that the input map states",
             Self::RepairTooLarge { .. } => {
                 "check the zeros, order and units of the joint readings; then measure this element and correct its file"
             }
             Self::TagSizeRepair { .. } => "measure the border square of one tag and correct size_m, in metres",
             Self::CornerNoise { .. } => "check lens, corner noise and tag sizes in robot.toml, and the tag map",
             Self::SensorError { .. } | Self::SensorFailed { .. } => "check that joint's sensor",
-            Self::SensorLine { .. } => "swap its ends, or change the sign of its scale in robot.toml",
             Self::Nonlinearity { .. } => "replace the sensor, or state its linearity in robot.toml",
             Self::OffsetsWalk { .. } => {
                 "calibrate right before the work and again during it, follow the estimate online, or replace the sensor"
@@ -489,6 +500,16 @@ impl Refusal {
             Self::PriorSingular => "make the prior again",
             Self::PriorContradicted { .. } => "calibrate without --prior",
         }
+    }
+}
+
+/// What to do about a sensor that is reversed or of another scale.
+fn remedy_of_line(found: Rescaled<'_>) -> String {
+    let (joint, line) = (found.joint, found.line());
+    match (found.slope, found.input_factor) {
+        (-1.0, None) => "swap its ends, or change the sign of its scale in robot.toml".to_owned(),
+        (-1.0, Some(_)) => format!("swap its ends, or {line}"),
+        _ => format!("correct the scale of {joint}: {line}, or correct the unit of its readings"),
     }
 }
 

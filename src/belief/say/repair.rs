@@ -78,7 +78,7 @@ fn of_finding(found: &Finding, since: &str) -> Option<Repair> {
         ),
         FindingKind::SensorScale => (
             format!("the sensor of {name} has {:.3} times its scale in robot.toml", found.size.unwrap_or(1.0).recip()),
-            format!("correct the scale of {name} in robot.toml"),
+            format!("correct the scale of {name} in robot.toml, or of stated angles its factor in the input map"),
             "the result uses the estimated scale",
         ),
         FindingKind::TagMoved

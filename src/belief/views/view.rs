@@ -247,8 +247,8 @@ impl ObservationRejection {
                 "check which columns or fields hold the corners, and the lens in [camera] of robot.toml"
             }
             Self::CornerOrder => {
-                "state the order in which the corners are recorded (tags.columns.corner_order of the input map of a \
-                 table), and check that u counts to the right and v down"
+                "state the order in which the corners are recorded (tags.corner_order of the input map, of a table \
+                 tags.columns.corner_order), and check that u counts to the right and v down"
             }
             Self::OutOfView => "check model, resolution and distortion of the lens in [camera] of robot.toml",
             Self::NoReadings => "check that joint readings and tags are of the same time",

@@ -72,13 +72,21 @@ pub enum InputError {
     )]
     JointNames { file: String, topic: String, recorded: Vec<String>, missing: Vec<String>, expected: Vec<String> },
     #[error(
-        "{file}: the joints' numbers are {}, not {}: `{joint}` is {value:.3}, far outside of its range; set \
-         joint_sensors.unit = \"{}\" in the input map",
+        "{file}: {} are {}, not {}: `{joint}` is {value:.3}, far outside of its range; set {}",
+        whose_numbers(factors),
         likely.name(),
         stated.name(),
-        likely.key()
+        unit_remedy(*likely, factors)
     )]
-    Unit { file: String, joint: String, value: f64, stated: JointUnit, likely: JointUnit },
+    Unit {
+        file: String,
+        joint: String,
+        value: f64,
+        stated: JointUnit,
+        likely: JointUnit,
+        /// Of the joints that are in the other unit, where not all are.
+        factors: Vec<(String, f64)>,
+    },
     #[error(
         "{file}: joint `{joint}` has {value:.3}, which LeRobot's {values} cannot be: {} to {}; set `values` of \
          joint_sensors.lerobot in the input map to what was recorded",
@@ -111,6 +119,21 @@ pub enum InputError {
     CameraInfo { file: String, topic: String, problem: String },
     #[error("{file}: topic {topic} holds {held}; `tags.use` of the input map must be {allowed}")]
     Use { file: String, topic: String, held: &'static str, allowed: &'static str },
+}
+
+/// The joints whose numbers are in another unit.
+fn whose_numbers(factors: &[(String, f64)]) -> String {
+    let names: Vec<String> = factors.iter().map(|(joint, _)| format!("`{joint}`")).collect();
+    if names.is_empty() { "the joints' numbers".to_owned() } else { format!("the numbers of {}", names.join(", ")) }
+}
+
+/// The keys for numbers in another unit, of all joints or of some.
+fn unit_remedy(likely: JointUnit, factors: &[(String, f64)]) -> String {
+    let keys: Vec<String> = factors.iter().map(|(joint, factor)| format!("factor.{joint} = {factor:.7}")).collect();
+    if keys.is_empty() {
+        return format!("joint_sensors.unit = \"{}\" in the input map", likely.key());
+    }
+    format!("in [joint_sensors] of the input map: {}", keys.join("; "))
 }
 
 /// The remedy for messages that are not CDR.

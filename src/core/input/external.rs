@@ -289,8 +289,8 @@ fn check_tags(file: &str, raw: &RawMessage<'_>, map: &InputMap) -> Result<(), In
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::input::read_input_map;
-    use crate::log::ros::JointState;
+    use crate::input::{RawMeasurement, parse_input_map, read_input_map};
+    use crate::log::ros::{AprilTagDetection, JointState, PixelPoint};
     use crate::log::{RecordingHeader, RecordingWriter, RosMessage};
     use crate::time::SIMULATION_EPOCH;
 
@@ -314,5 +314,39 @@ mod tests {
         let problem = |most| read_up_to(most, &path, &map, (&robot, None)).unwrap_err();
         assert!(matches!(problem(11), InputError::TooLong { most: 11, topic, .. } if topic == topics.joints));
         assert!(matches!(problem(12), InputError::NoTopic { .. }));
+    }
+
+    /// What a recording of one joint message and one detection has of the tag's corners.
+    fn corners_read(keys: &str, recorded_px: [[f64; 2]; 4]) -> RawMeasurement {
+        let robot = crate::robot::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/titan4")).unwrap();
+        let text = format!(
+            "version = 1\nkind = \"input\"\n[joint_sensors]\ntopic = \"/j\"\n[tags]\ntopic = \"/t\"\nuse = \"corners\"\n\
+             {keys}\n"
+        );
+        let map = parse_input_map(Path::new("map.toml"), &text).unwrap();
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("run.mcap");
+        let mut writer = RecordingWriter::create(&path, RecordingHeader::new(robot.joint_names())).unwrap();
+        let name = robot.joint_names();
+        let joints = JointState { position: vec![1.0; name.len()], name, ..JointState::default() };
+        writer.write_ros("/j", &JointState::SCHEMA, SIMULATION_EPOCH, &joints).unwrap();
+        let corners = recorded_px.map(|[x, y]| PixelPoint { x, y });
+        let detections = vec![AprilTagDetection { id: 3, corners, ..AprilTagDetection::default() }];
+        let tags = AprilTagDetectionArray { detections, ..AprilTagDetectionArray::default() };
+        writer.write_ros("/t", &AprilTagDetectionArray::SCHEMA, SIMULATION_EPOCH, &tags).unwrap();
+        writer.finish().unwrap();
+        read_external(&path, &map, &robot).unwrap().frames[0].tags[0].seen
+    }
+
+    #[test]
+    fn corners_of_detections_are_taken_in_the_stated_order() {
+        let apriltag_px = [[100.0, 200.0], [200.0, 201.0], [199.0, 101.0], [101.0, 99.0]];
+        let [bottom_left, bottom_right, top_right, top_left] = apriltag_px;
+        let opencv_px = [top_left, top_right, bottom_right, bottom_left];
+        let expected = RawMeasurement::Corners(apriltag_px);
+        assert_eq!(corners_read("", apriltag_px), expected);
+        assert_eq!(corners_read("corner_order = \"apriltag\"", apriltag_px), expected);
+        assert_eq!(corners_read("corner_order = \"opencv\"", opencv_px), expected);
+        assert_ne!(corners_read("", opencv_px), expected);
     }
 }

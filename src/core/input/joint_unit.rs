@@ -1,9 +1,11 @@
 //! Whether the recorded joints' numbers are in the unit that the input map says.
 
+use std::f64::consts::TAU;
+
 use super::error::InputError;
 use super::joints::{Reading, n_needed};
 use super::lerobot::LerobotCalibration;
-use super::map::{InputMap, JointUnit, SlideUnit};
+use super::map::{InputMap, JointAngleLines, JointUnit, SlideUnit};
 use crate::robot::{JointSensorSpec, Robot};
 
 /// An angle may lie so far outside of the joint's range: sensors are off.
@@ -36,23 +38,24 @@ pub(super) fn check_unit(
     if let Some(lerobot) = &map.lerobot {
         check_lerobot(file, map, lerobot, (robot, readings))?;
     }
-    let values = Values { stated: map.joint_unit, sensors: &robot.sensors[..n_needed(robot)], readings };
     let stated = map.joint_unit;
+    let values = Values { stated, lines: &map.joint_lines, sensors: &robot.sensors[..n_needed(robot)], readings };
     if stated != JointUnit::Counts {
-        values.check_slides(file, map.slide_unit)?;
+        values.check_slides(file, map.joint_lines.slide_unit)?;
     }
     let others = [JointUnit::Rad, JointUnit::Deg].into_iter().filter(|unit| *unit != stated);
-    let fits = |unit: &JointUnit| values.share_within(*unit) > NEARLY_ALL;
     if let Some((joint, value)) = values.first_outside()
         && stated != JointUnit::Counts
-        && values.share_within(stated) < FEW
-        && let Some(likely) = others.into_iter().find(fits)
+        && values.share(|reading, joint| values.is_within(stated, reading, joint)) < FEW
+        && let Some(likely) = others.into_iter().find(|unit| values.prove(*unit))
     {
         let joint = robot.sensors[joint].joint.clone();
-        return Err(InputError::Unit { file: file.to_owned(), joint, value, stated, likely });
+        let factors = values.factors_of_some(likely);
+        return Err(InputError::Unit { file: file.to_owned(), joint, value, stated, likely, factors });
     }
     let is_small = values.largest() < LARGEST_RAD && values.most_moved_rad(stated) < STOOD_RAD;
-    let would_move = values.most_moved_rad(JointUnit::Rad) > MOVED_RAD && fits(&JointUnit::Rad);
+    let fits_rad = || values.share(|reading, joint| values.is_within(JointUnit::Rad, reading, joint)) > NEARLY_ALL;
+    let would_move = values.most_moved_rad(JointUnit::Rad) > MOVED_RAD && fits_rad();
     let is_doubtful = stated != JointUnit::Rad && !readings.is_empty() && is_small && would_move;
     Ok(is_doubtful.then(|| {
         format!(
@@ -89,6 +92,7 @@ fn check_lerobot(
 /// The recorded numbers of the joints that move the camera.
 struct Values<'a> {
     stated: JointUnit,
+    lines: &'a JointAngleLines,
     sensors: &'a [JointSensorSpec],
     readings: &'a [Reading],
 }
@@ -97,25 +101,71 @@ impl Values<'_> {
     /// The number as recorded.
     fn value(&self, reading: &Reading, joint: usize) -> f64 {
         let (spec, counts) = (&self.sensors[joint], reading.counts[joint]);
-        let angle_rad = (counts - spec.offset_counts) / spec.counts_per_rad;
-        match self.stated {
-            JointUnit::Counts => counts,
-            JointUnit::Rad => angle_rad,
-            JointUnit::Deg if spec.moves.is_slide() => angle_rad,
-            JointUnit::Deg => angle_rad.to_degrees(),
+        match self.lines.of(self.stated, spec) {
+            Some(line) => line.recorded((counts - spec.offset_counts) / spec.counts_per_rad),
+            None => counts,
         }
     }
 
     fn angle_rad(&self, unit: JointUnit, reading: &Reading, joint: usize) -> f64 {
         let (spec, value) = (&self.sensors[joint], self.value(reading, joint));
-        (unit.counts(spec, value) - spec.offset_counts) / spec.counts_per_rad
+        match self.lines.of(unit, spec) {
+            Some(line) => line.angle_rad(value),
+            None => (value - spec.offset_counts) / spec.counts_per_rad,
+        }
     }
 
     fn is_within(&self, unit: JointUnit, reading: &Reading, joint: usize) -> bool {
+        self.off_center_rad(unit, reading, joint).abs() <= self.most_rad(joint)
+    }
+
+    /// The same where a turn less or more counts: of readings that are wrapped to 0 to 360 deg.
+    fn is_within_a_turn(&self, unit: JointUnit, reading: &Reading, joint: usize) -> bool {
+        let off_rad = self.off_center_rad(unit, reading, joint).abs();
+        let turn_rad = if self.sensors[joint].moves.is_slide() { 0.0 } else { TAU };
+        off_rad.min((off_rad - turn_rad).abs()) <= self.most_rad(joint)
+    }
+
+    fn off_center_rad(&self, unit: JointUnit, reading: &Reading, joint: usize) -> f64 {
+        self.angle_rad(unit, reading, joint) - self.sensors[joint].center_rad
+    }
+
+    fn most_rad(&self, joint: usize) -> f64 {
         let spec = &self.sensors[joint];
-        let most_rad =
-            if spec.is_limited() { RANGE_FACTOR * spec.half_range_rad + BEYOND_RANGE_RAD } else { TURNS_RAD };
-        (self.angle_rad(unit, reading, joint) - spec.center_rad).abs() <= most_rad
+        if spec.is_limited() { RANGE_FACTOR * spec.half_range_rad + BEYOND_RANGE_RAD } else { TURNS_RAD }
+    }
+
+    /// True where some joint's numbers are in `unit` and not as stated, and no joint's speak against `unit`.
+    fn prove(&self, unit: JointUnit) -> bool {
+        let no_other = self.share(|reading, joint| self.is_within_a_turn(unit, reading, joint)) > NEARLY_ALL;
+        no_other && (0..self.sensors.len()).any(|joint| self.proves(unit, joint))
+    }
+
+    /// True where the numbers of this joint are outside of its range as stated, and within it in `unit`.
+    fn proves(&self, unit: JointUnit, joint: usize) -> bool {
+        let share = |unit| self.share_of_readings(|reading| self.is_within(unit, reading, joint));
+        share(self.stated) < FEW && share(unit) > NEARLY_ALL
+    }
+
+    /// The factors of the joints whose numbers are in `unit`, where as many others move as stated and stand still in
+    /// `unit`; empty where all are in it.
+    fn factors_of_some(&self, unit: JointUnit) -> Vec<(String, f64)> {
+        let all = || 0..self.sensors.len();
+        let moves_as_stated = |joint: usize| {
+            let is_within = self.share_of_readings(|reading| self.is_within(self.stated, reading, joint)) > NEARLY_ALL;
+            let [stated_rad, other_rad] = [self.stated, unit].map(|unit| self.moved_rad(unit, joint));
+            is_within && stated_rad > MOVED_RAD && other_rad < STOOD_RAD
+        };
+        let (as_stated, others): (Vec<usize>, Vec<usize>) = all().partition(|&joint| moves_as_stated(joint));
+        if as_stated.len() < others.len() || !others.iter().all(|&joint| self.proves(unit, joint)) {
+            return Vec::new();
+        }
+        let factor = |&joint: &usize| {
+            let spec = &self.sensors[joint];
+            let [stated, other] = [self.lines.of(self.stated, spec)?, self.lines.of(unit, spec)?];
+            Some((spec.joint.clone(), stated.factor * other.unit_rad / stated.unit_rad))
+        };
+        others.iter().filter_map(factor).collect()
     }
 
     /// Refuses a slide whose numbers lie outside of its range, and within it in the other unit.
@@ -130,7 +180,7 @@ impl Values<'_> {
                 within.count() as f64 / self.readings.len().max(1) as f64
             };
             if spec.is_limited() && !self.readings.is_empty() && share(1.0) < FEW && share(factor) > NEARLY_ALL {
-                let value = self.angle_rad(self.stated, &self.readings[0], joint) / stated.in_m();
+                let value = self.value(&self.readings[0], joint);
                 let (file, joint) = (file.to_owned(), spec.joint.clone());
                 return Err(InputError::SlideUnit { file, joint, value, stated, likely });
             }
@@ -142,10 +192,15 @@ impl Values<'_> {
         self.readings.iter().flat_map(|reading| (0..self.sensors.len()).map(move |joint| (reading, joint)))
     }
 
-    /// Of the numbers, taken in `unit`, within their joints' ranges.
-    fn share_within(&self, unit: JointUnit) -> f64 {
+    /// Of the numbers of all joints, those of which `is_so` is true.
+    fn share(&self, is_so: impl Fn(&Reading, usize) -> bool) -> f64 {
         let n = (self.readings.len() * self.sensors.len()).max(1) as f64;
-        self.each().filter(|(reading, joint)| self.is_within(unit, reading, *joint)).count() as f64 / n
+        self.each().filter(|(reading, joint)| is_so(reading, *joint)).count() as f64 / n
+    }
+
+    /// Of the readings, those of which `is_so` is true.
+    fn share_of_readings(&self, is_so: impl Fn(&Reading) -> bool) -> f64 {
+        self.readings.iter().filter(|reading| is_so(reading)).count() as f64 / self.readings.len().max(1) as f64
     }
 
     /// The joint and number of the first one outside of its range.
@@ -154,18 +209,22 @@ impl Values<'_> {
         Some((joint, self.value(reading, joint)))
     }
 
+    /// Of joints that turn, in the stated unit.
     fn largest(&self) -> f64 {
-        self.each().map(|(reading, joint)| self.value(reading, joint).abs()).fold(0.0, f64::max)
+        let counts = |joint: usize| self.stated == JointUnit::Counts || !self.sensors[joint].moves.is_slide();
+        let all = self.each().filter(|(_, joint)| counts(*joint));
+        all.map(|(reading, joint)| self.value(reading, joint).abs()).fold(0.0, f64::max)
     }
 
     /// How far the joint that moved most did.
     fn most_moved_rad(&self, unit: JointUnit) -> f64 {
-        let span = |joint: usize| {
-            let angles = self.readings.iter().map(|reading| self.angle_rad(unit, reading, joint));
-            let (low, high) = angles.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), a| (l.min(a), h.max(a)));
-            high - low
-        };
-        (0..self.sensors.len()).map(span).fold(0.0, f64::max)
+        (0..self.sensors.len()).map(|joint| self.moved_rad(unit, joint)).fold(0.0, f64::max)
+    }
+
+    fn moved_rad(&self, unit: JointUnit, joint: usize) -> f64 {
+        let angles = self.readings.iter().map(|reading| self.angle_rad(unit, reading, joint));
+        let (low, high) = angles.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), a| (l.min(a), h.max(a)));
+        high - low
     }
 }
 
@@ -177,28 +236,71 @@ mod tests {
     use crate::time::Stamp;
     use std::path::Path;
 
-    /// The arm at six poses, its angles in rad times `factor`, read as `unit`.
-    fn told(unit: &str, factor: f64) -> Result<Option<String>, String> {
-        let robot = crate::robot::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/titan4")).unwrap();
+    fn titan() -> Robot {
+        crate::robot::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/titan4")).unwrap()
+    }
+
+    /// The arm at six poses; `recorded` has a joint and its angle in rad.
+    fn checked(keys: &str, recorded: impl Fn(usize, f64) -> f64) -> Result<Option<String>, InputError> {
+        let robot = titan();
         let text = format!(
-            "version = 1\nkind = \"input\"\n\
-             [joint_sensors]\ntopic = \"/j\"\nunit = \"{unit}\"\n[tags]\ntopic = \"/t\"\nuse = \
+            "version = 1\nkind = \"input\"\n[joint_sensors]\ntopic = \"/j\"\n{keys}\n[tags]\ntopic = \"/t\"\nuse = \
              \"corners\"\n"
         );
         let map = parse_input_map(Path::new("map.toml"), &text).unwrap();
-        let value = |pose: i32, spec: &JointSensorSpec| {
-            factor * (spec.center_rad + spec.half_range_rad * (0.15 * f64::from(pose) - 0.4))
-        };
+        let angle_rad =
+            |pose: i32, spec: &JointSensorSpec| spec.center_rad + spec.half_range_rad * (0.15 * f64::from(pose) - 0.4);
         let reading = |pose: i32| Reading {
             stamp: Stamp::default(),
             counts: JointCounts::from_fn(robot.n_joints(), |joint| {
                 let spec = &robot.sensors[joint];
-                map.joint_unit.counts(spec, value(pose, spec))
+                map.counts(spec, recorded(joint, angle_rad(pose, spec)))
             }),
             digest: [0; 32],
         };
         let readings: Vec<Reading> = (0..6).map(reading).collect();
-        check_unit("run.mcap", &map, &robot, &readings).map_err(|error| error.to_string())
+        check_unit("run.mcap", &map, &robot, &readings)
+    }
+
+    /// Its angles in rad times `factor`, read as `unit`.
+    fn told(unit: &str, factor: f64) -> Result<Option<String>, String> {
+        let keys = format!("unit = \"{unit}\"");
+        checked(&keys, |_, angle_rad| factor * angle_rad).map_err(|error| error.to_string())
+    }
+
+    /// One joint's numbers from 0 to 360 deg prove nothing, and refute nothing.
+    #[test]
+    fn degrees_are_refused_where_a_joint_is_wrapped() {
+        for wrapped in 0..n_needed(&titan()) {
+            let recorded = |joint: usize, angle_rad: f64| {
+                let deg = angle_rad.to_degrees();
+                if joint == wrapped { deg.rem_euclid(360.0) } else { deg }
+            };
+            let found = checked("unit = \"rad\"", recorded);
+            assert!(
+                matches!(&found, Err(InputError::Unit { likely: JointUnit::Deg, factors, .. }) if factors.is_empty()),
+                "{wrapped}: {found:?}"
+            );
+            assert!(checked("unit = \"deg\"", recorded).is_ok(), "{wrapped}");
+        }
+    }
+
+    /// The factors that the error names make the numbers angles.
+    #[test]
+    fn two_joints_in_degrees_are_named_and_the_factors_put_them_right() {
+        let robot = titan();
+        for [a, b] in [[0, 1], [1, 2], [0, 3]] {
+            let recorded =
+                |joint: usize, angle_rad: f64| if [a, b].contains(&joint) { angle_rad.to_degrees() } else { angle_rad };
+            let Err(InputError::Unit { factors, .. }) = checked("unit = \"rad\"", recorded) else {
+                panic!("{a}, {b}: not refused")
+            };
+            let names: Vec<&String> = factors.iter().map(|(joint, _)| joint).collect();
+            assert_eq!(names, [a, b].map(|joint| &robot.sensors[joint].joint));
+            let lines: Vec<String> = factors.iter().map(|(joint, by)| format!("factor.{joint} = {by:.7}")).collect();
+            let keys = format!("unit = \"rad\"\n{}", lines.join("\n"));
+            assert_eq!(checked(&keys, recorded).expect("put right"), None, "{a}, {b}");
+        }
     }
 
     #[test]

@@ -12,6 +12,8 @@
 //! names = { elbow = "joint_3" }      # optional: the robot's joint = the recorded name, where they differ
 //! unit = "counts"                    # optional: or "rad", "deg": angles made of the sensors by their datasheet
 //! slide_unit = "m"                   # optional, with "rad" or "deg": or "mm", of joints that slide
+//! factor = { elbow = -1.0 }          # optional, with "rad" or "deg": the angle is factor x (reading - zero)
+//! zero = { elbow = 90.0 }            # optional, with "rad" or "deg"
 //! # optional: LeRobot's calibration JSON, next to this file; then unit stays "counts", which are the motors' ticks
 //! lerobot = { file = "arm.json", motors = "feetech", values = "degrees" }   # or "range_m100_100", "ticks" ..
 //! [tags]
@@ -21,6 +23,7 @@
 //! camera_frame = "fisheye"
 //! child_frame = "tag36h11:{id}"      # or a plain name, for one landmark
 //! use = "position"                   # "position" | "pose" | "corners" | "board_corners"
+//! corner_order = "apriltag"          # optional, detections alone: or "opencv", clockwise from the top left
 //! family = "36h11"                   # optional, images alone: "Standard41h12" ..; absent: that of the robot's tags
 //! image_period_s = 0.2               # optional, images alone: time between two that are looked at; absent: all
 //! camera_info = "/camera_info"       # optional, images alone: sensor_msgs/msg/CameraInfo, for robots without a lens
@@ -45,19 +48,22 @@ use nalgebra::{Quaternion, UnitQuaternion};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+pub use self::joint_keys::JointAngleLines;
+use self::joint_keys::{JointsToml, check_name};
 pub use self::table::{
     CornerOrder, Direction, PoseColumns, RotationColumns, RotationForm, SeenColumns, TableFormat, TableJoin,
     TableLayout, TagTable, TimeColumn, TimeUnit,
 };
 use self::table::{TableToml, TagColumnsToml, TagTableToml, TagsOfTable};
 pub use self::units::{JointUnit, SlideUnit};
-use super::lerobot::{LerobotCalibration, LerobotToml};
+use super::lerobot::LerobotCalibration;
 use crate::document::parse_file;
 use crate::kind::Kind;
 use crate::optics::TagFamily;
-use crate::robot::{FileIssue, JointSensorSpec, Robot, RobotError, read_text};
+use crate::robot::{FileIssue, JointSensorSpec, Robot, RobotError, StatedAngle, read_text};
 use crate::schema::schema_of;
 
+mod joint_keys;
 mod table;
 mod units;
 
@@ -265,8 +271,8 @@ pub struct InputMap {
     pub joint_names: BTreeMap<String, String>,
     /// What the recorded numbers of the joints are.
     pub joint_unit: JointUnit,
-    /// What those of slides are, where `joint_unit` is one of angles.
-    pub slide_unit: SlideUnit,
+    /// How they become angles, where `joint_unit` is one of angles.
+    pub joint_lines: JointAngleLines,
     /// LeRobot's calibration, by which its numbers become ticks.
     pub lerobot: Option<LerobotCalibration>,
     /// Names of the tags' frames; `None` with [`TagUse::Corners`] alone.
@@ -275,6 +281,8 @@ pub struct InputMap {
     pub tag_family: Option<TagFamily>,
     /// What of a tag's measurement counts.
     pub tag_use: TagUse,
+    /// Order of the corners in recorded detections.
+    pub corner_order: CornerOrder,
     /// Stated noise of positions and poses of tags, where there is one.
     pub tag_noise: Option<TagNoise>,
     /// Largest gap between a tag message and the nearest joint reading; a tag farther off is left out.
@@ -288,17 +296,14 @@ pub struct InputMap {
 }
 
 impl InputMap {
-    /// Checks that `joint_sensors.names` and the cameras of `further_tags` are of this robot, and that each joint has a
-    /// recorded name of its own.
+    /// Checks that the joints of `joint_sensors` and the cameras of `further_tags` are of this robot, and that each joint has
+    /// a recorded name of its own.
     ///
     /// # Errors
     /// [`FileIssue`] naming `file`, the name and those that the robot has.
     pub fn check_robot(&self, file: &Path, robot: &Robot) -> Result<(), FileIssue> {
-        let joints = robot.joint_names();
-        if let Some(name) = self.joint_names.keys().find(|name| !joints.contains(name)) {
-            let problem = format!("`{name}` is no joint of the robot; it has {joints:?}");
-            return Err(FileIssue::new(Code::NameUnknown, file, "joint_sensors.names", problem));
-        }
+        self.joint_names.keys().try_for_each(|name| check_name(file, "names", name, robot))?;
+        self.joint_lines.check_robot(file, robot)?;
         if let Some(problem) = self.shared_name(robot) {
             return Err(FileIssue::new(Code::ValueDuplicate, file, "joint_sensors.names", problem));
         }
@@ -334,8 +339,14 @@ impl InputMap {
         if let Some(lerobot) = &self.lerobot {
             return lerobot.tick(self.recorded_name(&spec.joint), value);
         }
-        let is_metric = self.joint_unit != JointUnit::Counts && spec.moves.is_slide();
-        self.joint_unit.counts(spec, if is_metric { value * self.slide_unit.in_m() } else { value })
+        let Some(stated) = self.stated(spec) else { return value };
+        spec.offset_counts + spec.counts_per_rad * stated.angle_rad(value)
+    }
+
+    /// How the readings of a joint are stated as angles; `None`: they are counts.
+    #[must_use]
+    pub fn stated(&self, spec: &JointSensorSpec) -> Option<StatedAngle> {
+        self.joint_lines.of(self.joint_unit, spec)
     }
 
     /// What further cameras saw.
@@ -410,23 +421,6 @@ struct FurtherTagsToml {
 
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-struct JointsToml {
-    /// Topic of sensor_msgs/msg/JointState.
-    topic: Option<String>,
-    /// Recorded name or column of each joint of the robot, where they differ.
-    #[serde(default)]
-    names: BTreeMap<String, String>,
-    /// Unit of the recorded numbers.
-    #[serde(default)]
-    unit: JointUnit,
-    /// Unit of slides, where `unit` is "rad" or "deg".
-    slide_unit: Option<SlideUnit>,
-    /// Calibration of LeRobot by which the recorded numbers become ticks.
-    lerobot: Option<LerobotToml>,
-}
-
-#[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
 struct TagsToml {
     /// Topic of transforms, detections or images.
     topic: Option<String>,
@@ -436,6 +430,8 @@ struct TagsToml {
     camera_frame: Option<String>,
     /// Frame of a tag, such as `tag36h11:{id}`, or the plain name of one landmark.
     child_frame: Option<String>,
+    /// Order of a tag's corners in detections; of a table, in `columns`.
+    corner_order: Option<CornerOrder>,
     /// Part of a tag's measurement that counts.
     #[serde(rename = "use")]
     tag_use: TagUse,
@@ -527,6 +523,10 @@ fn checked(file: &Path, raw: MapToml) -> Result<InputMap, RobotError> {
     if raw.table.is_some() {
         check_no_topics(file, &raw)?;
     }
+    if raw.tags.corner_order.is_some() && raw.tags.tag_use != TagUse::Corners {
+        let problem = "is for corners of tags; set use = \"corners\"";
+        return Err(FileIssue::new(Code::KeysConflict, file, "tags.corner_order", problem).into());
+    }
     if raw.tags.tag_use == TagUse::BoardCorners && !matches!(child_frame, Some(ChildFrame::Plain(_))) {
         let problem = "must be the plain name of the board in the tag map; its corners have numbers of their own";
         return Err(FileIssue::new(Code::ValueInvalid, file, "tags.child_frame", problem).into());
@@ -535,6 +535,7 @@ fn checked(file: &Path, raw: MapToml) -> Result<InputMap, RobotError> {
         let problem = "is for numbers without `lerobot`, which says what they are by its `values`; leave one out";
         return Err(FileIssue::new(Code::KeysConflict, file, "joint_sensors.unit", problem).into());
     }
+    let joint_lines = JointAngleLines::checked(file, &raw.joint_sensors)?;
     let tag_noise = raw.tags.noise(file)?;
     let source = match raw.table {
         Some(table) => {
@@ -554,25 +555,18 @@ fn checked(file: &Path, raw: MapToml) -> Result<InputMap, RobotError> {
         source,
         joint_names: raw.joint_sensors.names,
         joint_unit: raw.joint_sensors.unit,
-        slide_unit: slide_unit(file, raw.joint_sensors.unit, raw.joint_sensors.slide_unit)?,
+        joint_lines,
         lerobot: None,
         child_frame,
         tag_family: tag_family.transpose()?,
         tag_use: raw.tags.tag_use,
+        corner_order: raw.tags.corner_order.unwrap_or_default(),
         tag_noise,
         max_gap_s: FileIssue::check_range(file, "max_gap_s", raw.max_gap_s, 1e-6..=60.0)?,
         while_moving: raw.while_moving,
         not_finite: raw.not_finite,
         stamps: raw.stamps,
     })
-}
-
-fn slide_unit(file: &Path, unit: JointUnit, slide_unit: Option<SlideUnit>) -> Result<SlideUnit, FileIssue> {
-    if slide_unit.is_some() && unit == JointUnit::Counts {
-        let problem = "is for numbers that are no raw readings: set unit = \"rad\" or \"deg\", too";
-        return Err(FileIssue::new(Code::KeysConflict, file, "joint_sensors.slide_unit", problem));
-    }
-    Ok(slide_unit.unwrap_or_default())
 }
 
 fn check_no_topics(file: &Path, raw: &MapToml) -> Result<(), FileIssue> {
@@ -587,6 +581,7 @@ fn check_no_topics(file: &Path, raw: &MapToml) -> Result<(), FileIssue> {
         ("conditions.attitude", &raw.conditions.attitude),
     ];
     let given = given.into_iter().find(|(_, value)| value.is_some()).map(|(key, _)| key);
+    let given = given.or(raw.tags.corner_order.is_some().then_some("tags.corner_order"));
     match given.or((!raw.further_tags.is_empty()).then_some("further_tags")) {
         Some(key) => Err(FileIssue::new(
             Code::KeysConflict,

@@ -34,9 +34,9 @@ pub use joints::Reading;
 pub use lerobot::{LerobotCalibration, LerobotMotors, LerobotValues};
 pub use map::{
     ChildFrame, ConditionKind, ConditionTopics, CornerOrder, DEFAULT_MAX_GAP_S, Direction, FurtherTopic, InputMap,
-    JointUnit, NotFinite, PoseColumns, RotationColumns, RotationForm, SeenColumns, SlideUnit, Source, StampSource,
-    TableFormat, TableJoin, TableLayout, TagNoise, TagTable, TagUse, TimeColumn, TimeUnit, Topics, WhileMoving,
-    input_schema, parse_input_map, read_input_map,
+    JointAngleLines, JointUnit, NotFinite, PoseColumns, RotationColumns, RotationForm, SeenColumns, SlideUnit, Source,
+    StampSource, TableFormat, TableJoin, TableLayout, TagNoise, TagTable, TagUse, TimeColumn, TimeUnit, Topics,
+    WhileMoving, input_schema, parse_input_map, read_input_map,
 };
 pub use recording::ExternalRecording;
 pub use table::{MAX_ROWS, MIN_APART_S, TableColumn, TableContents, plain_key, read_table_contents, tag_number};

@@ -223,7 +223,9 @@ impl<'a> TagReader<'a> {
                 self.add(stamp, digest, None, RawMeasurement::BoardCorner { number: id, pixel });
                 continue;
             }
-            let corners_px = tag.corners.map(|corner| [corner.x, corner.y]);
+            // Both orders are their own inverse.
+            let corner = |number: usize| tag.corners[self.map.corner_order.place(number)];
+            let corners_px = [0, 1, 2, 3].map(corner).map(|corner| [corner.x, corner.y]);
             if let Some(value) = corners_px.iter().flatten().find(|value| !value.is_finite()) {
                 self.not_finite(place, "corners", &format!("tag {id}"), *value)?;
                 continue;

@@ -8,6 +8,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::error::{FileIssue, RobotError};
+use super::stated_angle::StatedAngle;
 use crate::kinematics::{Chain, ChainJoint, JointKind};
 use crate::units::Unit;
 
@@ -62,6 +63,8 @@ pub struct JointSensorSpec {
     pub drift_std_rad_per_sqrt_h: f64,
     /// Largest rate that the joint is driven at.
     pub max_rate_rad_s: f64,
+    /// How its readings are stated as angles; `None`: they are counts.
+    pub stated: Option<StatedAngle>,
 }
 
 impl JointSensorSpec {
@@ -75,6 +78,24 @@ impl JointSensorSpec {
     #[must_use]
     pub fn is_limited(&self) -> bool {
         self.moves.is_slide() || self.half_range_rad < 0.999 * std::f64::consts::PI
+    }
+
+    /// What is recorded at an angle, before it wraps: counts, or a number in the unit of stated angles.
+    #[must_use]
+    pub fn recorded(&self, angle_rad: f64) -> f64 {
+        match &self.stated {
+            Some(stated) => stated.recorded(angle_rad),
+            None => self.offset_counts + self.counts_per_rad * angle_rad,
+        }
+    }
+
+    /// The angle that a recorded number means.
+    #[must_use]
+    pub fn angle_rad(&self, recorded: f64) -> f64 {
+        match &self.stated {
+            Some(stated) => stated.angle_rad(recorded),
+            None => (recorded - self.offset_counts) / self.counts_per_rad,
+        }
     }
 
     /// The same sensor with `ratio` times as many counts per radian; the reading in the middle of the range stays.
@@ -352,6 +373,7 @@ fn check_sensor(file: &Path, s: &SensorFile, joint: &ChainJoint) -> Result<Joint
         drift_std_rad_per_sqrt_h: of_joint.figure(&DRIFT)?,
         noise_std_counts: of_joint.check("noise_std_counts", s.noise_std_counts, 0.0..=1e6)?,
         max_rate_rad_s: of_joint.figure(&MAX_RATE)?,
+        stated: None,
     })
 }
 

@@ -1,6 +1,7 @@
 //! Joint readings that mean something else than robot.toml says: named, with the joints concerned.
 
 use std::f64::consts::{FRAC_PI_2, PI};
+use std::path::Path;
 
 use nalgebra::{Quaternion, UnitQuaternion};
 
@@ -8,6 +9,8 @@ use crate::batch::tests::failures::{Case, case};
 use crate::say::reading_error::ReadingError;
 use crate::say::refusal::Refusal;
 use crate::say::wrong_input::{WrongInput, WrongInputKind};
+use crate::views::view::View;
+use armcal_core::input::{InputMap, parse_input_map};
 use armcal_core::robot::Robot;
 use armcal_core::streams::JointAngles;
 
@@ -78,6 +81,86 @@ fn zeros_by_another_convention_are_named_with_their_size() {
     }
 }
 
+/// An input map that states angles in degrees, with further keys of its joints.
+fn map_of_degrees(keys: &[String]) -> InputMap {
+    let text = format!(
+        "version = 1\nkind = \"input\"\n[joint_sensors]\ntopic = \"/j\"\nunit = \"deg\"\n{}\n[tags]\ntopic = \
+         \"/t\"\nuse = \"corners\"\n",
+        keys.join("\n")
+    );
+    parse_input_map(Path::new("map.toml"), &text).expect("the keys are of an input map")
+}
+
+/// The keys of the input map in an advice.
+fn keys_in(advice: &str) -> Vec<String> {
+    let words: Vec<&str> = advice.split_whitespace().collect();
+    let lines = words.windows(3).filter(|three| three[1] == "=");
+    let of_map = lines.filter(|three| three[0].starts_with("factor.") || three[0].starts_with("zero."));
+    of_map.map(|three| three.join(" ").trim_end_matches([',', ';']).to_owned()).collect()
+}
+
+/// Reads angles of joint `joint` that are recorded as `recorded` says, and applies the advice of the refusal: the
+/// largest error of the angles that the corrected map reads.
+fn left_by_advice(seed: u64, joint: usize, recorded_rad: impl Fn(f64) -> f64) -> f64 {
+    let mut case = case(seed, None);
+    let map = map_of_degrees(&[]);
+    case.robot.sensors.iter_mut().for_each(|spec| spec.stated = map.stated(spec));
+    let spec = case.robot.sensors[joint].clone();
+    let angle_rad = |view: &View| spec.center_rad + view.travel_rad[joint];
+    let angles_rad: Vec<f64> = case.views.iter().map(angle_rad).collect();
+    changed(&mut case, |_, angles, read| read[joint] = recorded_rad(angles[joint]));
+    let calibration = case.calibrated();
+    let keys: Vec<String> = calibration.refusals.iter().flat_map(|refusal| keys_in(&refusal.remedy())).collect();
+    assert!(!keys.is_empty(), "seed {seed}: {:?}", calibration.refusals);
+    let line = map_of_degrees(&keys).stated(&spec).expect("angles are stated");
+    let error_rad = |angle_rad: f64| line.angle_rad(recorded_rad(angle_rad).to_degrees()) - angle_rad;
+    angles_rad.into_iter().map(|angle_rad| error_rad(angle_rad).abs()).fold(0.0, f64::max)
+}
+
+/// The sensor's own gain and offset are part of what is found.
+#[test]
+fn the_keys_that_are_advised_for_stated_angles_put_them_right() {
+    for (seed, joint, slope) in [(60, 0, -1.0), (62, 2, 0.5), (63, 3, 1.5), (62, 2, 1f64.to_degrees())] {
+        let left_rad = left_by_advice(seed, joint, |angle_rad| slope * angle_rad);
+        assert!(left_rad < 0.15, "seed {seed}, slope {slope}: {left_rad}");
+    }
+    for (seed, joint, by_rad) in [(7, 1, FRAC_PI_2), (8, 3, -FRAC_PI_2), (9, 2, 0.6)] {
+        let left_rad = left_by_advice(seed, joint, |angle_rad| angle_rad + by_rad);
+        assert!(left_rad < 0.15, "seed {seed}, zero {by_rad}: {left_rad}");
+    }
+}
+
+/// Angles are exchanged as they are, whatever scales robot.toml has for the two sensors.
+#[test]
+fn exchanged_angles_are_named() {
+    for (seed, [a, b]) in [(0, [0, 1]), (2, [3, 4])] {
+        let mut case = case(seed, None);
+        let map = map_of_degrees(&[]);
+        case.robot.sensors.iter_mut().for_each(|spec| spec.stated = map.stated(spec));
+        let spec = &mut case.robot.sensors[a];
+        (spec.counts_per_rad, spec.wrap_counts) = (-3.0 * spec.counts_per_rad, 3.0 * spec.wrap_counts);
+        spec.noise_std_counts *= 3.0;
+        changed(&mut case, |_, angles, read| (read[a], read[b]) = (angles[b], angles[a]));
+        let names = [a, b].map(|joint| case.robot.sensors[joint].joint.clone());
+        assert_eq!(found(case), ReadingError::Exchanged { joints: names }, "seed {seed}");
+    }
+}
+
+/// The camera cannot tell turns apart: an offset of one would explain all views.
+#[test]
+fn angles_a_turn_beyond_the_limits_are_not_accepted() {
+    for (seed, joint, turn_rad) in [(18, 0, 2.0 * PI), (19, 3, -2.0 * PI), (33, 4, 2.0 * PI)] {
+        let mut case = case(seed, None);
+        assert!(case.robot.sensors[joint].is_limited());
+        changed(&mut case, |_, _, read| read[joint] += turn_rad);
+        let name = case.robot.sensors[joint].joint.clone();
+        match found(case) {
+            ReadingError::OtherTurns { joints, .. } => assert_eq!(joints, [name], "seed {seed}"),
+            other => panic!("seed {seed}: {other:?}"),
+        }
+    }
+}
+
 /// So far off that nothing fits, and the sensor's line is not found.
 #[test]
 fn a_scale_that_is_far_off_is_named_with_its_size() {
@@ -88,10 +171,10 @@ fn a_scale_that_is_far_off_is_named_with_its_size() {
         let calibration = case.calibrated();
         let (of, factor) = match calibration.refusals.first() {
             Some(Refusal::MisreadReadings(misread)) => match &misread.found {
-                ReadingError::Scaled { joint, factor } => (joint.clone(), *factor),
+                ReadingError::Scaled { joint, factor, .. } => (joint.clone(), *factor),
                 other => panic!("seed {seed}: {other:?}"),
             },
-            Some(Refusal::SensorLine { joint, slope }) => (joint.clone(), *slope),
+            Some(Refusal::SensorLine { joint, slope, .. }) => (joint.clone(), *slope),
             Some(Refusal::SensorUnit { joint, gain, .. }) => (joint.clone(), *gain),
             other => panic!("seed {seed}: {other:?}"),
         };

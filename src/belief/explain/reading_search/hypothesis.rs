@@ -66,6 +66,17 @@ impl Hypothesis {
         (!joints.is_empty()).then_some(Self::OtherTurns(joints))
     }
 
+    /// The same, where one of the joints is beyond its limits in most views.
+    pub(crate) fn other_turns_in_most(robot: &Robot, views: &[View]) -> Option<Self> {
+        let hypothesis = Self::other_turns(robot, views)?;
+        let Self::OtherTurns(joints) = &hypothesis else { return None };
+        let in_most = |&joint: &usize| {
+            let limit_rad = robot.sensors[joint].half_range_rad + NEXT_TURN_RAD;
+            2 * views.iter().filter(|view| view.travel_rad[joint].abs() > limit_rad).count() > views.len()
+        };
+        joints.iter().any(in_most).then_some(hypothesis)
+    }
+
     /// All but readings of 0 to 360 deg.
     pub(crate) fn all(robot: &Robot) -> Vec<Self> {
         let n = robot.n_seen_joints();
@@ -143,10 +154,9 @@ impl Hypothesis {
                 for (joint, &from) in order.iter().enumerate().filter(|(joint, from)| joint != *from) {
                     let (spec, other) = (&robot.sensors[joint], &robot.sensors[from]);
                     let angle_rad = other.center_rad + view.travel_rad[from];
-                    let counts = other.offset_counts + other.counts_per_rad * angle_rad;
-                    changed.travel_rad[joint] =
-                        wrapped(robot, joint, (counts - spec.offset_counts) / spec.counts_per_rad - spec.center_rad);
-                    changed.rate_rad_s[joint] = view.rate_rad_s[from] * other.counts_per_rad / spec.counts_per_rad;
+                    let read = |angle_rad: f64| spec.angle_rad(other.recorded(angle_rad));
+                    changed.travel_rad[joint] = wrapped(robot, joint, read(angle_rad) - spec.center_rad);
+                    changed.rate_rad_s[joint] = view.rate_rad_s[from] * (read(1.0) - read(0.0));
                     changed.approach[joint] = view.approach[from];
                 }
             }

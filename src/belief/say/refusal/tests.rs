@@ -135,7 +135,9 @@ fn measured() -> Vec<Refusal> {
             most_sigmas: 10.0,
             focal_px: [900.1, 900.2],
         },
-        Refusal::SensorLine { joint: joint(), slope: 0.5 },
+        Refusal::SensorLine { joint: joint(), slope: 0.5, input_factor: None },
+        Refusal::SensorLine { joint: joint(), slope: -0.998, input_factor: Some(-0.998) },
+        Refusal::SensorUnit { joint: joint(), gain: 0.0173, moves: JointKind::Revolute, input_factor: Some(0.0173) },
         Refusal::Outliers { outliers: 40, observations: 100 },
         Refusal::Innovations {
             quantity: InnovationQuantity::Coordinates,
@@ -149,7 +151,22 @@ fn measured() -> Vec<Refusal> {
         misread(ReadingError::Alike { joint: joint(), with: "shoulder".to_owned(), views: 40 }),
         misread(ReadingError::OtherTurns { joints: vec![joint()], wrap_counts: 16_560.0 }),
         misread(ReadingError::Zeros {
-            joints: vec![JointZero { joint: joint(), off_rad: 1.57, moves: JointKind::Revolute, offset_counts: -1.57 }],
+            joints: vec![JointZero {
+                joint: joint(),
+                off_rad: 1.57,
+                moves: JointKind::Revolute,
+                offset_counts: -1.57,
+                input_zero: None,
+            }],
+        }),
+        misread(ReadingError::Zeros {
+            joints: vec![JointZero {
+                joint: joint(),
+                off_rad: 1.57,
+                moves: JointKind::Revolute,
+                offset_counts: -1.57,
+                input_zero: Some(-90.0),
+            }],
         }),
         misread(ReadingError::Shifted { views: 1 }),
         misread(ReadingError::Camera { link: Some("wrist".to_owned()), turn: [1.0, 0.0, 0.0, 0.0] }),

@@ -243,7 +243,7 @@ impl Refusal {
             Self::WrongInput(wrong) => write!(f, "{wrong}"),
             Self::MisreadReadings(misread) => write!(f, "{misread}"),
             Self::Geometry(geometry) => write!(f, "{geometry}"),
-            Self::SensorUnit { joint, gain, moves } => {
+            Self::SensorUnit { joint, gain, moves, .. } => {
                 let [small, large] = if moves.is_slide() { ["mm", "m"] } else { ["deg", "rad"] };
                 let [found, stated] = if *gain < 1.0 { [small, large] } else { [large, small] };
                 write!(f, "the readings of {joint} are in {found}, not in {stated}: {:.4} times its motion", 1.0 / gain)
@@ -262,7 +262,7 @@ impl Refusal {
                 std_rad / datasheet_std_rad,
                 moves.unit().shown(*datasheet_std_rad, 2)
             ),
-            Self::SensorLine { joint, slope } => {
+            Self::SensorLine { joint, slope, .. } => {
                 let what = if *slope < 0.0 { "is reversed" } else { "has another scale than its datasheet" };
                 let digits = if slope.abs() < MORE_DIGITS_BELOW { 4 } else { 2 };
                 write!(

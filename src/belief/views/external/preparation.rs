@@ -86,9 +86,16 @@ pub fn prepare_external(
         data,
         gripper_tag_data: None,
         held_out: HeldOut::CrossValidation,
-        robot: robot.clone(),
+        robot: with_stated_angles(robot, map),
         identified: Vec::new(),
     })
+}
+
+/// The arm whose sensors know how the input map states their readings.
+fn with_stated_angles(robot: &Robot, map: &InputMap) -> Robot {
+    let mut robot = robot.clone();
+    robot.sensors.iter_mut().for_each(|spec| spec.stated = map.stated(spec));
+    robot
 }
 
 fn names_of(recordings: &[ExternalRecording]) -> String {

@@ -275,6 +275,18 @@ impl TimeUnit {
             Self::Iso8601 => None,
         }
     }
+
+    /// As the input map writes it.
+    #[must_use]
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::S => "s",
+            Self::Ms => "ms",
+            Self::Us => "us",
+            Self::Ns => "ns",
+            Self::Iso8601 => "iso8601",
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]

@@ -92,3 +92,16 @@ fn each_joint_has_a_recorded_name_of_its_own() {
         assert!(checked(good.clone()).is_ok(), "{good}");
     }
 }
+
+#[test]
+fn the_order_of_corners_is_for_detections_of_tags() {
+    use crate::codes::Coded;
+    let code = |text: &str| parse_input_map(Path::new("map.toml"), text).expect_err("refused").code();
+    let of_positions = GOOD.replace("use = ", "corner_order = \"opencv\"\nuse = ");
+    assert_eq!(code(&of_positions), Code::KeysConflict);
+    let of_a_table = "version = 1\nkind = \"input\"\n[table]\n[joint_sensors]\n[tags]\ncorner_order = \"opencv\"\n\
+                      use = \"corners\"\n[tags.columns]\nid = \"id\"\n\
+                      corners = [\"a\", \"b\", \"c\", \"d\", \"e\", \"f\", \"g\", \"h\"]\n";
+    assert_eq!(code(of_a_table), Code::KeysConflict);
+    assert!(parse(&of_a_table.replace("corner_order = \"opencv\"\n", "")).is_ok());
+}

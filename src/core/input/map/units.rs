@@ -3,8 +3,6 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::robot::JointSensorSpec;
-
 /// What the recorded numbers of the joints are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -36,16 +34,6 @@ impl JointUnit {
             Self::Counts => "counts",
             Self::Rad => "rad",
             Self::Deg => "deg",
-        }
-    }
-
-    /// The raw reading that `value` stands for.
-    pub(in crate::input) fn counts(self, spec: &JointSensorSpec, value: f64) -> f64 {
-        match self {
-            Self::Counts => value,
-            Self::Rad => spec.offset_counts + spec.counts_per_rad * value,
-            Self::Deg if spec.moves.is_slide() => Self::Rad.counts(spec, value),
-            Self::Deg => Self::Rad.counts(spec, value.to_radians()),
         }
     }
 }

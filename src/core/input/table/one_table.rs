@@ -4,12 +4,12 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use super::columns::{Columns, Part};
-use super::row_reader::{RowReader, digest};
+use super::row_reader::{MAX_NANOS, RowReader, digest};
 use super::rows::Row;
 use super::{NOT_A_NUMBER, TableFile, read_rows};
 use crate::input::error::InputError;
 use crate::input::joints::{Reading, n_needed};
-use crate::input::map::{InputMap, TableLayout};
+use crate::input::map::{InputMap, TableLayout, TimeUnit};
 use crate::input::recording::ExternalRecording;
 use crate::input::tags::{ExternalDetection, TagFrame};
 use crate::joints::JointCounts;
@@ -34,14 +34,34 @@ pub(super) fn read(
     let absent_joints = columns.absent_joints(&found);
     let rows = RowReader { file: &file, map, layout, robot, columns: &columns, absent_joints: &absent_joints };
     let recording = ExternalRecording { path: path.to_owned(), ..ExternalRecording::default() };
-    let mut reader = PoseReader { rows, recording, keys: BTreeSet::new() };
+    let likely_unit = likely_time_unit(rows, &found.rows);
+    let mut reader = PoseReader { rows, likely_unit, recording, keys: BTreeSet::new() };
     found.rows.iter().try_for_each(|row| reader.take(row))?;
     let PoseReader { recording, .. } = reader;
     Ok(ExternalRecording { absent_joints, ..recording })
 }
 
+/// A coarser unit of the times, in which all rows of other times are poses at rest; as stated, none are.
+fn likely_time_unit(reader: RowReader<'_>, rows: &[Row]) -> Option<TimeUnit> {
+    let (at, stated) = reader.columns.time?;
+    let stated_nanos = stated.nanos()?;
+    let times: Vec<f64> = rows.iter().filter_map(|row| row.values[at]).collect();
+    let mut apart = times.windows(2).map(|two| two[1] - two[0]).filter(|apart| *apart != 0.0).peekable();
+    apart.peek()?;
+    let (least, most) = apart.fold((f64::INFINITY, 0.0f64), |(least, most), one| (least.min(one), most.max(one)));
+    let last = times.last()?;
+    let is_likely = |unit: &TimeUnit| {
+        let nanos = unit.nanos().unwrap_or(0.0);
+        least * nanos >= MIN_APART_S * 1e9 && last * nanos <= MAX_NANOS
+    };
+    let is_too_fine = least > 0.0 && most * stated_nanos < MIN_APART_S * 1e9;
+    [TimeUnit::Us, TimeUnit::Ms, TimeUnit::S].into_iter().find(is_likely).filter(|_| is_too_fine)
+}
+
 struct PoseReader<'a> {
     rows: RowReader<'a>,
+    /// What the times may be in, where they are too near to each other as stated.
+    likely_unit: Option<TimeUnit>,
     recording: ExternalRecording,
     /// [`ExternalDetection::key`] of those in the last frame.
     keys: BTreeSet<(Option<u32>, Option<u32>)>,
@@ -92,14 +112,57 @@ impl PoseReader<'_> {
             };
         }
         if after_s < MIN_APART_S {
+            let unit = self.likely_unit.map_or(String::new(), |unit| {
+                format!("set `table.time.unit` to \"{0}\" if the times are in {0}, or ", unit.key())
+            });
             return self.rows.problem(
                 row,
                 format!(
                     "is {after_s} s after the row before; poses at rest are at least {MIN_APART_S} s apart, in the \
-                     order of time. Leave `table.time` out where it says something else"
+                     order of time: {unit}leave `table.time` out where it says something else"
                 ),
             );
         }
         Ok(stamp)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::parse_input_map;
+
+    const MAP: &str = "version = 1\nkind = \"input\"\n[table]\ntime = { column = \"t\", unit = \"UNIT\" }\n\
+        [joint_sensors]\nunit = \"rad\"\n[tags]\nchild_frame = \"board\"\nuse = \"position\"\n[tags.columns]\n\
+        direction = \"camera_from_tag\"\nposition = [\"x\", \"y\", \"z\"]\n";
+
+    /// The unit that is thought likely of times that are stated to be in `unit`.
+    fn likely(unit: &str, times: &[f64]) -> Option<TimeUnit> {
+        let robot = crate::robot::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/titan4")).unwrap();
+        let map = parse_input_map(Path::new("map.toml"), &MAP.replace("UNIT", unit)).unwrap();
+        let crate::input::Source::Table(layout) = &map.source else { panic!("a table") };
+        let columns = Columns::of(&map, layout, &robot, Part::Both);
+        let rows = RowReader { file: "a.csv", map: &map, layout, robot: &robot, columns: &columns, absent_joints: &[] };
+        let row = |(k, time): (usize, &f64)| {
+            let values = vec![Some(*time); columns.names.len()];
+            Row { number: k as u64 + 1, values, date: None, key: String::new() }
+        };
+        let found: Vec<Row> = times.iter().enumerate().map(row).collect();
+        likely_time_unit(rows, &found)
+    }
+
+    #[test]
+    fn a_coarser_unit_is_likely_where_it_makes_poses_at_rest_of_all_rows() {
+        assert_eq!(likely("ms", &[0.0, 3.0, 3.0, 7.5, 130.0]), Some(TimeUnit::S));
+        assert_eq!(likely("ms", &[1.79e9, 1.79e9 + 4.0, 1.79e9 + 9.0]), Some(TimeUnit::S));
+        assert_eq!(likely("ns", &[0.0, 3e3, 8e3]), Some(TimeUnit::Ms));
+        assert_eq!(likely("us", &[0.0, 3e3, 8e3]), Some(TimeUnit::Ms));
+        // As stated some are poses at rest, none follow each other, or times are disordered.
+        assert_eq!(likely("ms", &[0.0, 3.0, 4000.0, 4003.0]), None);
+        assert_eq!(likely("s", &[0.0, 0.01, 0.02]), None);
+        assert_eq!(likely("ms", &[5.0, 5.0]), None);
+        assert_eq!(likely("ms", &[5.0, 2.0, 9.0]), None);
+        // Seconds would be beyond all times.
+        assert_eq!(likely("ms", &[1.79e12, 1.79e12 + 10.0]), None);
     }
 }

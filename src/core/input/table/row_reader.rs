@@ -13,7 +13,7 @@ use crate::robot::Robot;
 use crate::time::Stamp;
 
 /// The largest time, ns: the year 2262.
-const MAX_NANOS: f64 = 9.2e18;
+pub(super) const MAX_NANOS: f64 = 9.2e18;
 
 /// One table, and what its columns are.
 #[derive(Clone, Copy)]

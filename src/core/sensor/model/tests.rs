@@ -21,6 +21,7 @@ fn spec() -> JointSensorSpec {
         temperature_std_rad_per_k: 0.0,
         drift_std_rad_per_sqrt_h: 0.0,
         max_rate_rad_s: 0.5,
+        stated: None,
     }
 }
 
