@@ -38,7 +38,7 @@ impl VerdictInput<'_> {
         if !self.found.has_poses() {
             return None;
         }
-        let stated_rad = self.tag_noise.map(|noise| noise.rotation_std_rad);
+        let stated_rad = self.tag_noise.and_then(|noise| noise.rotation_std_rad);
         let limit_rad = stated_rad.map_or(MAX_ROTATION_NOISE_RAD, |stated_rad| MAX_SIGMAS_OFF * stated_rad);
         let rotation_rad = self.found.scales().rotation_std_rad;
         let check = Check::at_most("noise of rotations, rad", rotation_rad, limit_rad);

@@ -19,6 +19,7 @@ use crate::solve::input::HyperparameterMode;
 use crate::solve::model_for_views::model_for;
 use crate::views::calibration_data::{CalibrationData, HeldOut};
 use crate::views::view::{CaptureData, View};
+use armcal_core::input::TagNoise;
 use armcal_core::robot::{FailedKind, Robot};
 use armcal_core::spatial::Pose;
 
@@ -32,10 +33,15 @@ pub(crate) struct Case {
 
 impl Case {
     pub(crate) fn calibrated(self) -> Calibration {
+        self.calibrated_with(None)
+    }
+
+    /// With this stated noise of positions and poses.
+    pub(crate) fn calibrated_with(self, tag_noise: Option<TagNoise>) -> Calibration {
         let data = CalibrationData {
             name: "synthetic".to_owned(),
             messages_hash: String::new(),
-            data: CaptureData { n_marks: self.views.len(), fit: self.views, ..CaptureData::default() },
+            data: CaptureData { n_marks: self.views.len(), fit: self.views, tag_noise, ..CaptureData::default() },
             gripper_tag_data: None,
             held_out: HeldOut::CrossValidation,
             robot: self.robot,

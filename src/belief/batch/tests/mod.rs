@@ -13,6 +13,7 @@ mod growth;
 mod lenses;
 mod moved_tags;
 mod readings;
+mod recorded_poses;
 mod reservations;
 mod sag;
 mod score_test;
