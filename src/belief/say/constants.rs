@@ -20,6 +20,15 @@ pub(crate) mod repair {
     pub(crate) const LEAST_FOCAL: f64 = 1e-3;
 }
 
+pub(crate) mod length_unit {
+    /// Units that lengths may be written in in place of metres, and how many make a metre.
+    pub(crate) const UNITS: [(&str, f64); 5] =
+        [("mm", 1e3), ("cm", 1e2), ("dm", 1e1), ("inches", 1.0 / 0.0254), ("feet", 1.0 / 0.3048)];
+    /// A ratio of lengths within this of a unit's is that unit, relative. Assumed: neighbours differ by a factor of two
+    /// and more.
+    pub(crate) const NEAR: f64 = 0.03;
+}
+
 pub(crate) mod wrong_input_words {
     /// Refractive index of sea water (Treibitz et al. 2012).
     pub(crate) const WATER: f64 = 1.34;

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::say::finding::FindingUnit;
 use crate::say::geometry_error::GeometryError;
+use crate::say::length_unit::unit_of;
 use crate::say::reading_error::MisreadReadings;
 use crate::say::wrong_input::WrongInput;
 
@@ -480,6 +481,9 @@ impl Refusal {
             Self::Touch { .. } => {
                 "measure the tool point ([tool] point_m of robot.toml), the links beyond the camera and the camera \
                  mount"
+            }
+            Self::Length { measured_m, by_views_m, .. } if unit_of(measured_m / by_views_m).is_some() => {
+                "write this length in metres"
             }
             Self::Length { .. } => "measure again, and correct this length or the tags' size_m in robot.toml",
             Self::PriorReused => "give a prior that was made from other views",
