@@ -294,9 +294,6 @@ pub(crate) mod wrong_input {
 }
 
 pub(crate) mod wrong_input_map {
-    /// Units that a survey may be in, and how many make a metre.
-    pub(crate) const UNITS: [(&str, f64); 4] =
-        [("mm", 1e3), ("cm", 1e2), ("inches", 1.0 / 0.0254), ("feet", 1.0 / 0.3048)];
     /// A ratio of sizes within this of that of a print to its border is that one, relative.
     pub(crate) const PRINT_TOLERANCE: f64 = 0.02;
 }
