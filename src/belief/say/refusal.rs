@@ -229,6 +229,17 @@ pub enum Refusal {
         /// Largest residual that is accepted.
         limit_px: f64,
     },
+    /// Under the stated corner noise most observations fit nothing, under a larger one nearly all do.
+    CornerNoiseUnderstated {
+        /// Of corners averaged over a view, with the larger noise.
+        residual_px: f64,
+        /// Of one frame, by robot.toml.
+        stated_px: f64,
+        /// Number of tag observations that are rejected under the stated noise.
+        outliers: usize,
+        /// Number of all.
+        observations: usize,
+    },
     /// A gain or offset that no sensor of this datasheet has.
     BeyondDatasheet {
         /// Name of the parameter: `shoulder_yaw gain`.
@@ -400,6 +411,7 @@ impl Refusal {
             Self::PriorContradicted { .. } => 3,
             // Where hardly any observation fits, the solver's end and every test of the rest say nothing.
             Self::Outliers { outliers, observations } if 2 * outliers > *observations => 4,
+            Self::CornerNoiseUnderstated { .. } => 4,
             // Another scale makes offsets and links seem off.
             Self::SensorLine { .. } | Self::SensorUnit { .. } => 5,
             _ => 6,
@@ -423,6 +435,10 @@ impl Refusal {
                 1.0 / slope
             )
             .into(),
+            Self::CornerNoiseUnderstated { residual_px, .. } => {
+                format!("state corner_std_px = {residual_px:.2} in [camera] of robot.toml, or check lens and tag map")
+                    .into()
+            }
             Self::Lens { focal_px: [x, y], .. } => format!(
                 "measure the intrinsics in the water or air that the arm works in; these views show focal_px = \
                  [{x:.1}, {y:.1}] for [camera] of robot.toml"
@@ -435,7 +451,10 @@ impl Refusal {
     /// Advice without figures of this result.
     fn usual_remedy(&self) -> &'static str {
         match self {
-            Self::MisreadReadings(_) | Self::WrongInput(_) | Self::Lens { .. } => "",
+            Self::MisreadReadings(_)
+            | Self::WrongInput(_)
+            | Self::Lens { .. }
+            | Self::CornerNoiseUnderstated { .. } => "",
             Self::TooFewViews { .. } | Self::PriorUntested => "capture more views",
             Self::TooFewViewsSinceSlip { .. } => "fasten the sensor on its shaft, then capture more views",
             Self::NotSolved { .. } => "capture views that move each joint over more of its range",
@@ -533,7 +552,7 @@ impl Coded for Refusal {
             Self::SensorError { .. } => Code::SensorError,
             Self::OffsetsWalk { .. } => Code::OffsetsWalk,
             Self::Nonlinearity { .. } => Code::Nonlinearity,
-            Self::CornerNoise { .. } => Code::CornerNoise,
+            Self::CornerNoise { .. } | Self::CornerNoiseUnderstated { .. } => Code::CornerNoise,
             Self::BeyondDatasheet { .. } => Code::BeyondDatasheet,
             Self::Outliers { .. } => Code::TooManyOutliers,
             Self::Innovations { .. } => Code::Innovations,

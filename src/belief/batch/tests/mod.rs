@@ -19,6 +19,7 @@ mod sag;
 mod score_test;
 mod slips;
 mod small_samples;
+mod stated_noise;
 mod statistics;
 mod tag_distances;
 mod touches;

@@ -109,6 +109,7 @@ fn measured() -> Vec<Refusal> {
         Refusal::SensorError { joint: joint(), std_rad: 0.01, datasheet_std_rad: 0.002, moves: JointKind::Revolute },
         Refusal::Nonlinearity { joint: joint(), std_rad: 0.03, datasheet_std_rad: 0.002, moves: JointKind::Revolute },
         Refusal::CornerNoise { residual_px: 1.2, stated_px: 0.3, limit_px: 0.9 },
+        Refusal::CornerNoiseUnderstated { residual_px: 0.25, stated_px: 0.03, outliers: 135, observations: 137 },
         Refusal::BeyondDatasheet {
             parameter: "wrist_yaw offset".to_owned(),
             sigmas: 9.0,

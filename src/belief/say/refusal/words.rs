@@ -44,6 +44,7 @@ impl Refusal {
             | Self::Touch { .. } => self.fmt_of_arm(f),
             Self::Innovations { .. }
             | Self::CornerNoise { .. }
+            | Self::CornerNoiseUnderstated { .. }
             | Self::OffsetsWalk { .. }
             | Self::PriorReused
             | Self::PriorSingular
@@ -318,6 +319,10 @@ impl Refusal {
                 "corner residuals averaged over a view are {residual_px:.2} px rms, above {limit_px:.2} px; \
                  robot.toml states {stated_px:.2} px for one frame"
             ),
+            Self::CornerNoiseUnderstated { residual_px, stated_px, outliers, observations } => {
+                write!(f, "corner_std_px of robot.toml, {stated_px:.3} px, is too small: under it {outliers} of ")?;
+                write!(f, "{observations} tag observations fit no arm, and with {residual_px:.2} px nearly all do")
+            }
             Self::PriorReused => write!(f, "the prior was made from the same messages, which must not count twice"),
             Self::PriorSingular => write!(f, "the prior's covariance has no inverse"),
             Self::PriorUntested => write!(f, "the views determine too little to be tested against the prior"),
