@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -71,6 +72,13 @@ pub enum ReadingError {
         /// So many views later are its own readings; negative: before.
         views: i32,
     },
+    /// The tag map is in another frame than the base's.
+    MapFrame {
+        /// Its frame in the base's, m.
+        position_m: [f64; 3],
+        /// Rotation of its frame in the base's: w, x, y, z.
+        turn: [f64; 4],
+    },
     /// The camera is not where robot.toml says.
     Camera {
         /// The link that carries it, where that is another one.
@@ -128,6 +136,10 @@ impl fmt::Display for ReadingError {
                 let side = if *views > 0 { "previous" } else { "next" };
                 write!(f, "each view has the joint readings of the {side} one")
             }
+            Self::MapFrame { position_m: [x, y, z], turn } => {
+                write!(f, "the frame of the tag map is not the base's: it lies at ({x:.3}, {y:.3}, {z:.3}) m in it, ")?;
+                write!(f, "turned by {}", any_turn_in_words(turn))
+            }
             Self::Camera { link, turn } => {
                 f.write_str("the camera is not as robot.toml says: ")?;
                 match link {
@@ -157,6 +169,30 @@ impl fmt::Display for MisreadReadings {
     }
 }
 
+fn zeros_remedy(joints: &[JointZero]) -> String {
+    let one = |zero: &JointZero| format!("{}: offset_counts = {:.5}", zero.joint, zero.offset_counts);
+    let lines: Vec<String> = joints.iter().map(one).collect();
+    format!("set the zeros in [[joint_sensor]] of robot.toml, if the URDF is right: {}", lines.join("; "))
+}
+
+/// `None` of all that is not the frame of the map.
+fn frame_remedy(error: &ReadingError) -> Option<String> {
+    let ReadingError::MapFrame { position_m: [x, y, z], turn } = error else { return None };
+    let [qw, qx, qy, qz] = turn.map(|value| format!("{value:.4}"));
+    Some(format!(
+        "write the tag map in the base's frame: place each pose behind that of the map's frame, position_m = [{x:.3}, \
+         {y:.3}, {z:.3}], quaternion_wxyz = [{qw}, {qx}, {qy}, {qz}]"
+    ))
+}
+
+/// `89.7 deg about (0.00, 0.01, 1.00)`.
+fn any_turn_in_words([w, x, y, z]: &[f64; 4]) -> String {
+    let turn = UnitQuaternion::new_normalize(Quaternion::new(*w, *x, *y, *z));
+    let axis = turn.axis().map_or(Vector3::z(), |axis| axis.into_inner());
+    let degrees = turn.angle().to_degrees();
+    format!("{degrees:.1} deg about ({:.2}, {:.2}, {:.2})", axis.x, axis.y, axis.z)
+}
+
 impl MisreadReadings {
     /// Advice with the lines to change.
     #[must_use]
@@ -179,10 +215,16 @@ impl MisreadReadings {
                 format!("state in [[joint_sensor]] of robot.toml that the word repeats: wrap_counts = {wrap_counts:.6}")
             }
             ReadingError::Zeros { joints } => {
-                let one = |zero: &JointZero| format!("{}: offset_counts = {:.5}", zero.joint, zero.offset_counts);
-                let lines: Vec<String> = joints.iter().map(one).collect();
-                format!("set the zeros in [[joint_sensor]] of robot.toml, if the URDF is right: {}", lines.join("; "))
+                let zeros = zeros_remedy(joints);
+                match self.alternatives.iter().find_map(frame_remedy) {
+                    Some(frame) => {
+                        let names: Vec<&str> = joints.iter().map(|zero| zero.joint.as_str()).collect();
+                        format!("look at {} at its zero to tell which; {zeros}; or {frame}", names.join(", "))
+                    }
+                    None => zeros,
+                }
             }
+            ReadingError::MapFrame { .. } => frame_remedy(&self.found).unwrap_or_default(),
             ReadingError::Scaled { joint, factor } => {
                 format!(
                     "correct the unit of {joint} in the input map, or its scale: multiply scale_counts_per_deg (of a \
@@ -216,6 +258,7 @@ impl Coded for MisreadReadings {
             ReadingError::Scaled { .. } => Code::SensorLine,
             ReadingError::Shifted { .. } => Code::ReadingsShifted,
             ReadingError::Camera { .. } => Code::InputCamera,
+            ReadingError::MapFrame { .. } => Code::MapFrame,
         }
     }
 }

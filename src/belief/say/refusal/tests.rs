@@ -91,6 +91,10 @@ fn misread(found: ReadingError) -> Refusal {
     Refusal::MisreadReadings(MisreadReadings { found, alternatives, tag_error_m: 0.9, corrected_m: Some(0.002) })
 }
 
+fn map_frame() -> ReadingError {
+    ReadingError::MapFrame { position_m: [0.0, 0.1, 0.35], turn: [0.8, 0.0, 0.0, 0.6] }
+}
+
 /// One of each kind that says something measured.
 fn measured() -> Vec<Refusal> {
     let joint = || "wrist_yaw".to_owned();
@@ -141,6 +145,20 @@ fn measured() -> Vec<Refusal> {
             joints: vec![JointZero { joint: joint(), off_rad: 1.57, moves: JointKind::Revolute, offset_counts: -1.57 }],
         }),
         misread(ReadingError::Shifted { views: 1 }),
+        misread(map_frame()),
+        Refusal::MisreadReadings(MisreadReadings {
+            found: ReadingError::Zeros {
+                joints: vec![JointZero {
+                    joint: joint(),
+                    off_rad: 1.57,
+                    moves: JointKind::Revolute,
+                    offset_counts: -1.57,
+                }],
+            },
+            alternatives: vec![map_frame()],
+            tag_error_m: 0.9,
+            corrected_m: Some(0.002),
+        }),
         misread(ReadingError::Camera { link: Some("wrist".to_owned()), turn: [1.0, 0.0, 0.0, 0.0] }),
         misread(ReadingError::Camera { link: None, turn: [0.5, -0.5, 0.5, -0.5] }),
         Refusal::TagSizeRepair { element: "tag 3".to_owned(), ratio: 0.015, stated_m: 9.9 },
