@@ -133,6 +133,12 @@ pub(crate) mod permutation_test {
 }
 
 pub(crate) mod reading_search_hypothesis {
+    /// Added to the score of a camera hypothesis, twice the logarithm of odds (assumed): where it explains the views as
+    /// well as a sensor's zero does, the zero is named first.
+    pub(crate) const CAMERA_HANDICAP: f64 = 5.0;
+    /// The same for the frame of the tag map, which has six numbers: a turn about the first joint's axis is named
+    /// behind that joint's zero, and always with it (chi-square of 5 is below this in 99 of 100 cases).
+    pub(crate) const FRAME_HANDICAP: f64 = 15.0;
     /// A camera mount with larger stated sigmas does not place the tags, m and rad.
     pub(crate) const KNOWN_MOUNT: [f64; 2] = [0.05, 0.2];
     /// Excess over the half range from which a reading is on another turn, rad.
@@ -165,12 +171,6 @@ pub(crate) mod reading_search {
     pub(crate) const MARGIN: f64 = 60.0;
     /// Hypotheses within this of the best one are printed with it, in the same unit: odds of e^5.
     pub(crate) const ALTERNATIVE: f64 = 10.0;
-    /// Added to the score of a camera hypothesis, in the same unit (assumed): where it explains the views as well as a
-    /// sensor's zero does, the zero is named first.
-    pub(crate) const CAMERA_HANDICAP: f64 = 5.0;
-    /// The same for the frame of the tag map, which has six numbers: a turn about the first joint's axis is named behind
-    /// that joint's zero, and always with it (chi-square of 5 is below this in 99 of 100 cases).
-    pub(crate) const FRAME_HANDICAP: f64 = 15.0;
     pub(crate) const MAX_ALTERNATIVES: usize = 2;
     /// More views do not change the answer; they would cost time.
     pub(crate) const MAX_VIEWS: usize = 40;

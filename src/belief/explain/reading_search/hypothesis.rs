@@ -1,8 +1,8 @@
 //! Ways in which the readings of all joints may be meant and the camera be carried, and how a view is read in each.
 
-use crate::explain::constants::reading_search::{CAMERA_HANDICAP, FRAME_HANDICAP};
 use crate::explain::constants::reading_search_hypothesis::{
-    KNOWN_MOUNT, LEAST_SCALE_STEPS, NEXT_TURN_RAD, PARALLEL_RAD, SCALE_STEP, SCALE_STEPS,
+    CAMERA_HANDICAP, FRAME_HANDICAP, KNOWN_MOUNT, LEAST_SCALE_STEPS, NEXT_TURN_RAD, PARALLEL_RAD, SCALE_STEP,
+    SCALE_STEPS,
 };
 pub(crate) use crate::explain::constants::reading_search_hypothesis::{SCALE_STD, ZERO_STD_RAD};
 use std::borrow::Cow;

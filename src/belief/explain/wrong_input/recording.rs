@@ -1,7 +1,8 @@
 //! Other readings of the recording: pixels of another image, poses in another order or direction.
 //!
-//! Where views have several landmarks, these tell which reading is right (`by_pairs`). Where a view has one, the arm by its datasheet tells where that stands: the rotations of
-//! `base_from_tag` over the views must agree but for what sensors may be off.
+//! Where views have several landmarks, these tell which reading is right (`by_pairs`). Where a view has one, the arm by
+//! its datasheet tells where that stands: the rotations of `base_from_tag` over the views must agree but for what
+//! sensors may be off.
 
 use crate::explain::constants::wrong_input_recording::{BEYOND_IMAGE, GOOD_SPREAD_RAD, MIN_ROTATIONS, SPREAD_RAD};
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion};

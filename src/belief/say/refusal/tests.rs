@@ -97,6 +97,10 @@ fn map_frame() -> ReadingError {
 
 /// One of each kind that says something measured.
 fn measured() -> Vec<Refusal> {
+    [measured_of_the_fit(), misread_inputs(), measured_of_repairs()].concat()
+}
+
+fn measured_of_the_fit() -> Vec<Refusal> {
     let joint = || "wrist_yaw".to_owned();
     vec![
         Refusal::TooFewViews { views: 8, parameters: 10 },
@@ -137,6 +141,12 @@ fn measured() -> Vec<Refusal> {
             limit: 1.7,
             expected: [0.9, 1.1],
         },
+    ]
+}
+
+fn misread_inputs() -> Vec<Refusal> {
+    let joint = || "wrist_yaw".to_owned();
+    vec![
         misread(ReadingError::Exchanged { joints: ["shoulder".to_owned(), joint()] }),
         misread(ReadingError::Reversed { joints: vec!["shoulder".to_owned(), joint()] }),
         misread(ReadingError::Coupled { joint: joint(), with: "shoulder".to_owned(), sign: -1.0 }),
@@ -161,6 +171,12 @@ fn measured() -> Vec<Refusal> {
         }),
         misread(ReadingError::Camera { link: Some("wrist".to_owned()), turn: [1.0, 0.0, 0.0, 0.0] }),
         misread(ReadingError::Camera { link: None, turn: [0.5, -0.5, 0.5, -0.5] }),
+    ]
+}
+
+fn measured_of_repairs() -> Vec<Refusal> {
+    let joint = || "wrist_yaw".to_owned();
+    vec![
         Refusal::TagSizeRepair { element: "tag 3".to_owned(), ratio: 0.015, stated_m: 9.9 },
         Refusal::TooFewViewsSinceSlip { joint: joint(), evidence: "it slipped".to_owned(), views: 4 },
         Refusal::SensorFailed {
