@@ -49,9 +49,13 @@ impl Tried {
         }
     }
 
-    /// Whether it explains the views nearly as well as the best one. A frame that moves as a joint does is never told
-    /// from it: its handicap decides the order alone.
+    /// Whether it explains the views nearly as well as the best one. A frame that is turned as a joint turns is never
+    /// told from that joint's zero: its handicap decides the order alone, and what it explains better is a part of the
+    /// base that the zero does not have.
     fn is_near(&self, best: &Self) -> bool {
+        if best.hypothesis.is_of_map() && matches!(self.hypothesis, Hypothesis::Zeros(_)) {
+            return true;
+        }
         let of_order = if self.hypothesis.is_of_map() { self.hypothesis.handicap() } else { 0.0 };
         self.score - of_order - best.score < ALTERNATIVE
     }

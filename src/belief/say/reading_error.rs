@@ -169,10 +169,12 @@ impl fmt::Display for MisreadReadings {
     }
 }
 
-fn zeros_remedy(joints: &[JointZero]) -> String {
+/// `None` of all that are no zeros.
+fn zeros_remedy(error: &ReadingError) -> Option<String> {
+    let ReadingError::Zeros { joints } = error else { return None };
     let one = |zero: &JointZero| format!("{}: offset_counts = {:.5}", zero.joint, zero.offset_counts);
     let lines: Vec<String> = joints.iter().map(one).collect();
-    format!("set the zeros in [[joint_sensor]] of robot.toml, if the URDF is right: {}", lines.join("; "))
+    Some(format!("set the zeros in [[joint_sensor]] of robot.toml, if the URDF is right: {}", lines.join("; ")))
 }
 
 /// `None` of all that is not the frame of the map.
@@ -194,6 +196,18 @@ fn any_turn_in_words([w, x, y, z]: &[f64; 4]) -> String {
 }
 
 impl MisreadReadings {
+    /// Zeros and the frame of the map are told apart at the arm alone.
+    fn remedy_of_zeros_or_frame(&self) -> String {
+        let all = || std::iter::once(&self.found).chain(&self.alternatives);
+        let (zeros, frame) = (all().find_map(zeros_remedy), all().find_map(frame_remedy));
+        match (zeros, frame) {
+            (Some(zeros), Some(frame)) => {
+                format!("see where the joint stands when it reads zero, to tell which; {zeros}; or {frame}")
+            }
+            (zeros, frame) => zeros.or(frame).unwrap_or_default(),
+        }
+    }
+
     /// Advice with the lines to change.
     #[must_use]
     pub fn remedy(&self) -> String {
@@ -214,17 +228,7 @@ impl MisreadReadings {
             ReadingError::OtherTurns { wrap_counts, .. } => {
                 format!("state in [[joint_sensor]] of robot.toml that the word repeats: wrap_counts = {wrap_counts:.6}")
             }
-            ReadingError::Zeros { joints } => {
-                let zeros = zeros_remedy(joints);
-                match self.alternatives.iter().find_map(frame_remedy) {
-                    Some(frame) => {
-                        let names: Vec<&str> = joints.iter().map(|zero| zero.joint.as_str()).collect();
-                        format!("look at {} at its zero to tell which; {zeros}; or {frame}", names.join(", "))
-                    }
-                    None => zeros,
-                }
-            }
-            ReadingError::MapFrame { .. } => frame_remedy(&self.found).unwrap_or_default(),
+            ReadingError::Zeros { .. } | ReadingError::MapFrame { .. } => self.remedy_of_zeros_or_frame(),
             ReadingError::Scaled { joint, factor } => {
                 format!(
                     "correct the unit of {joint} in the input map, or its scale: multiply scale_counts_per_deg (of a \
