@@ -368,7 +368,8 @@ impl<'a> BundleCalibration<'a> {
         let is_unbounded = |refusal: &Refusal| matches!(refusal, Refusal::RepairTooLarge { .. });
         let nominal = Drawing::default();
         let drawing = if calibration.refusals.iter().any(is_unbounded) { &nominal } else { &self.drawing };
-        let search = ReadingSearch { robot: &self.data.robot, views: &self.as_read, failures, drawing };
+        let map = self.map.is_none().then_some(&self.surveyed[..]);
+        let search = ReadingSearch { robot: &self.data.robot, views: &self.as_read, failures, drawing, map };
         calibration.refuse_first_for(search.find().map(Refusal::MisreadReadings));
     }
 

@@ -138,7 +138,8 @@ fn held_out_limit(
     };
     let n = tags().count().max(1) as f64;
     let distance_m2 = tags().map(|tag| tag.center_in_camera_m.norm_squared()).sum::<f64>() / n;
-    let noise_m2 = 3.0 * position_std_m.powi(2) + 2.0 * distance_m2 * rotation_std_rad.powi(2);
+    // Where the rotation's noise is not stated, the position's is all that a tag is off by.
+    let noise_m2 = 3.0 * position_std_m.powi(2) + 2.0 * distance_m2 * rotation_std_rad.unwrap_or(0.0).powi(2);
     let at = &fit.solution.parameters;
     let sensors = at.sensors(source.robot);
     let estimate_m2 = fit.problem.views.iter().map(|view| {

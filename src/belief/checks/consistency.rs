@@ -60,6 +60,7 @@ impl VerdictInput<'_> {
         let configurations = if targets.is_empty() { self.found.view_angles() } else { targets.clone() };
         let mut table = VerdictTable { warnings: Vec::new(), not_covered: Vec::new(), checks: Vec::new() };
         let refusals = [
+            self.understated_corner_noise(calibration.fit.tags_seen),
             self.block_measurements(&mut table),
             self.walks(calibration),
             self.geometry(&configurations, calibration, &mut table),

@@ -1,11 +1,16 @@
 //! Checks of the fitted noise of corners, rotations and all other sizes against what is stated for them.
 
-use crate::checks::consistency::{MAX_SIGMAS_OFF, VerdictInput};
-use crate::checks::constants::noise_checks::{MAX_OVER_CORNER_NOISE, MAX_ROTATION_NOISE_RAD, NEAR, NOISY};
+use crate::checks::consistency::{MAX_OUTLIERS, MAX_SIGMAS_OFF, VerdictInput};
+use crate::checks::constants::noise_checks::{
+    LARGER_NOISE, MAX_OVER_CORNER_NOISE, MAX_ROTATION_NOISE_RAD, MAX_USUAL_CORNER_PX, NEAR, NOISY,
+};
 use crate::explain::model_selection::CAMERA_ERROR_STD;
 use crate::file::verdict_tables::{Check, VerdictTable};
+use crate::model::scales::Hyperparameters;
 use crate::say::refusal::Refusal;
+use crate::solve::estimate::estimate;
 use crate::solve::evidence::{NOISE_BOUNDS, POSITION_BOUNDS, SCALE_BOUNDS};
+use crate::solve::input::{BundleInput, HyperparameterMode};
 use armcal_core::codes::{Code, Warning};
 
 impl VerdictInput<'_> {
@@ -33,12 +38,34 @@ impl VerdictInput<'_> {
         refusal
     }
 
+    /// Returns the refusal of a stated corner noise that is far too small: under it most observations seem to fit
+    /// nothing, and under a larger one nearly all fit within what detectors have.
+    pub(crate) fn understated_corner_noise(&self, n_observations: usize) -> Option<Refusal> {
+        let n_outliers = self.found.outliers.len();
+        if 2 * n_outliers <= n_observations || self.found.has_positions() {
+            return None;
+        }
+        let stated_px = self.input.robot.camera.corner_std_px;
+        let with_noise = |multiple: f64| {
+            let scales = Hyperparameters { noise: multiple * self.input.scales.noise, ..self.input.scales.clone() };
+            let input = BundleInput { scales, evidence: HyperparameterMode::Fitted, ..self.input.clone() };
+            let found = estimate(&input)?;
+            let residual_px = found.scales().noise * found.mean_corner_std_px()?;
+            let fits = found.outliers.len() as f64 <= MAX_OUTLIERS * n_observations as f64;
+            let is_usual = residual_px > NOISY * stated_px && residual_px < MAX_USUAL_CORNER_PX;
+            (fits && is_usual).then_some(residual_px)
+        };
+        let residual_px = LARGER_NOISE.into_iter().find_map(with_noise)?;
+        let (outliers, observations) = (n_outliers, n_observations);
+        Some(Refusal::CornerNoiseUnderstated { residual_px, stated_px, outliers, observations })
+    }
+
     /// Returns the refusal of poses whose rotations contradict their positions: another form or direction fits so.
     pub(crate) fn rotation_noise(&self, table: &mut VerdictTable) -> Option<Refusal> {
         if !self.found.has_poses() {
             return None;
         }
-        let stated_rad = self.tag_noise.map(|noise| noise.rotation_std_rad);
+        let stated_rad = self.tag_noise.and_then(|noise| noise.rotation_std_rad);
         let limit_rad = stated_rad.map_or(MAX_ROTATION_NOISE_RAD, |stated_rad| MAX_SIGMAS_OFF * stated_rad);
         let rotation_rad = self.found.scales().rotation_std_rad;
         let check = Check::at_most("noise of rotations, rad", rotation_rad, limit_rad);

@@ -140,6 +140,12 @@ pub(crate) mod permutation_test {
 }
 
 pub(crate) mod reading_search_hypothesis {
+    /// Added to the score of a camera hypothesis, twice the logarithm of odds (assumed): where it explains the views as
+    /// well as a sensor's zero does, the zero is named first.
+    pub(crate) const CAMERA_HANDICAP: f64 = 5.0;
+    /// The same for the frame of the tag map, which has six numbers: a turn about the first joint's axis is named
+    /// behind that joint's zero, and always with it (chi-square of 5 is below this in 99 of 100 cases).
+    pub(crate) const FRAME_HANDICAP: f64 = 15.0;
     /// A camera mount with larger stated sigmas does not place the tags, m and rad.
     pub(crate) const KNOWN_MOUNT: [f64; 2] = [0.05, 0.2];
     /// Excess over the half range from which a reading is on another turn, rad.
@@ -155,14 +161,23 @@ pub(crate) mod reading_search_hypothesis {
     pub(crate) const PARALLEL_RAD: f64 = 0.02;
 }
 
+pub(crate) mod reading_search_map_frame {
+    /// Tags farther than this from where a motion of the map has them hardly pull at it, m.
+    pub(crate) const WIDTH_M: f64 = 0.1;
+    /// Rounds of weights and motions: the last ones change nothing that the estimate does not.
+    pub(crate) const ROUNDS: usize = 20;
+    /// One sigma of what the datasheet's arm leaves of the frame, m and rad. Wide.
+    pub(crate) const FRAME_STD: [f64; 2] = [0.1, 0.1];
+    /// Smaller motions are those of a base that is estimated, or named as the geometry, m and rad. Assumed.
+    pub(crate) const LEAST_M: f64 = 0.05;
+    pub(crate) const LEAST_RAD: f64 = 0.05;
+}
+
 pub(crate) mod reading_search {
     /// Evidence that a reading error needs, twice the logarithm of the odds: e^30, as about 500 are tried.
     pub(crate) const MARGIN: f64 = 60.0;
     /// Hypotheses within this of the best one are printed with it, in the same unit: odds of e^5.
     pub(crate) const ALTERNATIVE: f64 = 10.0;
-    /// Added to the score of a camera hypothesis, in the same unit (assumed): where it explains the views as well as a
-    /// sensor's zero does, the zero is named first.
-    pub(crate) const CAMERA_HANDICAP: f64 = 5.0;
     pub(crate) const MAX_ALTERNATIVES: usize = 2;
     /// More views do not change the answer; they would cost time.
     pub(crate) const MAX_VIEWS: usize = 40;
@@ -305,9 +320,6 @@ pub(crate) mod wrong_input {
 }
 
 pub(crate) mod wrong_input_map {
-    /// Units that a survey may be in, and how many make a metre.
-    pub(crate) const UNITS: [(&str, f64); 4] =
-        [("mm", 1e3), ("cm", 1e2), ("inches", 1.0 / 0.0254), ("feet", 1.0 / 0.3048)];
     /// A ratio of sizes within this of that of a print to its border is that one, relative.
     pub(crate) const PRINT_TOLERANCE: f64 = 0.02;
 }

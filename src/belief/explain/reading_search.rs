@@ -1,15 +1,16 @@
-//! Searches for a way to read the joints, or to carry the camera, that explains views which no arm of this URDF
-//! explains as they are read.
+//! Searches for a way to read the joints, to carry the camera, or to place the tag map, that explains views which no
+//! arm of this URDF explains as they are read.
 //!
-//! Each [`Hypothesis`] changes the readings of all views alike, or the nominal mount; the joints are then estimated by
-//! the datasheet's scales. The score is that of
+//! Each [`Hypothesis`] changes the readings of all views alike, the nominal mount or the map's frame; the joints are
+//! then estimated by the datasheet's scales. The score is that of
 //! [`failure_detection`](crate::explain::failure_detection). A hypothesis is named if it is likelier than the
 //! readings as they are by [`MARGIN`], and if its estimate leaves no sensor suspicious.
 
 mod hypothesis;
+mod map_frame;
 
 use crate::explain::constants::reading_search::{
-    ALTERNATIVE, CAMERA_HANDICAP, MARGIN, MAX_ALTERNATIVES, MAX_ESTIMATED, MAX_OF_CAMERA, MAX_VIEWS, MIN_SIGMAS,
+    ALTERNATIVE, MARGIN, MAX_ALTERNATIVES, MAX_ESTIMATED, MAX_OF_CAMERA, MAX_VIEWS, MIN_SIGMAS,
 };
 use std::f64::consts::TAU;
 
@@ -26,7 +27,7 @@ use crate::solve::estimate::{Estimate, estimate};
 use crate::solve::input::HyperparameterMode;
 use crate::views::view::View;
 use armcal_core::joints::JointAngles;
-use armcal_core::robot::{JointSensorSpec, Robot};
+use armcal_core::robot::{JointSensorSpec, Robot, SurveyedTag};
 use armcal_core::sensor::wrap_symmetric;
 
 /// A hypothesis and what it explains.
@@ -38,7 +39,31 @@ struct Tried {
     tag_error_m: Option<f64>,
 }
 
+impl Tried {
+    fn of(hypothesis: Hypothesis, found: &Estimate<'_>, views: &[View]) -> Self {
+        Self {
+            score: score(found) + hypothesis.handicap(),
+            hypothesis,
+            fits: !is_suspicious(found),
+            sensors: found.parameters(),
+            tag_error_m: tag_error_m(found, views),
+        }
+    }
+
+    /// Whether it explains the views nearly as well as the best one. A frame that is turned as a joint turns is never
+    /// told from that joint's zero: its handicap decides the order alone, and what it explains better is a part of the
+    /// base that the zero does not have.
+    fn is_near(&self, best: &Self) -> bool {
+        if best.hypothesis.is_of_map() && matches!(self.hypothesis, Hypothesis::Zeros(_)) {
+            return true;
+        }
+        let of_order = if self.hypothesis.is_of_map() { self.hypothesis.handicap() } else { 0.0 };
+        self.score - of_order - best.score < ALTERNATIVE
+    }
+}
+
 /// An arm whose views no calibration explains.
+#[derive(Clone, Copy)]
 pub(crate) struct ReadingSearch<'a> {
     pub robot: &'a Robot,
     /// As they were read.
@@ -47,6 +72,8 @@ pub(crate) struct ReadingSearch<'a> {
     pub failures: &'a [Failure],
     /// Repaired geometry, another alternative.
     pub drawing: &'a Drawing,
+    /// The tags as they were given; `None` where the views made the map, which then is in the base's frame.
+    pub map: Option<&'a [SurveyedTag]>,
 }
 
 impl ReadingSearch<'_> {
@@ -60,21 +87,33 @@ impl ReadingSearch<'_> {
         if let Some(turned) = turned.filter(|turned| turned.fits && turned.score < as_read) {
             return Some(self.misread_turns(&turned, before_m));
         }
-        let tried = self.likely().into_iter().filter_map(|hypothesis| self.attempt(hypothesis));
-        let mut tried: Vec<Tried> =
-            tried.filter(|tried| tried.fits && as_read - tried.score > MARGIN && self.is_large(tried)).collect();
+        let is_good = |tried: &Tried| tried.fits && as_read - tried.score > MARGIN && self.is_large(tried);
+        let frame = self.attempt_map_frame(&views).filter(is_good);
+        // In the wrong frame tags seem to have moved or to have other sizes: what was made of that says nothing.
+        let given = frame.as_ref().and(self.map).map(|map| map_frame::as_given(self.robot, map, self.views));
+        let search = given.as_ref().map_or(*self, |(robot, views)| ReadingSearch { robot, views, ..*self });
+        let tried = search.likely().into_iter().filter_map(|hypothesis| search.attempt(hypothesis));
+        let mut tried: Vec<Tried> = tried.filter(is_good).chain(frame).collect();
         tried.sort_by(|a, b| a.score.total_cmp(&b.score));
         let best = tried.first()?;
         let found = self.named(best);
+        let alternatives = self.alternatives(best, &tried[1..]);
+        Some(MisreadReadings { found, alternatives, tag_error_m: before_m, corrected_m: best.tag_error_m })
+    }
+
+    /// Those that explain the views nearly as well as the best one, the frame of the map first.
+    fn alternatives(&self, best: &Tried, others: &[Tried]) -> Vec<ReadingError> {
+        let mut near: Vec<&Tried> = others.iter().filter(|other| other.is_near(best)).collect();
+        near.sort_by_key(|other| !other.hypothesis.is_of_map());
+        let found = self.named(best);
         let mut alternatives: Vec<ReadingError> = Vec::new();
-        for other in tried.iter().take_while(|other| other.score - best.score < ALTERNATIVE) {
-            let error = self.named(other);
+        for error in near.into_iter().map(|other| self.named(other)) {
             let is_new = !concerns_same(&error, &found) && !alternatives.iter().any(|one| concerns_same(one, &error));
             if is_new && alternatives.len() < MAX_ALTERNATIVES {
                 alternatives.push(error);
             }
         }
-        Some(MisreadReadings { found, alternatives, tag_error_m: before_m, corrected_m: best.tag_error_m })
+        alternatives
     }
 
     /// Joints that are beyond their limits in most views, and on a turn within them fit as well.
@@ -162,19 +201,31 @@ impl ReadingSearch<'_> {
         let views = self.views_by(&hypothesis);
         let adjusted = FailureAdjusted::new(&robot, &views, &[], &JointParameters::default());
         let found = estimate(&adjusted.input(HyperparameterMode::Given))?;
-        let handicap = if hypothesis.is_of_camera() { CAMERA_HANDICAP } else { 0.0 };
-        Some(Tried {
-            hypothesis,
-            score: score(&found) + handicap,
-            fits: !is_suspicious(&found),
-            sensors: found.parameters(),
-            tag_error_m: tag_error_m(&found, &views),
-        })
+        Some(Tried::of(hypothesis, &found, &views))
     }
 
-    /// Zeros as they were found, beyond what the sensors are stated to be off; other errors have no size.
+    /// All tags moved as one, where somebody measured them beside the arm.
+    fn attempt_map_frame(&self, views: &[View]) -> Option<Tried> {
+        let map = self.map.filter(|_| !self.robot.is_watched())?;
+        let (robot, views) = map_frame::as_given(self.robot, map, views);
+        let map_from_base = map_frame::map_from_base(&robot, &views)?;
+        let moved = map_frame::in_base(&robot, &map_from_base);
+        let adjusted = FailureAdjusted::new(&moved, &views, &[], &JointParameters::default());
+        let mut input = adjusted.input(HyperparameterMode::Given);
+        map_frame::free(&mut input);
+        let found = estimate(&input)?;
+        let base_from_map = map_frame::base_from_map(&found, &map_from_base);
+        Some(Tried::of(Hypothesis::MapFrame(base_from_map), &found, &views))
+    }
+
+    /// Zeros as they were found, beyond what the sensors are stated to be off, and a frame beyond what a base is; other
+    /// errors have no size.
     fn is_large(&self, tried: &Tried) -> bool {
-        let Hypothesis::Zeros(zeros) = &tried.hypothesis else { return true };
+        let zeros = match &tried.hypothesis {
+            Hypothesis::Zeros(zeros) => zeros,
+            Hypothesis::MapFrame(base_from_map) => return map_frame::is_large(base_from_map),
+            _ => return true,
+        };
         zeros.iter().all(|(joint, off_rad)| {
             let off_rad = wrap_symmetric(off_rad + tried.sensors.offset_rad[*joint], TAU);
             off_rad.abs() > MIN_SIGMAS * self.robot.sensors[*joint].offset_std_rad
@@ -219,6 +270,13 @@ impl ReadingSearch<'_> {
                 ReadingError::Scaled { joint: name(*joint), factor, input_factor }
             }
             Hypothesis::Shifted(views) => ReadingError::Shifted { views: *views as i32 },
+            Hypothesis::MapFrame(base_from_map) => {
+                let turn = base_from_map.rotation;
+                ReadingError::MapFrame {
+                    position_m: base_from_map.translation.vector.into(),
+                    turn: [turn.w, turn.i, turn.j, turn.k],
+                }
+            }
             Hypothesis::Camera { n_joints, turn } => {
                 let is_here = *n_joints == self.robot.camera.mount.n_joints;
                 let link = || self.robot.chain.joints()[n_joints - 1].child_link.clone();
@@ -261,7 +319,7 @@ fn concerns_same(a: &ReadingError, b: &ReadingError) -> bool {
         }
         ReadingError::Zeros { joints } => joints.iter().map(|zero| zero.joint.clone()).collect(),
         ReadingError::Scaled { joint, .. } => vec![joint.clone()],
-        ReadingError::Shifted { .. } | ReadingError::Camera { .. } => Vec::new(),
+        ReadingError::Shifted { .. } | ReadingError::Camera { .. } | ReadingError::MapFrame { .. } => Vec::new(),
     };
     std::mem::discriminant(a) == std::mem::discriminant(b) && joints(a) == joints(b)
 }

@@ -8,6 +8,7 @@ pub(crate) mod constants;
 pub(crate) mod finding;
 pub(crate) mod finding_words;
 pub(crate) mod geometry_error;
+pub(crate) mod length_unit;
 pub(crate) mod reading_error;
 pub(crate) mod refusal;
 pub(crate) mod repair;

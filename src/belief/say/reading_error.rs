@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -87,6 +88,13 @@ pub enum ReadingError {
         /// So many views later are its own readings; negative: before.
         views: i32,
     },
+    /// The tag map is in another frame than the base's.
+    MapFrame {
+        /// Its frame in the base's, m.
+        position_m: [f64; 3],
+        /// Rotation of its frame in the base's: w, x, y, z.
+        turn: [f64; 4],
+    },
     /// The camera is not where robot.toml says.
     Camera {
         /// The link that carries it, where that is another one.
@@ -147,6 +155,10 @@ impl fmt::Display for ReadingError {
                 let side = if *views > 0 { "previous" } else { "next" };
                 write!(f, "each view has the joint readings of the {side} one")
             }
+            Self::MapFrame { position_m: [x, y, z], turn } => {
+                write!(f, "the frame of the tag map is not the base's: it lies at ({x:.3}, {y:.3}, {z:.3}) m in it, ")?;
+                write!(f, "turned by {}", any_turn_in_words(turn))
+            }
             Self::Camera { link, turn } => {
                 f.write_str("the camera is not as robot.toml says: ")?;
                 match link {
@@ -176,7 +188,50 @@ impl fmt::Display for MisreadReadings {
     }
 }
 
+/// `None` of all that are no zeros.
+fn zeros_remedy(error: &ReadingError) -> Option<String> {
+    let ReadingError::Zeros { joints } = error else { return None };
+    let one = |zero: &JointZero| match zero.input_zero {
+        Some(input_zero) => format!("zero.{} = {input_zero:.5}", zero.joint),
+        None => format!("{}: offset_counts = {:.5}", zero.joint, zero.offset_counts),
+    };
+    let lines: Vec<String> = joints.iter().map(one).collect();
+    let is_of_map = joints.iter().all(|zero| zero.input_zero.is_some());
+    let table = if is_of_map { "[joint_sensors] of the input map" } else { "[[joint_sensor]] of robot.toml" };
+    Some(format!("set the zeros in {table}, if the URDF is right: {}", lines.join("; ")))
+}
+
+/// `None` of all that is not the frame of the map.
+fn frame_remedy(error: &ReadingError) -> Option<String> {
+    let ReadingError::MapFrame { position_m: [x, y, z], turn } = error else { return None };
+    let [qw, qx, qy, qz] = turn.map(|value| format!("{value:.4}"));
+    Some(format!(
+        "write the tag map in the base's frame: place each pose behind that of the map's frame, position_m = [{x:.3}, \
+         {y:.3}, {z:.3}], quaternion_wxyz = [{qw}, {qx}, {qy}, {qz}]"
+    ))
+}
+
+/// `89.7 deg about (0.00, 0.01, 1.00)`.
+fn any_turn_in_words([w, x, y, z]: &[f64; 4]) -> String {
+    let turn = UnitQuaternion::new_normalize(Quaternion::new(*w, *x, *y, *z));
+    let axis = turn.axis().map_or(Vector3::z(), |axis| axis.into_inner());
+    let degrees = turn.angle().to_degrees();
+    format!("{degrees:.1} deg about ({:.2}, {:.2}, {:.2})", axis.x, axis.y, axis.z)
+}
+
 impl MisreadReadings {
+    /// Zeros and the frame of the map are told apart at the arm alone.
+    fn remedy_of_zeros_or_frame(&self) -> String {
+        let all = || std::iter::once(&self.found).chain(&self.alternatives);
+        let (zeros, frame) = (all().find_map(zeros_remedy), all().find_map(frame_remedy));
+        match (zeros, frame) {
+            (Some(zeros), Some(frame)) => {
+                format!("see where the joint stands when it reads zero, to tell which; {zeros}; or {frame}")
+            }
+            (zeros, frame) => zeros.or(frame).unwrap_or_default(),
+        }
+    }
+
     /// Advice with the lines to change.
     #[must_use]
     pub fn remedy(&self) -> String {
@@ -200,17 +255,7 @@ impl MisreadReadings {
             ReadingError::OtherTurns { wrap_counts, .. } => {
                 format!("state in [[joint_sensor]] of robot.toml that the word repeats: wrap_counts = {wrap_counts:.6}")
             }
-            ReadingError::Zeros { joints } => {
-                let one = |zero: &JointZero| match zero.input_zero {
-                    Some(input_zero) => format!("zero.{} = {input_zero:.5}", zero.joint),
-                    None => format!("{}: offset_counts = {:.5}", zero.joint, zero.offset_counts),
-                };
-                let lines: Vec<String> = joints.iter().map(one).collect();
-                let is_of_map = joints.iter().all(|zero| zero.input_zero.is_some());
-                let table =
-                    if is_of_map { "[joint_sensors] of the input map" } else { "[[joint_sensor]] of robot.toml" };
-                format!("set the zeros in {table}, if the URDF is right: {}", lines.join("; "))
-            }
+            ReadingError::Zeros { .. } | ReadingError::MapFrame { .. } => self.remedy_of_zeros_or_frame(),
             ReadingError::Scaled { joint, factor, input_factor } => {
                 let found = Rescaled { joint, slope: *factor, input_factor: *input_factor };
                 format!("correct the unit of {joint} in the input map, or its scale: {}", found.line())
@@ -242,6 +287,7 @@ impl Coded for MisreadReadings {
             ReadingError::Scaled { .. } => Code::SensorLine,
             ReadingError::Shifted { .. } => Code::ReadingsShifted,
             ReadingError::Camera { .. } => Code::InputCamera,
+            ReadingError::MapFrame { .. } => Code::MapFrame,
         }
     }
 }

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::say::finding::FindingUnit;
 use crate::say::geometry_error::GeometryError;
+use crate::say::length_unit::unit_of;
 use crate::say::reading_error::MisreadReadings;
 use crate::say::sensor_keys::Rescaled;
 use crate::say::wrong_input::WrongInput;
@@ -232,6 +233,17 @@ pub enum Refusal {
         /// Largest residual that is accepted.
         limit_px: f64,
     },
+    /// Under the stated corner noise most observations fit nothing, under a larger one nearly all do.
+    CornerNoiseUnderstated {
+        /// Of corners averaged over a view, with the larger noise.
+        residual_px: f64,
+        /// Of one frame, by robot.toml.
+        stated_px: f64,
+        /// Number of tag observations that are rejected under the stated noise.
+        outliers: usize,
+        /// Number of all.
+        observations: usize,
+    },
     /// A gain or offset that no sensor of this datasheet has.
     BeyondDatasheet {
         /// Name of the parameter: `shoulder_yaw gain`.
@@ -409,6 +421,7 @@ impl Refusal {
             Self::PriorContradicted { .. } => 3,
             // Where hardly any observation fits, the solver's end and every test of the rest say nothing.
             Self::Outliers { outliers, observations } if 2 * outliers > *observations => 4,
+            Self::CornerNoiseUnderstated { .. } => 4,
             // Another scale makes offsets and links seem off.
             Self::SensorLine { .. } | Self::SensorUnit { .. } => 5,
             _ => 6,
@@ -434,6 +447,10 @@ impl Refusal {
                 let found = Rescaled { joint, slope: *gain, input_factor: *input_factor };
                 format!("convert the readings of {joint}, or {}", found.of_another_unit(*moves).line()).into()
             }
+            Self::CornerNoiseUnderstated { residual_px, .. } => {
+                format!("state corner_std_px = {residual_px:.2} in [camera] of robot.toml, or check lens and tag map")
+                    .into()
+            }
             Self::Lens { focal_px: [x, y], .. } => format!(
                 "measure the intrinsics in the water or air that the arm works in; these views show focal_px = \
                  [{x:.1}, {y:.1}] for [camera] of robot.toml"
@@ -450,7 +467,8 @@ impl Refusal {
             | Self::WrongInput(_)
             | Self::Lens { .. }
             | Self::SensorLine { .. }
-            | Self::SensorUnit { .. } => "",
+            | Self::SensorUnit { .. }
+            | Self::CornerNoiseUnderstated { .. } => "",
             Self::TooFewViews { .. } | Self::PriorUntested => "capture more views",
             Self::TooFewViewsSinceSlip { .. } => "fasten the sensor on its shaft, then capture more views",
             Self::NotSolved { .. } => "capture views that move each joint over more of its range",
@@ -494,6 +512,9 @@ impl Refusal {
             Self::Touch { .. } => {
                 "measure the tool point ([tool] point_m of robot.toml), the links beyond the camera and the camera \
                  mount"
+            }
+            Self::Length { measured_m, by_views_m, .. } if unit_of(measured_m / by_views_m).is_some() => {
+                "write this length in metres"
             }
             Self::Length { .. } => "measure again, and correct this length or the tags' size_m in robot.toml",
             Self::PriorReused => "give a prior that was made from other views",
@@ -553,7 +574,7 @@ impl Coded for Refusal {
             Self::SensorError { .. } => Code::SensorError,
             Self::OffsetsWalk { .. } => Code::OffsetsWalk,
             Self::Nonlinearity { .. } => Code::Nonlinearity,
-            Self::CornerNoise { .. } => Code::CornerNoise,
+            Self::CornerNoise { .. } | Self::CornerNoiseUnderstated { .. } => Code::CornerNoise,
             Self::BeyondDatasheet { .. } => Code::BeyondDatasheet,
             Self::Outliers { .. } => Code::TooManyOutliers,
             Self::Innovations { .. } => Code::Innovations,

@@ -10,7 +10,10 @@ use armcal_core::codes::{Code, Coded};
 pub struct WrongInput {
     /// Which, and how it should be read.
     pub input: WrongInputKind,
-    /// As it is written: of two tags, where the one is not seen over its distance from the other.
+    /// What `mismatch` is of.
+    #[serde(default, skip_serializing_if = "MismatchMeasure::is_of_distances")]
+    pub measure: MismatchMeasure,
+    /// As it is written: of two tags, where the one is not seen over its distance from the other; of rotations, rad.
     pub mismatch: f64,
     /// The same with the input put right; absent where nothing puts it right.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -18,6 +21,23 @@ pub struct WrongInput {
     /// What of the tags was measured in place of their size, in words, where their print tells it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub size_hint: Option<String>,
+}
+
+/// What tells that an input is wrong.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum MismatchMeasure {
+    /// Distances of tags that one view shows.
+    #[default]
+    Distances,
+    /// Rotations of one landmark over the views.
+    Rotations,
+}
+
+impl MismatchMeasure {
+    pub(crate) fn is_of_distances(&self) -> bool {
+        *self == Self::Distances
+    }
 }
 
 impl WrongInput {
@@ -37,6 +57,14 @@ pub enum WrongInputKind {
     RecordedQuaternions,
     /// The recorded poses are those of the camera in the landmark's frame, or the other way round.
     RecordedDirection,
+    /// Both: quaternions in the other order, of the inverse poses.
+    RecordedOrderAndDirection,
+    /// The recorded rotations are inverse, the positions are not.
+    RecordedRotations,
+    /// The recorded positions are in this unit, and not in metres.
+    RecordedUnit(String),
+    /// The recorded positions are so many times as far apart as the map has the tags.
+    RecordedScale(f64),
     /// The lens is that of an image of another size: columns and rows by robot.toml, and the largest ones of a corner.
     ImageSize {
         /// By robot.toml.
@@ -74,15 +102,16 @@ impl Coded for WrongInput {
     fn code(&self) -> Code {
         match &self.input {
             WrongInputKind::MapQuaternions => Code::InputOrder,
-            WrongInputKind::RecordedQuaternions => Code::InputRotation,
-            WrongInputKind::RecordedDirection => Code::InputDirection,
+            WrongInputKind::RecordedQuaternions | WrongInputKind::RecordedRotations => Code::InputRotation,
+            WrongInputKind::RecordedDirection | WrongInputKind::RecordedOrderAndDirection => Code::InputDirection,
+            WrongInputKind::RecordedUnit(_) => Code::InputPoseUnit,
             WrongInputKind::ImageSize { .. }
             | WrongInputKind::ImageScale(_)
             | WrongInputKind::NegativePixels(_)
             | WrongInputKind::ImageShares => Code::InputImageSize,
             WrongInputKind::LensModel | WrongInputKind::Distortion => Code::InputLensModel,
             WrongInputKind::FocalLength(_) => Code::LensContradicted,
-            WrongInputKind::TagSize(_) => Code::InputTagSize,
+            WrongInputKind::TagSize(_) | WrongInputKind::RecordedScale(_) => Code::InputTagSize,
             WrongInputKind::ExchangedIds(_) => Code::InputTagIds,
             WrongInputKind::MapUnit(_) => Code::InputMapUnit,
             WrongInputKind::MapAxes(_) => Code::InputMapAxes,

@@ -6,7 +6,7 @@ use std::fmt;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-use crate::say::wrong_input::{WrongInput, WrongInputKind};
+use crate::say::wrong_input::{MismatchMeasure, WrongInput, WrongInputKind};
 
 impl WrongInput {
     /// What to do about it.
@@ -35,11 +35,26 @@ impl WrongInput {
             }
             WrongInputKind::MapQuaternions => "write quaternion_wxyz of the tag map in the order w, x, y, z",
             WrongInputKind::RecordedQuaternions => {
-                "set the other one of quaternion_wxyz and quaternion_xyzw as \
-                                                    tags.columns.rotation_form of the input map"
+                "set the other one of quaternion_wxyz and quaternion_xyzw as tags.columns.rotation_form of the input \
+                 map; in messages, correct the program that writes them"
             }
             WrongInputKind::RecordedDirection => {
-                "set the other one of camera_from_tag and tag_from_camera as tags.columns.direction of the input map"
+                "set the other one of camera_from_tag and tag_from_camera as tags.columns.direction of the input map; \
+                 in messages, correct the program that writes them"
+            }
+            WrongInputKind::RecordedOrderAndDirection => {
+                "set the other one of quaternion_wxyz and quaternion_xyzw as tags.columns.rotation_form of the input \
+                 map, and of camera_from_tag and tag_from_camera as tags.columns.direction; in messages, correct the \
+                 program that writes them"
+            }
+            WrongInputKind::RecordedRotations => {
+                "record the rotation of the tag in the camera's frame beside its position there, or use the positions \
+                 only (tags.use)"
+            }
+            WrongInputKind::RecordedUnit(_) => "record positions in metres",
+            WrongInputKind::RecordedScale(_) => {
+                "measure the border square of one tag and the distance of two; give that size to the program that \
+                 recorded the poses, or correct position_m of the tag map"
             }
             WrongInputKind::ImageSize { .. } | WrongInputKind::ImageScale(_) => {
                 "state the lens of the recorded image size in [camera] of robot.toml, or record images of the size \
@@ -51,7 +66,8 @@ impl WrongInput {
             }
             WrongInputKind::LensModel => "state the model and the distortion of that lens in [camera] of robot.toml",
             WrongInputKind::TagSize(_) => {
-                "measure the border square of one tag (of tag36h11 the black one) and correct size_m"
+                "measure the border square of one tag (of tag36h11 the black one) and the distance of two tags, and \
+                 correct size_m or position_m"
             }
             WrongInputKind::ExchangedIds(_) => "give each of them the id that is printed there",
             WrongInputKind::OtherMap => {
@@ -63,12 +79,49 @@ impl WrongInput {
 }
 
 impl WrongInput {
+    /// Causes in recorded poses.
+    fn fmt_of_poses(&self, f: &mut fmt::Formatter<'_>, of_pairs: &str) -> fmt::Result {
+        let cause = match &self.input {
+            WrongInputKind::RecordedUnit(unit) => {
+                return write!(
+                    f,
+                    "the recorded positions of tags are in {unit}, not in metres, by the distances of the tag map"
+                );
+            }
+            WrongInputKind::RecordedScale(factor) => {
+                write!(f, "the tags of a view are recorded {factor:.3} times as far apart as the tag map has them: ")?;
+                write!(f, "the detector was given {factor:.3} times their size")?;
+                self.size_hint.as_ref().map_or(Ok(()), |hint| write!(f, ", {hint}"))?;
+                return write!(f, "; or all distances of the tag map are {:.3} times the true ones", 1.0 / factor);
+            }
+            WrongInputKind::RecordedQuaternions => "the recorded quaternions are in the other order: read so",
+            WrongInputKind::RecordedDirection => "the recorded poses are inverse: inverted",
+            WrongInputKind::RecordedOrderAndDirection => {
+                "the recorded poses are inverse and their quaternions in the other order: read so"
+            }
+            _ => "the recorded rotations are inverse, the positions are not: read so",
+        };
+        match self.measure {
+            MismatchMeasure::Distances => write!(f, "{cause}, the tags of a view fit each other within {of_pairs}"),
+            MismatchMeasure::Rotations => {
+                let degrees = |rad: f64| format!("{:.0} deg", rad.to_degrees());
+                let [otherwise, as_written] = [self.mismatch_otherwise.unwrap_or(f64::NAN), self.mismatch].map(degrees);
+                write!(
+                    f,
+                    "{cause}, the rotations of the landmark over the views agree within {otherwise} instead of "
+                )?;
+                f.write_str(&as_written)
+            }
+        }
+    }
+
     /// Causes in the tag map.
     fn fmt_of_map(&self, f: &mut fmt::Formatter<'_>, of_pairs: &str) -> fmt::Result {
         match &self.input {
             WrongInputKind::TagSize(ratio) => {
                 write!(f, "the size of all tags differs by {:+.1} % from the stated size", 100.0 * (ratio - 1.0))?;
-                self.size_hint.as_ref().map_or(Ok(()), |hint| write!(f, ", {hint}"))
+                self.size_hint.as_ref().map_or(Ok(()), |hint| write!(f, ", {hint}"))?;
+                write!(f, "; or all distances of the tag map are {ratio:.3} times the true ones")
             }
             WrongInputKind::MapUnit(unit) => {
                 write!(
@@ -104,10 +157,8 @@ impl WrongInput {
 impl fmt::Display for WrongInput {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let percent = |share: f64| format!("{:.0} %", 100.0 * share);
-        let degrees = |rad: f64| format!("{:.0} deg", rad.to_degrees());
         let otherwise = self.mismatch_otherwise.unwrap_or(f64::NAN);
         let of_pairs = format!("{} of their distances instead of {}", percent(otherwise), percent(self.mismatch));
-        let of_turns = format!("{} instead of {}", degrees(otherwise), degrees(self.mismatch));
         match &self.input {
             WrongInputKind::MapQuaternions => {
                 write!(
@@ -115,17 +166,6 @@ impl fmt::Display for WrongInput {
                     "the quaternions of the tag map are in the order x, y, z, w: read so, the tags of a view fit "
                 )?;
                 write!(f, "each other within {of_pairs}")
-            }
-            WrongInputKind::RecordedQuaternions => {
-                write!(
-                    f,
-                    "the recorded quaternions are in the other order: read so, the rotations of the landmark over "
-                )?;
-                write!(f, "the views agree within {of_turns}")
-            }
-            WrongInputKind::RecordedDirection => {
-                write!(f, "the recorded poses are inverse: inverted, the rotations of the landmark over ")?;
-                write!(f, "the views agree within {of_turns}")
             }
             WrongInputKind::ImageSize { stated_px: [columns, rows], seen_px: [x, y] } => write!(
                 f,
@@ -159,6 +199,12 @@ impl fmt::Display for WrongInput {
                 )?;
                 write!(f, "the tags of a view fit each other within {of_pairs}")
             }
+            WrongInputKind::RecordedQuaternions
+            | WrongInputKind::RecordedDirection
+            | WrongInputKind::RecordedOrderAndDirection
+            | WrongInputKind::RecordedRotations
+            | WrongInputKind::RecordedUnit(_)
+            | WrongInputKind::RecordedScale(_) => self.fmt_of_poses(f, &of_pairs),
             _ => self.fmt_of_map(f, &of_pairs),
         }
     }

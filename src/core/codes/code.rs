@@ -149,6 +149,8 @@ codes! {
     InputCornerOrder = "input_corner_order",
     InputTagFrames = "input_tag_frames",
     InputMapUnit = "input_map_unit",
+    InputPoseUnit = "input_pose_unit",
+    MapFrame = "map_frame",
     RepairTooLarge = "repair_too_large",
     LensContradicted = "lens_contradicted",
     GeometryContradicted = "geometry_contradicted",

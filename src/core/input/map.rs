@@ -97,8 +97,8 @@ impl TagUse {
 pub struct TagNoise {
     /// Position in the camera frame.
     pub position_std_m: f64,
-    /// Direction of the camera: it moves a tag by this times its distance.
-    pub rotation_std_rad: f64,
+    /// Direction of the camera: it moves a tag by this times its distance. `None`: not stated.
+    pub rotation_std_rad: Option<f64>,
 }
 
 /// What becomes of tags that were seen while the arm moved.
@@ -468,8 +468,8 @@ impl TagsToml {
         for (key, value, most) in stated {
             value.map(|value| FileIssue::check_range(file, &format!("tags.{key}"), value, 1e-7..=most)).transpose()?;
         }
-        let rotation_std_rad = self.rotation_std_rad.unwrap_or(0.0);
-        match (self.position_std_m, self.rotation_std_rad) {
+        let rotation_std_rad = self.rotation_std_rad;
+        match (self.position_std_m, rotation_std_rad) {
             (None, Some(_)) => {
                 let problem = "is missing; rotation_std_rad is given, and needs it";
                 Err(FileIssue::new(Code::KeyMissing, file, "tags.position_std_m", problem))

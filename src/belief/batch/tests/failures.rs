@@ -20,6 +20,7 @@ use crate::solve::input::HyperparameterMode;
 use crate::solve::model_for_views::model_for;
 use crate::views::calibration_data::{CalibrationData, HeldOut};
 use crate::views::view::{CaptureData, View};
+use armcal_core::input::TagNoise;
 use armcal_core::kinematics::Attachment;
 use armcal_core::robot::{FailedJoint, FailedKind, Robot};
 use armcal_core::spatial::Pose;
@@ -35,7 +36,12 @@ pub(crate) struct Case {
 
 impl Case {
     pub(crate) fn calibrated(self) -> Calibration {
-        calibrated(self.robot, self.views)
+        self.calibrated_with(None)
+    }
+
+    /// With this stated noise of positions and poses.
+    pub(crate) fn calibrated_with(self, tag_noise: Option<TagNoise>) -> Calibration {
+        calibrated_by(self.robot, CaptureData { fit: self.views, tag_noise, ..CaptureData::default() })
     }
 }
 
@@ -45,10 +51,14 @@ pub(crate) fn calibrated(robot: Robot, views: Vec<View>) -> Calibration {
 }
 
 fn calibrated_for(robot: Robot, views: Vec<View>, task: Option<ReachTask>) -> Calibration {
+    calibrated_by(robot, CaptureData { fit: views, task, ..CaptureData::default() })
+}
+
+fn calibrated_by(robot: Robot, data: CaptureData) -> Calibration {
     let data = CalibrationData {
         name: "synthetic".to_owned(),
         messages_hash: String::new(),
-        data: CaptureData { n_marks: views.len(), fit: views, task, ..CaptureData::default() },
+        data: CaptureData { n_marks: data.fit.len(), ..data },
         gripper_tag_data: None,
         held_out: HeldOut::CrossValidation,
         robot,

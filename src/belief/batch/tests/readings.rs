@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::Path;
 
-use nalgebra::{Quaternion, UnitQuaternion};
+use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
 use crate::batch::tests::failures::{Case, case};
 use crate::say::reading_error::ReadingError;
@@ -12,6 +12,7 @@ use crate::say::wrong_input::{WrongInput, WrongInputKind};
 use crate::views::view::View;
 use armcal_core::input::{InputMap, parse_input_map};
 use armcal_core::robot::Robot;
+use armcal_core::spatial::Pose;
 use armcal_core::streams::JointAngles;
 
 /// Changes what robot.toml reads as angles, view by view.
@@ -210,6 +211,64 @@ fn a_camera_on_another_link_or_with_other_axes_is_named() {
         let ReadingError::Camera { link: on, turn: by } = found(case) else { panic!("seed {seed}: no camera") };
         let by = UnitQuaternion::new_normalize(Quaternion::new(by[0], by[1], by[2], by[3]));
         assert!(on == (less > 0).then_some(link) && by.angle_to(&turn) < 1e-6, "seed {seed}: {on:?} {by}");
+    }
+}
+
+/// All tags of the case's map, moved as one.
+fn with_map_in(case: &mut Case, map_from_base: &Isometry3<f64>) {
+    for tag in &mut case.robot.tags {
+        tag.base_from_tag = Pose::from_isometry(map_from_base * tag.base_from_tag.isometry());
+    }
+}
+
+fn is_near(position_m: [f64; 3], [w, x, y, z]: [f64; 4], map_from_base: &Isometry3<f64>) -> bool {
+    let turn = UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
+    let left = Isometry3::from_parts(position_m.into(), turn) * map_from_base;
+    // A turn about the first joint's axis is shared with its offset.
+    left.translation.vector.norm() < 0.06 && left.rotation.angle() < 0.1
+}
+
+#[test]
+fn a_tag_map_in_another_frame_is_named_with_shift_and_turn() {
+    let motions = [
+        (Vector3::new(0.0, 0.0, -0.35), Vector3::zeros()),
+        (Vector3::new(0.3, 0.0, 0.0), Vector3::zeros()),
+        (Vector3::new(2.0, -1.2, 0.4), Vector3::new(0.0, 0.0, 0.6)),
+        (Vector3::new(0.0, 0.0, 0.1), Vector3::new(0.3, 0.0, 0.0)),
+    ];
+    for (seed, (shift_m, turn)) in (33..).zip(motions) {
+        let (mut case, map_from_base) = (case(seed, None), Isometry3::new(shift_m, turn));
+        with_map_in(&mut case, &map_from_base);
+        match found(case) {
+            ReadingError::MapFrame { position_m, turn } => {
+                assert!(is_near(position_m, turn, &map_from_base), "seed {seed}: {position_m:?} {turn:?}");
+            }
+            other => panic!("seed {seed}: {other:?}"),
+        }
+    }
+}
+
+/// No view tells a turn of all tags about the first joint's axis from that joint's zero.
+#[test]
+fn a_map_that_is_turned_about_the_first_joint_is_named_beside_its_zero() {
+    for (seed, by_rad) in [(37, FRAC_PI_2), (38, -0.6)] {
+        let mut case = case(seed, None);
+        let (place, axis) = (case.robot.chain.first_place(), case.robot.chain.joints()[0].axis);
+        let turn = Isometry3::from_parts(Vector3::zeros().into(), UnitQuaternion::from_axis_angle(&axis, by_rad));
+        let map_from_base = place * turn * place.inverse();
+        with_map_in(&mut case, &map_from_base);
+        let name = case.robot.sensors[0].joint.clone();
+        let calibration = case.calibrated();
+        let Some(Refusal::MisreadReadings(misread)) = calibration.refusals.first() else {
+            panic!("seed {seed}: {:?}", calibration.refusals.first())
+        };
+        let all = || std::iter::once(&misread.found).chain(&misread.alternatives);
+        let is_zero = |error: &ReadingError| matches!(error, ReadingError::Zeros { joints } if joints[0].joint == name);
+        let is_frame = |error: &ReadingError| match error {
+            ReadingError::MapFrame { position_m, turn } => is_near(*position_m, *turn, &map_from_base),
+            _ => false,
+        };
+        assert!(all().any(is_zero) && all().any(is_frame), "seed {seed}: {misread:?}");
     }
 }
 

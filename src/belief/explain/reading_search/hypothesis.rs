@@ -1,13 +1,14 @@
 //! Ways in which the readings of all joints may be meant and the camera be carried, and how a view is read in each.
 
 use crate::explain::constants::reading_search_hypothesis::{
-    KNOWN_MOUNT, LEAST_SCALE_STEPS, NEXT_TURN_RAD, PARALLEL_RAD, SCALE_STEP, SCALE_STEPS,
+    CAMERA_HANDICAP, FRAME_HANDICAP, KNOWN_MOUNT, LEAST_SCALE_STEPS, NEXT_TURN_RAD, PARALLEL_RAD, SCALE_STEP,
+    SCALE_STEPS,
 };
 pub(crate) use crate::explain::constants::reading_search_hypothesis::{SCALE_STD, ZERO_STD_RAD};
 use std::borrow::Cow;
 use std::f64::consts::{FRAC_PI_6, PI, TAU};
 
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use crate::explain::wrong_input::map::quarter_turns;
 use crate::views::view::View;
@@ -37,6 +38,8 @@ pub(crate) enum Hypothesis {
     },
     /// Each view has its own readings at the view so many later.
     Shifted(isize),
+    /// The tag map has its frame there in the base's.
+    MapFrame(Isometry3<f64>),
     /// The camera is behind so many joints, and its frame is turned.
     Camera {
         n_joints: usize,
@@ -117,6 +120,19 @@ impl Hypothesis {
         all.filter(|one| *one != as_stated).collect()
     }
 
+    /// What is added to its score, for it has more numbers to fit the views with, or is less usual.
+    pub(crate) fn handicap(&self) -> f64 {
+        match self {
+            Self::Camera { .. } => CAMERA_HANDICAP,
+            Self::MapFrame(_) => FRAME_HANDICAP,
+            _ => 0.0,
+        }
+    }
+
+    pub(crate) fn is_of_map(&self) -> bool {
+        matches!(self, Self::MapFrame(_))
+    }
+
     pub(crate) fn is_of_camera(&self) -> bool {
         matches!(self, Self::Camera { .. })
     }
@@ -181,7 +197,7 @@ impl Hypothesis {
                 changed.travel_rad[*joint] = wrapped(robot, *joint, angle_rad - center_rad);
                 changed.rate_rad_s[*joint] *= factor;
             }
-            Self::Shifted(_) | Self::Camera { .. } => {}
+            Self::Shifted(_) | Self::Camera { .. } | Self::MapFrame(_) => {}
         }
         changed
     }

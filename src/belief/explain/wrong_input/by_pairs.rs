@@ -1,24 +1,22 @@
-//! The reading of map or lens with which the tags of each view fit one another.
+//! The reading of recording, map or lens with which the tags of each view fit one another.
 
-use super::pairs::{Pairs, mismatch};
-use super::{BETTER, GOOD, SIZE_TOLERANCE, lens, map};
+use super::pairs::{Pairs, distances, mismatch};
+use super::{BETTER, GOOD, SIZE_TOLERANCE, lens, map, recording};
 use crate::explain::constants::wrong_input_by_pairs::BAD;
-use crate::say::wrong_input::{WrongInput, WrongInputKind};
-use crate::views::view::View;
+use crate::say::length_unit::unit_of;
+use crate::say::wrong_input::{MismatchMeasure, WrongInput, WrongInputKind};
+use crate::views::view::{TagMeasurement, TagObservation, View};
+use armcal_core::optics::CameraModel;
 use armcal_core::robot::{Robot, SurveyedTag};
 
-/// The first of these: a reading of map or lens that fits, exchanged ids, another map, a wrong scale.
+/// The first of these: a reading of poses, map or lens that fits, exchanged ids, another map, a wrong scale.
 pub(crate) fn by_pairs(views: &[&View], tags: &[SurveyedTag], robot: &Robot, as_written: &Pairs) -> Option<WrongInput> {
     let stated = &robot.camera.lens;
-    let wrong = |input, otherwise| WrongInput {
-        input,
-        mismatch: as_written.mismatch,
-        mismatch_otherwise: otherwise,
-        size_hint: None,
-    };
+    let wrong = |input, otherwise| wrong_by(as_written, input, otherwise);
     let maps = map::readings(tags).into_iter().map(|(input, tags)| (input, mismatch(views, &tags, stated)));
     let lenses = lens::readings(stated).into_iter().map(|(input, lens)| (input, mismatch(views, tags, &lens)));
-    let fitting = maps.chain(lenses).filter_map(|(input, pairs)| Some((input, pairs?.mismatch)));
+    let all = poses_otherwise(views, tags, stated).into_iter().chain(maps).chain(lenses);
+    let fitting = all.filter_map(|(input, pairs)| Some((input, pairs?.mismatch)));
     let fitting = fitting.filter(|(_, mismatch)| *mismatch < GOOD.min(BETTER * as_written.mismatch));
     if let Some((input, otherwise)) = fitting.min_by(|a, b| a.1.total_cmp(&b.1)) {
         return Some(wrong(input, Some(otherwise)));
@@ -30,11 +28,45 @@ pub(crate) fn by_pairs(views: &[&View], tags: &[SurveyedTag], robot: &Robot, as_
         return Some(wrong(WrongInputKind::OtherMap, None));
     }
     let is_scaled = (as_written.ratio - 1.0).abs() > SIZE_TOLERANCE && as_written.mismatch < GOOD;
-    is_scaled.then(|| match map::unit_of(as_written.ratio) {
-        Some(unit) => wrong(WrongInputKind::MapUnit(unit.to_owned()), None),
-        None => WrongInput {
-            size_hint: map::margin_hint(robot.tag_family, as_written.ratio),
-            ..wrong(WrongInputKind::TagSize(as_written.ratio), None)
-        },
-    })
+    is_scaled.then(|| of_scale(views, robot, as_written))
+}
+
+/// A scale of recorded positions, by their distances alone: such landmarks have no rotation that could tell more.
+pub(crate) fn by_distances(views: &[&View], tags: &[SurveyedTag], robot: &Robot) -> Option<WrongInput> {
+    let found = distances(views, tags)?;
+    let is_scaled = (found.ratio - 1.0).abs() > SIZE_TOLERANCE;
+    let is_sure = found.mismatch < GOOD.min(BETTER * found.ratio.ln().abs());
+    (is_scaled && is_sure).then(|| of_scale(views, robot, &found))
+}
+
+fn wrong_by(as_written: &Pairs, input: WrongInputKind, otherwise: Option<f64>) -> WrongInput {
+    let (measure, mismatch) = (MismatchMeasure::Distances, as_written.mismatch);
+    WrongInput { input, measure, mismatch, mismatch_otherwise: otherwise, size_hint: None }
+}
+
+/// The mismatch with recorded poses read otherwise; none where there are no poses.
+fn poses_otherwise(views: &[&View], tags: &[SurveyedTag], lens: &CameraModel) -> Vec<(WrongInputKind, Option<Pairs>)> {
+    let is_pose = |seen: &TagObservation| matches!(seen.measured, TagMeasurement::Pose(_));
+    if !views.iter().any(|view| view.tags.iter().any(is_pose)) {
+        return Vec::new();
+    }
+    let with = |read: recording::Reading| {
+        let read: Vec<View> = views.iter().map(|view| recording::read_by(view, read)).collect();
+        mismatch(&read.iter().collect::<Vec<_>>(), tags, lens)
+    };
+    recording::readings().into_iter().map(|(input, read)| (input, with(read))).collect()
+}
+
+/// What a scale of all distances means: of pixels the tags' size tells, of positions their unit or the detector's size.
+fn of_scale(views: &[&View], robot: &Robot, as_written: &Pairs) -> WrongInput {
+    let ratio = as_written.ratio;
+    let wrong = |input| wrong_by(as_written, input, None);
+    let is_in_pixels = views.iter().any(|view| view.tags.iter().any(TagObservation::is_in_pixels));
+    let hint = || map::margin_hint(robot.tag_family, ratio);
+    match (unit_of(ratio), unit_of(1.0 / ratio)) {
+        (Some(unit), _) => wrong(WrongInputKind::MapUnit(unit.to_owned())),
+        (None, Some(unit)) if !is_in_pixels => wrong(WrongInputKind::RecordedUnit(unit.to_owned())),
+        _ if is_in_pixels => WrongInput { size_hint: hint(), ..wrong(WrongInputKind::TagSize(ratio)) },
+        _ => WrongInput { size_hint: hint(), ..wrong(WrongInputKind::RecordedScale(1.0 / ratio)) },
+    }
 }

@@ -4,10 +4,10 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
+use super::GOOD;
 use super::pairs::{PosedTag, mismatch_at, posed_tags};
 use super::recording::reordered;
-use super::{GOOD, SIZE_TOLERANCE};
-use crate::explain::constants::wrong_input_map::{PRINT_TOLERANCE, UNITS};
+use crate::explain::constants::wrong_input_map::PRINT_TOLERANCE;
 use crate::say::wrong_input::WrongInputKind;
 use crate::views::view::View;
 use armcal_core::optics::{CameraModel, TagFamily};
@@ -27,11 +27,6 @@ pub(crate) fn readings(tags: &[SurveyedTag]) -> Vec<(WrongInputKind, Vec<Surveye
         (input, changed(&|tag| turned_by(tag, &turn)))
     }));
     found
-}
-
-/// The unit of the map's positions, where `ratio` of the map's distances to the seen ones is that of one.
-pub(crate) fn unit_of(ratio: f64) -> Option<&'static str> {
-    UNITS.iter().find(|(_, per_m)| (ratio / per_m - 1.0).abs() < SIZE_TOLERANCE).map(|(name, _)| *name)
 }
 
 /// A size that stands beside its print: of tag36h11 the border square has 8 of the 10 cells that the whole print has.

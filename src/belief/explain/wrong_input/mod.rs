@@ -1,8 +1,8 @@
 //! A file that the images contradict: how the tags stand to one another is seen without the arm.
 //!
 //! `pairs` measures by how much the tags of one view differ from the map; a large mismatch means that map or lens is
-//! wrong, and no joint has a part in it. `map` and `lens` have other readings of their file; `by_pairs` names the one
-//! that makes the mismatch small. `recording` looks at pixels, and at the rotations of a single landmark.
+//! wrong, and no joint has a part in it. `recording`, `map` and `lens` have other readings of their file; `by_pairs`
+//! names the one that makes the mismatch small. `recording` looks at pixels, and at rotations of a single landmark.
 
 pub(crate) mod by_pairs;
 pub(crate) mod lens;
@@ -11,11 +11,11 @@ pub(crate) mod pairs;
 pub(crate) mod recording;
 
 use crate::explain::constants::wrong_input::{BETTER, GOOD, MAX_VIEWS, SIZE_TOLERANCE};
-use crate::say::wrong_input::WrongInput;
+use crate::say::wrong_input::{MismatchMeasure, WrongInput};
 
 use crate::views::view::{CaptureData, View};
 use armcal_core::robot::{Robot, SurveyedTag};
-use by_pairs::by_pairs;
+use by_pairs::{by_distances, by_pairs};
 use pairs::mismatch;
 
 /// The input that explains why the views do not fit; `tags` as the map has them.
@@ -23,11 +23,12 @@ pub(crate) fn wrong_input(data: &CaptureData, tags: &[SurveyedTag], robot: &Robo
     let of_first = data.fit.iter().chain(&data.held_out).filter(|view| view.camera == 0);
     let views: Vec<&View> = of_first.take(MAX_VIEWS).collect();
     if let Some(input) = recording::beside_image(robot.camera.lens.resolution_px(), data) {
-        return Some(WrongInput { input, mismatch: 1.0, mismatch_otherwise: None, size_hint: None });
+        let measure = MismatchMeasure::Distances;
+        return Some(WrongInput { input, measure, mismatch: 1.0, mismatch_otherwise: None, size_hint: None });
     }
     match mismatch(&views, tags, &robot.camera.lens) {
         Some(pairs) => by_pairs(&views, tags, robot, &pairs),
-        None => recording::by_rotations(&views, robot),
+        None => recording::by_rotations(&views, robot).or_else(|| by_distances(&views, tags, robot)),
     }
 }
 

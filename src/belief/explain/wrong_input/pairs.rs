@@ -40,6 +40,28 @@ pub(crate) fn mismatch(views: &[&View], tags: &[SurveyedTag], lens: &CameraModel
     Some(Pairs { ratio, mismatch: quantile(&mismatches, 0.5)? })
 }
 
+/// The same of positions without rotations: how far the ratio of the distances of two tags is from that of most.
+pub(crate) fn distances(views: &[&View], tags: &[SurveyedTag]) -> Option<Pairs> {
+    let place_m = |seen: &TagObservation| {
+        let tag = tags.get(seen.tag_idx).filter(|tag| tag.is_known())?;
+        Some((tag.base_from_tag.origin().vector(), seen.center_in_camera_m))
+    };
+    let mut ratios = Vec::new();
+    for view in views {
+        let places: Vec<(Vector3<f64>, Vector3<f64>)> = view.tags.iter().filter_map(place_m).collect();
+        for (n, (a, seen_a)) in places.iter().enumerate() {
+            let of_pair = |(b, seen_b): &(Vector3<f64>, Vector3<f64>)| (a - b).norm() / (seen_a - seen_b).norm();
+            ratios.extend(places[n + 1..].iter().map(of_pair).filter(|ratio| ratio.is_finite() && *ratio > 0.0));
+        }
+    }
+    if ratios.len() < MIN_PAIRS {
+        return None;
+    }
+    let ratio = quantile(&ratios, 0.5)?;
+    let off: Vec<f64> = ratios.iter().map(|of_pair| (of_pair / ratio - 1.0).abs()).collect();
+    Some(Pairs { ratio, mismatch: quantile(&off, 0.5)? })
+}
+
 fn ordered_pairs<'a, 'b>(tags: &'b [PosedTag<'a>]) -> impl Iterator<Item = (&'b PosedTag<'a>, &'b PosedTag<'a>)> {
     let each = move |(n, a)| tags.iter().enumerate().filter(move |(m, _)| *m != n).map(move |(_, b)| (a, b));
     tags.iter().enumerate().flat_map(each)

@@ -1,13 +1,14 @@
-//! Other readings of the recording: pixels of another image, rotations in another order or direction.
+//! Other readings of the recording: pixels of another image, poses in another order or direction.
 //!
-//! Where a view has one landmark with its rotation, the arm by its datasheet tells where that stands: the rotations of
-//! `base_from_tag` over the views must agree but for what sensors may be off.
+//! Where views have several landmarks, these tell which reading is right (`by_pairs`). Where a view has one, the arm by
+//! its datasheet tells where that stands: the rotations of `base_from_tag` over the views must agree but for what
+//! sensors may be off.
 
 use crate::explain::constants::wrong_input_recording::{BEYOND_IMAGE, GOOD_SPREAD_RAD, MIN_ROTATIONS, SPREAD_RAD};
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion};
 
 use super::BETTER;
-use crate::say::wrong_input::{WrongInput, WrongInputKind};
+use crate::say::wrong_input::{MismatchMeasure, WrongInput, WrongInputKind};
 use crate::views::view::{CaptureData, TagMeasurement, View};
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::Robot;
@@ -29,7 +30,41 @@ pub(crate) fn beside_image(stated_px: [u32; 2], data: &CaptureData) -> Option<Wr
 }
 
 /// How a recorded pose may be meant.
-type Reading<'a> = &'a dyn Fn(&Isometry3<f64>) -> Isometry3<f64>;
+pub(crate) type Reading = fn(&Isometry3<f64>) -> Isometry3<f64>;
+
+/// Recorded poses as they may be meant. A reader may have inverted them already, so that each order of quaternions
+/// counts for the pose and for its inverse.
+pub(crate) fn readings() -> [(WrongInputKind, Reading); 11] {
+    use WrongInputKind::{RecordedDirection, RecordedOrderAndDirection, RecordedQuaternions, RecordedRotations};
+    [
+        (RecordedDirection, |pose| pose.inverse()),
+        (RecordedQuaternions, |pose| with(pose, reordered)),
+        (RecordedQuaternions, |pose| with(pose, reordered_back)),
+        (RecordedQuaternions, |pose| with(&pose.inverse(), reordered).inverse()),
+        (RecordedQuaternions, |pose| with(&pose.inverse(), reordered_back).inverse()),
+        (RecordedOrderAndDirection, |pose| with(&pose.inverse(), reordered)),
+        (RecordedOrderAndDirection, |pose| with(&pose.inverse(), reordered_back)),
+        (RecordedOrderAndDirection, |pose| with(pose, reordered).inverse()),
+        (RecordedOrderAndDirection, |pose| with(pose, reordered_back).inverse()),
+        (RecordedRotations, |pose| with(pose, UnitQuaternion::inverse)),
+        (RecordedRotations, |pose| with(&pose.inverse(), UnitQuaternion::inverse).inverse()),
+    ]
+}
+
+fn with(pose: &Isometry3<f64>, turn: fn(&UnitQuaternion<f64>) -> UnitQuaternion<f64>) -> Isometry3<f64> {
+    Isometry3::from_parts(pose.translation, turn(&pose.rotation))
+}
+
+/// The view with its recorded poses read that way.
+pub(crate) fn read_by(view: &View, read: Reading) -> View {
+    let mut view = view.clone();
+    for seen in &mut view.tags {
+        if let TagMeasurement::Pose(pose) = &mut seen.measured {
+            *pose = read(pose);
+        }
+    }
+    view
+}
 
 /// Of recorded poses of one landmark a view.
 pub(crate) fn by_rotations(views: &[&View], robot: &Robot) -> Option<WrongInput> {
@@ -47,25 +82,23 @@ pub(crate) fn by_rotations(views: &[&View], robot: &Robot) -> Option<WrongInput>
             })
         })
         .collect();
-    let spread = |read: &dyn Fn(&Isometry3<f64>) -> Isometry3<f64>| {
+    let spread = |read: Reading| {
         let turned = |&(tag, camera, pose): &(usize, Isometry3<f64>, Isometry3<f64>)| (tag, camera * read(&pose));
         spread_rad(&posed.iter().map(turned).collect::<Vec<_>>())
     };
-    let as_written = spread(&|pose| *pose)?;
-    let with = |pose: &Isometry3<f64>, turn: fn(&UnitQuaternion<f64>) -> UnitQuaternion<f64>| {
-        Isometry3::from_parts(pose.translation, turn(&pose.rotation))
-    };
-    let readings: [(WrongInputKind, Reading<'_>); 5] = [
-        (WrongInputKind::RecordedQuaternions, &|pose| with(pose, reordered)),
-        (WrongInputKind::RecordedQuaternions, &|pose| with(pose, reordered_back)),
-        (WrongInputKind::RecordedQuaternions, &|pose| with(&pose.inverse(), reordered).inverse()),
-        (WrongInputKind::RecordedQuaternions, &|pose| with(&pose.inverse(), reordered_back).inverse()),
-        (WrongInputKind::RecordedDirection, &|pose: &Isometry3<f64>| pose.inverse()),
-    ];
-    let spreads = readings.into_iter().filter_map(|(input, read)| Some((input, spread(read)?)));
+    let as_written = spread(|pose| *pose)?;
+    // Rotations alone do not tell the inverse of a pose from that of its rotation.
+    let readings = readings().into_iter().filter(|(input, _)| *input != WrongInputKind::RecordedRotations);
+    let spreads = readings.filter_map(|(input, read)| Some((input, spread(read)?)));
     let (input, least) = spreads.min_by(|a, b| a.1.total_cmp(&b.1))?;
     let is_better = as_written > SPREAD_RAD && least < GOOD_SPREAD_RAD.min(BETTER * as_written);
-    is_better.then_some(WrongInput { input, mismatch: as_written, mismatch_otherwise: Some(least), size_hint: None })
+    is_better.then_some(WrongInput {
+        input,
+        measure: MismatchMeasure::Rotations,
+        mismatch: as_written,
+        mismatch_otherwise: Some(least),
+        size_hint: None,
+    })
 }
 
 /// Median angle of a landmark's rotations from the one that is nearest to all others; the largest of all landmarks.

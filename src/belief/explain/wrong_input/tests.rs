@@ -1,3 +1,4 @@
+use crate::say::constants::length_unit::UNITS;
 use crate::say::wrong_input::WrongInputKind;
 use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
@@ -9,7 +10,6 @@ use super::lens::{of_other_model, scaled};
 use super::map::{margin_hint, other_axes};
 use super::recording::reordered_back;
 use super::*;
-use crate::explain::constants::wrong_input_map::UNITS;
 use crate::fixture::titan;
 use crate::views::association::{associate, surveyed};
 use crate::views::view::TagMeasurement;
@@ -201,18 +201,24 @@ fn a_tag_size_is_told_and_the_margin_of_the_print() {
 /// A tag that nearly all views show.
 const OFTEN_SEEN: usize = 4;
 
+/// All landmarks by what a program may have written of their poses.
+fn recorded(data: &CaptureData, robot: &Robot, write: impl Fn(&Isometry3<f64>) -> TagMeasurement) -> CaptureData {
+    let mut data = data.clone();
+    for seen in data.fit.iter_mut().chain(&mut data.held_out).flat_map(|view| &mut view.tags) {
+        let corners = seen.corners().expect("corners").corners_px;
+        let pose = solve_square(&robot.camera.lens, robot.tags[seen.tag_idx].size_m, &corners).expect("a pose");
+        seen.measured = write(pose.camera_from_tag.isometry());
+    }
+    data
+}
+
 /// One landmark a view, by its pose as a program may have written it.
 fn posed(data: &CaptureData, robot: &Robot, write: impl Fn(&Isometry3<f64>) -> Isometry3<f64>) -> CaptureData {
     let mut data = data.clone();
     for view in data.fit.iter_mut().chain(&mut data.held_out) {
         view.tags.retain(|seen| seen.tag_idx == OFTEN_SEEN);
-        for seen in &mut view.tags {
-            let corners = seen.corners().expect("corners").corners_px;
-            let pose = solve_square(&robot.camera.lens, robot.tags[OFTEN_SEEN].size_m, &corners).expect("a pose");
-            seen.measured = TagMeasurement::Pose(write(pose.camera_from_tag.isometry()));
-        }
     }
-    data
+    recorded(&data, robot, |pose| TagMeasurement::Pose(write(pose)))
 }
 
 #[test]
@@ -224,4 +230,71 @@ fn recorded_poses_in_another_order_or_direction_are_told() {
     assert_eq!(found(&turned), Some(WrongInputKind::RecordedQuaternions));
     assert_eq!(found(&|pose| turned(&pose.inverse()).inverse()), Some(WrongInputKind::RecordedQuaternions));
     assert_eq!(found(&|pose| pose.inverse()), Some(WrongInputKind::RecordedDirection));
+}
+
+/// The tags of one view tell how their poses are to be read, with the map as it is.
+#[test]
+fn recorded_poses_of_several_tags_are_told_without_the_arm() {
+    let (data, robot) = sample();
+    let found = |write: &dyn Fn(&Isometry3<f64>) -> Isometry3<f64>| {
+        found(&recorded(&data, &robot, |pose| TagMeasurement::Pose(write(pose))), &robot)
+    };
+    let turned = |pose: &Isometry3<f64>| Isometry3::from_parts(pose.translation, reordered_back(&pose.rotation));
+    assert_eq!(found(&|pose| *pose), None);
+    assert_eq!(found(&|pose| pose.inverse()), Some(WrongInputKind::RecordedDirection));
+    assert_eq!(found(&turned), Some(WrongInputKind::RecordedQuaternions));
+    assert_eq!(found(&|pose| turned(&pose.inverse()).inverse()), Some(WrongInputKind::RecordedQuaternions));
+    assert_eq!(found(&|pose| turned(pose).inverse()), Some(WrongInputKind::RecordedOrderAndDirection));
+    assert_eq!(found(&|pose| turned(&pose.inverse())), Some(WrongInputKind::RecordedOrderAndDirection));
+    let of_inverse = |pose: &Isometry3<f64>| Isometry3::from_parts(pose.translation, pose.rotation.inverse());
+    assert_eq!(found(&of_inverse), Some(WrongInputKind::RecordedRotations));
+}
+
+/// Poses that are right do not hide a map that is wrong.
+#[test]
+fn a_wrong_map_is_told_by_recorded_poses_too() {
+    let (data, robot) = sample();
+    let data = recorded(&data, &robot, |pose| TagMeasurement::Pose(*pose));
+    let written =
+        |_: usize, pose: &Isometry3<f64>| Isometry3::from_parts(pose.translation, reordered_back(&pose.rotation));
+    assert_eq!(found(&data, &with_tags(&robot, written)), Some(WrongInputKind::MapQuaternions));
+    let scaled =
+        |_: usize, pose: &Isometry3<f64>| Isometry3::from_parts((1e3 * pose.translation.vector).into(), pose.rotation);
+    assert_eq!(found(&data, &with_tags(&robot, scaled)), Some(WrongInputKind::MapUnit("mm".to_owned())));
+}
+
+/// With their rotations or without them.
+#[test]
+fn a_scale_of_recorded_positions_is_not_called_the_size_of_the_tags() {
+    let (data, robot) = sample();
+    let with_poses = |scale: f64| {
+        let scaled =
+            |pose: &Isometry3<f64>| Isometry3::from_parts((scale * pose.translation.vector).into(), pose.rotation);
+        recorded(&data, &robot, |pose| TagMeasurement::Pose(scaled(pose)))
+    };
+    let with_positions = |scale: f64| {
+        let mut data = recorded(&data, &robot, |_| TagMeasurement::Position);
+        let tags = data.fit.iter_mut().chain(&mut data.held_out).flat_map(|view| &mut view.tags);
+        tags.for_each(|seen| seen.center_in_camera_m *= scale);
+        data
+    };
+    for with_scale in [&with_poses as &dyn Fn(f64) -> CaptureData, &with_positions] {
+        assert_eq!(found(&with_scale(1.0), &robot), None);
+        for (unit, per_m) in UNITS {
+            let wrong = found(&with_scale(per_m), &robot);
+            assert_eq!(wrong, Some(WrongInputKind::RecordedUnit(unit.to_owned())));
+        }
+        let wrong = found(&with_scale(1.25), &robot);
+        assert!(matches!(wrong, Some(WrongInputKind::RecordedScale(k)) if (k / 1.25 - 1.0).abs() < 0.01), "{wrong:?}");
+    }
+}
+
+/// A map that is stretched looks as tags of another size do: the words name both.
+#[test]
+fn a_stretched_map_is_told_with_its_ratio() {
+    let (data, robot) = sample();
+    let stretched =
+        |_: usize, pose: &Isometry3<f64>| Isometry3::from_parts((1.05 * pose.translation.vector).into(), pose.rotation);
+    let wrong = found(&data, &with_tags(&robot, stretched));
+    assert!(matches!(wrong, Some(WrongInputKind::TagSize(ratio)) if (ratio / 1.05 - 1.0).abs() < 0.01), "{wrong:?}");
 }

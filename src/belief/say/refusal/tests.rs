@@ -102,8 +102,16 @@ fn sensor_failed() -> Refusal {
     }
 }
 
+fn map_frame() -> ReadingError {
+    ReadingError::MapFrame { position_m: [0.0, 0.1, 0.35], turn: [0.8, 0.0, 0.0, 0.6] }
+}
+
 /// One of each kind that says something measured.
 fn measured() -> Vec<Refusal> {
+    [measured_of_the_fit(), misread_inputs(), measured_of_repairs()].concat()
+}
+
+fn measured_of_the_fit() -> Vec<Refusal> {
     let joint = || "wrist_yaw".to_owned();
     vec![
         Refusal::TooFewViews { views: 8, parameters: 10 },
@@ -120,6 +128,7 @@ fn measured() -> Vec<Refusal> {
         Refusal::SensorError { joint: joint(), std_rad: 0.01, datasheet_std_rad: 0.002, moves: JointKind::Revolute },
         Refusal::Nonlinearity { joint: joint(), std_rad: 0.03, datasheet_std_rad: 0.002, moves: JointKind::Revolute },
         Refusal::CornerNoise { residual_px: 1.2, stated_px: 0.3, limit_px: 0.9 },
+        Refusal::CornerNoiseUnderstated { residual_px: 0.25, stated_px: 0.03, outliers: 135, observations: 137 },
         Refusal::BeyondDatasheet {
             parameter: "wrist_yaw offset".to_owned(),
             sigmas: 9.0,
@@ -145,6 +154,12 @@ fn measured() -> Vec<Refusal> {
             limit: 1.7,
             expected: [0.9, 1.1],
         },
+    ]
+}
+
+fn misread_inputs() -> Vec<Refusal> {
+    let joint = || "wrist_yaw".to_owned();
+    vec![
         misread(ReadingError::Exchanged { joints: ["shoulder".to_owned(), joint()] }),
         misread(ReadingError::Reversed { joints: vec!["shoulder".to_owned(), joint()] }),
         misread(ReadingError::Coupled { joint: joint(), with: "shoulder".to_owned(), sign: -1.0 }),
@@ -169,8 +184,29 @@ fn measured() -> Vec<Refusal> {
             }],
         }),
         misread(ReadingError::Shifted { views: 1 }),
+        misread(map_frame()),
+        Refusal::MisreadReadings(MisreadReadings {
+            found: ReadingError::Zeros {
+                joints: vec![JointZero {
+                    joint: joint(),
+                    off_rad: 1.57,
+                    moves: JointKind::Revolute,
+                    offset_counts: -1.57,
+                    input_zero: None,
+                }],
+            },
+            alternatives: vec![map_frame()],
+            tag_error_m: 0.9,
+            corrected_m: Some(0.002),
+        }),
         misread(ReadingError::Camera { link: Some("wrist".to_owned()), turn: [1.0, 0.0, 0.0, 0.0] }),
         misread(ReadingError::Camera { link: None, turn: [0.5, -0.5, 0.5, -0.5] }),
+    ]
+}
+
+fn measured_of_repairs() -> Vec<Refusal> {
+    let joint = || "wrist_yaw".to_owned();
+    vec![
         Refusal::TagSizeRepair { element: "tag 3".to_owned(), ratio: 0.015, stated_m: 9.9 },
         Refusal::TooFewViewsSinceSlip { joint: joint(), evidence: "it slipped".to_owned(), views: 4 },
         sensor_failed(),

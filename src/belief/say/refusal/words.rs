@@ -4,6 +4,7 @@ use std::fmt;
 
 use crate::judge::baseline_comparison::SIGNIFICANCE;
 use crate::say::constants::refusal_words::MORE_DIGITS_BELOW;
+use crate::say::length_unit::unit_of;
 use crate::say::refusal::{HeldOutLimitSource, MIN_USED_SHARE, Refusal, with_advice};
 use crate::say::wrong_input_words::medium_of_lens;
 use armcal_core::codes::Coded;
@@ -44,6 +45,7 @@ impl Refusal {
             | Self::Touch { .. } => self.fmt_of_arm(f),
             Self::Innovations { .. }
             | Self::CornerNoise { .. }
+            | Self::CornerNoiseUnderstated { .. }
             | Self::OffsetsWalk { .. }
             | Self::PriorReused
             | Self::PriorSingular
@@ -273,14 +275,15 @@ impl Refusal {
             Self::TooFewViewsSinceSlip { joint, evidence, views } => {
                 write!(f, "{joint}: {evidence}; {views} views since then cannot calibrate it")
             }
-            Self::Length { what, key, measured_m, by_views_m, std_m } => write!(
-                f,
-                "{what} is {:.1} mm by {key} and {:.1} mm by the views: {:.0} sigmas of {:.1} mm apart",
-                measured_m * 1e3,
-                by_views_m * 1e3,
-                (measured_m - by_views_m).abs() / std_m,
-                std_m * 1e3
-            ),
+            Self::Length { what, key, measured_m, by_views_m, std_m } => {
+                let sigmas = (measured_m - by_views_m).abs() / std_m;
+                let [measured, by_views, std] = [measured_m, by_views_m, std_m].map(|m| 1e3 * m);
+                write!(f, "{what} is {measured:.1} mm by {key} and {by_views:.1} mm by the views: ")?;
+                match unit_of(measured_m / by_views_m) {
+                    Some(unit) => write!(f, "it is written in {unit}, not in metres"),
+                    None => write!(f, "{sigmas:.0} sigmas of {std:.1} mm apart"),
+                }
+            }
             Self::Touch { off_m, surface, chi2, limit, causes, link, tool_point_m: [x, y, z] } => write!(
                 f,
                 "touch: the tool is {:.0} mm from its predicted position at {surface} (chi-square {chi2:.0}, limit \
@@ -318,6 +321,10 @@ impl Refusal {
                 "corner residuals averaged over a view are {residual_px:.2} px rms, above {limit_px:.2} px; \
                  robot.toml states {stated_px:.2} px for one frame"
             ),
+            Self::CornerNoiseUnderstated { residual_px, stated_px, outliers, observations } => {
+                write!(f, "corner_std_px of robot.toml, {stated_px:.3} px, is too small: under it {outliers} of ")?;
+                write!(f, "{observations} tag observations fit no arm, and with {residual_px:.2} px nearly all do")
+            }
             Self::PriorReused => write!(f, "the prior was made from the same messages, which must not count twice"),
             Self::PriorSingular => write!(f, "the prior's covariance has no inverse"),
             Self::PriorUntested => write!(f, "the views determine too little to be tested against the prior"),
