@@ -343,7 +343,7 @@ impl<'a> BundleCalibration<'a> {
                 return;
             }
             let (robot, views, drawing) = (&self.data.robot, &self.as_read[..], &self.drawing);
-            let search = ReadingSearch { robot, views, failures, drawing };
+            let search = ReadingSearch { robot, views, failures, drawing, map: None };
             calibration.refuse_first_for(search.find_other_turns().map(Refusal::MisreadReadings));
             return;
         }
