@@ -330,7 +330,7 @@ mod tests {
         Readings { joint: JOINT, view_idx: (0..40).collect(), travel_rad, angle_rad, std_rad: vec![1e-4; 40] }
     }
 
-    /// Another line, another joint's angle or no sense since a view. The first one that is off may read right by chance.
+    /// Another line, or another joint's angle, since a view. The first ones may read right by chance.
     #[test]
     fn a_sensor_that_reads_something_else_up_to_the_end_is_lost() {
         const FROM: usize = 32;
