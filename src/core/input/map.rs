@@ -64,6 +64,7 @@ use crate::robot::{FileIssue, JointSensorSpec, Robot, RobotError, StatedAngle, r
 use crate::schema::schema_of;
 
 mod joint_keys;
+mod own_names;
 mod table;
 mod units;
 
@@ -319,19 +320,6 @@ impl InputMap {
                 Err(FileIssue::new(Code::NameUnknown, file, "further_tags.camera", problem))
             }
         }
-    }
-
-    /// What is wrong where two joints have one recorded name. A joint beyond the camera that nobody maps may lack
-    /// readings.
-    fn shared_name(&self, robot: &Robot) -> Option<String> {
-        let joints = robot.joint_names();
-        let is_read =
-            |(k, joint): &(usize, &String)| *k < robot.n_seen_joints() || self.joint_names.contains_key(*joint);
-        let read: Vec<&String> = joints.iter().enumerate().filter(is_read).map(|(_, joint)| joint).collect();
-        let mut pairs = read.iter().enumerate().flat_map(|(k, &a)| read[k + 1..].iter().map(move |&b| (a, b)));
-        let (a, b) = pairs.find(|(a, b)| self.recorded_name(a) == self.recorded_name(b))?;
-        let name = self.recorded_name(a);
-        Some(format!("gives `{a}` and `{b}` the same recorded name, `{name}`; name the readings of each joint"))
     }
 
     /// The raw reading that a recorded number stands for.

@@ -272,12 +272,12 @@ fn a_sensor_that_reads_wrongly_up_to_the_end_is_refused() {
     for seed in 110..115 {
         let joint = (seed % 5) as usize;
         let mut case = case(seed, None);
-        reverse_in(&mut case, joint, 13..N_VIEWS);
+        reverse_in(&mut case, joint, 14..N_VIEWS);
         let failures = found_failures(&case, &[]);
         let [Failure { joint: found, kind: FailedKind::Dead, lost_since: Some(since), .. }] = failures[..] else {
             panic!("seed {seed}: {failures:?}")
         };
-        assert!(found == joint && (13..16).contains(&since), "seed {seed}: {found} since {since}");
+        assert!(found == joint && (13..17).contains(&since), "seed {seed}: {found} since {since}");
         let name = case.robot.sensors[joint].joint.clone();
         let result = case.calibrated();
         let is_named = |refusal: &Refusal| matches!(refusal, Refusal::SensorFailed { joint, .. } if *joint == name);
