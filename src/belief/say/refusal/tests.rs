@@ -23,6 +23,7 @@ fn the_words_of_each_reason() {
     let mut all = measured();
     all.extend([geometry(), contradicted(), touch(), length(), Refusal::PriorReused, Refusal::PriorSingular]);
     all.push(Refusal::PriorUntested);
+    all.extend(of_stated_angles());
     let mut words: Vec<String> = all.iter().map(ToString::to_string).collect();
     words.extend(in_words(&all[..2]));
     insta::assert_snapshot!("refusals", words.join("\n"));
@@ -106,6 +107,23 @@ fn map_frame() -> ReadingError {
     ReadingError::MapFrame { position_m: [0.0, 0.1, 0.35], turn: [0.8, 0.0, 0.0, 0.6] }
 }
 
+fn zeros(input_zero: Option<f64>) -> Refusal {
+    let (joint, moves) = ("wrist_yaw".to_owned(), JointKind::Revolute);
+    let zero = JointZero { joint, off_rad: 1.57, moves, offset_counts: -1.57, input_zero };
+    misread(ReadingError::Zeros { joints: vec![zero] })
+}
+
+/// Of readings that the input map states as angles.
+fn of_stated_angles() -> Vec<Refusal> {
+    let joint = || "wrist_yaw".to_owned();
+    vec![
+        Refusal::SensorLine { joint: joint(), slope: -0.998, input_factor: Some(-0.998) },
+        Refusal::SensorUnit { joint: joint(), gain: 0.0173, moves: JointKind::Revolute, input_factor: Some(0.0173) },
+        misread(ReadingError::Scaled { joint: joint(), factor: 0.048, input_factor: Some(0.048) }),
+        zeros(Some(-90.0)),
+    ]
+}
+
 /// One of each kind that says something measured.
 fn measured() -> Vec<Refusal> {
     [measured_of_the_fit(), misread_inputs(), measured_of_repairs()].concat()
@@ -145,8 +163,6 @@ fn measured_of_the_fit() -> Vec<Refusal> {
             focal_px: [900.1, 900.2],
         },
         Refusal::SensorLine { joint: joint(), slope: 0.5, input_factor: None },
-        Refusal::SensorLine { joint: joint(), slope: -0.998, input_factor: Some(-0.998) },
-        Refusal::SensorUnit { joint: joint(), gain: 0.0173, moves: JointKind::Revolute, input_factor: Some(0.0173) },
         Refusal::Outliers { outliers: 40, observations: 100 },
         Refusal::Innovations {
             quantity: InnovationQuantity::Coordinates,
@@ -165,24 +181,7 @@ fn misread_inputs() -> Vec<Refusal> {
         misread(ReadingError::Coupled { joint: joint(), with: "shoulder".to_owned(), sign: -1.0 }),
         misread(ReadingError::Alike { joint: joint(), with: "shoulder".to_owned(), views: 40 }),
         misread(ReadingError::OtherTurns { joints: vec![joint()], wrap_counts: 16_560.0 }),
-        misread(ReadingError::Zeros {
-            joints: vec![JointZero {
-                joint: joint(),
-                off_rad: 1.57,
-                moves: JointKind::Revolute,
-                offset_counts: -1.57,
-                input_zero: None,
-            }],
-        }),
-        misread(ReadingError::Zeros {
-            joints: vec![JointZero {
-                joint: joint(),
-                off_rad: 1.57,
-                moves: JointKind::Revolute,
-                offset_counts: -1.57,
-                input_zero: Some(-90.0),
-            }],
-        }),
+        zeros(None),
         misread(ReadingError::Shifted { views: 1 }),
         misread(map_frame()),
         Refusal::MisreadReadings(MisreadReadings {
@@ -237,7 +236,11 @@ fn a_reason_survives_the_file() {
             Refusal::NotSolved { outcome: Outcome::Stalled, evaluations: 40 },
             contradicted(),
             touch(),
-        ],
+            Refusal::SensorLine { joint: "wrist_yaw".to_owned(), slope: 0.5, input_factor: None },
+        ]
+        .into_iter()
+        .chain(of_stated_angles())
+        .collect(),
     };
     let text = toml::to_string(&file).expect("it has a TOML form");
     assert_eq!(toml::from_str::<File>(&text).expect("it reads"), file, "{text}");
