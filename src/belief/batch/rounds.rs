@@ -100,7 +100,7 @@ struct Estimated<'a> {
     failures: &'a [Failure],
     estimate: Estimate<'a>,
     selections: Vec<Selection>,
-    /// Of the measured lengths.
+    /// The measured lengths against the views.
     lengths: Vec<LengthInnovation>,
     touches: Option<Touched<'a>>,
 }

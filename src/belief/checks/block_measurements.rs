@@ -4,7 +4,6 @@
 //! or look like a tag that moved. With the variance v of what they predict and the length's own s^2, measured less
 //! predicted has the variance `s^2 + v`. Lengths that hold are in the last estimate.
 
-use crate::checks::consistency::VerdictInput;
 use crate::file::verdict_tables::{Check, VerdictTable};
 use crate::judge::constants::FALSE_ALARM;
 use crate::measure::BlockMeasurement;
@@ -67,12 +66,12 @@ impl<'a> Estimate<'a> {
     }
 }
 
-impl VerdictInput<'_> {
+impl Estimate<'_> {
     /// Returns the refusal of the measured length that the views contradict most; warns of those that are not used.
-    pub(crate) fn block_measurements(&self, table: &mut VerdictTable) -> Option<Refusal> {
-        for stated in BlockMeasurement::all(self.input.robot) {
+    pub(crate) fn judge_lengths(&self, all: &[LengthInnovation], table: &mut VerdictTable) -> Option<Refusal> {
+        for stated in BlockMeasurement::all(self.problem.robot) {
             let has_columns =
-                |of: &BlockMeasurement| of.blocks().iter().all(|block| self.found.problem.layout.at(*block).is_some());
+                |of: &BlockMeasurement| of.blocks().iter().all(|block| self.problem.layout.at(*block).is_some());
             let what = match stated {
                 Ok(measurement) if has_columns(&measurement) => continue,
                 Ok(measurement) => measurement.name().0,
@@ -81,7 +80,7 @@ impl VerdictInput<'_> {
             let text = format!("{what} is not used: the views do not show both ends");
             table.warnings.push(Warning::new(Code::LengthUnused, text));
         }
-        let (worst, limit) = worst(self.lengths)?;
+        let (worst, limit) = worst(all)?;
         let (what, key) = worst.measurement.name();
         let check = Check::at_most(format!("{what}: sigmas from what the views say"), worst.sigmas(), limit);
         let refusal = (!check.holds).then(|| Refusal::Length {

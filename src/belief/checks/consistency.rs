@@ -61,7 +61,7 @@ impl VerdictInput<'_> {
         let mut table = VerdictTable { warnings: Vec::new(), not_covered: Vec::new(), checks: Vec::new() };
         let refusals = [
             self.understated_corner_noise(calibration.fit.tags_seen),
-            self.block_measurements(&mut table),
+            self.found.judge_lengths(self.lengths, &mut table),
             self.walks(calibration),
             self.geometry(&configurations, calibration, &mut table),
             self.baseline(&configurations, calibration, &mut table),

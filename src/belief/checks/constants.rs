@@ -43,7 +43,7 @@ pub(crate) mod noise_checks {
     /// Noise that is tried, over robot.toml's, where most observations seem to fit nothing: each takes in what is up to
     /// three times as large.
     pub(crate) const LARGER_NOISE: [f64; 2] = [5.0, 25.0];
-    /// Corners averaged over a view are not farther off by a detector's noise, px. Assumed: blurred images reach it.
+    /// Noise of a detector leaves corners averaged over a view within this, px. Assumed: blurred images reach it.
     pub(crate) const MAX_USUAL_CORNER_PX: f64 = 2.0;
     /// Noise of rotations, where none is stated, above which they are of another form: boards and tags are read to 0.05
     /// rad or better. Assumed.

@@ -81,7 +81,7 @@ pub(crate) mod failure_pattern {
     /// Assumed: single jumps, of one view in five, are no such row in one of a hundred recordings.
     pub(crate) const MIN_LOST: usize = 4;
     pub(crate) const LOST_SHARE: f64 = 0.75;
-    /// How often the line is drawn anew through the readings that are not off. Assumed: one time settles nearly all.
+    /// Number of times that the line is drawn again through the readings that are not off. Assumed: one time settles nearly all.
     pub(crate) const REFITS: usize = 3;
     /// So many right readings at the end show that the sensor is back. Assumed: a wrong one is right by chance in less
     /// than a quarter of the views, three times on end in less than two of a hundred.
@@ -145,7 +145,7 @@ pub(crate) mod reading_search_hypothesis {
     /// Added to the score of a camera hypothesis, twice the logarithm of odds (assumed): where it explains the views as
     /// well as a sensor's zero does, the zero is named first.
     pub(crate) const CAMERA_HANDICAP: f64 = 5.0;
-    /// The same for the frame of the tag map, which has six numbers: a turn about the first joint's axis is named
+    /// Handicap of the frame of the tag map, which has six numbers: a turn about the first joint's axis is named
     /// behind that joint's zero, and always with it (chi-square of 5 is below this in 99 of 100 cases).
     pub(crate) const FRAME_HANDICAP: f64 = 15.0;
     /// A camera mount with larger stated sigmas does not place the tags, m and rad.
@@ -197,7 +197,7 @@ pub(crate) mod score_test {
     /// Size of an error of geometry that is worth a look: what the data cannot tell to that is not tested.
     pub(crate) const SIZE_M: f64 = 0.01;
     pub(crate) const SIZE_RAD: f64 = 0.0175;
-    /// Of two elements whose chi-square differs by less neither explains more: a likelihood ratio of 20.
+    /// Two elements whose chi-square differs by less explain the same: a likelihood ratio of 20.
     pub(crate) const ALIKE_CHI2: f64 = 6.0;
     /// A sigma so many times smaller than another is the surer one. Assumed.
     pub(crate) const SURER: f64 = 2.0;

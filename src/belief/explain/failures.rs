@@ -63,7 +63,7 @@ pub struct Failure {
     pub since: Option<usize>,
     /// By how much more it reads since, rad.
     pub step_rad: Option<f64>,
-    /// Of a sensor that reads something else up to the end: the first view in which it does.
+    /// First view in which a sensor reads something else up to the end.
     pub lost_since: Option<usize>,
     /// Of a reversed sensor, whose reading is not used, and of one of another scale, whose gain is estimated.
     pub line: Option<SensorLine>,
@@ -121,7 +121,7 @@ impl Failure {
         Some(views.iter().filter(|view| view.end >= since && !view.tags.is_empty()).count())
     }
 
-    /// Whether nothing tells the joint's angle any more, now that the views are over.
+    /// Returns true where nothing determines the joint's angle any more, now that the views are over.
     pub fn has_no_sensor_now(&self) -> bool {
         self.leaves_no_sensor() || self.lost_since.is_some()
     }

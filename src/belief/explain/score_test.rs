@@ -63,8 +63,8 @@ pub(crate) struct Score {
 }
 
 impl Estimate<'_> {
-    /// All that can be tested, the least likely by chance first; `task`: the arm's angles at the task's targets. A mount
-    /// that explains as much as a link, and is stated less surely, comes before it.
+    /// All that can be tested, the least likely by chance first; `task`: the arm's angles at the task's targets. A
+    /// mount that explains as much as a link, and has a much larger stated sigma, comes before it.
     #[must_use]
     pub fn score_tests(&self, task: &[JointAngles]) -> Vec<ScoreTestResult> {
         let score = self.score();
@@ -82,7 +82,7 @@ impl Estimate<'_> {
     }
 
     /// The mount among `results`, where it explains as much as the link that comes first: behind the last joint that
-    /// the views move no view tells them apart, and the stated sigmas do.
+    /// the views move only the stated sigmas distinguish them.
     fn likelier_mount(&self, results: &[ScoreTestResult]) -> Option<usize> {
         let first = results.first().filter(|first| matches!(first.element, GeometryElement::Joint(1..)))?;
         let (links, camera) = (&self.problem.robot.geometry, &self.problem.robot.camera);

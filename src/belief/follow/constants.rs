@@ -206,6 +206,6 @@ pub(crate) mod view_stream {
     pub(crate) const WAITING_IMAGES: usize = 1000;
     /// Messages kept at most, whatever their rate.
     pub(crate) const WINDOW_MESSAGES: usize = 100_000;
-    /// What is kept of the past: a rest, with what was read before it, s.
+    /// Length of the past that is kept: a rest, with the readings before it, s.
     pub(crate) const WINDOW_S: f64 = LONGEST_REST_S + BACK_S + NEAR_S + 10.0;
 }

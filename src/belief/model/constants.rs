@@ -53,7 +53,7 @@ pub(crate) mod scales {
     pub(crate) const DRIFT_STD_RAD_PER_H: f64 = 1e-3;
     /// Half of the backlash between joint and sensor shaft, rad. Assumed; the views correct it.
     pub(crate) const HALF_PLAY_STD_RAD: f64 = 2e-4;
-    /// Of positions and rotations that a recording gives in place of corners, m and rad. Assumed; the views correct it.
+    /// Noise of recorded positions and rotations, m and rad. Assumed; the views correct it.
     pub(crate) const POSE_STD: [f64; 2] = [0.005, 0.02];
 }
 

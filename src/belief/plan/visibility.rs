@@ -31,7 +31,7 @@ impl Default for VisibilityModel {
 }
 
 impl VisibilityModel {
-    /// Of a usual detector and a usual image.
+    /// Limits of a usual detector and a usual image.
     pub const USUAL: Self = {
         let [min_range_m, max_range_m] = RANGE_M;
         Self {

@@ -21,7 +21,7 @@ pub(crate) mod repair {
 }
 
 pub(crate) mod length_unit {
-    /// Units that lengths may be written in in place of metres, and how many make a metre.
+    /// Units that lengths may be written in instead of metres, and how many make a metre.
     pub(crate) const UNITS: [(&str, f64); 5] =
         [("mm", 1e3), ("cm", 1e2), ("dm", 1e1), ("inches", 1.0 / 0.0254), ("feet", 1.0 / 0.3048)];
     /// A ratio of lengths within this of a unit's is that unit, relative. Assumed: neighbours differ by a factor of two
@@ -30,7 +30,8 @@ pub(crate) mod length_unit {
 }
 
 pub(crate) mod sensor_keys {
-    /// A reversed sensor whose slope is within this of -1 has the scale of its datasheet. Assumed: gears differ by more.
+    /// A reversed sensor whose slope is within this of -1 has the scale of its datasheet. Assumed: gears differ by
+    /// more.
     pub(crate) const SIGN_ALONE: f64 = 0.1;
     /// Digits of a scale, for files: what they leave is below the sigma of any stated gain. Assumed.
     pub(crate) const SIGNIFICANT_DIGITS: i32 = 6;

@@ -220,7 +220,7 @@ fn any_turn_in_words([w, x, y, z]: &[f64; 4]) -> String {
 }
 
 impl MisreadReadings {
-    /// Zeros and the frame of the map are told apart at the arm alone.
+    /// Only at the arm can zeros and the frame of the map be distinguished.
     fn remedy_of_zeros_or_frame(&self) -> String {
         let all = || std::iter::once(&self.found).chain(&self.alternatives);
         let (zeros, frame) = (all().find_map(zeros_remedy), all().find_map(frame_remedy));

@@ -228,14 +228,14 @@ pub enum Refusal {
     CornerNoise {
         /// Of corners averaged over a view.
         residual_px: f64,
-        /// Of one frame, by robot.toml.
+        /// Noise of one frame, by robot.toml.
         stated_px: f64,
         /// Largest residual that is accepted.
         limit_px: f64,
     },
     /// Under the stated corner noise most observations fit nothing, under a larger one nearly all do.
     CornerNoiseUnderstated {
-        /// Of corners averaged over a view, with the larger noise.
+        /// Residual of corners averaged over a view, with the larger noise.
         residual_px: f64,
         /// Of one frame, by robot.toml.
         stated_px: f64,
@@ -524,7 +524,7 @@ impl Refusal {
     }
 }
 
-/// What to do about a sensor that is reversed or of another scale.
+/// Advice for a sensor that is reversed or of another scale.
 fn remedy_of_line(found: Rescaled<'_>) -> String {
     let (joint, line) = (found.joint, found.line());
     match (found.slope, found.input_factor) {

@@ -1,4 +1,4 @@
-//! Keys that put right how a joint is read: of robot.toml for counts, of the input map for readings stated as angles.
+//! Keys that correct how a joint is read: of robot.toml for counts, of the input map for readings stated as angles.
 
 use crate::say::constants::sensor_keys::{SIGN_ALONE, SIGNIFICANT_DIGITS};
 use armcal_core::kinematics::JointKind;

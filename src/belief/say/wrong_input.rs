@@ -10,7 +10,7 @@ use armcal_core::codes::{Code, Coded};
 pub struct WrongInput {
     /// Which, and how it should be read.
     pub input: WrongInputKind,
-    /// What `mismatch` is of.
+    /// Quantity of `mismatch`.
     #[serde(default, skip_serializing_if = "MismatchMeasure::is_of_distances")]
     pub measure: MismatchMeasure,
     /// As it is written: of two tags, where the one is not seen over its distance from the other; of rotations, rad.
@@ -23,7 +23,7 @@ pub struct WrongInput {
     pub size_hint: Option<String>,
 }
 
-/// What tells that an input is wrong.
+/// Evidence that an input is wrong.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MismatchMeasure {

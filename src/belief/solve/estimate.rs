@@ -56,7 +56,7 @@ pub fn estimate<'a>(input: &BundleInput<'a>) -> Option<Estimate<'a>> {
     estimate_with_lengths(input, &[])
 }
 
-/// The same with lengths between blocks that have columns.
+/// Estimates with measured lengths between blocks that have columns.
 #[must_use]
 pub(crate) fn estimate_with_lengths<'a>(input: &BundleInput<'a>, lengths: &[BlockMeasurement]) -> Option<Estimate<'a>> {
     let RobustStart { parameters: start, steps, mut iterations } = robust_start(input);

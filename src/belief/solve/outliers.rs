@@ -24,7 +24,7 @@ pub struct Outlier {
     pub sigmas: f64,
 }
 
-/// What is rejected beyond the one comes back below the other: the limit of each by whether it was used so far.
+/// Limit of each by its use so far: an observation is rejected beyond the one and comes back below the other.
 fn limits_of<const N: usize>(used: [bool; N], [reject, readmit]: [f64; 2]) -> [f64; N] {
     used.map(|is_used| if is_used { reject } else { readmit })
 }

@@ -101,12 +101,12 @@ pub(crate) fn check_pose_variation(name: &str, data: &CaptureData, robot: &Robot
     })
 }
 
-/// What readings of a sensor span at least where its joint moved.
+/// Least span of a sensor's readings where its joint moved.
 fn least_motion_rad(spec: &JointSensorSpec) -> f64 {
     MOVED_SIGMAS * spec.noise_std_counts / spec.counts_per_rad.abs()
 }
 
-/// The joint that has the same readings as `joint`, in whatever unit: they lie on one straight line in all views, and
+/// The joint that has the same readings as `joint`, possibly in another unit: they lie on one straight line in all views, and
 /// two sensors' noise would not let them.
 pub(crate) fn joint_with_same_readings(views: &[View], robot: &Robot, joint: usize) -> Option<usize> {
     (0..robot.n_seen_joints()).find(|&other| other != joint && are_alike(views, robot, [joint, other]))

@@ -80,7 +80,7 @@ fn mean<'a>(frames: impl Iterator<Item = &'a Corners>) -> Option<MeanCorners> {
     (n_frames > 0).then_some(MeanCorners { corners_px, n_frames, scatter_px2 })
 }
 
-/// What repeats another one to the bit counts once.
+/// Frames without those that repeat another one to the bit.
 pub(crate) fn different<'a, Points: Copy + PartialEq + 'a>(frames: impl Iterator<Item = &'a Points>) -> Vec<Points> {
     frames.fold(Vec::new(), |mut different, frame| {
         if !different.contains(frame) {

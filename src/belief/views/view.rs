@@ -53,7 +53,7 @@ impl View {
         (!view.tags.is_empty() || view.gripper_tag.is_some()).then_some(view)
     }
 
-    /// Whether readings and tags are those of `other` to the bit, as no second measurement has them.
+    /// Returns true where readings and tags are those of `other` to the bit, as in no second measurement.
     fn repeats(&self, other: &Self) -> bool {
         let of_tag = |seen: &TagObservation| (seen.tag_idx, seen.center_in_camera_m);
         self.travel_rad == other.travel_rad

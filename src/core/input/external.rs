@@ -316,12 +316,12 @@ mod tests {
         assert!(matches!(problem(12), InputError::NoTopic { .. }));
     }
 
-    /// What a recording of one joint message and one detection has of the tag's corners.
+    /// Corners of the tag in a recording of one joint message and one detection.
     fn corners_read(keys: &str, recorded_px: [[f64; 2]; 4]) -> RawMeasurement {
         let robot = crate::robot::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/titan4")).unwrap();
         let text = format!(
-            "version = 1\nkind = \"input\"\n[joint_sensors]\ntopic = \"/j\"\n[tags]\ntopic = \"/t\"\nuse = \"corners\"\n\
-             {keys}\n"
+            "version = 1\nkind = \"input\"\n[joint_sensors]\ntopic = \"/j\"\n[tags]\ntopic = \"/t\"\n\
+             use = \"corners\"\n{keys}\n"
         );
         let map = parse_input_map(Path::new("map.toml"), &text).unwrap();
         let dir = tempfile::tempdir().unwrap();

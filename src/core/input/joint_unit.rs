@@ -119,7 +119,7 @@ impl Values<'_> {
         self.off_center_rad(unit, reading, joint).abs() <= self.most_rad(joint)
     }
 
-    /// The same where a turn less or more counts: of readings that are wrapped to 0 to 360 deg.
+    /// Allows a turn less or more: readings may be wrapped to 0 to 360 deg.
     fn is_within_a_turn(&self, unit: JointUnit, reading: &Reading, joint: usize) -> bool {
         let off_rad = self.off_center_rad(unit, reading, joint).abs();
         let turn_rad = if self.sensors[joint].moves.is_slide() { 0.0 } else { TAU };
@@ -192,13 +192,13 @@ impl Values<'_> {
         self.readings.iter().flat_map(|reading| (0..self.sensors.len()).map(move |joint| (reading, joint)))
     }
 
-    /// Of the numbers of all joints, those of which `is_so` is true.
+    /// Those numbers of all joints for which `is_so` is true.
     fn share(&self, is_so: impl Fn(&Reading, usize) -> bool) -> f64 {
         let n = (self.readings.len() * self.sensors.len()).max(1) as f64;
         self.each().filter(|(reading, joint)| is_so(reading, *joint)).count() as f64 / n
     }
 
-    /// Of the readings, those of which `is_so` is true.
+    /// Those readings for which `is_so` is true.
     fn share_of_readings(&self, is_so: impl Fn(&Reading) -> bool) -> f64 {
         self.readings.iter().filter(|reading| is_so(reading)).count() as f64 / self.readings.len().max(1) as f64
     }
@@ -209,7 +209,7 @@ impl Values<'_> {
         Some((joint, self.value(reading, joint)))
     }
 
-    /// Of joints that turn, in the stated unit.
+    /// Readings of joints that turn, in the stated unit.
     fn largest(&self) -> f64 {
         let counts = |joint: usize| self.stated == JointUnit::Counts || !self.sensors[joint].moves.is_slide();
         let all = self.each().filter(|(_, joint)| counts(*joint));
@@ -299,7 +299,7 @@ mod tests {
             assert_eq!(names, [a, b].map(|joint| &robot.sensors[joint].joint));
             let lines: Vec<String> = factors.iter().map(|(joint, by)| format!("factor.{joint} = {by:.7}")).collect();
             let keys = format!("unit = \"rad\"\n{}", lines.join("\n"));
-            assert_eq!(checked(&keys, recorded).expect("put right"), None, "{a}, {b}");
+            assert_eq!(checked(&keys, recorded).expect("corrected"), None, "{a}, {b}");
         }
     }
 

@@ -272,7 +272,7 @@ pub struct InputMap {
     pub joint_names: BTreeMap<String, String>,
     /// What the recorded numbers of the joints are.
     pub joint_unit: JointUnit,
-    /// How they become angles, where `joint_unit` is one of angles.
+    /// Lines from readings to angles, where `joint_unit` is one of angles.
     pub joint_lines: JointAngleLines,
     /// LeRobot's calibration, by which its numbers become ticks.
     pub lerobot: Option<LerobotCalibration>,
@@ -297,8 +297,8 @@ pub struct InputMap {
 }
 
 impl InputMap {
-    /// Checks that the joints of `joint_sensors` and the cameras of `further_tags` are of this robot, and that each joint has
-    /// a recorded name of its own.
+    /// Checks that the joints of `joint_sensors` and the cameras of `further_tags` are of this robot, and that each joint
+    /// has a recorded name of its own.
     ///
     /// # Errors
     /// [`FileIssue`] naming `file`, the name and those that the robot has.
@@ -331,7 +331,7 @@ impl InputMap {
         spec.offset_counts + spec.counts_per_rad * stated.angle_rad(value)
     }
 
-    /// How the readings of a joint are stated as angles; `None`: they are counts.
+    /// Line from a joint's readings to its angle; `None`: they are counts.
     #[must_use]
     pub fn stated(&self, spec: &JointSensorSpec) -> Option<StatedAngle> {
         self.joint_lines.of(self.joint_unit, spec)

@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::error::{FileIssue, RobotError};
-use super::stated_angle::StatedAngle;
+pub use super::stated_angle::StatedAngle;
 use crate::kinematics::{Chain, ChainJoint, JointKind};
 use crate::units::Unit;
 
@@ -63,7 +63,7 @@ pub struct JointSensorSpec {
     pub drift_std_rad_per_sqrt_h: f64,
     /// Largest rate that the joint is driven at.
     pub max_rate_rad_s: f64,
-    /// How its readings are stated as angles; `None`: they are counts.
+    /// Line from its readings to its angle; `None`: they are counts.
     pub stated: Option<StatedAngle>,
 }
 
@@ -80,7 +80,7 @@ impl JointSensorSpec {
         self.moves.is_slide() || self.half_range_rad < 0.999 * std::f64::consts::PI
     }
 
-    /// What is recorded at an angle, before it wraps: counts, or a number in the unit of stated angles.
+    /// Recorded number at an angle, before it wraps: counts, or in the unit of stated angles.
     #[must_use]
     pub fn recorded(&self, angle_rad: f64) -> f64 {
         match &self.stated {

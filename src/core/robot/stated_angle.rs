@@ -1,13 +1,13 @@
 //! Joint readings that are recorded as angles, and not as raw counts.
 
-/// What is recorded of a joint, as a line of its angle: `angle = unit_rad factor (recorded - zero)`; of a slide, m.
+/// Line from a joint's angle to its recorded number: `angle = unit_rad factor (recorded - zero)`; of a slide, m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StatedAngle {
     /// One of the unit that the input map states.
     pub unit_rad: f64,
     /// Angle over reading, as the input map corrects it; 1 where it does not.
     pub factor: f64,
-    /// What is recorded at angle zero.
+    /// Recorded number at angle zero.
     pub zero: f64,
 }
 
@@ -18,7 +18,7 @@ impl StatedAngle {
         self.unit_rad * self.factor * (recorded - self.zero)
     }
 
-    /// What is recorded at an angle.
+    /// Recorded number at an angle.
     #[must_use]
     pub fn recorded(&self, angle_rad: f64) -> f64 {
         self.zero + angle_rad / (self.unit_rad * self.factor)

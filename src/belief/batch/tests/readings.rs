@@ -131,7 +131,7 @@ fn the_keys_that_are_advised_for_stated_angles_put_them_right() {
     }
 }
 
-/// Angles are exchanged as they are, whatever scales robot.toml has for the two sensors.
+/// Stated angles are exchanged as they are: the scales of the two sensors in robot.toml do not matter.
 #[test]
 fn exchanged_angles_are_named() {
     for (seed, [a, b]) in [(0, [0, 1]), (2, [3, 4])] {

@@ -1,4 +1,4 @@
-//! Recordings that hold poses of tags in place of corners, with a stated noise or without.
+//! Recordings that hold poses of tags instead of corners, with a stated noise or without.
 
 use nalgebra::Isometry3;
 
@@ -33,7 +33,7 @@ fn with_poses(mut case: Case) -> Case {
     case
 }
 
-/// Whether the rotations are refused for their noise.
+/// Returns true where the rotations are refused for their noise.
 fn has_rotation_noise(seed: u64, rotation_std_rad: Option<f64>) -> bool {
     let noise = TagNoise { position_std_m: POSITION_STD_M, rotation_std_rad };
     let calibration = with_poses(case(seed, None)).calibrated_with(Some(noise));

@@ -95,7 +95,7 @@ fn measured(n_seeds: u64, n_views: usize, worse: [f64; 2]) -> [[f64; 3]; 2] {
     })
 }
 
-/// Copied rows are no further views: what is left are the recorded ones, whatever is fitted and held out.
+/// Copied rows are no further views: what is left are the recorded ones, among fitted and held-out views alike.
 #[test]
 fn views_that_repeat_another_to_the_bit_are_left_out() {
     let robot = titan();

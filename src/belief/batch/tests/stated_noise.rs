@@ -4,7 +4,7 @@ use crate::batch::tests::failures::{Case, case};
 use crate::say::refusal::Refusal;
 use crate::views::view::{TagMeasurement, View};
 
-/// What the corners of a case are off by, averaged over its five frames, px.
+/// Error of a case's corners, averaged over its five frames, px.
 const CORNER_PX: f64 = 0.3 / 2.236;
 
 /// The case as single frames, whose noise robot.toml alone tells.

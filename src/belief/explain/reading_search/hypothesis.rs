@@ -120,7 +120,7 @@ impl Hypothesis {
         all.filter(|one| *one != as_stated).collect()
     }
 
-    /// What is added to its score, for it has more numbers to fit the views with, or is less usual.
+    /// Handicap in its score: it has more numbers to fit the views with, or is less usual.
     pub(crate) fn handicap(&self) -> f64 {
         match self {
             Self::Camera { .. } => CAMERA_HANDICAP,

@@ -17,7 +17,7 @@ use armcal_core::spatial::Pose;
 /// Where the arm sees a tag, base frame, and where the map has it, its own frame.
 type Places = (Vector3<f64>, Vector3<f64>);
 
-/// The arm and its views with the tags as the map has them, whatever was found of tags since.
+/// The arm and its views with the tags as the map has them, without what was found of tags since.
 pub(crate) fn as_given(robot: &Robot, map: &[SurveyedTag], views: &[View]) -> (Robot, Vec<View>) {
     let mut views = views.to_vec();
     for seen in views.iter_mut().flat_map(|view| &mut view.tags).filter(|seen| seen.corners().is_some()) {

@@ -57,7 +57,8 @@ fn poses_otherwise(views: &[&View], tags: &[SurveyedTag], lens: &CameraModel) ->
     recording::readings().into_iter().map(|(input, read)| (input, with(read))).collect()
 }
 
-/// What a scale of all distances means: of pixels the tags' size tells, of positions their unit or the detector's size.
+/// Meaning of a scale of all distances: the tags' size where they are seen in pixels; for positions, their unit or the
+/// detector's size.
 fn of_scale(views: &[&View], robot: &Robot, as_written: &Pairs) -> WrongInput {
     let ratio = as_written.ratio;
     let wrong = |input| wrong_by(as_written, input, None);

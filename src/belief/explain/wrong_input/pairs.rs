@@ -40,7 +40,7 @@ pub(crate) fn mismatch(views: &[&View], tags: &[SurveyedTag], lens: &CameraModel
     Some(Pairs { ratio, mismatch: quantile(&mismatches, 0.5)? })
 }
 
-/// The same of positions without rotations: how far the ratio of the distances of two tags is from that of most.
+/// Mismatch of positions without rotations: how far the ratio of the distances of two tags is from that of most.
 pub(crate) fn distances(views: &[&View], tags: &[SurveyedTag]) -> Option<Pairs> {
     let place_m = |seen: &TagObservation| {
         let tag = tags.get(seen.tag_idx).filter(|tag| tag.is_known())?;

@@ -113,7 +113,7 @@ fn zeros(input_zero: Option<f64>) -> Refusal {
     misread(ReadingError::Zeros { joints: vec![zero] })
 }
 
-/// Of readings that the input map states as angles.
+/// Refusals of readings that the input map states as angles.
 fn of_stated_angles() -> Vec<Refusal> {
     let joint = || "wrist_yaw".to_owned();
     vec![

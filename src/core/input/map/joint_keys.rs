@@ -1,4 +1,4 @@
-//! What the input map says of the joints' readings.
+//! Keys of the input map for the joints' readings.
 
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
@@ -42,14 +42,14 @@ pub(super) struct JointsToml {
     pub lerobot: Option<LerobotToml>,
 }
 
-/// How recorded numbers that are no counts become angles: `angle = factor (recorded - zero)`.
+/// Lines from recorded numbers that are no counts to angles: `angle = factor (recorded - zero)`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct JointAngleLines {
     /// Unit of slides.
     pub slide_unit: SlideUnit,
-    /// By joint, where it is not 1.
+    /// Factor of each joint where it is not 1.
     pub factor: BTreeMap<String, f64>,
-    /// By joint, where it is not 0.
+    /// Zero of each joint where it is not 0.
     pub zero: BTreeMap<String, f64>,
 }
 
@@ -85,7 +85,7 @@ impl JointAngleLines {
         Ok(())
     }
 
-    /// Of readings in `unit`; `None` for counts.
+    /// Lines for readings in `unit`; `None` for counts.
     pub(in crate::input) fn of(&self, unit: JointUnit, spec: &JointSensorSpec) -> Option<StatedAngle> {
         let unit_rad = match unit {
             JointUnit::Counts => return None,

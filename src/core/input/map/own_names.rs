@@ -4,7 +4,7 @@ use super::InputMap;
 use crate::robot::Robot;
 
 impl InputMap {
-    /// What is wrong where two joints have one recorded name. A joint beyond the camera that nobody maps may lack
+    /// Describes two joints that have one recorded name. A joint beyond the camera that nobody maps may lack
     /// readings.
     pub(super) fn shared_name(&self, robot: &Robot) -> Option<String> {
         let joints = robot.joint_names();

@@ -60,7 +60,7 @@ fn likely_time_unit(reader: RowReader<'_>, rows: &[Row]) -> Option<TimeUnit> {
 
 struct PoseReader<'a> {
     rows: RowReader<'a>,
-    /// What the times may be in, where they are too near to each other as stated.
+    /// Unit that the times may be in, where they are too near to each other as stated.
     likely_unit: Option<TimeUnit>,
     recording: ExternalRecording,
     /// [`ExternalDetection::key`] of those in the last frame.
