@@ -81,7 +81,8 @@ pub(crate) mod failure_pattern {
     /// Assumed: single jumps, of one view in five, are no such row in one of a hundred recordings.
     pub(crate) const MIN_LOST: usize = 4;
     pub(crate) const LOST_SHARE: f64 = 0.75;
-    /// Number of times that the line is drawn again through the readings that are not off. Assumed: one time settles nearly all.
+    /// Number of times that the line is drawn again through the readings that are not off. Assumed: one settles nearly
+    /// all.
     pub(crate) const REFITS: usize = 3;
     /// So many right readings at the end show that the sensor is back. Assumed: a wrong one is right by chance in less
     /// than a quarter of the views, three times on end in less than two of a hundred.

@@ -123,7 +123,7 @@ pub(crate) mod hindsight {
 }
 
 pub(crate) mod hypothesis {
-    /// How far a tag, the camera or the base may be knocked aside: one sigma, m and rad. Assumed: wide, the views tell
+    /// How far a tag, the camera or the base may be knocked aside: one sigma, m and rad. Assumed: wide, the views find
     /// it.
     pub(crate) const TAG_STD: [f64; 2] = [0.03, 0.06];
     pub(crate) const MOUNT_STD: [f64; 2] = [0.02, 0.1];

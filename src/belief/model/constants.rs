@@ -41,7 +41,7 @@ pub(crate) mod scales {
     pub const MAX_CAMERAS: usize = 1 + MAX_FURTHER_CAMERAS;
     /// A scale over what robot.toml states, as long as the views say nothing else.
     pub(crate) const AS_STATED: f64 = 1.0;
-    /// Error of a joint whose sensor says nothing, rad. Assumed: wide, the views tell it.
+    /// Error of a joint whose sensor says nothing, rad. Assumed: wide, the views determine it.
     pub(crate) const FREE_JOINT_STD_RAD: f64 = 1.0;
     /// Change of an offset with the oil temperature where no datasheet states it, rad/K. Assumed; the views correct it.
     pub(crate) const OFFSET_STD_RAD_PER_K: f64 = 3e-4;

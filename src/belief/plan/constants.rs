@@ -86,7 +86,7 @@ pub(crate) mod clearance_sight {
     /// A ray that passes a shape's box or sphere by more than this does not meet the shape, however its distance is
     /// rounded.
     pub(crate) const MISS_M: f64 = 1e-3;
-    /// A ray that comes along an axis of a box by less than this share of its way runs beside it.
+    /// A ray that comes along an axis of a box by less than this share of its way passes it.
     pub(crate) const BESIDE: f64 = 1e-9;
 }
 
@@ -178,7 +178,7 @@ pub(crate) mod view_planning_camera_ik {
     /// Nearer and farther from a tag than this there is little to gain: corners leave the image, or are coarse.
     /// Assumed.
     pub(crate) const RANGES_M: [f64; 2] = [0.35, 1.5];
-    /// How far the optical axis may point beside the tag, rad.
+    /// Largest angle between the optical axis and the tag, rad.
     pub(crate) const BESIDE_RAD: f64 = 0.6;
     /// Added to the normal matrix, m^2/rad^2.
     pub(crate) const DAMPING: Damping =

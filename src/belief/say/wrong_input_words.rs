@@ -48,7 +48,7 @@ impl WrongInput {
                  program that writes them"
             }
             WrongInputKind::RecordedRotations => {
-                "record the rotation of the tag in the camera's frame beside its position there, or use the positions \
+                "record the rotation of the tag in the camera's frame as its position is, or use the positions \
                  only (tags.use)"
             }
             WrongInputKind::RecordedUnit(_) => "record positions in metres",

@@ -107,7 +107,7 @@ pub(crate) mod scale {
     pub(crate) const EXPLAINS: f64 = 0.5;
     pub(crate) const MAX_SAMPLES: usize = 400;
     pub(crate) const MAX_ROOTS: usize = 60;
-    /// A tag whose place is less sure than this share of its size tells no distance.
+    /// A tag whose place has a larger sigma than this share of its size gives no distance.
     pub(crate) const SURE_SHARE: f64 = 0.25;
     /// Tags nearer to each other are at one place and tell no scale, m.
     pub(crate) const ONE_PLACE_M: f64 = 1e-6;

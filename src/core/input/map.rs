@@ -297,8 +297,8 @@ pub struct InputMap {
 }
 
 impl InputMap {
-    /// Checks that the joints of `joint_sensors` and the cameras of `further_tags` are of this robot, and that each joint
-    /// has a recorded name of its own.
+    /// Checks that the joints of `joint_sensors` and the cameras of `further_tags` are of this robot, and that each
+    /// joint has a recorded name of its own.
     ///
     /// # Errors
     /// [`FileIssue`] naming `file`, the name and those that the robot has.
