@@ -51,7 +51,7 @@ impl Tried {
     }
 
     /// Returns true where it explains the views nearly as well as the best one. A frame that is turned as a joint turns
-    /// cannot be distinguished from that joint's zero: its handicap decides the order alone, and what it explains better is a part of the
+    /// looks like that joint's zero: its handicap decides the order alone, and what it explains better is a part of the
     /// base that the zero does not have.
     fn is_near(&self, best: &Self) -> bool {
         if best.hypothesis.is_of_map() && matches!(self.hypothesis, Hypothesis::Zeros(_)) {

@@ -136,7 +136,7 @@ pub(crate) mod tag_pairs {
 pub(crate) mod types {
     /// Of a corner in each direction, where neither detections nor settings say it, px. Assumed.
     pub(crate) const CORNER_STD_PX: f64 = 0.3;
-    /// Detections whose corners are farther off than this many standard deviations (rms) are rejected. Assumed.
+    /// Detections whose corners have a larger error than this many standard deviations (rms) are rejected. Assumed.
     pub(crate) const REJECT_SIGMAS: f64 = 5.0;
     /// Images in which two groups of tags must be seen together to become one. Assumed.
     pub(crate) const MIN_LINK_VIEWS: usize = 2;

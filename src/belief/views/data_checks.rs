@@ -106,8 +106,8 @@ fn least_motion_rad(spec: &JointSensorSpec) -> f64 {
     MOVED_SIGMAS * spec.noise_std_counts / spec.counts_per_rad.abs()
 }
 
-/// The joint that has the same readings as `joint`, possibly in another unit: they lie on one straight line in all views,
-/// which two sensors' noise would not allow.
+/// The joint that has the same readings as `joint`, possibly in another unit: they lie on one straight line in all
+/// views, which two sensors' noise would not allow.
 pub(crate) fn joint_with_same_readings(views: &[View], robot: &Robot, joint: usize) -> Option<usize> {
     (0..robot.n_seen_joints()).find(|&other| other != joint && are_alike(views, robot, [joint, other]))
 }
