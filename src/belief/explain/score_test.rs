@@ -86,15 +86,13 @@ impl Estimate<'_> {
     fn likelier_mount(&self, results: &[ScoreTestResult]) -> Option<usize> {
         let first = results.first().filter(|first| matches!(first.element, GeometryElement::Joint(1..)))?;
         let (links, camera) = (&self.problem.robot.geometry, &self.problem.robot.camera);
-        let (of_link, of_mount) = match first.error {
-            ErrorKind::Shift => (links.link_position_std_m, camera.mount_std_m),
-            ErrorKind::Turn => (links.link_rotation_std_rad, camera.mount_std_rad),
-        };
         let is_likelier = |result: &ScoreTestResult| {
-            result.element == GeometryElement::Mount
-                && result.error == first.error
-                && result.chi2 > first.chi2 - ALIKE_CHI2
-                && of_mount > SURER * of_link
+            let (of_link, of_mount) = match result.error {
+                ErrorKind::Shift => (links.link_position_std_m, camera.mount_std_m),
+                ErrorKind::Turn => (links.link_rotation_std_rad, camera.mount_std_rad),
+            };
+            let explains_as_much = result.chi2 > first.chi2 - ALIKE_CHI2;
+            result.element == GeometryElement::Mount && explains_as_much && of_mount > SURER * of_link
         };
         results.iter().position(is_likelier)
     }
