@@ -1,7 +1,7 @@
 //! A lens that is not robot.toml's, before any sensor is blamed: a centre some ten pixels off looks like readings that
 //! are off here and there.
 
-use crate::explain::constants::drawing::MIN_GAIN_NATS;
+use crate::explain::constants::drawing::{LENS_SCALE, MIN_GAIN_NATS};
 use crate::explain::drawing::Drawing;
 use crate::explain::failure_detection::is_suspicious;
 use crate::explain::model_selection::log_evidence_of_all;
@@ -9,7 +9,8 @@ use crate::solve::estimate::{Estimate, estimate};
 use crate::solve::input::BundleInput;
 
 /// `drawing` with the lens of a camera estimated, where `found` looks as if a sensor did not belong, the same with that
-/// lens does not, and nothing else of the drawing explains more.
+/// lens does not, and nothing else of the drawing explains more. A focal length far from the stated one is no lens that
+/// is a little off: another image size, another unit or water come first.
 pub(crate) fn lens_that_fits(drawing: &Drawing, input: &BundleInput<'_>, found: &Estimate<'_>) -> Option<Drawing> {
     if input.joint_prior.is_some() || found.has_positions() || !is_suspicious(found) {
         return None;
@@ -19,10 +20,17 @@ pub(crate) fn lens_that_fits(drawing: &Drawing, input: &BundleInput<'_>, found: 
         let other = Drawing { lenses: [&drawing.lenses[..], &[camera]].concat(), ..drawing.clone() };
         let mut input = input.clone();
         other.apply(&mut input);
-        let by_lens = estimate(&input).filter(|by_lens| !is_suspicious(by_lens))?;
+        let by_lens = estimate(&input).filter(|by_lens| !is_suspicious(by_lens) && is_near(by_lens, camera))?;
         Some((log_evidence_of_all(&by_lens) - before, other))
     };
     let cameras = found.cameras().filter(|camera| !drawing.lenses.contains(camera));
     let (gain, other) = cameras.filter_map(with_lens).max_by(|a, b| a.0.total_cmp(&b.0))?;
     (gain > MIN_GAIN_NATS && drawing.better(input, found, gain).is_none()).then_some(other)
+}
+
+/// Returns true for a focal length within [`LENS_SCALE`] stated sigmas.
+fn is_near(found: &Estimate<'_>, camera: usize) -> bool {
+    let stated = found.problem.robot.camera_at(camera);
+    let mut axes = found.lens(camera).focal_px().into_iter().zip(stated.lens.focal_px());
+    axes.all(|(found_px, stated_px)| (found_px / stated_px - 1.0).abs() <= LENS_SCALE * stated.lens_priors.focal_std)
 }
