@@ -36,8 +36,8 @@ pub struct ViewStream {
     images: VecDeque<Stamp>,
     /// Travel at the last view of a moving arm.
     moved_at: Option<JointAngles>,
-    /// End of the last rest or marked span that a view was made of.
-    rests_until: Stamp,
+    /// What ends before this has been looked at.
+    used_until: Stamp,
     n_views: u32,
 }
 
@@ -63,7 +63,7 @@ impl ViewStream {
             ended: None,
             images: VecDeque::new(),
             moved_at: None,
-            rests_until: Stamp { nanos: i64::MIN },
+            used_until: Stamp { nanos: i64::MIN },
             n_views: 0,
         }
     }
@@ -87,7 +87,7 @@ impl ViewStream {
             }
             Message::Rejects(_) | Message::Temperature(_) | Message::Pressure(_) => self.keep(log_time, message),
             Message::Mark(Mark { start, end, kind: MarkKind::Capture { pose_idx, .. } }) => {
-                views.extend(self.marked((*start, *end), *pose_idx));
+                views.extend(self.marked(*start, *end, *pose_idx));
             }
             _ => {}
         }
@@ -122,8 +122,8 @@ impl ViewStream {
         self.last = Some(*stamp);
         let has_moved = self.rest.is_none_or(|rest| self.leaves(&rest, counts));
         if has_moved {
-            if let Some(rest) = self.rest.filter(|rest| !rest.is_used && stamp.since_s(rest.since) >= SHORTEST_REST_S) {
-                views.extend(self.ended.replace((rest.since, *stamp)).and_then(|span| self.rested(span)));
+            if let Some(rest) = self.rest.filter(|rest| !rest.is_used) {
+                self.ended = Some((rest.since, *stamp));
             }
             let anchor = self.sensors.travel_rad(counts);
             self.rest = Some(Rest { since: *stamp, anchor, is_used: false });
@@ -135,8 +135,7 @@ impl ViewStream {
             self.rest = Some(Rest { is_used: true, ..rest });
             views.extend(self.rested((rest.since, *stamp)));
         }
-        // Views come in the order of time: what moves waits for the rest before it.
-        while self.ended.is_none() && self.images.front().is_some_and(|image| stamp.since_s(*image) > ABOUT_IMAGE_S) {
+        while self.images.front().is_some_and(|image| stamp.since_s(*image) > ABOUT_IMAGE_S) {
             let image = self.images.pop_front();
             views.extend(image.and_then(|image| self.moving(image)));
         }
@@ -151,20 +150,19 @@ impl ViewStream {
         })
     }
 
-    /// The view of a marked span, unless it was looked at already, behind that of a rest that ended before it.
-    fn marked(&mut self, (start, end): (Stamp, Stamp), pose_idx: u32) -> Vec<View> {
-        if start < self.rests_until {
-            return Vec::new();
+    /// The view of a marked span, unless it was looked at already.
+    fn marked(&mut self, start: Stamp, end: Stamp, pose_idx: u32) -> Option<View> {
+        if start < self.used_until {
+            return None;
         }
-        let before = self.ended.take().filter(|(_, rest_end)| *rest_end <= start);
-        let before = before.and_then(|span| self.rested(span));
+        self.ended = self.ended.filter(|(_, rest_end)| *rest_end <= start);
         self.rest = self.rest.map(|rest| Rest { is_used: rest.is_used || rest.since < end, ..rest });
-        before.into_iter().chain(self.view(pose_idx, (start, end))).collect()
+        self.view(pose_idx, (start, end))
     }
 
     /// The view of a rest; nothing where it is short or was looked at already.
     fn rested(&mut self, (since, end): (Stamp, Stamp)) -> Option<View> {
-        let (start, end) = (since.plus_s(SETTLE_S).max(self.rests_until), end.plus_s(-0.1));
+        let (start, end) = (since.plus_s(SETTLE_S).max(self.used_until), end.plus_s(-0.1));
         if end.since_s(start) < SHORTEST_REST_S {
             return None;
         }
@@ -178,7 +176,7 @@ impl ViewStream {
         }
         self.window.make_contiguous();
         let view = view_of_span(self.window.as_slices().0, &self.robot, pose_idx, span)?;
-        self.rests_until = span.1;
+        self.used_until = span.1;
         self.n_views += 1;
         // An arm settles from both sides: which way its sensors' shafts are turned is known in motion alone.
         Some(View { approach: [0.0; MAX_JOINTS], ..view })
@@ -206,7 +204,7 @@ impl ViewStream {
     /// The view of one image of a moving arm.
     fn moving(&mut self, image: Stamp) -> Option<View> {
         let (start, end) = (image.plus_s(-ABOUT_IMAGE_S), image.plus_s(ABOUT_IMAGE_S));
-        if start < self.rests_until {
+        if start < self.used_until {
             return None;
         }
         let belongs = |(_, message): &&(Stamp, Message)| match message {
@@ -229,6 +227,7 @@ impl ViewStream {
             *approach = if rate.abs() < 0.5 * SLOWEST_RAD_S { 0.0 } else { rate.signum() };
         }
         self.moved_at = Some(view.travel_rad);
+        self.used_until = image;
         self.n_views += 1;
         Some(view)
     }
