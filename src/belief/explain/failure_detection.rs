@@ -290,8 +290,7 @@ fn is_beyond_datasheet(robot: &Robot, found: &Estimate<'_>) -> bool {
 }
 
 impl Estimate<'_> {
-    /// Of the joint's estimated angles, without what its sensor slipped by, by its readings; one where they do not
-    /// move.
+    /// Slope of the joint's estimated angles by its readings, its sensor's slips taken off; one where they do not move.
     fn slope(&self, gain: Parameter, column: usize) -> f64 {
         let problem = &self.problem;
         let views = (0..problem.views.len()).filter(|&view_idx| self.uses(view_idx));

@@ -110,7 +110,7 @@ impl Estimate<'_> {
         Some((self.solved.state.joint[column], self.posterior.covariance[(column, column)].max(0.0).sqrt()))
     }
 
-    /// `parameter` as the sensor had it before it slipped: that is what its datasheet tells of.
+    /// `parameter` before the sensor slipped: the datasheet states that.
     pub(crate) fn before_slips(&self, parameter: Parameter) -> f64 {
         let now = self.parameters().get(parameter);
         if parameter.kind != ParameterKind::Offset {

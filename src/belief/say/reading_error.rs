@@ -206,8 +206,8 @@ fn frame_remedy(error: &ReadingError) -> Option<String> {
     let ReadingError::MapFrame { position_m: [x, y, z], turn } = error else { return None };
     let [qw, qx, qy, qz] = turn.map(|value| format!("{value:.4}"));
     Some(format!(
-        "write the tag map in the base's frame: place each pose behind that of the map's frame, position_m = [{x:.3}, \
-         {y:.3}, {z:.3}], quaternion_wxyz = [{qw}, {qx}, {qy}, {qz}]"
+        "write the tag map in the base's frame: multiply each pose from the left by that of the map's frame, \
+         position_m = [{x:.3}, {y:.3}, {z:.3}], quaternion_wxyz = [{qw}, {qx}, {qy}, {qz}]"
     ))
 }
 

@@ -142,7 +142,7 @@ impl Departures {
     }
 }
 
-/// Of `n` tags so many may have moved: more than half of them stay.
+/// Largest number of `n` tags that may have moved: more than half of them stay.
 fn most_moved(n: usize) -> usize {
     n.saturating_sub(MIN_TRUSTED).min(n.saturating_sub(1) / 2)
 }
