@@ -70,6 +70,11 @@ fn calibrated_by(robot: Robot, data: CaptureData) -> Calibration {
 
 /// A sound arm; `locked`: a joint that stands still.
 pub(crate) fn case(seed: u64, locked: Option<usize>) -> Case {
+    case_with_range(seed, locked.map(|joint| (joint, 1e-12)))
+}
+
+/// A sound arm, one joint of which moves within this half range alone, rad.
+pub(crate) fn case_with_range(seed: u64, narrow: Option<(usize, f64)>) -> Case {
     let robot = titan();
     let mut rng = rng(seed, "failed joints");
     let scales = Hyperparameters::datasheet(&robot);
@@ -78,9 +83,9 @@ pub(crate) fn case(seed: u64, locked: Option<usize>) -> Case {
     let drawn = Truth::draw(&robot, &model, &scales, &mut rng);
     model.joints = model_for(&robot, &views(&robot, &drawn, &noise, 6, &mut rng)).joints;
     let mut moving = robot.clone();
-    if let Some(joint) = locked {
+    if let Some((joint, half_range_rad)) = narrow {
         // It stands in the middle; its sensor is straight, so that this is one angle.
-        moving.sensors[joint].half_range_rad = 1e-12;
+        moving.sensors[joint].half_range_rad = half_range_rad;
         model.joints[joint].retain(|kind| matches!(kind, crate::model::parameters::ParameterKind::Offset));
     }
     let truth = Truth::draw(&robot, &model, &scales, &mut rng);

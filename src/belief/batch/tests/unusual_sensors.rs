@@ -1,6 +1,6 @@
 //! A gain that is farther from its datasheet than nearly all are: named, and what the views do not tell is less sure.
 
-use crate::batch::tests::failures::{Case, case};
+use crate::batch::tests::failures::{Case, case_with_range};
 use crate::explain::failures::FailureAdjusted;
 use crate::model::parameters::{JointParameters, ParameterKind};
 use crate::say::finding::FindingKind;
@@ -15,9 +15,9 @@ fn with_estimate<T>(case: &Case, then: impl FnOnce(&mut Estimate<'_>) -> T) -> T
     then(&mut applied.estimate(HyperparameterMode::Given).expect("solved"))
 }
 
-/// A sound arm whose sensors' gains are stated so closely that the largest is so many sigmas off.
+/// A sound arm whose sensors' gains are stated so closely that the largest is `sigmas` off; joint 3 hardly moves.
 fn stated_closely(seed: u64, sigmas: f64) -> Case {
-    let mut case = case(seed, None);
+    let mut case = case_with_range(seed, Some((3, 0.05)));
     for _ in 0..3 {
         let largest = with_estimate(&case, |found| {
             let gains = found.from_datasheet().into_iter().filter(|of| of.parameter.kind == ParameterKind::Gain);
@@ -44,7 +44,7 @@ fn a_covariance_with_wider_priors_is_that_of_an_estimate_with_larger_sigmas() {
         assert!(grown > 1.5, "seed {seed}: {grown}");
         for row in 0..wide.nrows() {
             let ratio = widened[(row, row)] / wide[(row, row)];
-            assert!((ratio - 1.0).abs() < 0.03, "seed {seed}, row {row}: {ratio}");
+            assert!((ratio - 1.0).abs() < 0.1, "seed {seed}, row {row}: {ratio}");
         }
     }
 }
