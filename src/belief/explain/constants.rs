@@ -60,6 +60,9 @@ pub(crate) mod failure_detection {
     pub(crate) const MARGIN: f64 = 30.0;
     /// At most this many failures are looked for beyond those that the readings alone show.
     pub(crate) const MAX_FOUND: usize = 2;
+    /// A joint's error from view to view over its datasheet's linearity: sensors do not have more, after what is smooth
+    /// is taken off.
+    pub(crate) const MAX_OVER_LINEARITY: f64 = 3.0;
 }
 
 pub(crate) mod failure_pattern {

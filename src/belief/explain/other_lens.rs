@@ -3,7 +3,7 @@
 
 use crate::explain::constants::drawing::{LENS_SCALE, MIN_GAIN_NATS};
 use crate::explain::drawing::Drawing;
-use crate::explain::failure_detection::is_suspicious;
+use crate::explain::failure_detection::{has_unsteady_sensor, is_suspicious};
 use crate::explain::model_selection::log_evidence_of_all;
 use crate::solve::estimate::{Estimate, estimate};
 use crate::solve::input::BundleInput;
@@ -12,7 +12,7 @@ use crate::solve::input::BundleInput;
 /// lens does not, and nothing else of the drawing explains more. A focal length far from the stated one is no lens that
 /// is a little off: another image size, another unit or water come first.
 pub(crate) fn lens_that_fits(drawing: &Drawing, input: &BundleInput<'_>, found: &Estimate<'_>) -> Option<Drawing> {
-    if input.joint_prior.is_some() || found.has_positions() || !is_suspicious(found) {
+    if input.joint_prior.is_some() || found.has_positions() || !seems_of_sensors(found) {
         return None;
     }
     let before = log_evidence_of_all(found);
@@ -20,12 +20,17 @@ pub(crate) fn lens_that_fits(drawing: &Drawing, input: &BundleInput<'_>, found: 
         let other = Drawing { lenses: [&drawing.lenses[..], &[camera]].concat(), ..drawing.clone() };
         let mut input = input.clone();
         other.apply(&mut input);
-        let by_lens = estimate(&input).filter(|by_lens| !is_suspicious(by_lens) && is_near(by_lens, camera))?;
+        let by_lens = estimate(&input).filter(|by_lens| !seems_of_sensors(by_lens) && is_near(by_lens, camera))?;
         Some((log_evidence_of_all(&by_lens) - before, other))
     };
     let cameras = found.cameras().filter(|camera| !drawing.lenses.contains(camera));
     let (gain, other) = cameras.filter_map(with_lens).max_by(|a, b| a.0.total_cmp(&b.0))?;
     (gain > MIN_GAIN_NATS && drawing.better(input, found, gain).is_none()).then_some(other)
+}
+
+/// Returns true where a sensor would be blamed, be it for some views or for its errors in all.
+fn seems_of_sensors(found: &Estimate<'_>) -> bool {
+    is_suspicious(found) || has_unsteady_sensor(found)
 }
 
 /// Returns true for a focal length within [`LENS_SCALE`] stated sigmas.

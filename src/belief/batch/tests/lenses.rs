@@ -92,6 +92,28 @@ fn a_centre_that_is_off_is_told_from_sensors_that_are() {
     }
 }
 
+/// Encoders whose datasheet leaves them next to no error: a centre that is less far off makes them vary from view to
+/// view by more than they do, and by less than what looks like readings that are off.
+#[test]
+fn a_centre_that_makes_good_encoders_vary_is_told_from_them() {
+    let mut real = titan();
+    real.sensors.iter_mut().for_each(|spec| spec.linearity_std_rad = 2e-4);
+    let [fx, fy, cx, cy, k1, k2, k3, k4] = real.camera.lens.intrinsics();
+    let mut other = real.clone();
+    other.camera.lens = real.camera.lens.with_intrinsics([fx, fy, cx + 20.0, cy, k1, k2, k3, k4]);
+    for seed in SEEDS.take(6) {
+        let mut case = case(&real, seed, N_VIEWS);
+        let lenses = |case: &Case<'_>| {
+            let input = input(case, &case.views, HyperparameterMode::Fitted);
+            let found = estimate(&input).expect("solved");
+            lens_that_fits(&Drawing::default(), &input, &found).map(|drawing| drawing.lenses)
+        };
+        assert_eq!(lenses(&case), None, "seed {seed}: as it is");
+        case.robot = &other;
+        assert_eq!(lenses(&case), Some(vec![0]), "seed {seed}: another centre");
+    }
+}
+
 /// The farthest corner of all views lies a little beyond the edge of the field of view as robot.toml has it.
 #[test]
 fn a_corner_at_the_edge_of_the_field_of_view_is_no_wall() {
