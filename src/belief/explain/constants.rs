@@ -335,6 +335,14 @@ pub(crate) mod wrong_input_pairs {
     pub(crate) const MIN_PAIRS: usize = 6;
 }
 
+pub(crate) mod wrong_input_positions {
+    /// Fewer positions determine no median. Assumed.
+    pub(crate) const MIN_POSITIONS: usize = 6;
+    /// The datasheet's arm and the tilt of a small tag place the camera to this share of its distance from the tag.
+    /// Assumed.
+    pub(crate) const NEAR_ARM: f64 = 0.25;
+}
+
 pub(crate) mod wrong_input_recording {
     /// A corner may lie so far outside of the stated image: detectors round.
     pub(crate) const BEYOND_IMAGE: f64 = 1.03;
