@@ -14,13 +14,14 @@ use crate::checks::innovations::Innovations;
 use crate::checks::touch_term::TouchUpdate;
 use crate::explain::calibration_prior::PriorConsistency;
 use crate::explain::drawing::Drawing;
-use crate::explain::failure_detection::FailureSearch;
+use crate::explain::failure_detection::{FailureSearch, is_suspicious};
 use crate::explain::failures::Failure;
 use crate::explain::model_selection::{OptionalTerm, Selection};
 use crate::explain::other_lens::lens_that_fits;
 use crate::explain::reading_search::ReadingSearch;
 use crate::explain::setup::{BundleSetup, Clocks, declared};
 use crate::explain::tags::freed::MovedTags;
+use crate::explain::unpaired::unpaired;
 use crate::explain::wrong_input::wrong_input;
 use crate::file::calibration::{Calibration, Status};
 use crate::file::map_table::MapResult;
@@ -370,7 +371,8 @@ impl<'a> BundleCalibration<'a> {
         let drawing = if calibration.refusals.iter().any(is_unbounded) { &nominal } else { &self.drawing };
         let map = self.map.is_none().then_some(&self.surveyed[..]);
         let search = ReadingSearch { robot: &self.data.robot, views: &self.as_read, failures, drawing, map };
-        calibration.refuse_first_for(search.find().map(Refusal::MisreadReadings));
+        let unpaired = || is_suspicious(estimated.by_views()).then(|| unpaired(search.robot, search.views)).flatten();
+        calibration.refuse_first_for(search.find().or_else(unpaired).map(Refusal::MisreadReadings));
     }
 
     fn lens_that_fits(&self, input: &BundleInput<'_>, found: &Estimate<'_>) -> Option<Drawing> {
