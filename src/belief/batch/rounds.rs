@@ -17,7 +17,7 @@ use crate::explain::drawing::Drawing;
 use crate::explain::failure_detection::{FailureSearch, is_suspicious};
 use crate::explain::failures::Failure;
 use crate::explain::model_selection::{OptionalTerm, Selection};
-use crate::explain::other_lens::lens_that_fits;
+use crate::explain::other_lens::{lens_that_fits, of_better_model};
 use crate::explain::reading_search::ReadingSearch;
 use crate::explain::setup::{BundleSetup, Clocks, declared};
 use crate::explain::tags::freed::MovedTags;
@@ -327,7 +327,10 @@ impl<'a> BundleCalibration<'a> {
         let task = self.data.data.task_rests();
         let targets = task.map(|task| task_angles(&diagnosis.robot, task)).unwrap_or_default();
         let at = if targets.is_empty() { found.view_angles() } else { targets };
-        found.report_drawing(&self.drawing, &at, calibration);
+        let input = estimated.setup.input();
+        let of_better_model = |&camera: &usize| Some((camera, of_better_model(&input, camera)?));
+        let models: Vec<_> = self.drawing.lenses.iter().filter_map(of_better_model).collect();
+        found.report_drawing(&self.drawing, &models, &at, calibration);
     }
 
     /// Where the calibration is refused and the images contradict a file, or the readings mean something else than the

@@ -130,6 +130,12 @@ pub(crate) mod model_selection {
     pub(crate) const MIN_RATE_RAD_S: f64 = 0.01;
 }
 
+pub(crate) mod other_lens {
+    /// What a lens of the other model must bring over the stated one, both estimated, nats. Assumed: the models have as
+    /// many numbers, and within a narrow view explain the same.
+    pub(crate) const MODEL_NATS: f64 = 10.0;
+}
+
 pub(crate) mod permutation_test {
     /// Permutations of one test: they resolve probabilities down to 5e-4.
     pub(crate) const N_PERMUTATIONS: usize = 1999;
