@@ -194,17 +194,8 @@ impl fmt::Display for ReadingError {
                      readings of {views} views follow the camera no better than in a random order (p = {p:.2})"
                 )
             }
-            Self::InCircle { joints, recorded } => {
-                let all: Vec<String> =
-                    joints.iter().zip(recorded).map(|(joint, from)| format!("those of {joint} under {from}")).collect();
-                write!(f, "the readings of {} joints are recorded under one another's names: ", joints.len())?;
-                f.write_str(&all.join(", "))
-            }
-            Self::Sum { joint, own, with } => {
-                let of_others = with.iter().map(|other| (other.sign, other.joint.as_str()));
-                let sum = signed_sum(std::iter::once((*own, joint.as_str())).chain(of_others));
-                write!(f, "the reading of {joint} is a sum of angles: {sum}")
-            }
+            Self::InCircle { joints, recorded } => fmt_in_circle(f, joints, recorded),
+            Self::Sum { joint, own, with } => fmt_sum(f, joint, *own, with),
             Self::MapFrame { position_m: [x, y, z], turn } => {
                 write!(f, "the frame of the tag map is not the base's: it lies at ({x:.3}, {y:.3}, {z:.3}) m in it, ")?;
                 write!(f, "turned by {}", any_turn_in_words(turn))
@@ -236,6 +227,20 @@ impl fmt::Display for MisreadReadings {
         }
         self.alternatives.iter().try_for_each(|other| write!(f, " (nearly as likely: {other})"))
     }
+}
+
+/// `the readings of 3 joints are recorded under one another's names: those of waist under elbow`.
+fn fmt_in_circle(f: &mut fmt::Formatter<'_>, joints: &[String], recorded: &[String]) -> fmt::Result {
+    let one = |(joint, from): (&String, &String)| format!("those of {joint} under {from}");
+    let all: Vec<String> = joints.iter().zip(recorded).map(one).collect();
+    let n = joints.len();
+    write!(f, "the readings of {n} joints are recorded under one another's names: {}", all.join(", "))
+}
+
+fn fmt_sum(f: &mut fmt::Formatter<'_>, joint: &str, own: f64, with: &[SignedJoint]) -> fmt::Result {
+    let of_others = with.iter().map(|other| (other.sign, other.joint.as_str()));
+    let sum = signed_sum(std::iter::once((own, joint)).chain(of_others));
+    write!(f, "the reading of {joint} is a sum of angles: {sum}")
 }
 
 /// `elbow + shoulder`, `-elbow - shoulder`.
