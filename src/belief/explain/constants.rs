@@ -280,6 +280,10 @@ pub(crate) mod tags_identity {
     /// A tag is looked at where so many of its observations are rejected, or all the data have it elsewhere.
     pub(crate) const REJECTED_SHARE: f64 = 0.5;
     pub(crate) const MIN_OBSERVATIONS: usize = 3;
+    /// The size of a tag that fits otherwise counts from so many observations and this ratio on: fewer have no spread
+    /// to speak of, and a smaller one moves the tool by less than U95. Assumed.
+    pub(crate) const MIN_SIZED: usize = 5;
+    pub(crate) const LEAST_RATIO_OF_FITTING: f64 = 0.01;
     /// Exchanged ids: so near each other's places, m, and so much nearer than to their own.
     pub(crate) const SAME_PLACE_M: f64 = 0.05;
     pub(crate) const NEARER: f64 = 0.3;
