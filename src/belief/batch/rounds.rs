@@ -31,6 +31,7 @@ use crate::model::parameters::JointParameters;
 use crate::positions::position_problem::PositionProblem;
 use crate::positions::solution::Solution;
 use crate::positions::unobservable::grouped_names;
+use crate::say::reading_error::MisreadReadings;
 use crate::say::refusal::Refusal;
 use crate::say::wrong_input::WrongInput;
 use crate::solve::covariance::{ParameterCovariance, task_angles};
@@ -374,8 +375,19 @@ impl<'a> BundleCalibration<'a> {
         let drawing = if calibration.refusals.iter().any(is_unbounded) { &nominal } else { &self.drawing };
         let map = self.map.is_none().then_some(&self.surveyed[..]);
         let search = ReadingSearch { robot: &self.data.robot, views: &self.as_read, failures, drawing, map };
-        let unpaired = || is_suspicious(estimated.by_views()).then(|| unpaired(search.robot, search.views)).flatten();
-        calibration.refuse_first_for(search.find().or_else(unpaired).map(Refusal::MisreadReadings));
+        calibration.refuse_first_for(search.find().or_else(|| self.unpaired(estimated)).map(Refusal::MisreadReadings));
+    }
+
+    /// With the tags as they were given, where nothing explains the views.
+    fn unpaired(&self, estimated: &Estimated<'_>) -> Option<MisreadReadings> {
+        if !is_suspicious(estimated.by_views()) {
+            return None;
+        }
+        let mut robot = self.data.robot.clone();
+        if self.map.is_none() {
+            robot.tags.clone_from(&self.surveyed);
+        }
+        unpaired(&robot, &self.as_read)
     }
 
     fn lens_that_fits(&self, input: &BundleInput<'_>, found: &Estimate<'_>) -> Option<Drawing> {

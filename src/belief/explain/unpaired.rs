@@ -1,10 +1,11 @@
 //! Are readings and tags of the same instants? A permutation test over the views.
 //!
-//! Where the camera is in each view is known from the tags alone. Whatever is wrong with sensors, zeros or columns, most
-//! joints still move the camera: near readings go with near places. Readings of other instants do not. The statistic is
-//! the largest distance correlation of a joint's readings and the camera's place (Szekely, Rizzo and Bakirov 2007),
-//! against that of readings in a random order. The same of the places where the nominal arm has the camera by these
-//! readings tells whether so many views could show it at all.
+//! Where the camera is in each view is known from the tags alone. Whatever is wrong with sensors, zeros or columns,
+//! most joints still move the camera: near readings go with near places. Readings of other instants do not.
+//!
+//! The statistic is the largest distance correlation of a joint's readings and the camera's place (Szekely, Rizzo and
+//! Bakirov 2007), against that of readings in a random order. The same of the places where the nominal arm has the
+//! camera by these readings tells whether so many views could show it at all.
 
 use nalgebra::{DMatrix, Vector3};
 

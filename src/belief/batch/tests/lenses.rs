@@ -115,8 +115,8 @@ fn a_centre_that_makes_good_encoders_vary_is_told_from_them() {
     }
 }
 
-/// A pinhole that robot.toml calls equidistant, with its own numbers, and the other way round; a lens of the right model
-/// whose centre is off is none.
+/// A pinhole that robot.toml calls equidistant, with its own numbers, and the other way round; a lens of the right
+/// model whose centre is off is none.
 #[test]
 fn a_lens_of_the_other_model_is_told_from_one_that_is_off() {
     let fisheye = titan().camera.lens;

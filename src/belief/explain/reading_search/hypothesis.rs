@@ -130,8 +130,8 @@ impl Hypothesis {
         circles.chain(turning.iter().flat_map(|&joint| Self::sums(joint, &turning))).collect()
     }
 
-    /// Readings of `joint` that contain the angle of any other joint, or of two before it, as one against the base does;
-    /// without those of a single neighbour that are not reversed.
+    /// Readings of `joint` that contain the angle of any other joint, or of two before it, as one against the base
+    /// does; without those of a single neighbour that are not reversed.
     fn sums(joint: usize, turning: &[usize]) -> Vec<Self> {
         let others = || turning.iter().copied().filter(move |&other| other != joint);
         let before = || turning.iter().copied().filter(move |&other| other < joint);
