@@ -14,13 +14,14 @@ use crate::checks::innovations::Innovations;
 use crate::checks::touch_term::TouchUpdate;
 use crate::explain::calibration_prior::PriorConsistency;
 use crate::explain::drawing::Drawing;
-use crate::explain::failure_detection::FailureSearch;
+use crate::explain::failure_detection::{FailureSearch, is_suspicious};
 use crate::explain::failures::Failure;
 use crate::explain::model_selection::{OptionalTerm, Selection};
-use crate::explain::other_lens::lens_that_fits;
+use crate::explain::other_lens::{lens_that_fits, of_better_model};
 use crate::explain::reading_search::ReadingSearch;
 use crate::explain::setup::{BundleSetup, Clocks, declared};
 use crate::explain::tags::freed::MovedTags;
+use crate::explain::unpaired::unpaired;
 use crate::explain::wrong_input::wrong_input;
 use crate::file::calibration::{Calibration, Status};
 use crate::file::map_table::MapResult;
@@ -30,6 +31,7 @@ use crate::model::parameters::JointParameters;
 use crate::positions::position_problem::PositionProblem;
 use crate::positions::solution::Solution;
 use crate::positions::unobservable::grouped_names;
+use crate::say::reading_error::MisreadReadings;
 use crate::say::refusal::Refusal;
 use crate::say::wrong_input::WrongInput;
 use crate::solve::covariance::{ParameterCovariance, task_angles};
@@ -326,7 +328,10 @@ impl<'a> BundleCalibration<'a> {
         let task = self.data.data.task_rests();
         let targets = task.map(|task| task_angles(&diagnosis.robot, task)).unwrap_or_default();
         let at = if targets.is_empty() { found.view_angles() } else { targets };
-        found.report_drawing(&self.drawing, &at, calibration);
+        let input = estimated.setup.input();
+        let of_better_model = |&camera: &usize| Some((camera, of_better_model(&input, camera)?));
+        let models: Vec<_> = self.drawing.lenses.iter().filter_map(of_better_model).collect();
+        found.report_drawing(&self.drawing, &models, &at, calibration);
     }
 
     /// Where the calibration is refused and the images contradict a file, or the readings mean something else than the
@@ -370,7 +375,19 @@ impl<'a> BundleCalibration<'a> {
         let drawing = if calibration.refusals.iter().any(is_unbounded) { &nominal } else { &self.drawing };
         let map = self.map.is_none().then_some(&self.surveyed[..]);
         let search = ReadingSearch { robot: &self.data.robot, views: &self.as_read, failures, drawing, map };
-        calibration.refuse_first_for(search.find().map(Refusal::MisreadReadings));
+        calibration.refuse_first_for(search.find().or_else(|| self.unpaired(estimated)).map(Refusal::MisreadReadings));
+    }
+
+    /// With the tags as they were given, where nothing explains the views.
+    fn unpaired(&self, estimated: &Estimated<'_>) -> Option<MisreadReadings> {
+        if !is_suspicious(estimated.by_views()) {
+            return None;
+        }
+        let mut robot = self.data.robot.clone();
+        if self.map.is_none() {
+            robot.tags.clone_from(&self.surveyed);
+        }
+        unpaired(&robot, &self.as_read)
     }
 
     fn lens_that_fits(&self, input: &BundleInput<'_>, found: &Estimate<'_>) -> Option<Drawing> {

@@ -3,14 +3,15 @@
 
 use crate::checks::block_measurements::LengthInnovation;
 use crate::checks::constants::consistency::{
-    FAR_BEYOND, HELD, LEAST, MAX_NONLINEARITY, MAX_OVER_LINEARITY, MAX_UNCONFIRMED, NAMED_SIGMAS, NAMED_WALK_NATS,
-    WALK_SIGNIFICANCE, WALKED, WORN, WORTH_M,
+    FAR_BEYOND, HELD, LEAST, MAX_NONLINEARITY, MAX_UNCONFIRMED, NAMED_SIGMAS, NAMED_WALK_NATS, WALK_SIGNIFICANCE,
+    WALKED, WORN, WORTH_M,
 };
 pub(crate) use crate::checks::constants::consistency::{MAX_OUTLIERS, MAX_SIGMAS_OFF};
 use crate::checks::innovations::{Innovations, JointInnovation};
 use crate::checks::marginal::FromDatasheet;
 use crate::checks::observability::{Observability, observability};
 use crate::explain::constants::tags_departure::TAILS;
+use crate::explain::failure_detection::most_unsteady_rad;
 use crate::explain::score_test::{GeometryElement, ScoreTestResult};
 use crate::file::calibration::Calibration;
 use crate::file::validity::Extrapolation;
@@ -221,9 +222,7 @@ impl VerdictInput<'_> {
             let scales = self.found.scales();
             let walked_rad = if self.found.model.walk.is_some() { scales.walk_std_rad[joint] } else { 0.0 };
             let std_rad = scales.joint_std_rad[joint];
-            // Its noise is no error of its own: where linearity is stated as none, that is what differs.
-            let noise_rad = (spec.noise_std_counts / spec.counts_per_rad).abs();
-            let limit_rad = MAX_OVER_LINEARITY * spec.linearity_std_rad.max(noise_rad).max(stated.joint_std_rad[joint]);
+            let limit_rad = most_unsteady_rad(robot, joint, &stated);
             let check = Check::at_most(
                 format!("{}: error from view to view, {}", spec.joint, spec.moves.si()),
                 std_rad,

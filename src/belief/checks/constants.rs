@@ -112,9 +112,6 @@ pub(crate) mod consistency {
     /// Geometry that would move the tool by less than this, and by less than the predicted error, is no reason to
     /// refuse, m.
     pub(crate) const WORTH_M: f64 = 0.004;
-    /// A joint's error from view to view over its datasheet's linearity: sensors do not have more, after what is smooth
-    /// is taken off.
-    pub(crate) const MAX_OVER_LINEARITY: f64 = 3.0;
     /// Nonlinearity over the datasheet's above which a sensor is called worn, and above which it is no such sensor any
     /// more.
     pub(crate) const WORN: f64 = 3.0;

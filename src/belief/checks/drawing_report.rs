@@ -17,12 +17,14 @@ use crate::explain::tags::identity::TagFault;
 use crate::explain::wrong_input::map::margin_hint;
 use crate::file::calibration::Calibration;
 use crate::model::blocks::Block;
+use crate::say;
 use crate::say::finding::{Finding, FindingKind, FindingUnit};
 use crate::say::geometry_error::{BASE, ErrorKind, GeometryError};
 use crate::say::refusal::Refusal;
 use crate::solve::estimate::Estimate;
 use armcal_core::codes::{Coded, Warning};
 use armcal_core::joints::JointAngles;
+use armcal_core::optics::CameraModel;
 use armcal_core::robot::Robot;
 
 mod sag_report;
@@ -47,8 +49,15 @@ struct Departure {
 }
 
 impl Estimate<'_> {
-    /// Writes what is not as drawn to `calibration`, the most telling first; `task`: angles at which the tool matters.
-    pub(crate) fn report_drawing(&self, drawing: &Drawing, task: &[JointAngles], calibration: &mut Calibration) {
+    /// Writes what is not as drawn to `calibration`, the most telling first; `task`: angles at which the tool matters;
+    /// `models`: cameras whose lens is of the other model, and that lens.
+    pub(crate) fn report_drawing(
+        &self,
+        drawing: &Drawing,
+        models: &[(usize, CameraModel)],
+        task: &[JointAngles],
+        calibration: &mut Calibration,
+    ) {
         let all = self.link_departures(task).chain(self.mount_departures());
         let mut found: Vec<Departure> = all.collect();
         found.sort_by(|a, b| b.weight.total_cmp(&a.weight));
@@ -67,7 +76,10 @@ impl Estimate<'_> {
         calibration.refuse_first_for(self.lenses().filter_map(|(number, at)| self.lens_beyond_bound(number, at)));
         calibration.refuse_for(drawing.tags.iter().find_map(|fault| self.size_beyond_bound(fault)));
         let of_tags = drawing.tags.iter().filter_map(|fault| self.tag_finding(fault));
-        let of_lenses = self.lenses().map(|(number, at)| self.lens_finding(number, at));
+        let of_lenses = self.lenses().map(|(number, at)| {
+            let other = models.iter().find(|(camera, _)| *camera == number);
+            other.map_or_else(|| self.lens_finding(number, at), |(_, lens)| self.lens_model_finding(number, lens))
+        });
         let left_out = self.left_out_tags().map(|(tag, n)| self.left_out_finding(tag, n));
         for (finding, words) in self.sag_findings(task).into_iter().chain(of_lenses).chain(of_tags).chain(left_out) {
             warnings.push(Warning::new(finding.code(), words));
@@ -191,6 +203,14 @@ impl Estimate<'_> {
         );
         let (size, unit) = (Some(ratio), Some(FindingUnit::One));
         let kind = FindingKind::Lens;
+        (Finding { kind, name, size, unit, tool_error_m: None, time_s: None, repaired: true }, words)
+    }
+
+    /// A lens that has columns, and is of the other model.
+    fn lens_model_finding(&self, number: usize, lens: &CameraModel) -> (Finding, String) {
+        let name = if number == 0 { "camera".to_owned() } else { self.problem.robot.camera_at(number).name.clone() };
+        let words = say::other_lens_model(&name, lens);
+        let (kind, size, unit) = (FindingKind::LensModel, None, None);
         (Finding { kind, name, size, unit, tool_error_m: None, time_s: None, repaired: true }, words)
     }
 

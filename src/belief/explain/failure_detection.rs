@@ -7,7 +7,7 @@
 //! of the evidence, MacKay 1992, with a round figure), must fall by `MARGIN`.
 
 use crate::explain::constants::failure_detection::{
-    LARGE_STD_RAD, MANY_REJECTED, MARGIN, MAX_FOUND, PER_READING, PER_STEP,
+    LARGE_STD_RAD, MANY_REJECTED, MARGIN, MAX_FOUND, MAX_OVER_LINEARITY, PER_READING, PER_STEP,
 };
 use crate::explain::drawing::Drawing;
 use crate::explain::failure_pattern::{FailurePattern, MIN_STILL_VIEWS, Readings, n_still};
@@ -18,6 +18,7 @@ use crate::file::calibration::Calibration;
 use crate::measure::ObservationTerm;
 use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::model::prior::steps_of;
+use crate::model::scales::Hyperparameters;
 use crate::solve::constants::outliers::LIMITS;
 use crate::solve::estimate::{Estimate, estimate};
 use crate::solve::input::HyperparameterMode;
@@ -307,6 +308,22 @@ impl Estimate<'_> {
         let squares = sum(0);
         if squares > 0.0 { sum(1) / squares } else { 1.0 }
     }
+}
+
+/// Error from view to view above which a joint's sensor is none of its datasheet's, rad; `stated`: the datasheet's.
+pub(crate) fn most_unsteady_rad(robot: &Robot, joint: usize, stated: &Hyperparameters) -> f64 {
+    let spec = &robot.sensors[joint];
+    // Its noise is no error of its own: where linearity is stated as none, that is what differs.
+    let noise_rad = (spec.noise_std_counts / spec.counts_per_rad).abs();
+    MAX_OVER_LINEARITY * spec.linearity_std_rad.max(noise_rad).max(stated.joint_std_rad[joint])
+}
+
+/// Returns true where the sensor of a joint would be refused for its errors from view to view.
+pub(crate) fn has_unsteady_sensor(found: &Estimate<'_>) -> bool {
+    let robot = found.problem.robot;
+    let stated = Hyperparameters::datasheet(robot);
+    let is_unsteady = |joint: usize| found.scales().joint_std_rad[joint] > most_unsteady_rad(robot, joint, &stated);
+    (0..found.problem.n_seen_joints).any(is_unsteady)
 }
 
 /// Whether an estimate looks as if some sensor did not belong.

@@ -1,8 +1,8 @@
 //! What else could be so: other explanations of the same views, compared by their evidence.
 //!
-//! `setup` estimates under one of them. Sensors: `failure_detection`, `slips`, `walk`; readings: `reading_search`;
-//! tags: `tags`; links, lens, sag: `drawing`, told beforehand by `score_test`; terms of a sensor: `model_selection`;
-//! files that the images contradict: `wrong_input`; an earlier calibration: `calibration_prior`.
+//! `setup` estimates under one of them. Sensors: `failure_detection`, `slips`, `walk`; readings: `reading_search`,
+//! `unpaired`; tags: `tags`; links, lens, sag: `drawing`, told beforehand by `score_test`; terms of a sensor:
+//! `model_selection`; files that the images contradict: `wrong_input`; an earlier calibration: `calibration_prior`.
 
 pub(crate) mod angles_by_camera;
 pub(crate) mod baseline;
@@ -21,5 +21,6 @@ pub(crate) mod setup;
 pub(crate) mod slips;
 pub(crate) mod step_test;
 pub(crate) mod tags;
+pub(crate) mod unpaired;
 pub(crate) mod walk;
 pub(crate) mod wrong_input;

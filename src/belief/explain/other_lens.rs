@@ -2,17 +2,21 @@
 //! are off here and there.
 
 use crate::explain::constants::drawing::{LENS_SCALE, MIN_GAIN_NATS};
+use crate::explain::constants::other_lens::MODEL_NATS;
 use crate::explain::drawing::Drawing;
-use crate::explain::failure_detection::is_suspicious;
+use crate::explain::failure_detection::{has_unsteady_sensor, is_suspicious};
 use crate::explain::model_selection::log_evidence_of_all;
+use crate::explain::wrong_input::lens::of_other_model;
 use crate::solve::estimate::{Estimate, estimate};
 use crate::solve::input::BundleInput;
+use armcal_core::optics::CameraModel;
+use armcal_core::robot::Robot;
 
 /// `drawing` with the lens of a camera estimated, where `found` looks as if a sensor did not belong, the same with that
 /// lens does not, and nothing else of the drawing explains more. A focal length far from the stated one is no lens that
 /// is a little off: another image size, another unit or water come first.
 pub(crate) fn lens_that_fits(drawing: &Drawing, input: &BundleInput<'_>, found: &Estimate<'_>) -> Option<Drawing> {
-    if input.joint_prior.is_some() || found.has_positions() || !is_suspicious(found) {
+    if input.joint_prior.is_some() || found.has_positions() || !seems_of_sensors(found) {
         return None;
     }
     let before = log_evidence_of_all(found);
@@ -20,12 +24,44 @@ pub(crate) fn lens_that_fits(drawing: &Drawing, input: &BundleInput<'_>, found: 
         let other = Drawing { lenses: [&drawing.lenses[..], &[camera]].concat(), ..drawing.clone() };
         let mut input = input.clone();
         other.apply(&mut input);
-        let by_lens = estimate(&input).filter(|by_lens| !is_suspicious(by_lens) && is_near(by_lens, camera))?;
+        let by_lens = estimate(&input).filter(|by_lens| !seems_of_sensors(by_lens) && is_near(by_lens, camera))?;
         Some((log_evidence_of_all(&by_lens) - before, other))
     };
     let cameras = found.cameras().filter(|camera| !drawing.lenses.contains(camera));
     let (gain, other) = cameras.filter_map(with_lens).max_by(|a, b| a.0.total_cmp(&b.0))?;
     (gain > MIN_GAIN_NATS && drawing.better(input, found, gain).is_none()).then_some(other)
+}
+
+/// The lens of the other model as estimated, where it explains the views much better than the lens that is stated and
+/// estimated, as `input` has it; with the stated distortion, or from none.
+pub(crate) fn of_better_model(input: &BundleInput<'_>, camera: usize) -> Option<CameraModel> {
+    let stated = input.robot.camera_at(camera).lens;
+    let before = log_evidence_of_all(&estimate(input)?);
+    let without = of_other_model(&stated);
+    let explained = |lens: CameraModel| {
+        let robot = with_lens(input.robot, camera, lens);
+        let mut views = input.views.to_vec();
+        views.iter_mut().filter(|view| view.camera == camera).for_each(|view| view.see_through(&robot));
+        let found = estimate(&BundleInput { robot: &robot, views: &views, ..input.clone() })?;
+        Some((log_evidence_of_all(&found) - before, *found.lens(camera)))
+    };
+    let others = [without.with_intrinsics(stated.intrinsics()), without];
+    let (gain, lens) = others.into_iter().filter_map(explained).max_by(|a, b| a.0.total_cmp(&b.0))?;
+    (gain > MODEL_NATS).then_some(lens)
+}
+
+fn with_lens(robot: &Robot, camera: usize, lens: CameraModel) -> Robot {
+    let mut robot = robot.clone();
+    match camera.checked_sub(1) {
+        None => robot.camera.lens = lens,
+        Some(further) => robot.further_cameras[further].lens = lens,
+    }
+    robot
+}
+
+/// Returns true where a sensor would be blamed, be it for some views or for its errors in all.
+fn seems_of_sensors(found: &Estimate<'_>) -> bool {
+    is_suspicious(found) || has_unsteady_sensor(found)
 }
 
 /// Returns true for a focal length within [`LENS_SCALE`] stated sigmas.

@@ -92,6 +92,22 @@ impl TimeOrder {
     }
 }
 
+/// Probability of as large a statistic of the order of `n` in a random order.
+pub(crate) fn p_of_order(name: &str, n: usize, statistic: impl Fn(&[usize]) -> f64) -> f64 {
+    let mut order: Vec<usize> = (0..n).collect();
+    let observed = statistic(&order);
+    let mut rng = stream_rng(0, name);
+    let mut above = 0;
+    for tried in 1..=N_PERMUTATIONS {
+        order.shuffle(&mut rng);
+        above += usize::from(statistic(&order) >= observed);
+        if above == ENOUGH_ABOVE {
+            return above as f64 / tried as f64;
+        }
+    }
+    (above + 1) as f64 / (N_PERMUTATIONS + 1) as f64
+}
+
 impl Estimate<'_> {
     /// The errors of a joint as a test of their order takes them. What the model has as smooth in time is given back,
     /// and regressed on where it is no larger than stated: warmth is no walk, but takes up one.

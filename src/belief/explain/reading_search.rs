@@ -10,7 +10,7 @@ mod hypothesis;
 mod map_frame;
 
 use crate::explain::constants::reading_search::{
-    ALTERNATIVE, MARGIN, MAX_ALTERNATIVES, MAX_ESTIMATED, MAX_OF_CAMERA, MAX_VIEWS, MIN_SIGMAS,
+    ALTERNATIVE, MARGIN, MAX_ALTERNATIVES, MAX_COMPOSITE, MAX_ESTIMATED, MAX_OF_CAMERA, MAX_VIEWS, MIN_SIGMAS,
 };
 use std::f64::consts::TAU;
 
@@ -22,7 +22,7 @@ use crate::explain::failures::{Failure, FailureAdjusted};
 use crate::explain::reading_search::hypothesis::{Hypothesis, SCALE_STD, ZERO_STD_RAD, has_known_mount};
 use crate::model::parameters::JointParameters;
 use crate::positions::position_problem::PositionProblem;
-use crate::say::reading_error::{JointZero, MisreadReadings, ReadingError};
+use crate::say::reading_error::{JointZero, MisreadReadings, ReadingError, SignedJoint};
 use crate::solve::estimate::{Estimate, estimate};
 use crate::solve::input::HyperparameterMode;
 use crate::views::view::View;
@@ -175,12 +175,16 @@ impl ReadingSearch<'_> {
             let views = self.views_by(hypothesis);
             views.iter().map(of_view).sum::<f64>() / views.len().max(1) as f64
         };
-        let mut with_costs: Vec<(f64, Hypothesis)> = all.into_iter().map(|one| (cost(&one), one)).collect();
-        with_costs.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let likely = with_costs.into_iter().map(|(_, hypothesis)| hypothesis);
-        let (of_camera, of_readings): (Vec<_>, Vec<_>) = likely.partition(Hypothesis::is_of_camera);
+        let by_cost = |all: Vec<Hypothesis>| {
+            let mut with_costs: Vec<(f64, Hypothesis)> = all.into_iter().map(|one| (cost(&one), one)).collect();
+            with_costs.sort_by(|a, b| a.0.total_cmp(&b.0));
+            with_costs.into_iter().map(|(_, hypothesis)| hypothesis)
+        };
+        let (of_camera, of_readings): (Vec<_>, Vec<_>) = by_cost(all).partition(Hypothesis::is_of_camera);
+        let composite = by_cost(Hypothesis::composite(self.robot)).take(MAX_COMPOSITE);
         let n_readings = MAX_ESTIMATED - MAX_OF_CAMERA;
-        of_readings.into_iter().take(n_readings).chain(of_camera.into_iter().take(MAX_OF_CAMERA)).collect()
+        let simple = of_readings.into_iter().take(n_readings).chain(of_camera.into_iter().take(MAX_OF_CAMERA));
+        simple.chain(composite).collect()
     }
 
     fn name(&self, joint: usize) -> String {
@@ -239,11 +243,19 @@ impl ReadingSearch<'_> {
                 let moved: Vec<usize> = (0..order.len()).filter(|&joint| order[joint] != joint).collect();
                 match moved[..] {
                     [a, b] => ReadingError::Exchanged { joints: [a, b].map(name) },
+                    [a, b, c] => {
+                        let recorded = [a, b, c].map(|joint| name(order[joint])).to_vec();
+                        ReadingError::InCircle { joints: [a, b, c].map(name).to_vec(), recorded }
+                    }
                     _ => ReadingError::Reversed { joints: (0..order.len()).map(name).collect() },
                 }
             }
             Hypothesis::Coupled { joint, with, sign } => {
                 ReadingError::Coupled { joint: name(*joint), with: name(*with), sign: *sign }
+            }
+            Hypothesis::Sum { joint, own, with } => {
+                let with = with.iter().map(|(other, sign)| SignedJoint { joint: name(*other), sign: *sign });
+                ReadingError::Sum { joint: name(*joint), own: *own, with: with.collect() }
             }
             Hypothesis::OtherTurns(joints) => {
                 let turn_counts = |joint: &usize| (TAU * self.robot.sensors[*joint].counts_per_rad).abs();
@@ -317,9 +329,16 @@ fn concerns_same(a: &ReadingError, b: &ReadingError) -> bool {
         ReadingError::Coupled { joint, with, .. } | ReadingError::Alike { joint, with, .. } => {
             vec![joint.clone(), with.clone()]
         }
+        ReadingError::InCircle { joints, recorded } => [&joints[..], recorded].concat(),
+        ReadingError::Sum { joint, with, .. } => {
+            std::iter::once(joint).chain(with.iter().map(|other| &other.joint)).cloned().collect()
+        }
         ReadingError::Zeros { joints } => joints.iter().map(|zero| zero.joint.clone()).collect(),
         ReadingError::Scaled { joint, .. } => vec![joint.clone()],
-        ReadingError::Shifted { .. } | ReadingError::Camera { .. } | ReadingError::MapFrame { .. } => Vec::new(),
+        ReadingError::Shifted { .. }
+        | ReadingError::Unpaired { .. }
+        | ReadingError::Camera { .. }
+        | ReadingError::MapFrame { .. } => Vec::new(),
     };
     std::mem::discriminant(a) == std::mem::discriminant(b) && joints(a) == joints(b)
 }

@@ -46,6 +46,8 @@ pub enum FindingKind {
     TagLeftOut,
     /// The lens against robot.toml; the size is the relative error of its focal length.
     Lens,
+    /// The lens is of the other model: a fisheye called a pinhole, or the other way round.
+    LensModel,
     /// A link's length or twist against the drawing.
     Link,
     /// A joint or the base's mount that gives under the arm's weight, or a load at the tool: the size is its compliance
@@ -83,7 +85,7 @@ impl Coded for FindingKind {
             Self::TagSize => Code::TagSize,
             Self::TagSwapped => Code::TagSwapped,
             Self::TagLeftOut => Code::TagLeftOut,
-            Self::Lens => Code::Lens,
+            Self::Lens | Self::LensModel => Code::Lens,
             Self::Link => Code::Link,
             Self::Sag => Code::Sag,
             Self::CameraMount => Code::CameraMount,

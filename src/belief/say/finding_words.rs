@@ -1,6 +1,7 @@
 //! Findings and events in words.
 
 use crate::say::finding::{Finding, FindingKind, FindingUnit};
+use armcal_core::optics::{CameraModel, LensModel};
 
 impl FindingKind {
     /// In words: `tag moved`.
@@ -13,6 +14,7 @@ impl FindingKind {
             Self::TagSwapped => "tags swapped",
             Self::TagLeftOut => "tag left out",
             Self::Lens => "lens differs from robot.toml",
+            Self::LensModel => "lens of another model than robot.toml says",
             Self::Link => "link differs from the URDF",
             Self::Sag => "compliance under weight",
             Self::CameraMount => "camera mount differs",
@@ -116,6 +118,18 @@ pub(crate) fn reading_in_views(what: &str, [n_there, n]: [usize; 2], numbers: &[
 /// `the reading is off in 13 of the last 14 views, since view 27`.
 pub(crate) fn lost_reading([n_off, n_since]: [usize; 2], number: u32) -> String {
     format!("the reading is off in {n_off} of the last {n_since} views, since view {number}")
+}
+
+/// A lens of the other model, as it was found.
+pub(crate) fn other_lens_model(camera: &str, lens: &CameraModel) -> String {
+    let model = if matches!(lens.lens, LensModel::Radtan(_)) { "pinhole" } else { "equidistant" };
+    let ([fx, fy], [cx, cy]) = (lens.focal_px(), lens.center_px());
+    let distortion: Vec<String> = lens.distortion().iter().map(|k| format!("{k:.4}")).collect();
+    format!(
+        "{camera}: model = \"{model}\" explains the images better, with focal_px = [{fx:.1}, {fy:.1}], center_px = \
+         [{cx:.1}, {cy:.1}], distortion = [{}]; the estimate uses the stated model. Measure the intrinsics again",
+        distortion.join(", ")
+    )
 }
 
 /// A walk of an offset, so large over the views (std), and its effect.

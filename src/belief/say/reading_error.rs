@@ -29,6 +29,15 @@ pub struct JointZero {
     pub input_zero: Option<f64>,
 }
 
+/// A joint whose angle is in another joint's reading.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct SignedJoint {
+    /// Name of the joint in the URDF.
+    pub joint: String,
+    /// 1 where it is added, -1 where it is subtracted.
+    pub sign: f64,
+}
+
 /// One way in which readings differ from the angles that they are read as.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", tag = "error")]
@@ -42,6 +51,22 @@ pub enum ReadingError {
     Reversed {
         /// Their names in the URDF, base first.
         joints: Vec<String>,
+    },
+    /// Several joints have one another's readings, in a circle.
+    InCircle {
+        /// Their names in the URDF.
+        joints: Vec<String>,
+        /// The joint under whose name each one's readings are recorded.
+        recorded: Vec<String>,
+    },
+    /// One joint's reading is a sum of its own angle and those of other joints.
+    Sum {
+        /// Name of the joint in the URDF.
+        joint: String,
+        /// 1, or -1 where its own angle is subtracted.
+        own: f64,
+        /// The others.
+        with: Vec<SignedJoint>,
     },
     /// One joint's reading contains another joint's angle.
     Coupled {
@@ -87,6 +112,13 @@ pub enum ReadingError {
     Shifted {
         /// So many views later are its own readings; negative: before.
         views: i32,
+    },
+    /// The views have the joint readings of other instants, in no order that was found.
+    Unpaired {
+        /// Views that were looked at.
+        views: usize,
+        /// Probability that readings in a random order go with the camera's places as well.
+        p: f64,
     },
     /// The tag map is in another frame than the base's.
     MapFrame {
@@ -155,6 +187,15 @@ impl fmt::Display for ReadingError {
                 let side = if *views > 0 { "previous" } else { "next" };
                 write!(f, "each view has the joint readings of the {side} one")
             }
+            Self::Unpaired { views, p } => {
+                write!(
+                    f,
+                    "joint readings and tags are not of the same instants: the tags of each view fit the map, but the \
+                     readings of {views} views follow the camera no better than in a random order (p = {p:.2})"
+                )
+            }
+            Self::InCircle { joints, recorded } => fmt_in_circle(f, joints, recorded),
+            Self::Sum { joint, own, with } => fmt_sum(f, joint, *own, with),
             Self::MapFrame { position_m: [x, y, z], turn } => {
                 write!(f, "the frame of the tag map is not the base's: it lies at ({x:.3}, {y:.3}, {z:.3}) m in it, ")?;
                 write!(f, "turned by {}", any_turn_in_words(turn))
@@ -186,6 +227,36 @@ impl fmt::Display for MisreadReadings {
         }
         self.alternatives.iter().try_for_each(|other| write!(f, " (nearly as likely: {other})"))
     }
+}
+
+/// `the readings of 3 joints are recorded under one another's names: those of waist under elbow`.
+fn fmt_in_circle(f: &mut fmt::Formatter<'_>, joints: &[String], recorded: &[String]) -> fmt::Result {
+    let one = |(joint, from): (&String, &String)| format!("those of {joint} under {from}");
+    let all: Vec<String> = joints.iter().zip(recorded).map(one).collect();
+    let n = joints.len();
+    write!(f, "the readings of {n} joints are recorded under one another's names: {}", all.join(", "))
+}
+
+fn fmt_sum(f: &mut fmt::Formatter<'_>, joint: &str, own: f64, with: &[SignedJoint]) -> fmt::Result {
+    let of_others = with.iter().map(|other| (other.sign, other.joint.as_str()));
+    let sum = signed_sum(std::iter::once((own, joint)).chain(of_others));
+    write!(f, "the reading of {joint} is a sum of angles: {sum}")
+}
+
+/// `elbow + shoulder`, `-elbow - shoulder`.
+fn signed_sum<'a>(terms: impl Iterator<Item = (f64, &'a str)>) -> String {
+    let mut sum = String::new();
+    for (sign, name) in terms {
+        let sign = match (sign < 0.0, sum.is_empty()) {
+            (true, true) => "-",
+            (false, true) => "",
+            (true, false) => " - ",
+            (false, false) => " + ",
+        };
+        sum.push_str(sign);
+        sum.push_str(name);
+    }
+    sum
 }
 
 /// `None` of all that are no zeros.
@@ -246,6 +317,18 @@ impl MisreadReadings {
                 let names: Vec<String> = pairs.map(|(joint, recorded)| format!("{joint} = \"{recorded}\"")).collect();
                 format!("reverse the names in [joint_sensors] of the input map: names = {{ {} }}", names.join(", "))
             }
+            ReadingError::InCircle { joints, recorded } => {
+                let lines: Vec<String> = joints.iter().zip(recorded).map(|(a, b)| format!("{a} = \"{b}\"")).collect();
+                format!("name their readings in [joint_sensors] of the input map: names = {{ {} }}", lines.join(", "))
+            }
+            ReadingError::Sum { joint, own, with } => {
+                let of_others = with.iter().map(|other| (-own * other.sign, other.joint.as_str()));
+                let sum = signed_sum(std::iter::once((*own, joint.as_str())).chain(of_others));
+                format!(
+                    "record the angle of {joint} relative to the link before it, which is {sum} of the recorded \
+                     columns; the input map has no key for sums"
+                )
+            }
             ReadingError::Coupled { joint, with, .. } => {
                 format!("record the angle of {joint} relative to the link before it, without that of {with}")
             }
@@ -264,6 +347,11 @@ impl MisreadReadings {
                 "give each view the joint readings of its own pose: check the rows of the table, or the stamps"
                     .to_owned()
             }
+            ReadingError::Unpaired { .. } => {
+                "give each view the joint readings of its own pose: check the time column or the stamps, the order of \
+                 the rows, and how joints and tags were put together"
+                    .to_owned()
+            }
             ReadingError::Camera { link, turn } => {
                 let link = link.as_ref().map(|link| format!("link = \"{link}\""));
                 let [w, x, y, z] = turn.map(|value| format!("{value:.4}"));
@@ -279,13 +367,15 @@ impl MisreadReadings {
 impl Coded for MisreadReadings {
     fn code(&self) -> Code {
         match self.found {
-            ReadingError::Exchanged { .. } | ReadingError::Reversed { .. } => Code::JointsExchanged,
-            ReadingError::Coupled { .. } => Code::JointsCoupled,
+            ReadingError::Exchanged { .. } | ReadingError::Reversed { .. } | ReadingError::InCircle { .. } => {
+                Code::JointsExchanged
+            }
+            ReadingError::Coupled { .. } | ReadingError::Sum { .. } => Code::JointsCoupled,
             ReadingError::Alike { .. } => Code::JointsAlike,
             ReadingError::OtherTurns { .. } => Code::JointTurns,
             ReadingError::Zeros { .. } => Code::JointZeros,
             ReadingError::Scaled { .. } => Code::SensorLine,
-            ReadingError::Shifted { .. } => Code::ReadingsShifted,
+            ReadingError::Shifted { .. } | ReadingError::Unpaired { .. } => Code::ReadingsShifted,
             ReadingError::Camera { .. } => Code::InputCamera,
             ReadingError::MapFrame { .. } => Code::MapFrame,
         }

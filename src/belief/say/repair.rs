@@ -54,7 +54,7 @@ pub fn repairs(findings: &[Finding], failed: &[FailedJoint<'_>], since: &str) ->
 }
 
 /// Findings that a user can act on, in the order in which they are told.
-const REPAIRS: [FindingKind; 11] = [
+const REPAIRS: [FindingKind; 12] = [
     FindingKind::SensorScale,
     FindingKind::SensorSlip,
     FindingKind::TagMoved,
@@ -62,6 +62,7 @@ const REPAIRS: [FindingKind; 11] = [
     FindingKind::TagSwapped,
     FindingKind::TagSize,
     FindingKind::TagLeftOut,
+    FindingKind::LensModel,
     FindingKind::Lens,
     FindingKind::CameraMount,
     FindingKind::Base,
@@ -94,6 +95,11 @@ fn of_finding(found: &Finding, since: &str) -> Option<Repair> {
                 _ => format!("the focal length is {} than robot.toml says", differs(found, ["longer", "shorter"])),
             },
             "measure the intrinsics again".to_owned(),
+            "the result uses the estimated lens",
+        ),
+        FindingKind::LensModel => (
+            "the lens has another model than robot.toml says (equidistant or pinhole)".to_owned(),
+            "set the other one as model in [camera] of robot.toml, with the intrinsics measured for it".to_owned(),
             "the result uses the estimated lens",
         ),
         FindingKind::Base => (

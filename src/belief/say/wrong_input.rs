@@ -13,7 +13,8 @@ pub struct WrongInput {
     /// Quantity of `mismatch`.
     #[serde(default, skip_serializing_if = "MismatchMeasure::is_of_distances")]
     pub measure: MismatchMeasure,
-    /// As it is written: of two tags, where the one is not seen over its distance from the other; of rotations, rad.
+    /// As it is written: of two tags, where the one is not seen over its distance from the other; of rotations, rad; of
+    /// positions, where the tag is not by the arm over its distance from the camera.
     pub mismatch: f64,
     /// The same with the input put right; absent where nothing puts it right.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -32,6 +33,8 @@ pub enum MismatchMeasure {
     Distances,
     /// Rotations of one landmark over the views.
     Rotations,
+    /// Positions of landmarks, against the arm by its datasheet.
+    Positions,
 }
 
 impl MismatchMeasure {

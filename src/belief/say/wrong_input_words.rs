@@ -103,6 +103,12 @@ impl WrongInput {
         };
         match self.measure {
             MismatchMeasure::Distances => write!(f, "{cause}, the tags of a view fit each other within {of_pairs}"),
+            MismatchMeasure::Positions => {
+                let percent = |share: f64| format!("{:.0} %", 100.0 * share);
+                let [otherwise, as_written] = [self.mismatch_otherwise.unwrap_or(f64::NAN), self.mismatch].map(percent);
+                write!(f, "{cause}, camera and tag are where the arm and the tag map have them within {otherwise} ")?;
+                write!(f, "of their distance instead of {as_written}")
+            }
             MismatchMeasure::Rotations => {
                 let degrees = |rad: f64| format!("{:.0} deg", rad.to_degrees());
                 let [otherwise, as_written] = [self.mismatch_otherwise.unwrap_or(f64::NAN), self.mismatch].map(degrees);

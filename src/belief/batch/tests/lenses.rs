@@ -4,7 +4,8 @@ use crate::batch::tests::corner_outliers::tool_error;
 use crate::batch::tests::data::titan;
 use crate::batch::tests::statistics::{Case, case, input};
 use crate::explain::drawing::Drawing;
-use crate::explain::other_lens::lens_that_fits;
+use crate::explain::other_lens::{lens_that_fits, of_better_model};
+use crate::explain::wrong_input::lens::of_other_model;
 use crate::solve::estimate::estimate;
 use crate::solve::input::HyperparameterMode;
 use armcal_core::numeric::Outcome;
@@ -89,6 +90,57 @@ fn a_centre_that_is_off_is_told_from_sensors_that_are() {
         case.robot = &real;
         case.views[7].travel_rad[1] += 0.3;
         assert_eq!(lenses(&case), None, "seed {seed}: a reading is off");
+    }
+}
+
+/// Encoders whose datasheet leaves them next to no error: a centre that is less far off makes them vary from view to
+/// view by more than they do, and by less than what looks like readings that are off.
+#[test]
+fn a_centre_that_makes_good_encoders_vary_is_told_from_them() {
+    let mut real = titan();
+    real.sensors.iter_mut().for_each(|spec| spec.linearity_std_rad = 2e-4);
+    let [fx, fy, cx, cy, k1, k2, k3, k4] = real.camera.lens.intrinsics();
+    let mut other = real.clone();
+    other.camera.lens = real.camera.lens.with_intrinsics([fx, fy, cx + 20.0, cy, k1, k2, k3, k4]);
+    for seed in SEEDS.take(6) {
+        let mut case = case(&real, seed, N_VIEWS);
+        let lenses = |case: &Case<'_>| {
+            let input = input(case, &case.views, HyperparameterMode::Fitted);
+            let found = estimate(&input).expect("solved");
+            lens_that_fits(&Drawing::default(), &input, &found).map(|drawing| drawing.lenses)
+        };
+        assert_eq!(lenses(&case), None, "seed {seed}: as it is");
+        case.robot = &other;
+        assert_eq!(lenses(&case), Some(vec![0]), "seed {seed}: another centre");
+    }
+}
+
+/// A pinhole that robot.toml calls equidistant, with its own numbers, and the other way round; a lens of the right
+/// model whose centre is off is none.
+#[test]
+fn a_lens_of_the_other_model_is_told_from_one_that_is_off() {
+    let fisheye = titan().camera.lens;
+    let off = |lens: CameraModel| {
+        let [fx, fy, cx, cy, k1, k2, k3, k4] = lens.intrinsics();
+        lens.with_intrinsics([fx, fy, cx + 15.0, cy, k1, k2, k3, k4])
+    };
+    let cases = [
+        (pinhole(), of_other_model(&pinhole()), true),
+        (pinhole(), off(pinhole()), false),
+        (fisheye, of_other_model(&fisheye), true),
+        (fisheye, off(fisheye), false),
+    ];
+    for (real, stated, is_other) in cases {
+        let (robot, believed) = (with_camera(real), with_camera(stated));
+        for seed in SEEDS.take(3) {
+            let mut case = case(&robot, seed, N_VIEWS);
+            case.robot = &believed;
+            let mut input = input(&case, &case.views, HyperparameterMode::Fitted);
+            Drawing { lenses: vec![0], ..Drawing::default() }.apply(&mut input);
+            let found = of_better_model(&input, 0);
+            assert_eq!(found.is_some(), is_other, "seed {seed}: {} as {}", real.name(), stated.name());
+            assert!(found.is_none_or(|lens| lens.name() == real.name()), "seed {seed}");
+        }
     }
 }
 

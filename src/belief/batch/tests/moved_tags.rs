@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use crate::batch::tests::arms::{Built, arm};
 use crate::batch::tests::data::titan;
-use crate::batch::tests::failures::case;
+use crate::batch::tests::failures::{Case, case};
 use crate::batch::tests::score_test::{input, views_of_changed};
 use crate::explain::drawing::Drawing;
 use crate::explain::tags::freed::MovedTags;
@@ -181,6 +181,31 @@ fn a_size_is_repaired_up_to_twice_the_stated_one() {
         let is_refused = calibration.refusals.iter().any(|refusal| refusal.code() == Code::RepairTooLarge);
         assert_eq!((is_named, is_refused), (true, !is_repaired), "{factor}: {:?}", calibration.findings);
     }
+}
+
+/// So little that its observations are not rejected, and seen from so many sides that it stays where it is; of sound
+/// arms none is named.
+#[test]
+fn a_size_that_is_off_by_little_is_named_with_its_tag() {
+    let mut n_named = 0;
+    for seed in 0..6 {
+        let sound = case(seed, None);
+        let n_seen =
+            |idx: &usize| sound.views.iter().flat_map(|view| &view.tags).filter(|tag| tag.tag_idx == *idx).count();
+        let most = (0..sound.robot.tags.len()).max_by_key(n_seen).expect("tags");
+        let id = sound.robot.tags[most].id.to_string();
+        let sizes = |mut case: Case, factor: f64| -> Vec<Finding> {
+            case.robot.tags[most].size_m *= factor;
+            case.views.iter_mut().for_each(|view| view.see_through(&case.robot));
+            let findings = case.calibrated().findings;
+            findings.into_iter().filter(|found| found.kind == FindingKind::TagSize).collect()
+        };
+        let named = sizes(case(seed, None), 1.025);
+        assert!(named.iter().all(|found| found.name == id), "seed {seed}: {named:?}");
+        n_named += named.len();
+        assert_eq!(sizes(sound, 1.0), Vec::new(), "seed {seed}: as it is");
+    }
+    assert!(n_named >= 3, "{n_named} of 6");
 }
 
 #[test]

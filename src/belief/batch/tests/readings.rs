@@ -6,7 +6,7 @@ use std::path::Path;
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
 use crate::batch::tests::failures::{Case, case};
-use crate::say::reading_error::ReadingError;
+use crate::say::reading_error::{ReadingError, SignedJoint};
 use crate::say::refusal::Refusal;
 use crate::say::wrong_input::{WrongInput, WrongInputKind};
 use crate::views::view::View;
@@ -66,6 +66,69 @@ fn a_reading_that_contains_the_angle_of_a_neighbour_is_named() {
             other => panic!("seed {seed}: {other:?}"),
         }
     }
+}
+
+#[test]
+fn three_columns_in_a_circle_are_named_with_the_names_that_put_them_right() {
+    for (seed, joints, from) in [(70, [0, 1, 2], [1, 2, 0]), (71, [0, 2, 4], [4, 0, 2]), (72, [1, 3, 4], [3, 4, 1])] {
+        let mut case = case(seed, None);
+        changed(&mut case, |robot, angles, read| {
+            // The column that is put right with the name `from` has that joint's angles.
+            for (joint, from) in joints.into_iter().zip(from) {
+                read[from] = counts_as(robot, from, joint, angles[joint]);
+            }
+        });
+        let name = |joint: usize| case.robot.sensors[joint].joint.clone();
+        let expected = ReadingError::InCircle { joints: joints.map(name).to_vec(), recorded: from.map(name).to_vec() };
+        assert_eq!(found(case), expected, "seed {seed}");
+    }
+}
+
+/// Angles against the base over two joints, of the other sign, and of a joint that is no neighbour.
+#[test]
+fn a_reading_that_is_a_sum_of_angles_is_named_with_its_terms() {
+    let sums = [
+        (3, 1.0, vec![(1, 1.0), (2, 1.0)]),
+        (2, -1.0, vec![(1, -1.0)]),
+        (4, 1.0, vec![(2, -1.0)]),
+        (2, -1.0, vec![(0, 1.0), (1, -1.0)]),
+    ];
+    for (seed, (of, own, with)) in (73..).zip(sums) {
+        let mut case = case(seed, None);
+        changed(&mut case, |_, angles, read| {
+            read[of] = own * angles[of] + with.iter().map(|(other, sign)| sign * angles[*other]).sum::<f64>();
+        });
+        let name = |joint: usize| case.robot.sensors[joint].joint.clone();
+        let others = with.iter().map(|(other, sign)| SignedJoint { joint: name(*other), sign: *sign });
+        let expected = ReadingError::Sum { joint: name(of), own, with: others.collect() };
+        assert_eq!(found(case), expected, "seed {seed}");
+    }
+}
+
+/// Rows of a table that were sorted apart, so that no joint's readings belong to the tags beside them.
+#[test]
+fn readings_in_another_order_than_the_tags_are_named() {
+    let mut n_named = 0;
+    for seed in 80..84 {
+        let mut case = case(seed, None);
+        let read: Vec<JointAngles> = case.views.iter().map(|view| view.travel_rad).collect();
+        let n = read.len();
+        for (k, view) in case.views.iter_mut().enumerate() {
+            view.travel_rad = read[(7 * k + 3) % n];
+        }
+        let calibration = case.calibrated();
+        let first = calibration.refusals.first().expect("a refusal");
+        match first {
+            Refusal::MisreadReadings(misread) => {
+                assert!(matches!(misread.found, ReadingError::Unpaired { .. }), "seed {seed}: {misread:?}");
+                n_named += 1;
+            }
+            other => {
+                assert!(matches!(other, Refusal::Outliers { .. } | Refusal::NotSolved { .. }), "seed {seed}: {other:?}")
+            }
+        }
+    }
+    assert!(n_named >= 2, "{n_named} of 4");
 }
 
 #[test]

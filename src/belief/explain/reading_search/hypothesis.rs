@@ -2,7 +2,7 @@
 
 use crate::explain::constants::reading_search_hypothesis::{
     CAMERA_HANDICAP, FRAME_HANDICAP, KNOWN_MOUNT, LEAST_SCALE_STEPS, NEXT_TURN_RAD, PARALLEL_RAD, SCALE_STEP,
-    SCALE_STEPS,
+    SCALE_STEPS, SUM_HANDICAP,
 };
 pub(crate) use crate::explain::constants::reading_search_hypothesis::{SCALE_STD, ZERO_STD_RAD};
 use std::borrow::Cow;
@@ -26,6 +26,12 @@ pub(crate) enum Hypothesis {
         joint: usize,
         with: usize,
         sign: f64,
+    },
+    /// The reading is `own` times the joint's angle plus those of other joints, each times its sign.
+    Sum {
+        joint: usize,
+        own: f64,
+        with: Vec<(usize, f64)>,
     },
     /// A turn less or more, where that is within the limits.
     OtherTurns(Vec<usize>),
@@ -107,6 +113,42 @@ impl Hypothesis {
         of_joints.chain(shifted).chain(Self::of_camera(robot)).collect()
     }
 
+    /// Three columns in a circle, and sums that take more than one neighbour or a sign: so many that only those are
+    /// worth an estimate that the nominal arm places well.
+    pub(crate) fn composite(robot: &Robot) -> Vec<Self> {
+        let n = robot.n_seen_joints();
+        let order: Vec<usize> = (0..robot.n_joints()).collect();
+        let triples = (0..n).flat_map(|a| (a + 1..n).flat_map(move |b| (b + 1..n).map(move |c| [a, b, c])));
+        let circles = triples.flat_map(|[a, b, c]| {
+            [[b, c, a], [c, a, b]].map(|from| {
+                let mut order = order.clone();
+                [a, b, c].into_iter().zip(from).for_each(|(joint, from)| order[joint] = from);
+                Self::Order(order)
+            })
+        });
+        let turning: Vec<usize> = (0..n).filter(|&joint| !robot.sensors[joint].moves.is_slide()).collect();
+        circles.chain(turning.iter().flat_map(|&joint| Self::sums(joint, &turning))).collect()
+    }
+
+    /// Readings of `joint` that contain the angle of any other joint, or of two before it, as one against the base
+    /// does; without those of a single neighbour that are not reversed.
+    fn sums(joint: usize, turning: &[usize]) -> Vec<Self> {
+        let others = || turning.iter().copied().filter(move |&other| other != joint);
+        let before = || turning.iter().copied().filter(move |&other| other < joint);
+        const SIGNS: [f64; 2] = [1.0, -1.0];
+        let one = others().flat_map(|other| SIGNS.map(|sign| vec![(other, sign)]));
+        let pairs = before().flat_map(|a| before().filter(move |&b| b > a).map(move |b| [a, b]));
+        let two = pairs.flat_map(|[a, b]| {
+            let signs = SIGNS.into_iter().flat_map(|first| SIGNS.map(|second| [first, second]));
+            signs.map(move |[first, second]| vec![(a, first), (b, second)])
+        });
+        let is_simple =
+            |own: f64, with: &[(usize, f64)]| own > 0.0 && with.len() == 1 && with[0].0.abs_diff(joint) == 1;
+        let all = one.chain(two).flat_map(|with| SIGNS.map(|own| (own, with.clone())));
+        let all = all.filter(|(own, with)| !is_simple(*own, with));
+        all.map(|(own, with)| Self::Sum { joint, own, with }).collect()
+    }
+
     /// On each link, at the stated pose with its frame turned by quarters; where the stated pose is known.
     fn of_camera(robot: &Robot) -> Vec<Self> {
         let camera = &robot.camera;
@@ -125,6 +167,7 @@ impl Hypothesis {
         match self {
             Self::Camera { .. } => CAMERA_HANDICAP,
             Self::MapFrame(_) => FRAME_HANDICAP,
+            Self::Sum { .. } => SUM_HANDICAP,
             _ => 0.0,
         }
     }
@@ -180,6 +223,17 @@ impl Hypothesis {
                 let with_rad = robot.sensors[*with].center_rad + view.travel_rad[*with];
                 changed.travel_rad[*joint] = wrapped(robot, *joint, view.travel_rad[*joint] - sign * with_rad);
                 changed.rate_rad_s[*joint] -= sign * view.rate_rad_s[*with];
+            }
+            Self::Sum { joint, own, with } => {
+                let spec = &robot.sensors[*joint];
+                let of_others_rad = with
+                    .iter()
+                    .map(|(other, sign)| sign * (robot.sensors[*other].center_rad + view.travel_rad[*other]));
+                let angle_rad = own * (spec.center_rad + view.travel_rad[*joint] - of_others_rad.sum::<f64>());
+                let rate_of_others: f64 = with.iter().map(|(other, sign)| sign * view.rate_rad_s[*other]).sum();
+                changed.travel_rad[*joint] = wrapped(robot, *joint, angle_rad - spec.center_rad);
+                changed.rate_rad_s[*joint] = own * (view.rate_rad_s[*joint] - rate_of_others);
+                changed.approach[*joint] *= own;
             }
             Self::OtherTurns(joints) => {
                 for &joint in joints {

@@ -8,7 +8,8 @@
 //! which no joint has a part in.
 
 use crate::explain::constants::tags_identity::{
-    CLOSER, LEAST_DISTANCE_M, LEAST_RATIO, MIN_OBSERVATIONS, REJECTED_SHARE, SURE_SIGMAS,
+    CLOSER, LEAST_DISTANCE_M, LEAST_RATIO, LEAST_RATIO_OF_FITTING, MIN_OBSERVATIONS, MIN_SIZED, REJECTED_SHARE,
+    SURE_SIGMAS,
 };
 pub(crate) use crate::explain::constants::tags_identity::{NEARER, SAME_PLACE_M};
 use nalgebra::{Isometry3, Point3, Vector3};
@@ -112,7 +113,23 @@ impl Estimate<'_> {
             faults.extend(exchanged.map(|b| TagFault::Swapped([a.tag_idx, b.tag_idx])));
         }
         faults.extend(seen.iter().filter_map(|tag| tag.size(robot)));
+        let has_size = faults.iter().any(|fault| matches!(fault, TagFault::Size { .. }));
+        faults.extend(if has_size { None } else { self.surest_size(views) });
         faults
+    }
+
+    /// The size that differs the most of those of tags that fit so far: seen from all sides, such a tag stays where it
+    /// is, and its observations are off here and there.
+    fn surest_size(&self, views: &[View]) -> Option<TagFault> {
+        let robot = self.problem.robot;
+        let all = (0..robot.tags.len()).map(|tag_idx| self.seen(tag_idx, views));
+        let often = all.filter(|tag| tag.observations.len() >= MIN_SIZED);
+        let sizes = often.filter_map(|tag| tag.size(robot)).filter_map(|fault| match fault {
+            TagFault::Size { ratio, .. } => Some(((ratio - 1.0).abs(), fault)),
+            _ => None,
+        });
+        let large = sizes.filter(|(off, _)| *off > LEAST_RATIO_OF_FITTING);
+        large.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, fault)| fault)
     }
 
     /// The tag most of whose observations are rejected, which agree on another place than its survey's, and that place,

@@ -2,12 +2,14 @@
 //!
 //! `pairs` measures by how much the tags of one view differ from the map; a large mismatch means that map or lens is
 //! wrong, and no joint has a part in it. `recording`, `map` and `lens` have other readings of their file; `by_pairs`
-//! names the one that makes the mismatch small. `recording` looks at pixels, and at rotations of a single landmark.
+//! names the one that makes the mismatch small. `recording` looks at pixels, and at rotations of a single landmark;
+//! `positions` at positions without rotations.
 
 pub(crate) mod by_pairs;
 pub(crate) mod lens;
 pub(crate) mod map;
 pub(crate) mod pairs;
+pub(crate) mod positions;
 pub(crate) mod recording;
 
 use crate::explain::constants::wrong_input::{BETTER, GOOD, MAX_VIEWS, SIZE_TOLERANCE};
@@ -28,7 +30,9 @@ pub(crate) fn wrong_input(data: &CaptureData, tags: &[SurveyedTag], robot: &Robo
     }
     match mismatch(&views, tags, &robot.camera.lens) {
         Some(pairs) => by_pairs(&views, tags, robot, &pairs),
-        None => recording::by_rotations(&views, robot).or_else(|| by_distances(&views, tags, robot)),
+        None => recording::by_rotations(&views, robot)
+            .or_else(|| positions::by_positions(&views, tags, robot))
+            .or_else(|| by_distances(&views, tags, robot)),
     }
 }
 

@@ -89,6 +89,11 @@ impl PosedTag<'_> {
         self.poses[0].translation.vector
     }
 
+    /// Where the map and the tag's poses have the camera, in the map's frame.
+    pub(crate) fn camera_places_m(&self) -> impl Iterator<Item = Vector3<f64>> + '_ {
+        self.poses.iter().map(|pose| (self.surveyed.base_from_tag.isometry() * pose.inverse()).translation.vector)
+    }
+
     /// Where this tag and the map have `other`, against where it is seen.
     fn mismatch_of(&self, other: &Self, ratio: f64) -> f64 {
         let (from, to) = (self.surveyed.base_from_tag.isometry(), other.surveyed.base_from_tag.isometry());

@@ -289,6 +289,33 @@ fn a_scale_of_recorded_positions_is_not_called_the_size_of_the_tags() {
     }
 }
 
+/// Landmarks by their positions alone: as they are, or those of the camera in the tag's frame. Of all tags, of one a
+/// view, and of tags that are turned alike, whose distances are the same both ways.
+#[test]
+fn positions_of_the_inverse_transform_are_told() {
+    let (data, robot) = sample();
+    let written = |keep: &dyn Fn(usize) -> bool, write: &dyn Fn(&Isometry3<f64>) -> Isometry3<f64>| {
+        let mut data = data.clone();
+        for view in data.fit.iter_mut().chain(&mut data.held_out) {
+            view.tags.retain(|seen| keep(seen.tag_idx));
+        }
+        for seen in data.fit.iter_mut().chain(&mut data.held_out).flat_map(|view| &mut view.tags) {
+            let corners = seen.corners().expect("corners").corners_px;
+            let pose = solve_square(&robot.camera.lens, robot.tags[seen.tag_idx].size_m, &corners).expect("a pose");
+            seen.center_in_camera_m = write(pose.camera_from_tag.isometry()).translation.vector;
+            seen.measured = TagMeasurement::Position;
+        }
+        found(&data, &robot)
+    };
+    let rotation = |tag: usize| robot.tags[tag].base_from_tag.isometry().rotation;
+    let is_alike = |tag: usize| rotation(tag).angle_to(&rotation(OFTEN_SEEN)) < 0.1;
+    let all: [&dyn Fn(usize) -> bool; 3] = [&|_| true, &|tag| tag == OFTEN_SEEN, &is_alike];
+    for keep in all {
+        assert_eq!(written(keep, &|pose| *pose), None);
+        assert_eq!(written(keep, &|pose| pose.inverse()), Some(WrongInputKind::RecordedDirection));
+    }
+}
+
 /// A map that is stretched looks as tags of another size do: the words name both.
 #[test]
 fn a_stretched_map_is_told_with_its_ratio() {
