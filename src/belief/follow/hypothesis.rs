@@ -202,10 +202,10 @@ impl Fault {
         }
     }
 
-    /// Returns the size of the fault: the displacement from belief `before` to belief `after`, m. For tags on one carrier
-    /// it is the median displacement, m; for the camera mount the rotation, rad. For a slip it is the increase of the
-    /// sensor's reading, rad; for a worn spot that at its middle, rad. For a scale fault it is the slope of the angle by
-    /// the reading. `None` without a size.
+    /// Returns the size of the fault: the displacement from belief `before` to belief `after`, m. For tags on one
+    /// carrier it is the median displacement, m; for the camera mount the rotation, rad. For a slip it is the increase
+    /// of the sensor's reading, rad; for a worn spot that at its middle, rad. For a scale fault it is the slope of the
+    /// angle by the reading. `None` without a size.
     pub(crate) fn size(self, before: &Filter, after: &Filter) -> Option<f64> {
         match self {
             Self::Slip(joint) => {

@@ -328,7 +328,8 @@ mod tests {
         assert_eq!(arms(&believed), arms(&datasheet));
     }
 
-    /// Every arm of an estimate is within the bounds for which planning keeps clear, except for the noise of its reading.
+    /// Every arm of an estimate is within the bounds for which planning keeps clear, except for the noise of its
+    /// reading.
     #[test]
     fn bounds_hold_the_arms_that_the_estimate_allows() {
         let robot = titan();
