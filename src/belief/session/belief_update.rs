@@ -35,7 +35,7 @@ impl ScriptRunner<'_, '_> {
         let accepted = self.accepted.as_ref();
         let mut found = interim_estimate(&recording, self.setup.robot, self.views_since, accepted);
         if accepted.is_some() && found.is_err() {
-            // A joint failed since then, so only the new views describe the present arm.
+            // The arm may have changed since the accepted calibration, so only the new views describe it.
             found = interim_estimate(&recording, self.setup.robot, self.views_since, None);
         }
         self.tally.calibration_wall_s += self.driver.progress.wall_s() - began_s;

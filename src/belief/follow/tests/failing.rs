@@ -91,7 +91,7 @@ fn images_that_scatter_are_not_looked_at_where_a_sensor_failed() {
     let mut creeping = still.clone();
     for tag in &mut creeping.tags {
         let TagMeasurement::Corners(mean) = &mut tag.measured else { continue };
-        // This dive's corners are twice as noisy as robot.toml says.
+        // This dive's corners are twice as noisy as robot.toml states.
         (mean.n_frames, mean.scatter_px2) = (5, 32.0 * (6.0 * robot.camera.corner_std_px).powi(2));
     }
     let mut failed = online.clone();
