@@ -1,4 +1,4 @@
-//! The batch of all views, to compare a belief with that took in the same views one by one.
+//! The batch estimate of all views, for comparison with an online estimate that took in the same views one by one.
 
 use crate::batch::marked_calibrations::calibrate_bundle;
 use crate::file::calibration::Calibration;
@@ -15,21 +15,21 @@ use crate::views::view::View;
 use armcal_core::robot::Robot;
 use armcal_core::streams::ReachTask;
 
-/// What `bundle` made of all views, and from what.
+/// Result of `bundle` over all views, with its inputs.
 pub struct Batch {
-    /// Its result and verdict.
+    /// Result and verdict of the batch.
     pub calibration: Calibration,
     task: Option<ReachTask>,
     used: Used,
 }
 
-/// What an estimate was made from, and what it came to.
+/// Inputs of an estimate, and the resulting filter.
 struct Used {
-    /// With the tags and the drawing that it ended with.
+    /// The robot with the final tags and nominal model.
     robot: Robot,
-    /// In the order of time, failed sensors marked.
+    /// Views in the order of time, with failed sensors marked.
     views: Vec<View>,
-    /// Its model and scales, nothing drifting.
+    /// Model and scales of the batch, without drift.
     settings: OnlineSettings,
     belief: Filter,
 }
@@ -38,7 +38,7 @@ impl Batch {
     /// Calibrates by `bundle`.
     ///
     /// # Errors
-    /// [`CalibError`] where the views determine nothing.
+    /// [`CalibError`] if the views determine nothing.
     pub fn of(data: CalibrationData) -> Result<Self, CalibError> {
         let (recording, task) = (data.name.clone(), data.data.task.clone());
         let mut used = None;
@@ -47,7 +47,7 @@ impl Batch {
         Ok(Self { calibration, task, used })
     }
 
-    /// Takes the same views in one by one, under the batch's model and scales; `hear` is told after each.
+    /// Takes in the same views one by one, under the batch's model and scales; calls `hear` after each.
     pub fn follow(&self, hear: &mut dyn FnMut(&Follower, Vec<OnlineEvent>)) -> Follower {
         let Used { robot, views, settings, .. } = &self.used;
         let mut follower = Follower::new(robot.clone(), settings.clone());
@@ -59,8 +59,9 @@ impl Batch {
         follower
     }
 
-    /// Largest difference between a belief and this batch over all that both estimate (sensors, links, mount, lens,
-    /// tags), in sigmas of the batch; `None` before the belief's first view, or where a difference is not a number.
+    /// Returns the largest difference between an online estimate and this batch, in sigmas of the batch. It covers all
+    /// parameters that both estimate: sensors, links, mount, lens, tags. `None` before the first view, or if a
+    /// difference is not finite.
     #[must_use]
     pub fn largest_difference_sigmas(&self, online: &OnlineEstimator) -> Option<f64> {
         let off = online.best_filter()?.sigmas_from(&self.used.belief)?;

@@ -1,4 +1,4 @@
-//! What was believed over time: a line a minute of the arm's time, and one for each event.
+//! Log of the online estimate: one line per minute of arm time, and one for each event.
 
 use crate::follow::constants::belief_log::EVERY_S;
 use serde::{Deserialize, Serialize};
@@ -11,32 +11,32 @@ use armcal_core::time::Stamp;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BeliefLine {
-    /// What was believed at a time.
+    /// Online estimate at one time.
     Belief(BeliefRow),
-    /// What happened.
+    /// An event.
     Event(OnlineEvent),
 }
 
 impl BeliefLine {
-    /// As belief.jsonl has it, without its end.
+    /// Returns the line of belief.jsonl, without its end.
     #[must_use]
     pub fn to_json(&self) -> String {
-        // Plain numbers and text: what cannot fail.
+        // Plain numbers and text always serialize.
         serde_json::to_string(self).unwrap_or_default()
     }
 }
 
-/// The lines so far.
+/// Lines recorded so far.
 #[derive(Clone, Debug, Default)]
 pub struct BeliefLog {
-    /// In the order in which they became known.
+    /// Lines in the order in which they became known.
     pub lines: Vec<BeliefLine>,
     first: Option<Stamp>,
     last: Option<Stamp>,
 }
 
 impl BeliefLog {
-    /// After each message: `events` are what it made known. Returns whether there are new lines.
+    /// Adds lines after a message with the `events` that it revealed. Returns true if there are new lines.
     pub fn hear(&mut self, follower: &Follower, events: Vec<OnlineEvent>) -> bool {
         let Some(now) = follower.conditions().stamp else { return false };
         self.first.get_or_insert(now);
@@ -50,12 +50,12 @@ impl BeliefLog {
         true
     }
 
-    /// After the last message.
+    /// Adds the final estimate after the last message.
     pub fn end(&mut self, follower: &Follower) {
         self.lines.extend(follower.belief().map(BeliefLine::Belief));
     }
 
-    /// What happened.
+    /// Returns the logged events.
     pub fn events(&self) -> impl Iterator<Item = &OnlineEvent> {
         self.lines.iter().filter_map(|line| match line {
             BeliefLine::Event(event) => Some(event),
@@ -63,7 +63,7 @@ impl BeliefLog {
         })
     }
 
-    /// What was believed.
+    /// Returns the logged estimates.
     pub fn beliefs(&self) -> impl Iterator<Item = &BeliefRow> {
         self.lines.iter().filter_map(|line| match line {
             BeliefLine::Belief(row) => Some(row),
@@ -71,23 +71,23 @@ impl BeliefLog {
         })
     }
 
-    /// `h:mm:ss` since the first message.
+    /// Returns the time since the first message as `h:mm:ss`.
     #[must_use]
     pub fn clock(&self, nanos: i64) -> String {
         let s = self.first.map_or(0.0, |first| Stamp { nanos }.since_s(first)).max(0.0) as u64;
         format!("{}:{:02}:{:02}", s / 3600, s / 60 % 60, s % 60)
     }
 
-    /// Each event with its time, a line each.
+    /// Returns each event with its time, one per line.
     #[must_use]
     pub fn told(&self) -> String {
         self.events().map(|event| format!("{}  {}\n", self.clock(event.since_nanos), event.to_line())).collect()
     }
 
-    /// Of belief.jsonl.
+    /// Reads the text of belief.jsonl.
     ///
     /// # Errors
-    /// The first line that is none, by its number.
+    /// Number of the first invalid line, and the reason.
     pub fn from_jsonl(text: &str) -> Result<Self, String> {
         let line = |(n, line): (usize, &str)| {
             serde_json::from_str::<BeliefLine>(line).map_err(|error| format!("line {}: {error}", n + 1))
@@ -99,7 +99,7 @@ impl BeliefLog {
         Ok(log)
     }
 
-    /// As belief.jsonl has it.
+    /// Returns the text of belief.jsonl.
     #[must_use]
     pub fn to_jsonl(&self) -> String {
         self.lines.iter().map(|line| line.to_json() + "\n").collect()

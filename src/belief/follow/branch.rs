@@ -1,4 +1,4 @@
-//! One explanation of what happened, and the belief under it.
+//! One hypothesis about a fault, and the belief under it.
 
 pub(crate) use crate::follow::constants::branch::NOTHING_FITS_NATS;
 use crate::follow::constants::branch::{LEAST_BUMP_RAD, LEAST_SCALE, SPEAKS_NATS};
@@ -11,28 +11,28 @@ use armcal_core::robot::Robot;
 use armcal_core::sensor::ConditionChange;
 use armcal_core::time::Stamp;
 
-/// One explanation, and the belief under it.
+/// One hypothesis about a fault, and the belief under it.
 #[derive(Clone)]
 pub(crate) struct Branch {
     pub fault: Option<Fault>,
     pub filter: Filter,
-    /// `ln` of its odds.
+    /// Logarithm of its odds, nats.
     pub nats: f64,
-    /// The evidence of each view since it was opened, nats.
+    /// Evidence of each view since the branch was opened, nats.
     pub gains: Vec<f64>,
-    /// Of one that was found in hindsight, how many views before its race count for it, and when the first was: those
-    /// that speak for it, of a tag those that saw it.
+    /// Number of views before the race that count for a branch found in hindsight, and the stamp of the first. Views
+    /// count if they support the hypothesis; for a tag, those that saw it.
     pub n_speak_before: usize,
     pub since: Option<Stamp>,
 }
 
 impl Branch {
-    /// That nothing happened, from `filter` on.
+    /// Returns the branch without a fault, from `filter` on.
     pub(crate) fn nothing(filter: Filter) -> Self {
         Self { fault: None, filter, nats: 0.0, gains: Vec::new(), n_speak_before: 0, since: None }
     }
 
-    /// That `fault` happens now, where nothing had so far.
+    /// Returns the branch in which `fault` happens now, with no fault before.
     pub(crate) fn with(&self, robot: &Robot, fault: Fault) -> Self {
         let nats = self.nats + fault.ln_prior();
         let mut branch = Self { fault: Some(fault), nats, ..Self::nothing(self.filter.clone()) };
@@ -40,18 +40,18 @@ impl Branch {
         branch
     }
 
-    /// Views since it was opened that may speak for it.
+    /// Returns the number of views since the branch was opened that may support it.
     pub(crate) fn n_views(&self) -> usize {
         self.gains.len() + self.n_speak_before
     }
 
-    /// How many of the views that it and `other` both took in speak for it.
+    /// Returns the number of views taken in by this branch and by `other` that support this one.
     pub(crate) fn n_speak_for_it(&self, other: &Self) -> usize {
         let both = self.gains.iter().rev().zip(other.gains.iter().rev());
         both.filter(|(own, other)| speaks(**own, **other)).count()
     }
 
-    /// Whether it explains by another scale or a bump that is none.
+    /// True if the branch explains the views by a scale or a bump too small to be a fault.
     pub(crate) fn is_void(&self, before: &Filter) -> bool {
         let Some(fault) = self.fault else { return false };
         let size = fault.size(before, &self.filter);
@@ -62,7 +62,7 @@ impl Branch {
         }
     }
 
-    /// Joint and place, where it is a worn spot.
+    /// Returns joint and place if the fault is a worn spot.
     pub(crate) fn worn_spot(&self) -> Option<(usize, WornSpot)> {
         match self.fault {
             Some(Fault::Worn(joint, spot)) => Some((joint, spot)),
@@ -70,13 +70,13 @@ impl Branch {
         }
     }
 
-    /// Whether it tells of something.
+    /// True if the hypothesis is a fault to report.
     pub(crate) fn tells(&self) -> bool {
         !matches!(self.fault, None | Some(Fault::Drift))
     }
 }
 
-/// A view, and what sensors may have changed since the one before.
+/// A view, and the sensor changes that may have happened since the view before.
 #[derive(Clone)]
 pub(crate) struct Step {
     pub drift: Option<(ProcessNoise, ConditionChange)>,
@@ -110,18 +110,18 @@ impl Step {
         update
     }
 
-    /// `ln` of the probability of the view, up to what is the same for all.
+    /// Returns `ln` of the probability of the view, up to a constant that all branches share.
     fn evidence(&self, update: Option<&ViewUpdate>) -> f64 {
         update.map_or(-NOTHING_FITS_NATS * self.view.tags.len() as f64, |update| update.log_evidence)
     }
 }
 
-/// Whether a view of which one explanation and another have the evidence, nats, speaks for the first.
+/// True if the evidence of one hypothesis exceeds that of another, nats, enough to support the first.
 pub(crate) fn speaks(one: f64, other: f64) -> bool {
     one > other + SPEAKS_NATS
 }
 
-/// A view under a fault: a failed sensor's reading is not looked at.
+/// Returns the view under a fault: the reading of a failed sensor is ignored.
 pub(crate) fn seen_by(fault: Option<Fault>, view: &View) -> View {
     let mut view = view.clone();
     if let Some(Fault::Failed(joint)) = fault {

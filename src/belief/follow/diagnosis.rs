@@ -1,6 +1,6 @@
-//! What happened, by the evidence of the views: a view that the belief does not explain starts a race of explanations,
-//! each a belief of its own, until one of them leads, or two to five more views were seen: up to twenty where two
-//! joints may be the one whose sensor is worn.
+//! Fault diagnosis by the evidence of the views. A view that the belief does not explain starts a race of hypotheses,
+//! each with its own belief. The race ends when one of them leads, or after two to five more views. It takes up to
+//! twenty if either of two joints may have the worn sensor.
 
 use crate::follow::branch::{Branch, Step};
 use crate::follow::constants::diagnosis::{
@@ -19,38 +19,38 @@ use armcal_core::joints::MAX_JOINTS;
 use armcal_core::robot::Robot;
 use armcal_core::time::Stamp;
 
-/// Explanations of what the last views show.
+/// Hypotheses about the last views.
 #[derive(Clone)]
 pub(crate) struct Race {
-    /// The best one first.
+    /// Branches, the best one first.
     branches: Vec<Branch>,
     /// The belief before the first suspicious view.
     before: Filter,
-    /// How many views were before the one that it began with, the last of the first ones, and before each of those
-    /// after it for which explanations are opened, and the belief that nothing had happened until then.
+    /// Number of earlier views, and branch without a fault until then, before each view for which hypotheses are
+    /// opened. These are the view that began the race (the last of the recent ones) and the first ones after it.
     nothing_until: Vec<(usize, Branch)>,
     steps: Vec<Step>,
-    /// Views after it began.
+    /// Number of views after the race began.
     n_later: usize,
 }
 
-/// What a race ended with.
+/// Result of a race.
 pub(crate) struct Verdict {
     pub fault: Fault,
     pub size: Option<f64>,
-    /// The first view that shows it, where that was before the race.
+    /// Stamp of the first view that shows the fault, if that was before the race.
     pub since: Option<Stamp>,
-    /// How far it leads the next explanation.
+    /// Lead over the next hypothesis, nats.
     pub lead_nats: f64,
     pub next: Option<Fault>,
 }
 
-/// The last few views close to each other in time: what one of them is too weak to show, they may show together.
+/// The last few views close to each other in time: together they may show a fault that each is too weak to show.
 #[derive(Clone)]
 pub(crate) struct RecentViews {
-    /// The belief before them, widened until the first.
+    /// Belief before these views, widened until the first.
     pub before: Filter,
-    /// Their evidence, as they were taken in.
+    /// Evidence of these views when they were taken in, nats.
     pub nats: f64,
     pub views: Vec<View>,
     sums: [WalkScore; MAX_JOINTS],
@@ -61,7 +61,7 @@ impl RecentViews {
         Self { before, nats: 0.0, views: Vec::new(), sums: [WalkScore::default(); MAX_JOINTS] }
     }
 
-    /// Whether `view` belongs to another group.
+    /// True if `view` belongs to another group.
     pub(crate) fn is_past(&self, view: &View) -> bool {
         let last = self.views.last().map_or(view.end, |last| last.end);
         self.views.len() >= MAX_RECENT || view.end.since_s(last) > RECENT_S
@@ -76,8 +76,8 @@ impl RecentViews {
         }
     }
 
-    /// Whether one joint's offset is pulled the same way by all of them: innovations have no memory, so that their
-    /// scores add up like independent numbers.
+    /// True if all views pull one joint's offset the same way. Innovations have no memory, so their scores add up like
+    /// independent numbers.
     pub(crate) fn show_a_step(&self) -> bool {
         self.views.len() > 1 && has_step(&self.sums)
     }
@@ -87,8 +87,8 @@ fn has_step(scores: &[WalkScore; MAX_JOINTS]) -> bool {
     scores.iter().any(|score| score.a * score.a > SUSPICIOUS_STEP_Z.powi(2) * score.b)
 }
 
-/// Whether a view is beyond what its noise explains: by its cost, by an observation that does not belong, or by one
-/// joint's offset alone (the score test of a step there).
+/// True if noise does not explain a view: by its cost, a rejected observation, or one joint's offset alone (the score
+/// test of a step there).
 pub(crate) fn is_suspicious(update: &ViewUpdate) -> bool {
     let n = update.n_coordinates.max(1) as f64;
     // Wilson and Hilferty 1931.
@@ -98,7 +98,7 @@ pub(crate) fn is_suspicious(update: &ViewUpdate) -> bool {
 }
 
 impl Race {
-    /// Of all that could explain the views, which the belief before them does not.
+    /// Starts a race of all hypotheses about views that the belief before them does not explain.
     pub(crate) fn start(robot: &Robot, RecentViews { before, views, .. }: &RecentViews) -> Self {
         let steps: Vec<Step> = views.iter().map(|view| Step { drift: None, view: view.clone() }).collect();
         let n_until = steps.len().saturating_sub(1);
@@ -111,9 +111,9 @@ impl Race {
         race
     }
 
-    /// Every explanation takes the view in, after what sensors may have changed before it. None is dropped at the first
-    /// ones, which open more: what a view of one tag cannot tell apart the next one does. What it says of offsets
-    /// and tags where nothing happened.
+    /// Takes the view into every hypothesis, after the sensor changes that may precede it. Returns the scores of
+    /// offsets and tags without a fault. No hypothesis is dropped at the first views, which open more: the next view
+    /// may decide what a view of one tag cannot.
     pub(crate) fn add(&mut self, robot: &Robot, step: Step) -> Scores {
         self.n_later += 1;
         let nothing = self.of(None).cloned();
@@ -124,7 +124,7 @@ impl Race {
             if branch.fault.is_some() {
                 continue;
             }
-            // What happens while nothing is found has a race of its own.
+            // A fault that happens before any is found starts a new race.
             let is_new = self.n_later > OPEN_VIEWS && !is_told && update.as_ref().is_none_or(is_suspicious);
             if is_new && self.steps.len() < MAX_VIEWS_OF_TIE {
                 self.n_later = 0;
@@ -146,7 +146,7 @@ impl Race {
         scores
     }
 
-    /// Explanations found in hindsight, each in the place of one that is less probable.
+    /// Adds hypotheses found in hindsight, each replacing a less probable one.
     pub(crate) fn take_up(&mut self, branches: Vec<Branch>) {
         for new in branches {
             let same = self.branches.iter_mut().find(|branch| branch.fault == new.fault);
@@ -159,12 +159,12 @@ impl Race {
         self.sort();
     }
 
-    /// Number of its views.
+    /// Returns the number of its views.
     pub(crate) fn n_views(&self) -> usize {
         self.steps.len()
     }
 
-    /// All explanations of the views so far that are not followed yet.
+    /// Opens all hypotheses about the views so far that are not followed yet.
     fn open(&mut self, robot: &Robot) {
         let views: Vec<&View> = self.steps.iter().map(|step| &step.view).collect();
         let all = std::iter::once(None).chain(Fault::all(&self.before, &views).into_iter().map(Some));
@@ -191,7 +191,7 @@ impl Race {
         self.sort();
     }
 
-    /// Keeps the best ones, and that nothing happened.
+    /// Keeps the best hypotheses, and that of no fault.
     fn drop_hopeless(&mut self) {
         let best = self.nats();
         let mut place = 0;
@@ -205,8 +205,8 @@ impl Race {
         self.branches.iter().find(|branch| branch.fault == fault)
     }
 
-    /// An explanation that took all views in: what happened before the first, before the one that began the race, or
-    /// before one of those after it that opened explanations.
+    /// Returns a branch that took in all views, with the most probable onset of the fault: before the first view,
+    /// before the view that began the race, or before a later view that opened hypotheses.
     fn branch(&self, robot: &Robot, fault: Option<Fault>) -> Branch {
         let early = self.since(robot, fault, &(0, Branch::nothing(self.before.clone())));
         if fault.is_none() {
@@ -216,15 +216,15 @@ impl Race {
         late.fold(early, |best, late| if late.nats > best.nats { late } else { best })
     }
 
-    /// What happened after so many views of which nothing is known to have happened before.
+    /// Returns the branch of a fault after `n` views without one.
     fn since(&self, robot: &Robot, fault: Option<Fault>, (n, nothing): &(usize, Branch)) -> Branch {
         let mut branch = fault.map_or_else(|| nothing.clone(), |fault| nothing.with(robot, fault));
         self.steps[*n..].iter().for_each(|step| _ = step.take_in(robot, &mut branch));
         branch
     }
 
-    /// The worn spot that explains most, with its middle half a width aside where that explains more: a view stands
-    /// anywhere on it.
+    /// Returns the most probable worn spot, with its middle shifted by half a width if that explains more: a view may
+    /// stand anywhere on the spot.
     fn nearer_spot(&self, robot: &Robot) -> Option<Branch> {
         let spots = self.branches.iter().filter_map(|branch| Some((branch, branch.worn_spot()?)));
         let (found, (joint, spot)) = spots.max_by(|(a, _), (b, _)| a.nats.total_cmp(&b.nats))?;
@@ -234,8 +234,8 @@ impl Race {
         new.filter(|branch| branch.nats > found.nats + NEARER_NATS).max_by(|a, b| a.nats.total_cmp(&b.nats))
     }
 
-    /// From the tag that explains most, or those found so far, one tag after another that belongs to them; `None` where
-    /// no other does.
+    /// Starts from the most probable tag, or from the set found so far, and adds one tag after another that belongs to
+    /// it. `None` if no other tag does.
     fn moved_together(&self, robot: &Robot) -> Option<Branch> {
         let best = |is_wanted: fn(Fault) -> bool| {
             let wanted = self.branches.iter().filter(|branch| branch.fault.is_some_and(is_wanted));
@@ -252,7 +252,7 @@ impl Race {
         tags.sort_unstable();
         tags.dedup();
         let mut together: Option<Branch> = None;
-        // All of them together are a moved base.
+        // If all tags moved together, the base moved.
         while set.iter().count() + 1 < tags.len() {
             let wider = tags.iter().filter_map(|tag| set.with(*tag));
             let branches = wider.map(|set| (set, self.branch(robot, Some(Fault::Tags(set)))));
@@ -265,29 +265,30 @@ impl Race {
         together
     }
 
-    /// The best one first; what is none comes last.
+    /// Sorts the hypotheses, the best one first and void ones last.
     fn sort(&mut self) {
         let before = &self.before;
         self.branches.sort_by(|a, b| a.is_void(before).cmp(&b.is_void(before)).then(b.nats.total_cmp(&a.nats)));
     }
 
-    /// The best explanation so far.
+    /// Returns the best hypothesis so far.
     pub(crate) fn best(&self) -> Option<&Branch> {
         self.branches.first()
     }
 
-    /// The belief to go on with: the best explanation's, that nothing happened where it is not confirmed.
+    /// Returns the belief to continue with: that of the best hypothesis, or that of no fault if the best one is not
+    /// confirmed.
     pub(crate) fn belief(&self) -> Option<&Filter> {
         let best = self.best().filter(|best| self.is_confirmed(best.fault)).or_else(|| self.of(None)).or(self.best());
         best.map(|branch| &branch.filter)
     }
 
-    /// `ln` of the odds of the best explanation so far.
+    /// Returns `ln` of the odds of the best hypothesis so far.
     pub(crate) fn nats(&self) -> f64 {
         self.branches.first().map_or(0.0, |branch| branch.nats)
     }
 
-    /// Whether it is decided: one view alone names nothing.
+    /// True if the race is decided; a single view identifies no fault.
     pub(crate) fn is_over(&self) -> bool {
         let Some(best) = self.best().filter(|best| self.is_confirmed(best.fault)) else {
             return self.n_later >= MAX_VIEWS;
@@ -300,7 +301,7 @@ impl Race {
         };
         let is_behind = |other: &Branch| {
             let is_of_sensor = best.fault.zip(other.fault).is_some_and(|(one, other)| one.is_of_same_sensor(other));
-            // Where all views are of the spot, a slip leads by what it is more probable before any.
+            // If all views are at the spot, a slip leads only by its higher prior.
             let may_be_worn = matches!(best.fault, Some(Fault::Slip(_))) && other.worn_spot().is_some();
             let lead = if is_of_sensor && !may_be_worn { LEAD_OF_SENSOR_NATS } else { LEAD_NATS };
             best.nats - other.nats > lead || may_name(other)
@@ -312,12 +313,12 @@ impl Race {
         self.n_later >= MAX_VIEWS || self.others().all(is_behind)
     }
 
-    /// Whether enough views could have spoken against it. A detection of another tag happens once; a tag that was moved
-    /// is there again.
+    /// True if enough views could have contradicted the fault. A misread tag occurs once; a moved tag appears there
+    /// again.
     fn is_confirmed(&self, fault: Option<Fault>) -> bool {
         match fault {
             None => true,
-            // What drifted shows in all views; a weak one must not settle it.
+            // Drift shows in all views, so a weak view must not decide it.
             Some(Fault::Drift) => self.n_later >= MAX_VIEWS,
             Some(Fault::Tag(tag)) => self.n_views_of(tag, fault) >= CONFIRMED_BY || self.is_lone_tag_confirmed(tag),
             Some(Fault::Tags(tags)) => tags.iter().map(|tag| self.n_views_of(tag, fault)).sum::<usize>() > CONFIRMED_BY,
@@ -330,31 +331,32 @@ impl Race {
         }
     }
 
-    /// Views since that may have happened.
+    /// Returns the number of views since the fault may have happened.
     fn n_views_since(&self, fault: Option<Fault>) -> usize {
         self.of(fault).map_or(0, Branch::n_views)
     }
 
-    /// One view that speaks for it may be of a torn reading, unless it is clear.
+    /// True if the failure is clear, because a single supporting view may have a torn reading.
     fn is_failure_clear(&self, fault: Option<Fault>) -> bool {
         let Some((failed, nothing)) = self.of(fault).zip(self.of(None)) else { return false };
         self.n_speak(fault) >= CONFIRMED_BY || failed.nats > nothing.nats + LONE_LEAD_IN_MOTION_NATS
     }
 
-    /// Those of them that speak for it.
+    /// Returns the number of views since then that support the fault.
     fn n_speak(&self, fault: Option<Fault>) -> usize {
         let both = self.of(fault).zip(self.of(None));
         both.map_or(0, |(branch, nothing)| branch.n_speak_before + branch.n_speak_for_it(nothing))
     }
 
-    /// Those of them that saw a tag.
+    /// Returns the number of views since then that saw a tag.
     fn n_views_of(&self, tag: usize, fault: Option<Fault>) -> usize {
         let since = self.steps.iter().rev().take(self.n_views_since(fault));
         let before = self.of(fault).map_or(0, |branch| branch.n_speak_before);
         before + since.filter(|step| step.view.sees(tag)).count()
     }
 
-    /// A tag that one view saw: read as another one it would be as far away as they are from each other.
+    /// True if a single view suffices for a moved tag: a misread tag would be displaced by the distance between two
+    /// tags.
     fn is_lone_tag_confirmed(&self, tag: usize) -> bool {
         let fault = Fault::Tag(tag);
         let (Some(moved), Some(nothing)) = (self.of(Some(fault)), self.of(None)) else { return false };
@@ -362,8 +364,8 @@ impl Race {
         self.n_later >= MAX_VIEWS_TO_NAME && is_near && moved.nats - nothing.nats > LONE_TAG_LEAD_NATS
     }
 
-    /// One view that speaks for it may be a mistake, unless it is clear. Views of the spot alone do not tell it from a
-    /// slip, of which it is the less probable.
+    /// True if the spot is confirmed. A single supporting view may be a mistake, unless it is clear. Views of the spot
+    /// alone do not distinguish it from a slip, which has the higher prior.
     fn is_spot_confirmed(&self, joint: usize, spot: WornSpot) -> bool {
         let worn = self.of(Some(Fault::Worn(joint, spot)));
         let Some((worn, nothing)) = worn.zip(self.of(None)).filter(|_| self.n_later > 0) else { return false };
@@ -380,7 +382,7 @@ impl Race {
         }
     }
 
-    /// All explanations but the best, those aside that are none, and the same worn spot with its middle elsewhere.
+    /// Returns all hypotheses but the best, without void ones and without the same worn spot with another middle.
     fn others(&self) -> impl Iterator<Item = &Branch> {
         let best = self.best().and_then(Branch::worn_spot);
         let is_same = move |branch: &Branch| {
@@ -390,7 +392,7 @@ impl Race {
         self.branches.iter().skip(1).filter(move |branch| !is_same(branch) && !branch.is_void(&self.before))
     }
 
-    /// What it ended with; `None` where nothing happened.
+    /// Returns the result; `None` if there is no fault.
     pub(crate) fn verdict(&self) -> Option<Verdict> {
         let best = self.branches.first()?;
         let fault = best.fault.filter(|fault| *fault != Fault::Drift && self.is_confirmed(best.fault))?;

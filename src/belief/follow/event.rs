@@ -1,4 +1,4 @@
-//! What happened to the arm, as the online belief tells it.
+//! Events of the arm, as the online estimator reports them.
 
 use crate::follow::constants::event::CLEAR_LEAD_NATS;
 use serde::{Deserialize, Serialize};
@@ -11,23 +11,23 @@ use armcal_core::codes::Coded;
 use armcal_core::robot::Robot;
 use armcal_core::time::Stamp;
 
-/// Something that happened, with the evidence for it.
+/// An event, with the evidence for it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OnlineEvent {
     /// End of the first view that shows it, ns since the epoch.
     pub since_nanos: i64,
-    /// End of the view that decided it.
+    /// End of the view that decided it, ns since the epoch.
     pub decided_nanos: i64,
-    /// What it is; the size of a slip or of something moved is how far, that of a scale the slope of the angle by the
-    /// reading.
+    /// The finding. Its size is the displacement of a slipped sensor or a moved part, or the slope of the angle by the
+    /// reading for a scale fault.
     pub finding: Finding,
-    /// Of a worn spot: the joint's angle at its middle by the datasheet, rad.
+    /// Joint angle by the datasheet at the middle of a worn spot, rad; absent for other findings.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub at_rad: Option<f64>,
-    /// `ln` of the odds against the next explanation.
+    /// Logarithm of the odds against the next hypothesis, nats.
     pub lead_nats: f64,
-    /// The next explanation, where it is not that nothing happened.
+    /// The next hypothesis; absent if that is no fault.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub or_else: Option<String>,
 }
@@ -58,18 +58,18 @@ impl OnlineEvent {
                 Fault::Worn(joint, spot) => Some(robot.sensors[joint].center_rad + spot.at_rad()),
                 _ => None,
             },
-            // Nothing else is left to lead against.
+            // No other hypothesis is left to compare with.
             lead_nats: verdict.lead_nats.min(1e3),
             or_else: verdict.next.map(|fault| fault.phrase(robot)),
         }
     }
 
-    /// Whether `other` is of the same thing, and began before this was decided.
+    /// True if `other` is about the same joint or tag, and began before this was decided.
     pub(crate) fn covers(&self, other: &Self) -> bool {
         self.finding.name == other.finding.name && other.since_nanos <= self.decided_nanos
     }
 
-    /// One line for people.
+    /// Returns the event as one line of text.
     #[must_use]
     pub fn to_line(&self) -> String {
         let mut line = say::event(&self.finding, self.at_rad);

@@ -1,9 +1,9 @@
-//! One belief about all that views have in common: a state and its information matrix.
+//! The filter: belief about all parameters that views share, as a state and its information matrix.
 //!
-//! A view is taken in by Gauss-Newton on its own residuals and the belief so far, both those of `bundle` (the iterated
-//! form of the information filter; Bell and Cathey 1993): the matrix of the normal equations at the end is the new
-//! information. Between views what drifts is widened, `(W^-1 + Q)^-1` by the matrix inversion lemma. Time and memory of
-//! a view do not depend on how many came before.
+//! A view is taken in by Gauss-Newton on its own residuals and the belief so far, as in `bundle`. This is the iterated
+//! form of the information filter (Bell and Cathey 1993): the final matrix of the normal equations is the new
+//! information. Between views, drifting parameters are widened, `(W^-1 + Q)^-1` by the matrix inversion lemma. Time and
+//! memory of a view do not depend on the number of earlier views.
 
 use crate::follow::constants::filter::{LAST_GAIN, MAX_STEPS, SHORTER, SHORTEST_STEP, UNKNOWN_STD};
 use crate::solve::constants::estimate::CORNER_WIDTH;
@@ -31,56 +31,56 @@ use armcal_core::joints::MAX_JOINTS;
 use armcal_core::numeric::{Loss, cholesky, solve_lower};
 use armcal_core::robot::Robot;
 
-/// Means and information of all columns, base to tags.
+/// Means and information of all columns, from base to tags.
 #[derive(Clone)]
 pub(crate) struct Filter {
     pub model: Model,
     pub scales: Hyperparameters,
-    /// What has no column keeps its values; its reference is that of the terms.
+    /// Values of all parameters without a column; its reference is that of the terms.
     pub guess: JointParameters,
     layout: Layout,
     state: State,
-    /// Inverse of the covariance.
+    /// Information matrix, the inverse of the covariance.
     info: DMatrix<f64>,
-    /// `ln det` of it.
+    /// Logarithm of the determinant of `info`.
     log_det: f64,
-    /// Noise of the images of a moving arm over that of one at rest.
+    /// Ratio of the image noise of a moving arm to that of an arm at rest.
     pub noise_in_motion: f64,
 }
 
-/// What taking in a view did.
+/// Result of taking in a view.
 #[derive(Clone, Debug)]
 pub(crate) struct ViewUpdate {
-    /// Sum of squares in sigmas at the solution, the pull of the belief so far included.
+    /// Sum of squares in sigmas at the solution, including the pull of the belief so far.
     pub cost: f64,
-    /// What the rejected ones cost beside, in the same units.
+    /// Cost of the rejected observations, in the same units.
     pub rejected_cost: f64,
-    /// Of the observations that are used.
+    /// Number of coordinates of the used observations.
     pub n_coordinates: usize,
-    /// Their part of the cost.
+    /// Part of the cost that comes from the observations.
     pub observation_cost: f64,
-    /// Logarithm of the probability of the view by the belief so far, up to what is the same for all beliefs.
+    /// Logarithm of the probability of the view by the belief so far, up to a constant that all beliefs share.
     pub log_evidence: f64,
-    /// Tags whose observations were left out as a whole.
+    /// Tags whose observations were rejected as a whole.
     pub rejected: Vec<Block>,
-    /// What each joint is off in this view beyond its sensor's model, rad, and its variance before and after.
+    /// Error of each joint in this view beyond its sensor's model, rad, and its variance before and after.
     pub joint_error: [JointErrorOfView; MAX_JOINTS],
-    /// Of the image's time.
+    /// Error of the image's time.
     pub time_error: TimeErrorOfView,
-    /// What the view says of changes since the view before.
+    /// Scores of changes since the view before.
     pub scores: Scores,
 }
 
-/// What a view says of what may have changed since the view before.
+/// Scores of the changes that may have happened since the view before.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Scores {
-    /// By joint with an offset.
+    /// Score of each joint with an offset.
     pub walk: [WalkScore; MAX_JOINTS],
-    /// Of each tag that was seen.
+    /// Score of each observed tag.
     pub tags: Vec<TagScore>,
 }
 
-/// First and second derivative of the log-likelihood by the place of a tag, in the tag's frame, m.
+/// First and second derivative of the log-likelihood by the position of a tag, in the tag's frame, m.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TagScore {
     pub tag: usize,
@@ -92,9 +92,9 @@ pub(crate) struct TagScore {
 /// variance: `(a^2 - b) / 2` and `b^2 / 2`.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct WalkScore {
-    /// `S^-1` times the innovation, along the offset.
+    /// Innovation times `S^-1`, along the offset.
     pub a: f64,
-    /// `S^-1`, along the offset.
+    /// Matrix `S^-1`, along the offset.
     pub b: f64,
 }
 
@@ -114,13 +114,13 @@ struct SolvedView {
 }
 
 impl Filter {
-    /// The belief of a batch, with the priors of the tags that no view of it saw. `None` where the batch determines
-    /// nothing.
+    /// Returns the belief of a batch, with the priors of the tags that no view of it saw. `None` if the batch
+    /// determines nothing.
     pub(crate) fn of_estimate(estimate: &Estimate<'_>, robot: &Robot) -> Option<Self> {
         let (problem, solved) = (&estimate.problem, &estimate.solved);
         let layout = Layout::new(robot, &estimate.model, |_| true);
         let mut info = DMatrix::zeros(layout.n, layout.n);
-        // Column of the batch by column here.
+        // Column of the batch for each column here.
         let mut column_of: Vec<Option<usize>> = vec![None; layout.n];
         (0..layout.n_joint()).for_each(|column| column_of[column] = Some(column));
         for (block, here) in layout.blocks() {
@@ -145,34 +145,34 @@ impl Filter {
         Some(Self { model, scales, guess, layout, state, info, log_det, noise_in_motion: 1.0 })
     }
 
-    /// Column of each joint's offset that has one.
+    /// Returns each joint with an offset, and the column of the offset.
     pub(crate) fn offsets(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         let columns = self.layout.parameters.iter().enumerate();
         columns.filter(|(_, p)| p.kind == ParameterKind::Offset).map(|(column, p)| (p.joint, column))
     }
 
-    /// First of the six columns of the camera's mount.
+    /// Returns the first of the six columns of the camera mount.
     pub(crate) fn mount_column(&self) -> Option<usize> {
         self.layout.at(Block::Mount(0))
     }
 
-    /// First of the six columns of a tag.
+    /// Returns the first of the six columns of a tag.
     pub(crate) fn tag_column(&self, tag_idx: usize) -> Option<usize> {
         self.layout.at(Block::Tag(tag_idx))
     }
 
-    /// Whether a worn spot of a joint's sensor has a column.
+    /// True if a worn spot of a joint's sensor has a column.
     pub(crate) fn has_bump(&self, joint: usize) -> bool {
         let of_joint = &self.layout.parameters[self.joint_columns(joint)];
         of_joint.iter().any(|parameter| matches!(parameter.kind, ParameterKind::Bump(_)))
     }
 
-    /// Columns of a joint's sensor.
+    /// Returns the columns of a joint's sensor.
     pub(crate) fn joint_columns(&self, joint: usize) -> std::ops::Range<usize> {
         self.layout.of_joint[joint].clone()
     }
 
-    /// The joints' parameters.
+    /// Returns the joints' parameters.
     pub(crate) fn parameters(&self) -> JointParameters {
         let mut parameters = self.guess;
         for (parameter, value) in self.layout.parameters.iter().zip(self.state.joint.iter()) {
@@ -181,27 +181,27 @@ impl Filter {
         parameters
     }
 
-    /// What has a column of a sensor, in their order.
+    /// Returns the sensor parameters that have a column, in the order of their columns.
     pub(crate) fn joint_parameters(&self) -> &[Parameter] {
         &self.layout.parameters
     }
 
-    /// `link_from_camera`, as believed.
+    /// Returns the believed `link_from_camera`.
     pub(crate) fn mount(&self) -> &Isometry3<f64> {
         self.state.pose(Block::Mount(0))
     }
 
-    /// `base_from_tag`, as believed.
+    /// Returns the believed `base_from_tag`.
     pub(crate) fn tag(&self, tag_idx: usize) -> &Isometry3<f64> {
         self.state.pose(Block::Tag(tag_idx))
     }
 
-    /// How much later the joint sensors' stamps are than the camera's, s, and its column.
+    /// Returns the delay of the joint sensors' stamps against the camera's, s, and its column.
     pub(crate) fn clock_offset(&self) -> Option<(f64, usize)> {
         self.layout.at(Block::Clock).map(|at| (self.state.blocks.number(Block::Clock), at))
     }
 
-    /// Covariance of the joints' parameters, which are the first columns; `None` only after an overflow.
+    /// Returns the covariance of the joints' parameters, which are the first columns; `None` only after an overflow.
     pub(crate) fn joint_covariance(&self) -> Option<DMatrix<f64>> {
         let (n, columns) = (self.layout.n, self.layout.parameters.len());
         let mut half = DMatrix::identity(n, columns);
@@ -209,7 +209,7 @@ impl Filter {
         Some(half.transpose() * half)
     }
 
-    /// One sigma of a column by all others; `None` only after an overflow.
+    /// Returns the marginal std of a column; `None` only after an overflow.
     pub(crate) fn std_of(&self, column: usize) -> Option<f64> {
         let mut half = DMatrix::zeros(self.layout.n, 1);
         half[column] = 1.0;
@@ -217,7 +217,7 @@ impl Filter {
         Some(half.norm())
     }
 
-    /// How far its means are from those of `reference`, by column, in sigmas of `reference`; `None` where they do not
+    /// Returns the difference of each mean from that of `reference`, in sigmas of `reference`. `None` if the two do not
     /// have the same columns.
     pub(crate) fn sigmas_from(&self, reference: &Self) -> Option<DVector<f64>> {
         if self.layout.parameters != reference.layout.parameters || self.layout.n != reference.layout.n {
@@ -228,7 +228,7 @@ impl Filter {
         Some(DVector::from_fn(self.layout.n, |k, _| off[k] / covariance[(k, k)].sqrt()))
     }
 
-    /// Adds `variance` to each of the columns: what may have changed since the last view.
+    /// Adds `variance` to each of the columns, for changes since the last view.
     pub(crate) fn widen(&mut self, columns: &[(usize, f64)]) {
         let columns: Vec<(usize, f64)> = columns.iter().copied().filter(|(_, variance)| *variance > 0.0).collect();
         let k = columns.len();
@@ -245,13 +245,13 @@ impl Filter {
         }
     }
 
-    /// Number of columns.
+    /// Returns the number of columns.
     pub(crate) fn n_columns(&self) -> usize {
         self.layout.n
     }
 
-    /// Half a backlash of which no view told anything yet: a sensor's shaft lags and never leads, so that what is of
-    /// size s about zero is 0.8 s, give or take 0.6 s (the moments of a half-normal).
+    /// Sets the prior of half a backlash that no view has determined yet. A sensor's shaft lags and never leads. So a
+    /// std of s about zero gives 0.8 s ± 0.6 s (the moments of a half-normal).
     pub(crate) fn expect_backlash(&mut self, joint: usize, std_rad: f64) {
         let columns = self.joint_columns(joint);
         let is_backlash = |at: &usize| self.layout.parameters[*at].kind == ParameterKind::HalfBacklash;
@@ -262,7 +262,7 @@ impl Filter {
         self.state.joint[at] = 0.798 * std_rad;
     }
 
-    /// Adds a column of what nothing is known of but its prior: a parameter of a joint that none was of so far.
+    /// Adds a column with only its prior: a parameter that the joint did not have so far.
     pub(crate) fn add_parameter(&mut self, robot: &Robot, parameter: Parameter) {
         let Parameter { joint, kind } = parameter;
         let at = self.layout.of_joint[joint].end;
@@ -284,24 +284,25 @@ impl Filter {
         self.subtract(along, inner);
     }
 
-    /// Takes `along inner^-1 along^T` off the information; `None`, and nothing changed, after an overflow.
+    /// Subtracts `along inner^-1 along^T` from the information. Returns `None`, with nothing changed, after an
+    /// overflow.
     fn subtract(&mut self, mut along: DMatrix<f64>, inner: DMatrix<f64>) -> Option<()> {
         let factor = Cholesky::new(inner)?;
         self.log_det -= log_det(&factor);
-        // `along L^-T`, by whole columns.
+        // Computes `along L^-T` by whole columns.
         let lower = factor.l_dirty();
         for k in 0..along.ncols() {
             let (done, mut own) = along.columns_range_pair_mut(..k, k);
             own.gemv(-1.0, &done, &lower.row(k).columns_range(..k).transpose(), 1.0);
             own /= lower[(k, k)];
         }
-        // Products of matrices with one turned are several times as slow.
+        // Products with a transposed matrix are several times slower.
         let turned = along.transpose();
         self.info.gemm(-1.0, &along, &turned, 1.0);
         Some(())
     }
 
-    /// Takes a view in. `None`, and nothing changed, where it sees no tag or its numbers are not finite.
+    /// Takes in a view. Returns `None`, with nothing changed, if the view has no tag or its numbers are not finite.
     pub(crate) fn update(&mut self, robot: &Robot, view: &View) -> Option<ViewUpdate> {
         let views = std::slice::from_ref(view);
         let info = std::mem::replace(&mut self.info, DMatrix::zeros(0, 0));
@@ -330,7 +331,7 @@ impl Filter {
         Some(update)
     }
 
-    /// A joint turns as fast as its sensor's slope has it, which is not the datasheet's.
+    /// Sets the joint rates by the sensors' estimated slopes, which differ from the datasheet's.
     fn set_rates(&self, problem: &mut BundleProblem<'_>, robot: &Robot, view: &View) {
         if !is_moving(view) {
             return;
@@ -343,7 +344,7 @@ impl Filter {
         }
     }
 
-    /// About a worn spot a sensor is off by more than its noise: a bump of one width is not how a track wears.
+    /// Adds noise near a worn spot, because wear does not have the exact shape of a bump of one width.
     fn set_shape_errors(&self, problem: &mut BundleProblem<'_>, view: &View) {
         for (parameter, height_rad) in self.layout.parameters.iter().zip(self.state.joint.iter()) {
             if let ParameterKind::Bump(spot) = parameter.kind {
@@ -353,7 +354,8 @@ impl Filter {
         }
     }
 
-    /// From `start`; where something does not fit and a joint may stand anywhere, from where the tags show it, too.
+    /// Solves from `start`. If an observation does not fit and a joint may stand anywhere, also from the angle that the
+    /// tags show.
     fn solve(&self, problem: &mut BundleProblem<'_>, view: &View, start: &State) -> Option<SolvedView> {
         let solved = solve_view(problem, start);
         let is_clean = solved.is_some() && problem.observations.iter().all(|observation| observation.is_used);
@@ -392,7 +394,7 @@ impl Filter {
         self.scales.noise * if is_moving(view) { self.noise_in_motion } else { 1.0 }
     }
 
-    /// The belief so far as a view's prior.
+    /// Returns the belief so far as a view's prior.
     fn prior(&self, robot: &Robot, info: DMatrix<f64>) -> Prior {
         Prior {
             joint_mean: self.state.joint.clone(),
@@ -407,17 +409,18 @@ fn log_det(factor: &Cholesky<f64, Dyn>) -> f64 {
     2.0 * factor.l_dirty().diagonal().map(f64::ln).sum()
 }
 
-/// Of what is used, and of what was rejected.
+/// Returns the cost of used and rejected observations.
 fn cost_of(problem: &BundleProblem<'_>, solved: &SolvedView) -> f64 {
     solved.normal.cost + problem.observations.iter().map(|observation| rejected(observation).chi2).sum::<f64>()
 }
 
-/// By least squares; robustly first where something does not fit. `None` where nothing of the view is used.
+/// Solves a view by least squares, after a robust solution if an observation does not fit. `None` if no observation of
+/// the view is used.
 fn solve_view(problem: &mut BundleProblem<'_>, start: &State) -> Option<SolvedView> {
     let mut solver = ViewSolver::new(problem);
     let (mut state, mut factor) = solver.iterate(problem, start, Loss::Square)?;
     if reject_by(problem, &solver.normal) {
-        // One wrong observation pulls the others off: what is left out is told by a robust solution.
+        // One wrong observation biases the others, so a robust solution decides which ones to reject.
         problem.observations.iter_mut().for_each(|observation| observation.set_used([true; 4]));
         (state, _) = solver.iterate(problem, start, Loss::Cauchy { c: CORNER_WIDTH })?;
         reject_by(problem, &solver.normal);
@@ -427,9 +430,9 @@ fn solve_view(problem: &mut BundleProblem<'_>, start: &State) -> Option<SolvedVi
     is_any_used.then_some(SolvedView { state, normal: solver.normal, factor })
 }
 
-/// Gauss-Newton, with the memory of two linearizations.
+/// Gauss-Newton solver, with the memory of two linearizations.
 struct ViewSolver {
-    /// At the last state that was taken.
+    /// Normal equations at the last accepted state.
     normal: NormalEquations,
     trial: NormalEquations,
 }
@@ -439,7 +442,7 @@ impl ViewSolver {
         Self { normal: NormalEquations::new(problem), trial: NormalEquations::new(problem) }
     }
 
-    /// From `start`; the factor is of the last state that was linearized at.
+    /// Iterates from `start`; the returned factor belongs to the last linearized state.
     fn iterate(
         &mut self,
         problem: &BundleProblem<'_>,
@@ -463,7 +466,7 @@ impl ViewSolver {
                     return Some((trial, factor));
                 }
                 self.trial.update(problem, &trial, loss);
-                // Not a number is no gain.
+                // A NaN cost is no decrease.
                 if self.trial.cost <= cost + LAST_GAIN || step.norm() < SHORTEST_STEP {
                     break;
                 }
@@ -499,7 +502,7 @@ fn view_update(problem: &BundleProblem<'_>, solved: &SolvedView, log_det_before:
     }
 }
 
-/// Joint errors of the view and their variances, and the error of its time.
+/// Returns the joint errors of the view with their variances, and the error of its time.
 fn view_errors(problem: &BundleProblem<'_>, solved: &SolvedView) -> ([JointErrorOfView; MAX_JOINTS], TimeErrorOfView) {
     let SolvedView { state, normal, factor } = solved;
     let mut errors = [JointErrorOfView::default(); MAX_JOINTS];
@@ -521,7 +524,7 @@ fn view_errors(problem: &BundleProblem<'_>, solved: &SolvedView) -> ([JointError
                 var: covariance[(joint, joint)],
             };
         }
-        // The tags about the arm tell of the time; the gripper's is behind one joint.
+        // The tags around the arm determine the time; the gripper's tag depends on one joint.
         if k == 0 {
             time_error = group.time_error.of_view(&own, &covariance);
         }
@@ -529,8 +532,8 @@ fn view_errors(problem: &BundleProblem<'_>, solved: &SolvedView) -> ([JointError
     (errors, time_error)
 }
 
-/// With W the information before and P the covariance after, `a = W (x' - x)` and `b = W - W P W`, both along each
-/// offset and along the place of each tag.
+/// Returns the scores along each offset and along the position of each tag. With W the information before and P the
+/// covariance after, `a = W (x' - x)` and `b = W - W P W`.
 fn scores(problem: &BundleProblem<'_>, state: &State, factor: &Cholesky<f64, Dyn>) -> Scores {
     let info = &problem.prior.information.matrix;
     let pull = info * problem.prior.off(&problem.layout, state);

@@ -1,4 +1,4 @@
-//! A belief that is fed messages, and what it says over time.
+//! An online estimate that takes in messages, and its reports over time.
 
 use crate::follow::constants::follower::AHEAD_H;
 use nalgebra::Matrix3;
@@ -17,9 +17,10 @@ use armcal_core::stats::Summary;
 use armcal_core::streams::{JointAngles, Mark, MarkKind, Message, ReachTask, Thermometer};
 use armcal_core::time::Stamp;
 
-/// Follows the messages of an arm: push messages, read belief, predicted tool error and events.
+/// Follows the messages of an arm: push messages, read estimate, predicted tool error and events.
 ///
-/// Memory and time a message are bounded whatever the length of the stream. The same messages give the same belief.
+/// Memory and time per message are bounded regardless of the length of the stream. The same messages give the same
+/// estimate.
 #[derive(Clone)]
 pub struct Follower {
     settings: OnlineSettings,
@@ -31,28 +32,27 @@ pub struct Follower {
     tolerance_m: Option<f64>,
 }
 
-/// What is believed at one time.
+/// Online estimate at one time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BeliefRow {
-    /// ns since the epoch, by the joint sensors' clock.
+    /// Stamp by the joint sensors' clock, ns since the epoch.
     pub stamp_nanos: i64,
-    /// Views so far.
+    /// Number of views so far.
     pub views: usize,
-    /// Expected error of the tool over the task, one sigma in space, m: now.
+    /// Expected tool error over the task now, one sigma in space, m.
     pub tool_error_m: Summary,
-    /// The same in an hour without any view.
+    /// Expected tool error over the task in an hour without any view, one sigma in space, m.
     pub tool_error_in_an_hour_m: Summary,
-    /// Of each joint: what its sensor is off at the middle of its range under the conditions of then, and one sigma,
-    /// rad.
+    /// Error of each joint's sensor at mid-range under the conditions at that time, and its std, rad.
     pub offset_rad: Vec<[f64; 2]>,
-    /// How much later the joint sensors' stamps are than the camera's, and one sigma, s.
+    /// Delay of the joint sensors' stamps against the camera's and its std, s.
     pub clock_offset_s: Option<[f64; 2]>,
     /// Lag of the sensors' temperature behind the oil's, s.
     pub temperature_lag_s: f64,
 }
 
 impl Follower {
-    /// For `robot`; tags that a recorded survey names take the place of its own.
+    /// Returns a follower for `robot`; tags of a recorded survey replace the robot's own.
     #[must_use]
     pub fn new(robot: Robot, settings: OnlineSettings) -> Self {
         Self {
@@ -66,10 +66,10 @@ impl Follower {
         }
     }
 
-    /// Takes a message in; what it made known, in the order of time.
+    /// Takes in a message. Returns the events that it revealed, in the order of time.
     pub fn push(&mut self, log_time: Stamp, message: &Message) -> Vec<OnlineEvent> {
         match message {
-            // The first word counts, as in a calibration.
+            // The first survey counts, as in a calibration.
             Message::Survey(survey) if self.estimator.n_views() == 0 => {
                 let robot = self.robot.clone().with_survey(survey.survey(&self.robot));
                 let (targets, tolerance_m) = (std::mem::take(&mut self.targets), self.tolerance_m);
@@ -93,13 +93,13 @@ impl Follower {
         self.add(views)
     }
 
-    /// What is complete when no more messages come.
+    /// Takes in the views that are complete when no more messages come. Returns their events.
     pub fn finish(&mut self) -> Vec<OnlineEvent> {
         let views = self.views.finish();
         self.add(views)
     }
 
-    /// Takes views in that were made elsewhere, of an external recording for instance.
+    /// Takes in views from elsewhere, for instance of an external recording. Returns their events.
     pub fn add(&mut self, views: Vec<View>) -> Vec<OnlineEvent> {
         for view in views {
             let Conditions { oil_c, pressure_pa, stamp } = &mut self.conditions;
@@ -113,7 +113,7 @@ impl Follower {
         self.estimator.take_events()
     }
 
-    /// The targets that tool errors are predicted at; where none is within reach, the stowed posture stays.
+    /// Sets the targets at which tool errors are predicted; if none is within reach, the stowed configuration stays.
     pub fn set_task(&mut self, task: &ReachTask) {
         let targets = task_angles(&self.robot, TaskRests { task, rests: &std::collections::BTreeMap::new() });
         self.tolerance_m = Some(task.tolerance_m);
@@ -122,7 +122,7 @@ impl Follower {
         }
     }
 
-    /// Returns true where the decision rule accepts every target of the task; `None` without a task or an estimate.
+    /// Returns true if the decision rule accepts every target of the task; `None` without a task or an estimate.
     #[must_use]
     pub fn is_good_enough(&self) -> Option<bool> {
         let covariance = self.estimator.covariance(&self.conditions)?;
@@ -135,23 +135,23 @@ impl Follower {
         Some(self.targets.iter().all(is_accepted))
     }
 
-    /// A joint whose sensor is left out stands still where it is believed to stand, to one sigma, rad.
+    /// Declares that a joint without a sensor stands still at its believed angle, with the std `std_rad`, rad.
     pub fn stands_still(&mut self, joint: usize, std_rad: f64) {
         self.estimator.stands_still(joint, std_rad);
     }
 
-    /// The estimator.
+    /// Returns the estimator.
     #[must_use]
     pub fn estimator(&self) -> &OnlineEstimator {
         &self.estimator
     }
 
-    /// The sensors as believed under the conditions of now; those of the datasheet before the first view.
+    /// Returns the estimated sensors under the present conditions; those of the datasheet before the first view.
     #[must_use]
     pub fn sensors(&self) -> ArmSensors {
         let Some(parameters) = self.estimator.parameters() else { return ArmSensors::nominal(&self.robot) };
         let mut sensors = parameters.sensors(&self.robot);
-        // What the sensors are warmer than the oil, their reference is colder.
+        // The reference is lowered by the excess of the sensors' temperature over the oil's.
         let at_sensors = self.estimator.at_sensors(&self.conditions);
         if let (Some(reference_c), Some(oil_c), Some(sensor_c)) =
             (&mut sensors.reference.oil_c, self.conditions.oil_c, at_sensors.oil_c)
@@ -161,13 +161,13 @@ impl Follower {
         sensors
     }
 
-    /// Latest temperatures, pressure and time.
+    /// Returns the latest temperatures, pressure and time.
     #[must_use]
     pub fn conditions(&self) -> &Conditions {
         &self.conditions
     }
 
-    /// What is believed now; `None` before the first view.
+    /// Returns the present estimate; `None` before the first view.
     #[must_use]
     pub fn belief(&self) -> Option<BeliefRow> {
         let stamp = self.conditions.stamp?;
@@ -193,13 +193,13 @@ impl Follower {
         })
     }
 
-    /// Expected error of the tool over the task under `conditions`, without further views until then.
+    /// Returns the expected tool error over the task under `conditions`, without further views until then, m.
     #[must_use]
     pub fn tool_error_m(&self, conditions: &Conditions) -> Option<Summary> {
         self.tool_error_under_m(&self.estimator.covariance(conditions)?, conditions)
     }
 
-    /// U95 of the tool at estimated `angles`, now, m.
+    /// Returns U95 of the tool at estimated `angles`, now, m.
     #[must_use]
     pub fn u95_at_m(&self, angles: &JointAngles) -> Option<f64> {
         let covariance = self.estimator.covariance(&self.conditions)?;
@@ -214,7 +214,7 @@ impl Follower {
         angles: &JointAngles,
         conditions: &Conditions,
     ) -> Matrix3<f64> {
-        // What drifts is in the covariance already.
+        // The covariance already includes drift.
         let at = Conditions { stamp: sensors.reference.stamp, ..*conditions };
         covariance.tool_position_under_m2(&self.robot, sensors, angles, &at)
     }

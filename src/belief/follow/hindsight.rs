@@ -1,7 +1,7 @@
-//! Worn spots and moved tags by looks that lie minutes apart, each of which is worth a few nats: a race about one of
-//! them is over before the next comes. What each view says of each joint's offset and of each tag's place is kept.
-//! Innovations have no memory, so that the scores of one place of a track, and of one tag, add up; where they are too
-//! many sigmas, the views since are taken in once more under what may have happened before the first of them.
+//! Worn spots and moved tags found by views that lie minutes apart. Each such view adds only a few nats, and a race
+//! about one is over before the next comes. So each view's scores of each joint's offset and each tag's position are
+//! kept. Innovations have no memory, so the scores of one place of a track, and of one tag, add up. If the sum is too
+//! many sigmas, the views since then are taken in once more, with a fault before the first of them.
 
 use crate::follow::constants::hindsight::{
     A_LITTLE_ASIDE_M, COMPARED_CHI2, COMPARED_Z, FARTHER_BY, GROWN_BY, LEAST_VIEWS, MIDDLES, SUSPICIOUS_CHI2,
@@ -21,11 +21,11 @@ use armcal_core::robot::Robot;
 /// The last views, and the belief before them.
 #[derive(Clone, Default)]
 pub(crate) struct Hindsight {
-    /// The older one first.
+    /// Spans, the older one first.
     spans: Vec<Span>,
-    /// By joint, the square of the score that was looked into last.
+    /// Square of the last tested score of each joint.
     looked_into: [f64; MAX_JOINTS],
-    /// The same of each tag that was, by its index.
+    /// Index and square of the last tested score of each tag that was tested.
     looked_into_tags: Vec<(usize, f64)>,
 }
 
@@ -39,54 +39,54 @@ struct Span {
 struct PastStep {
     step: Step,
     scores: Scores,
-    /// All sensors had drifted more than expected.
+    /// True if all sensors had drifted more than expected.
     has_drifted: bool,
 }
 
-/// A tag that the views have elsewhere, all together.
+/// A tag that all views together show displaced.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TagSuspicion {
     pub tag: usize,
-    /// Views since the first from which on they do.
+    /// Number of views since the first that shows the displacement.
     n_since: usize,
-    /// Chi-square of three.
+    /// Chi-square of three degrees of freedom.
     chi2: f64,
 }
 
-/// A place of a track that the views say something of together.
+/// A place of a track that the scores of several views concern.
 #[derive(Clone, Copy, Debug)]
 struct Suspicion {
     joint: usize,
     spot: WornSpot,
-    /// Views since the first that belongs to it.
+    /// Number of views since the first that belongs to it.
     n_since: usize,
     /// Square of the score in sigmas.
     chi2: f64,
 }
 
 impl Hindsight {
-    /// Before a view changes `filter`: begins a span with it where the last one is full.
+    /// Prepares for a view before it changes `filter`: begins a span with it if the last one is full.
     pub(crate) fn begin(&mut self, filter: &Filter) {
         if self.spans.last().is_some_and(|span| span.steps.len() < VIEWS_OF_SPAN) {
             return;
         }
         if self.spans.len() == 2 {
             self.spans.remove(0);
-            // What was looked into was looked into for views that are gone.
+            // The tests concerned views that are gone.
             self.looked_into = [0.0; MAX_JOINTS];
             self.looked_into_tags.clear();
         }
         self.spans.push(Span { before: filter.clone(), steps: Vec::with_capacity(VIEWS_OF_SPAN) });
     }
 
-    /// A view that was taken in, and what it said of offsets and tags as nothing had happened.
+    /// Adds a view that was taken in, and its scores of offsets and tags without a fault.
     pub(crate) fn add(&mut self, step: Step, scores: Scores) {
         if let Some(span) = self.spans.last_mut() {
             span.steps.push(PastStep { step, scores, has_drifted: false });
         }
     }
 
-    /// The last `n` views were explained by drift, which happened before the first of them.
+    /// Marks that the last `n` views were explained by drift before the first of them.
     pub(crate) fn has_drifted(&mut self, n: usize) {
         if let Some(past) = self.spans.iter_mut().rev().flat_map(|span| span.steps.iter_mut().rev()).nth(n - 1) {
             past.has_drifted = true;
@@ -97,7 +97,7 @@ impl Hindsight {
         self.spans.iter().rev().flat_map(|span| span.steps.iter().rev())
     }
 
-    /// Explanations of the last views that these suggest together with those before them, by [`Self::branches`].
+    /// Returns the hypotheses that the last views suggest together with those before them, by [`Self::branches`].
     pub(crate) fn found(&mut self, robot: &Robot, filter: &Filter, n_of_race: usize) -> Vec<Branch> {
         let suspicions = self.suspicions(filter);
         let mut found = self.branches(robot, filter, &suspicions, n_of_race);
@@ -106,8 +106,8 @@ impl Hindsight {
         found
     }
 
-    /// The tags of the last view that the views have elsewhere together: first that of which they are surest among
-    /// those of which they are surer than when it was looked into; none where there is no such one.
+    /// Returns the tags of the last view that all views together show displaced. The one with the largest score among
+    /// those whose score has grown since its test comes first. Empty if there is none.
     pub(crate) fn suspicious_tags(&mut self) -> Vec<TagSuspicion> {
         let Some(last) = self.latest_first().next() else { return Vec::new() };
         let tags: Vec<usize> = last.scores.tags.iter().map(|score| score.tag).collect();
@@ -126,7 +126,7 @@ impl Hindsight {
         all
     }
 
-    /// Since the view from which on its place is off the most; `None` where too few saw it.
+    /// Returns the suspicion since the view with the largest displacement; `None` if too few views saw the tag.
     fn of_tag(&self, tag: usize) -> Option<TagSuspicion> {
         let (mut a, mut n_views) = (Vector3::zeros(), 0);
         let mut b = Matrix3::from_diagonal_element(A_LITTLE_ASIDE_M.powi(-2));
@@ -144,7 +144,8 @@ impl Hindsight {
         best
     }
 
-    /// The same as [`Self::branches`] of tags: each of `suspicions`, and what a moved tag may be taken for.
+    /// Returns the branches of tags, as [`Self::branches`] does: each of `suspicions`, and faults that may look like a
+    /// moved tag.
     fn branches_of_tags(
         &self,
         robot: &Robot,
@@ -167,8 +168,8 @@ impl Hindsight {
         branches
     }
 
-    /// The places about which the last view stands of which the views say something together: first that of which they
-    /// say most among those beyond what was looked into before; none where there is no such one.
+    /// Returns the places around the last view whose scores add up over several views. The one with the largest score
+    /// among those grown since their test comes first. Empty if there is none.
     fn suspicions(&mut self, filter: &Filter) -> Vec<Suspicion> {
         let Some(last) = self.latest_first().next().map(|past| &past.step.view) else { return Vec::new() };
         let joints = filter.offsets().map(|(joint, _)| joint);
@@ -187,7 +188,7 @@ impl Hindsight {
         all
     }
 
-    /// Since the view from which on the scores are the most sigmas; `None` where too few are of that place.
+    /// Returns the suspicion since the view with the most sigmas; `None` if too few views are of that place.
     fn of_place(&self, joint: usize, spot: WornSpot) -> Option<Suspicion> {
         let (mut a, mut b, mut n_views) = (0.0, 0.0, 0);
         let mut best: Option<Suspicion> = None;
@@ -208,10 +209,10 @@ impl Hindsight {
         best
     }
 
-    /// Beliefs in which something happened before the first view of the first of `suspicions`, and all views since were
-    /// taken in: the worn spots, and what they may be taken for; none where the first is not worth it. Their evidence
-    /// is over that nothing happened, but for the last `n_of_race` views, of which it is their own. `filter` has the
-    /// noise of now.
+    /// Returns beliefs with a fault before the first view of the first of `suspicions`, and all views since taken in.
+    /// They are the worn spots and faults that may look like one; none if the first is not worth a test. Their evidence
+    /// is relative to no fault, except for the last `n_of_race` views, where it is absolute. `filter` has the present
+    /// noise.
     fn branches(&self, robot: &Robot, filter: &Filter, suspicions: &[Suspicion], n_of_race: usize) -> Vec<Branch> {
         let Some(first) = suspicions.first() else { return Vec::new() };
         let Some(look_back) = self.look_back(robot, filter, first.n_since.max(n_of_race), n_of_race) else {
@@ -233,7 +234,7 @@ impl Hindsight {
         branches
     }
 
-    /// The last `n` views under that nothing happened; `None` where fewer are known.
+    /// Returns the last `n` views without a fault; `None` if fewer are known.
     fn look_back(&self, robot: &Robot, filter: &Filter, n: usize, n_of_race: usize) -> Option<LookBack<'_>> {
         let all: Vec<&PastStep> = self.spans.iter().flat_map(|span| &span.steps).collect();
         let n_before = all.len().checked_sub(n)?;
@@ -256,10 +257,10 @@ impl Hindsight {
 
 /// The last views, and the belief before them.
 struct LookBack<'a> {
-    /// That nothing happened until then.
+    /// Belief without a fault until then.
     before: Branch,
     steps: Vec<&'a PastStep>,
-    /// The evidence of each where nothing happened, nats.
+    /// Evidence of each view without a fault, nats.
     of_nothing: Vec<f64>,
     n_before_race: usize,
 }
@@ -269,7 +270,7 @@ impl LookBack<'_> {
         self.of_nothing[self.n_before_race..].iter().sum()
     }
 
-    /// The belief that `fault` happened before the first of them.
+    /// Returns the belief with `fault` before the first of these views.
     fn branch(&self, robot: &Robot, fault: Fault) -> Branch {
         let mut branch = self.before.with(robot, fault);
         self.steps.iter().for_each(|past| past.take_in(robot, &mut branch));
@@ -290,7 +291,7 @@ impl LookBack<'_> {
     }
 }
 
-/// Whether a view of which a fault and nothing have the evidence, nats, counts for it.
+/// True if a view counts for a fault, given its evidence with the fault and without, nats.
 fn counts(fault: Fault, past: &PastStep, [own, nothing]: [f64; 2]) -> bool {
     match fault {
         Fault::Tag(tag) => past.step.view.sees(tag),

@@ -1,4 +1,4 @@
-//! What may have happened to the arm between two views: each is a belief that is widened where it re-opens.
+//! Faults of the arm that may happen between two views: each widens the belief in the parameters that it changes.
 
 use crate::explain::constants::failures::OTHER_GAIN_STD;
 use crate::follow::constants::hypothesis::{
@@ -15,22 +15,22 @@ use crate::views::view::View;
 use armcal_core::robot::Robot;
 use armcal_core::spatial::adjoint;
 
-/// Tags of one carrier, by their indices.
+/// Indices of the tags on one carrier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct TagSet {
-    /// In rising order, those in use first.
+    /// Indices in rising order, those in use first.
     indices: [u16; MOST_TAGS],
     n: u8,
 }
 
 impl TagSet {
-    /// One tag; `None` beyond the index that fits.
+    /// Returns a set of one tag; `None` if its index is too large.
     #[must_use]
     pub fn of(tag: usize) -> Option<Self> {
         Self { indices: [0; MOST_TAGS], n: 0 }.with(tag)
     }
 
-    /// With one more; `None` where it is among them, or there are too many.
+    /// Returns the set with one more tag; `None` if it is in the set already, or the set is full.
     #[must_use]
     pub fn with(mut self, tag: usize) -> Option<Self> {
         let (tag, n) = (u16::try_from(tag).ok()?, usize::from(self.n));
@@ -43,20 +43,20 @@ impl TagSet {
         Some(self)
     }
 
-    /// The indices, rising.
+    /// Returns the indices, in rising order.
     pub fn iter(&self) -> impl Iterator<Item = usize> + '_ {
         self.indices[..usize::from(self.n)].iter().map(|tag| usize::from(*tag))
     }
 }
 
-/// What may have happened.
+/// A fault that may have happened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Fault {
     /// The sensor of a joint turned on its shaft.
     Slip(usize),
     /// The sensor of a joint has another scale or sign.
     Scale(usize),
-    /// The sensor of a joint says nothing any more.
+    /// The sensor of a joint gives no information any more.
     Failed(usize),
     /// The track of a joint's sensor is worn at a place: a bump of its curve there.
     Worn(usize, WornSpot),
@@ -68,13 +68,13 @@ pub enum Fault {
     Mount,
     /// All tags together moved, or the arm's base.
     Base,
-    /// All sensors drifted more than expected: nothing to tell of.
+    /// All sensors drifted more than expected: nothing to report.
     Drift,
 }
 
 impl Fault {
-    /// All that views could tell of; sensors that are not looked at are not asked. Tags that moved together are found
-    /// by the evidence of one.
+    /// Returns all faults that the views could show, except of ignored sensors. Tags that moved together are found by
+    /// the evidence of one.
     pub(crate) fn all(filter: &Filter, views: &[&View]) -> Vec<Self> {
         let (Some(first), Some(last)) = (views.first(), views.last()) else { return Vec::new() };
         let mut tags: Vec<usize> = views.iter().flat_map(|view| &view.tags).map(|tag| tag.tag_idx).collect();
@@ -101,7 +101,7 @@ impl Fault {
             .collect()
     }
 
-    /// `ln` of its odds, before any view, against nothing.
+    /// Returns `ln` of its prior odds against no fault.
     pub(crate) fn ln_prior(self) -> f64 {
         match self {
             Self::Drift => LN_PRIOR_OF_DRIFT,
@@ -110,7 +110,7 @@ impl Fault {
         }
     }
 
-    /// Widens the belief where the fault re-opens it.
+    /// Widens the belief in the parameters that the fault changes.
     pub(crate) fn open(self, filter: &mut Filter, robot: &Robot) {
         match self {
             Self::Slip(joint) => {
@@ -126,7 +126,7 @@ impl Fault {
                 let columns: Vec<_> = filter.offsets().map(|(_, at)| (at, DRIFT_STD_RAD.powi(2))).collect();
                 filter.widen(&columns);
             }
-            // The views themselves are taken otherwise.
+            // A failed sensor changes how views are taken in, not the belief.
             Self::Failed(_) => {}
             Self::Worn(joint, spot) => {
                 filter.add_parameter(robot, Parameter { joint, kind: ParameterKind::Bump(spot) });
@@ -141,18 +141,18 @@ impl Fault {
         }
     }
 
-    /// Numbers that are open under it from the start.
+    /// Returns the number of parameters that the fault opens from the start.
     pub(crate) fn numbers(self) -> usize {
         match self {
             Self::Slip(_) | Self::Worn(..) => 1,
             Self::Scale(_) => 2,
             Self::Tags(_) | Self::Mount | Self::Base => 6,
-            // These depend on the views.
+            // The number depends on the views.
             Self::Failed(_) | Self::Tag(_) | Self::Drift => 0,
         }
     }
 
-    /// Whether both are about the same sensor.
+    /// True if both faults are of the same sensor.
     pub(crate) fn is_of_same_sensor(self, other: Self) -> bool {
         let joint = |fault| match fault {
             Self::Slip(joint) | Self::Scale(joint) | Self::Failed(joint) | Self::Worn(joint, _) => Some(joint),
@@ -161,7 +161,7 @@ impl Fault {
         joint(self).is_some() && joint(self) == joint(other)
     }
 
-    /// The kind as files write it.
+    /// Returns the kind as files write it.
     #[must_use]
     pub fn kind(self) -> FindingKind {
         match self {
@@ -176,7 +176,7 @@ impl Fault {
         }
     }
 
-    /// Joint or tag, as people know it.
+    /// Returns the name of the joint or tag.
     #[must_use]
     pub fn name(self, robot: &Robot) -> String {
         match self {
@@ -194,7 +194,7 @@ impl Fault {
         }
     }
 
-    /// What people read where it is one of several explanations.
+    /// Returns the user's text for one of several hypotheses.
     pub(crate) fn phrase(self, robot: &Robot) -> String {
         match self {
             Self::Drift => say::drift(),
@@ -202,14 +202,15 @@ impl Fault {
         }
     }
 
-    /// How far belief `after` is from belief `before` in what the fault is about: m, of a slip by how much the sensor
-    /// reads more since, rad, of a worn spot the same at its middle, of a scale the slope of the angle by the reading;
-    /// `None` without a size.
+    /// Returns the size of the fault: the displacement from belief `before` to belief `after`, m. For tags on one
+    /// carrier it is the median displacement, m; for the camera mount the rotation, rad. For a slip it is the increase
+    /// of the sensor's reading, rad; for a worn spot that at its middle, rad. For a scale fault it is the slope of the
+    /// angle by the reading. `None` without a size.
     pub(crate) fn size(self, before: &Filter, after: &Filter) -> Option<f64> {
         match self {
             Self::Slip(joint) => {
                 let offset = |filter: &Filter| filter.parameters().offset_rad[joint];
-                // The angle falls by what the sensor reads more since.
+                // The angle falls by the increase of the reading.
                 Some(offset(before) - offset(after))
             }
             Self::Scale(joint) => Some(after.parameters().gain[joint]),
@@ -240,7 +241,7 @@ fn six(at: Option<usize>, [shift, turn]: [f64; 2]) -> Vec<(usize, f64)> {
     at.into_iter().flat_map(|at| (0..6).map(move |k| (at + k, variance(k)))).collect()
 }
 
-/// Tags by a small motion of the first of them that carries the others along, each column times one sigma.
+/// Returns the directions of tags that move with their first tag as one body, each column times its std.
 fn carrier_directions(filter: &Filter, tags: TagSet) -> DMatrix<f64> {
     let mut along = DMatrix::zeros(filter.n_columns(), 6);
     let std = Matrix6::from_diagonal(&nalgebra::Vector6::from_fn(|k, _| TAG_STD[k / 3]));
@@ -253,7 +254,7 @@ fn carrier_directions(filter: &Filter, tags: TagSet) -> DMatrix<f64> {
     along
 }
 
-/// All tags by a small motion of the frame that they are known in, each column times one sigma.
+/// Returns the directions of all tags that move with their common frame, each column times its std.
 fn base_directions(filter: &Filter, robot: &Robot) -> DMatrix<f64> {
     let mut along = DMatrix::zeros(filter.n_columns(), 6);
     let std = Matrix6::from_diagonal(&nalgebra::Vector6::from_fn(|k, _| BASE_STD[k / 3]));

@@ -15,7 +15,7 @@ impl LaggedTemperature {
         Self { lag_s, last: None }
     }
 
-    /// A reading of the thermometer; the first one is where the sensor starts.
+    /// Takes in a reading of the thermometer; the first one is the sensor's initial temperature.
     pub(crate) fn hear(&mut self, stamp: Stamp, oil_c: f64) {
         if !oil_c.is_finite() {
             return;
@@ -29,12 +29,12 @@ impl LaggedTemperature {
         });
     }
 
-    /// `conditions` as the sensors have them.
+    /// Returns the conditions at the sensors.
     pub(crate) fn of_sensors(&self, conditions: &Conditions) -> Conditions {
         Conditions { oil_c: conditions.oil_c.map(|now_c| self.behind(now_c)), ..*conditions }
     }
 
-    /// The sensor's temperature where the oil has `oil_c`; that of the oil where nothing was heard.
+    /// Returns the sensor's temperature when the oil has `oil_c`; that of the oil before any reading.
     fn behind(&self, oil_c: f64) -> f64 {
         match self.last {
             Some((_, sensor_c)) if self.lag_s > 0.0 => sensor_c,

@@ -26,34 +26,34 @@ use armcal_core::robot::Robot;
 use armcal_core::sensor::Conditions;
 use armcal_core::time::Stamp;
 
-/// A belief kept up view by view, for sensors that follow the thermometer with one lag.
+/// A belief that takes in view by view, for sensors that follow the thermometer with one lag.
 #[derive(Clone)]
 pub(crate) struct Member {
     robot: Robot,
     settings: Arc<OnlineSettings>,
     lag: LaggedTemperature,
     corners: CornerNoise,
-    /// `ln` of the probability of the views by this belief, older ones counting less.
+    /// Logarithm of the probability of the views by this belief, with less weight on older ones.
     pub nats: f64,
-    /// The first views, until the filter goes on alone.
+    /// Initial views, until the filter continues without them.
     first: Vec<View>,
     /// Views of a moving arm before the first one at rest.
     moving: Vec<View>,
     n_views: usize,
-    /// Joints whose sensor says nothing any more.
+    /// Joints whose sensor gives no information any more.
     failed: Vec<usize>,
-    /// Of those that stand still: one sigma of where.
+    /// Std of the angle of each joint that stands still without a sensor, rad.
     stands_within_rad: [f64; MAX_JOINTS],
     running: Option<Running>,
     suspect_since: Option<Stamp>,
     events: Vec<OnlineEvent>,
 }
 
-/// The filter, and what it is tuned by.
+/// The filter, and its noise estimates.
 #[derive(Clone)]
 struct Running {
     filter: Filter,
-    /// Explanations of views that the filter did not expect, while they are open.
+    /// Open hypotheses about views that the filter did not expect.
     race: Option<Race>,
     recent: Option<RecentViews>,
     hindsight: Hindsight,
@@ -61,7 +61,7 @@ struct Running {
     errors: JointErrorSize,
     motion: MotionNoise,
     jitter: JitterSize,
-    /// Of the last view.
+    /// Conditions of the last view.
     conditions: Conditions,
 }
 
@@ -85,39 +85,39 @@ impl Member {
         }
     }
 
-    /// The same belief from now on under another lag, whose temperatures were about the same so far.
+    /// Returns the same belief under another lag from now on, whose temperatures were about the same so far.
     pub(crate) fn with_lag(&self, lag: LaggedTemperature) -> Self {
         Self { lag, ..self.clone() }
     }
 
-    /// Number of views taken in.
+    /// Returns the number of views taken in.
     pub(crate) fn n_views(&self) -> usize {
         self.n_views
     }
 
-    /// From now on the sensor of `joint` is not looked at.
+    /// Ignores the sensor of `joint` from now on.
     pub(crate) fn leave_out(&mut self, joint: usize) {
         if !self.failed.contains(&joint) {
             self.failed.push(joint);
         }
     }
 
-    /// The joint that is left out stands where it is believed to stand, to one sigma.
+    /// Declares that the joint without a sensor stands still at its believed angle, with the std `std_rad`.
     pub(crate) fn stands_still(&mut self, joint: usize, std_rad: f64) {
         self.stands_within_rad[joint] = std_rad;
     }
 
-    /// A reading of the oil's thermometer.
+    /// Takes in a reading of the oil's thermometer.
     pub(crate) fn hear_temperature(&mut self, stamp: Stamp, oil_c: f64) {
         self.lag.hear(stamp, oil_c);
     }
 
-    /// `conditions` as the sensors have them.
+    /// Returns the conditions at the sensors.
     pub(crate) fn lagged(&self, conditions: &Conditions) -> Conditions {
         self.lag.of_sensors(conditions)
     }
 
-    /// Takes a view in; whether it told anything.
+    /// Takes in a view. Returns true if it gave information.
     pub(crate) fn add_view(&mut self, mut view: View) -> bool {
         self.n_views += 1;
         view.conditions = self.lagged(&view.conditions);
@@ -138,8 +138,8 @@ impl Member {
         }
     }
 
-    /// A start that goes on no more is over; what came since its last batch is in the belief. Where nothing drifts,
-    /// views at rest may come at any time.
+    /// Ends a start after a long pause; the belief includes the views since its last batch. Without drift, views at
+    /// rest may come at any time.
     fn close_start(&mut self, view: &View) {
         let is_late = self.first.last().is_some_and(|last| view.end.since_s(last.end) > START_PAUSE_S);
         let may_wait = self.settings.drift == DriftModel::Stationary && !is_moving(view);
@@ -148,7 +148,7 @@ impl Member {
         }
     }
 
-    /// Views of a moving arm are for later, unless there are no others.
+    /// Holds views of a moving arm back, unless there are no others.
     fn hold_back(&mut self, view: View) -> bool {
         if self.running.is_some() {
             return false;
@@ -163,7 +163,7 @@ impl Member {
         self.running.is_some()
     }
 
-    /// The batch of the first views.
+    /// Makes the batch of the initial views.
     fn start_with(&mut self, view: View) -> bool {
         self.moving = Vec::new();
         let n = self.first.len() + 1;
@@ -257,7 +257,7 @@ impl Member {
         recent.add(view, update.as_ref());
         if is_searched {
             running.hindsight.add(step, update.as_ref().map(|update| update.scores.clone()).unwrap_or_default());
-            // A view of which nothing fits changes nothing.
+            // A view whose observations are all rejected changes nothing.
             let is_suspicious = update.as_ref().is_none_or(is_suspicious) || recent.show_a_step();
             let n_views = recent.views.len();
             let found = running.hindsight.found(&self.robot, &running.filter, n_views);
@@ -273,12 +273,13 @@ impl Member {
         Some(update)
     }
 
-    /// Of explanations of the last views, `found` in hindsight among them.
+    /// Starts a race of hypotheses about the last views, with those `found` in hindsight.
     fn start_race(&mut self, recent: &RecentViews, found: Vec<Branch>, nats_of_earlier: f64) {
         let Some(running) = &mut self.running else { return };
         let mut race = Race::start(&self.robot, recent);
         race.take_up(found);
-        // Forgotten once a view, race or not: beliefs under other lags are compared by this.
+        // The evidence is forgotten once per view, with or without a race, because it compares beliefs under other
+        // lags.
         self.nats = FORGETTING * self.nats + race.nats() - nats_of_earlier;
         self.suspect_since = recent.views.first().map(|first| first.end);
         running.race = Some(race);
@@ -298,7 +299,7 @@ impl Member {
         self.settle_race(now);
     }
 
-    /// How much sensors change and err.
+    /// Learns the noise of sensors and images.
     fn learn(&mut self, update: &ViewUpdate, view: &View) {
         let Some(running) = &mut self.running else { return };
         if self.settings.drift == DriftModel::Tuned {
@@ -317,7 +318,7 @@ impl Member {
         }
     }
 
-    /// The best explanation is the belief; once it is decided, it is told of.
+    /// Makes the best hypothesis the belief, and reports it once it is decided.
     fn settle_race(&mut self, now: Stamp) {
         let Some(running) = &mut self.running else { return };
         let Some(race) = &running.race else { return };
@@ -340,7 +341,7 @@ impl Member {
         running.race = None;
     }
 
-    /// What each of `explanations` makes of the views from now on; `None` before the first belief.
+    /// Returns an oracle that follows each of `explanations` from now on; `None` before the first estimate.
     pub(crate) fn oracle(&self, explanations: &[Vec<Fault>]) -> Option<Oracle> {
         let Running { filter, noise, conditions, .. } = self.running.as_ref()?;
         let explained = |faults: &[Fault]| Explained::new(faults.to_vec(), filter, &self.robot);
@@ -355,27 +356,27 @@ impl Member {
         })
     }
 
-    /// What happened since this was last asked for, in the order of time.
+    /// Returns the events since the last call, in the order of time.
     pub(crate) fn take_events(&mut self) -> Vec<OnlineEvent> {
         std::mem::take(&mut self.events)
     }
 
-    /// Of what nobody asked for yet.
+    /// Drops uncollected events for which `is_past` holds.
     pub(crate) fn forget_events(&mut self, is_past: impl Fn(&OnlineEvent) -> bool) {
         self.events.retain(|event| !is_past(event));
     }
 
-    /// State and information; `None` before the first view.
+    /// Returns state and information; `None` before the first view.
     pub(crate) fn filter(&self) -> Option<&Filter> {
         self.running.as_ref().map(|running| &running.filter)
     }
 
-    /// The sensors as believed; `None` before the first view.
+    /// Returns the believed sensor parameters; `None` before the first view.
     pub(crate) fn parameters(&self) -> Option<JointParameters> {
         self.running.as_ref().map(|running| running.filter.parameters())
     }
 
-    /// Covariance of the joints' parameters under `conditions`, with what may have changed since the last view.
+    /// Returns the covariance of the joints' parameters under `conditions`, including changes since the last view.
     pub(crate) fn covariance(&self, conditions: &Conditions) -> Option<ParameterCovariance> {
         let running = self.running.as_ref()?;
         let mut filter = running.filter.clone();
@@ -388,12 +389,12 @@ impl Member {
         let matrix = filter.joint_covariance()?;
         let sensors = filter.parameters();
         let residual_std_rad = std::array::from_fn(|joint| match self.robot.sensors.get(joint) {
-            // What says nothing leaves the angle open.
+            // A failed sensor leaves the angle open.
             _ if self.failed.contains(&joint) => filter.scales.free_joint_std_rad.min(self.stands_within_rad[joint]),
             Some(spec) if filter.joint_columns(joint).is_empty() => spec.linearity_std_rad,
             _ => {
-                // Rests do not say from which side a joint came, so that what they leave has the backlash in it, which
-                // the tool's error adds once more.
+                // Rests do not show from which side a joint came, so their residuals include the backlash. The tool's
+                // error adds the backlash itself.
                 let half_backlash_rad = sensors.terms[joint].half_backlash_rad;
                 (filter.scales.joint_std_rad[joint].powi(2) - half_backlash_rad.powi(2)).max(0.0).sqrt()
             }
@@ -401,7 +402,7 @@ impl Member {
         Some(ParameterCovariance { parameters, matrix, residual_std_rad: Some(residual_std_rad) })
     }
 
-    /// How much later the joint sensors' stamps are than the camera's, and one sigma, s.
+    /// Returns the delay of the joint sensors' stamps against the camera's and its std, s.
     pub(crate) fn clock_offset_s(&self) -> Option<[f64; 2]> {
         let filter = &self.running.as_ref()?.filter;
         let (offset_s, at) = filter.clock_offset()?;
@@ -412,7 +413,7 @@ impl Member {
         self.lag.lag_s
     }
 
-    /// How much faster than by the datasheet offsets walk and lag, as factors of standard deviations.
+    /// Returns the ratios of estimated to datasheet std: of the offsets' random walk and of their lag.
     pub(crate) fn drift_factors(&self) -> Option<[f64; 2]> {
         self.running.as_ref().map(|running| running.noise.factors())
     }

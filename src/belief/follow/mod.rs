@@ -1,11 +1,11 @@
-//! ONLINE: the belief kept up through a dive, message by message.
+//! ONLINE: the estimate kept up to date during a dive, message by message.
 //!
-//! `view_stream` makes views of messages. `estimator` holds a `member` for each lag of the sensors' temperature; each
-//! starts from the first views by `bundle` and carries its belief on: `filter` is state and information,
-//! `process_noise` how fast sensors change. `diagnosis` races `hypothesis` against hypothesis where a view does not
-//! fit, each with a `branch` of the belief; `hindsight` gathers what looks minutes apart say of one place of a sensor's
-//! track; `event` tells what happened. `follower` is all of it, `belief_log` what it said over time; `oracle` and
-//! `batch` are what it is compared with.
+//! `view_stream` makes views of messages. `estimator` holds a `member` for each lag of the sensors' temperature. Each
+//! starts from the first views by `bundle` and continues with a filter: `filter` is state and information,
+//! `process_noise` the rate of sensor changes. If a view does not fit, `diagnosis` races each `hypothesis` with its own
+//! `branch` of the belief. `hindsight` adds up scores of views that lie minutes apart. `event` reports the result.
+//! `follower` combines all of it, and `belief_log` records its reports; `oracle` and `batch` are references for
+//! comparison.
 
 pub(crate) mod batch;
 pub(crate) mod belief_log;

@@ -1,5 +1,5 @@
-//! An oracle that knows when something may have happened: what can be told of it by the views since then. For studies:
-//! a belief that finds out by itself cannot be faster.
+//! An oracle with known fault times: the evidence that later views can give for a fault. For studies: no diagnosis
+//! without that knowledge can be faster.
 
 use crate::follow::branch::{NOTHING_FITS_NATS, seen_by};
 use crate::follow::filter::Filter;
@@ -11,20 +11,20 @@ use armcal_core::robot::Robot;
 use armcal_core::sensor::Conditions;
 use armcal_core::time::Stamp;
 
-/// Beliefs that took the same views in: that nothing happened, and each of some explanations, opened at its time.
+/// Beliefs that took in the same views: one without a fault, and one for each hypothesis, opened at its time.
 #[derive(Clone)]
 pub struct Oracle {
     pub(crate) robot: Robot,
     pub(crate) lag: LaggedTemperature,
     pub(crate) noise: ProcessNoise,
     pub(crate) conditions: Conditions,
-    /// Joints whose sensor is not looked at.
+    /// Joints whose sensor is ignored.
     pub(crate) failed: Vec<usize>,
     pub(crate) nothing: Explained,
     pub(crate) explanations: Vec<Explained>,
 }
 
-/// What the views say of one explanation.
+/// State of one hypothesis.
 #[derive(Clone)]
 pub(crate) struct Explained {
     pub faults: Vec<Fault>,
@@ -33,20 +33,20 @@ pub(crate) struct Explained {
     pub cost: f64,
     /// Logarithm of the probability of the views.
     pub nats: f64,
-    /// Numbers that the faults leave open and the views see.
+    /// Number of parameters that the faults open and the views see.
     pub numbers: usize,
     /// Tags that were seen.
     pub tags: Vec<usize>,
 }
 
-/// How one explanation compares with that nothing happened.
+/// Comparison of one hypothesis with no fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OracleGain {
-    /// What it saves of the sum of squares in sigmas.
+    /// Decrease of the sum of squares in sigmas.
     pub chi2: f64,
-    /// Numbers that it fits to the views for that: where nothing happened, `chi2` has about so many degrees of freedom.
+    /// Number of parameters fitted for that: without a fault, `chi2` has about as many degrees of freedom.
     pub numbers: usize,
-    /// `ln` of the odds that the views give it.
+    /// Logarithm of the odds by the views, nats.
     pub nats: f64,
 }
 
@@ -58,7 +58,7 @@ impl Explained {
         Self { faults, filter, cost: 0.0, nats: 0.0, numbers, tags: Vec::new() }
     }
 
-    /// A tag counts once it is seen, a sensor that says nothing anew in each view.
+    /// Counts the parameters that a view adds: a tag once it is seen, a failed sensor in each view.
     fn count(&mut self, view: &View) {
         let new = view.tags.iter().map(|seen| seen.tag_idx).filter(|tag| !self.tags.contains(tag));
         let new: Vec<usize> = new.collect();
@@ -92,12 +92,12 @@ impl Explained {
 }
 
 impl Oracle {
-    /// A reading of the oil's thermometer.
+    /// Takes in a reading of the oil's thermometer.
     pub fn hear_temperature(&mut self, stamp: Stamp, oil_c: f64) {
         self.lag.hear(stamp, oil_c);
     }
 
-    /// Takes a view in.
+    /// Takes in a view.
     pub fn add_view(&mut self, view: &View) {
         let Some(mut view) = view.of_known_tags(&self.robot) else { return };
         self.failed.iter().for_each(|joint| view.is_free[*joint] = true);
@@ -111,7 +111,7 @@ impl Oracle {
         }
     }
 
-    /// Of each explanation, in their order.
+    /// Returns the gain of each hypothesis, in their order.
     #[must_use]
     pub fn gains(&self) -> Vec<OracleGain> {
         let Explained { cost, nats, .. } = &self.nothing;

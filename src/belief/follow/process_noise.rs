@@ -1,9 +1,9 @@
-//! How fast the sensors' offsets change, and the size of what their model leaves, tuned by the likelihood of the views.
+//! Rate of change of the sensors' offsets, and std of their residual errors, tuned by the likelihood of the views.
 //!
-//! Between two views an offset gains the variance `q^2 h + s^2 (t^2 dT^2 + p^2 dP^2)`: h hours of random walk, and a
-//! share s of the datasheet's temperature and pressure effects, for sensors follow thermometer and depth gauge with a
-//! lag. `ln` of each factor is moved along the score of the views so far over its Fisher information (Fisher scoring;
-//! the belief before a view counts as given), from a prior about the datasheet's figure.
+//! Between two views an offset gains the variance `q^2 h + s^2 (t^2 dT^2 + p^2 dP^2)`. That is h hours of random walk,
+//! and a share s of the datasheet's temperature and pressure effects. Sensors follow thermometer and depth gauge with a
+//! lag. `ln` of each factor moves along the score of the views so far over its Fisher information (Fisher scoring). The
+//! belief before a view counts as given. The prior is about the datasheet's value.
 
 use crate::explain::calibration_prior::drift_std_rad_per_sqrt_h;
 use crate::follow::constants::process_noise::{
@@ -34,35 +34,35 @@ impl LogFactor {
         self.ln.exp()
     }
 
-    /// One step by the score and the information of a view for `ln` of the variance.
+    /// Makes one step by the score and the information of a view for `ln` of the variance.
     fn learn(&mut self, score: f64, information: f64) {
         if !(score.is_finite() && information.is_finite()) {
             return;
         }
         let prior = LN_STD.powi(-2);
         self.information = prior + FORGETTING * (self.information - prior) + information;
-        // Towards the prior as much as a view is forgotten.
+        // The step moves towards the prior by the forgotten share.
         let by = (score - (1.0 - FORGETTING) * prior * self.ln) / self.information;
         self.ln = (self.ln + by.clamp(-0.5, 0.5)).clamp(-LN_BOUND, LN_BOUND);
     }
 }
 
-/// How fast offsets change.
+/// Rate of change of the offsets.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ProcessNoise {
-    /// Datasheet, rad^2/h, rad/K, rad/MPa.
+    /// Datasheet values, rad^2/h, rad/K, rad/MPa.
     walk_var_per_h: [f64; MAX_JOINTS],
     by_k: f64,
     by_mpa: f64,
-    /// By all joints together: they are of one kind.
+    /// Factors that all joints share, because their sensors are of one kind.
     walk: LogFactor,
     behind: LogFactor,
-    /// What was added before the view at hand, by its two causes.
+    /// Variances added before the present view, by the two causes.
     added: [[f64; 2]; MAX_JOINTS],
 }
 
 impl ProcessNoise {
-    /// Those of the datasheet.
+    /// Starts with the datasheet's values.
     pub(crate) fn datasheet(robot: &Robot, scales: &Hyperparameters) -> Self {
         let mut walk_var_per_h = [0.0; MAX_JOINTS];
         for (variance, spec) in walk_var_per_h.iter_mut().zip(&robot.sensors) {
@@ -78,7 +78,7 @@ impl ProcessNoise {
         }
     }
 
-    /// Variance of each joint's offset after a change of conditions, by walk and by what lags behind.
+    /// Returns the variance of each joint's offset after a change of conditions, by random walk and by lag.
     fn variances(&self, change: &ConditionChange) -> [[f64; 2]; MAX_JOINTS] {
         let share = BEHIND_SHARE * BEHIND_SHARE * self.behind.value();
         let effects = (self.by_k * change.oil_k).powi(2) + (self.by_mpa * change.pressure_mpa).powi(2);
@@ -86,13 +86,13 @@ impl ProcessNoise {
         self.walk_var_per_h.map(|per_h| [per_h * hours, share * effects])
     }
 
-    /// Columns of `filter` and the variances that they gain.
+    /// Returns columns of `filter` and the variances that they gain.
     pub(crate) fn widening(&self, filter: &Filter, change: &ConditionChange) -> Vec<(usize, f64)> {
         let variances = self.variances(change);
         filter.offsets().map(|(joint, column)| (column, variances[joint][0] + variances[joint][1])).collect()
     }
 
-    /// Widens `filter` and keeps what was added for [`Self::learn`].
+    /// Widens `filter` and keeps the added variances for [`Self::learn`].
     pub(crate) fn widen(&mut self, filter: &mut Filter, change: &ConditionChange) {
         self.added = self.variances(change);
         filter.widen(&self.widening(filter, change));
@@ -111,13 +111,13 @@ impl ProcessNoise {
         self.behind.learn(behind[0], behind[1]);
     }
 
-    /// Of the random walk and of the lag, over the first guess, as standard deviations.
+    /// Returns the factors of the random walk and of the lag over the first guess, as standard deviations.
     pub(crate) fn factors(&self) -> [f64; 2] {
         [self.walk.value().sqrt(), self.behind.value().sqrt()]
     }
 }
 
-/// What the sensors' model leaves from view to view, by the views so far.
+/// Std of the sensors' residual errors between views, by the views so far.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct JointErrorSize {
     first: [f64; MAX_JOINTS],
@@ -134,7 +134,7 @@ impl JointErrorSize {
         }
     }
 
-    /// MacKay's fixed point, one view of an arm at rest at a time: of an error what the data tell counts.
+    /// Makes a step of MacKay's fixed point with one view of an arm at rest: the determined share of an error counts.
     pub(crate) fn learn(&mut self, update: &ViewUpdate, scales: &mut Hyperparameters) {
         for (joint, error) in update.joint_error.iter().enumerate().filter(|(_, error)| error.prior_var > 0.0) {
             let told = (1.0 - error.var / error.prior_var).clamp(0.0, 1.0);
@@ -159,7 +159,7 @@ impl JitterSize {
         Self { first_s: scales.time_jitter_std_s, factor: LogFactor::default() }
     }
 
-    /// By what a view of a moving arm tells of its time.
+    /// Learns from the time error of a view of a moving arm.
     pub(crate) fn learn(&mut self, update: &ViewUpdate, scales: &mut Hyperparameters) {
         let TimeErrorOfView { sigmas, var } = update.time_error;
         let told = (1.0 - var).clamp(0.0, 1.0);

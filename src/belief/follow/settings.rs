@@ -1,4 +1,4 @@
-//! What an online estimator is told beforehand.
+//! Settings of the online estimator.
 
 use crate::follow::constants::settings::WRONG_BY;
 use crate::model::blocks::Shown;
@@ -8,37 +8,36 @@ use crate::model::scales::{Hyperparameters, TIME_JITTER_STD_S};
 use crate::solve::model_for_views::{Scope, model_of};
 use armcal_core::robot::Robot;
 
-/// How an online estimator works.
+/// Settings of the online estimator.
 #[derive(Clone, Debug)]
 pub struct OnlineSettings {
-    /// Which parameters have a column; `None`: all that a dive may change.
+    /// Parameters with a column; `None`: all that a dive may change.
     pub model: Option<Model>,
-    /// Sizes of noise and priors, if they are known; then they stay.
+    /// Noise and prior scales, which stay fixed; `None`: they are tuned.
     pub scales: Option<Hyperparameters>,
-    /// Where the search begins, and the reference of the terms; `None`: the datasheet, under the first view's
-    /// conditions.
+    /// Initial guess, and the reference of the terms; `None`: the datasheet, under the first view's conditions.
     pub guess: Option<JointParameters>,
-    /// Whether sensors change between views.
+    /// Drift of sensors between views.
     pub drift: DriftModel,
-    /// Whether explanations are looked for where a view does not fit.
+    /// Search for faults if a view does not fit.
     pub faults: FaultSearch,
 }
 
-/// Whether explanations are looked for where a view does not fit.
+/// Search for faults if a view does not fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FaultSearch {
-    /// Views that do not fit are taken in as they are.
+    /// Views that do not fit are taken in without a search.
     Off,
-    /// Slips, failed sensors, moved tags and a moved camera are told apart and told of.
+    /// Slips, failed sensors, moved tags and a moved camera are distinguished and reported.
     On,
 }
 
-/// Whether sensors change between views.
+/// Drift of sensors between views.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DriftModel {
-    /// Nothing changes: the belief tends to that of the batch of all views.
+    /// No drift: the estimate tends to that of the batch of all views.
     Stationary,
-    /// By the datasheet at first, then by what the views say.
+    /// Drift by the datasheet at first, then tuned by the views.
     Tuned,
 }
 
@@ -48,7 +47,7 @@ impl Default for OnlineSettings {
     }
 }
 
-/// All that a dive may change.
+/// Returns the model of all parameters that a dive may change.
 #[must_use]
 pub fn online_model(robot: &Robot) -> Model {
     let gripper_tag = robot.gripper_tag.is_some();
@@ -56,8 +55,8 @@ pub fn online_model(robot: &Robot) -> Model {
     model_of(robot, &Scope { warmed: true, dived: true, from_both_sides: &|_| true, shown })
 }
 
-/// The datasheet's scales for a whole dive: what only a dive shows may be wrong by half, and images of a moving arm
-/// have a time of their own.
+/// Returns the datasheet's scales for a whole dive. Effects that only a dive shows may exceed the datasheet by half,
+/// and images of a moving arm have their own time error.
 pub(crate) fn dive_scales(robot: &Robot) -> Hyperparameters {
     let datasheet = Hyperparameters::datasheet(robot);
     Hyperparameters {

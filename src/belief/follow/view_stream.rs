@@ -1,10 +1,9 @@
-//! From messages, one at a time, to views: spans that a capture marks, rests that nobody marked, and images of a moving
-//! arm.
+//! Converts messages, one at a time, to views: spans that a capture marks, unmarked rests, and images of a moving arm.
 //!
-//! An arm that stays within a few thousandths of a radian rests; one view is made of each rest. While it moves, an
-//! image makes a view with the readings about its stamp and their rate, if the arm has moved on since the last one:
-//! what a sensor's model leaves is the same again at the same posture and must not count twice. Memory is bounded: a
-//! window of messages, whatever the length of the stream.
+//! An arm that stays within a few thousandths of a radian rests, and each rest gives one view. During motion, an image
+//! gives a view with the readings about its stamp and their rate, if the arm has moved since the last one. A sensor's
+//! residual error repeats at the same configuration and must not count twice. Memory is bounded: a window of messages,
+//! regardless of the length of the stream.
 
 use crate::follow::constants::view_stream::{
     ABOUT_IMAGE_S, APART_RAD, LONGEST_REST_S, MARK_DELAY_S, MOVES_RAD, REST_RAD, SETTLE_S, SHORTEST_REST_S,
@@ -22,7 +21,7 @@ use armcal_core::sensor::ArmSensors;
 use armcal_core::streams::{JointSensorSample, Mark, MarkKind, Message, TagDetections};
 use armcal_core::time::Stamp;
 
-/// Turns the messages of an arm into views as they come.
+/// Converts the messages of an arm to views as they come.
 #[derive(Clone)]
 pub struct ViewStream {
     robot: Robot,
@@ -30,28 +29,28 @@ pub struct ViewStream {
     window: VecDeque<(Stamp, Message)>,
     last: Option<Stamp>,
     rest: Option<Rest>,
-    /// A rest that ended and waits for a mark.
+    /// Span of a rest that ended and waits for a mark.
     ended: Option<(Stamp, Stamp)>,
-    /// Images of a moving arm that wait for readings.
+    /// Stamps of images of a moving arm that wait for readings.
     images: VecDeque<Stamp>,
     /// Travel at the last view of a moving arm.
     moved_at: Option<JointAngles>,
-    /// What ends before this has been looked at.
+    /// End of the processed spans.
     used_until: Stamp,
     n_views: u32,
 }
 
-/// An arm within [`REST_RAD`] of where it was.
+/// A rest: an arm within [`REST_RAD`] of its initial configuration.
 #[derive(Clone, Copy)]
 struct Rest {
     since: Stamp,
     anchor: JointAngles,
-    /// Whether a view was made of it.
+    /// True if a view was made of it.
     is_used: bool,
 }
 
 impl ViewStream {
-    /// For `robot` with the tags that are around it.
+    /// Returns a stream for `robot`, with the tags around it.
     #[must_use]
     pub fn new(robot: Robot) -> Self {
         Self {
@@ -68,7 +67,7 @@ impl ViewStream {
         }
     }
 
-    /// Takes a message in; the views that are complete with it.
+    /// Takes in a message. Returns the views that are complete with it.
     pub fn push(&mut self, log_time: Stamp, message: &Message) -> Vec<View> {
         let mut views = Vec::new();
         match message {
@@ -94,7 +93,7 @@ impl ViewStream {
         views
     }
 
-    /// What is complete when no more messages come.
+    /// Returns the views that are complete when no more messages come.
     pub fn finish(&mut self) -> Vec<View> {
         let mut views: Vec<View> = self.ended.take().and_then(|span| self.rested(span)).into_iter().collect();
         if let (Some(rest), Some(last)) = (self.rest, self.last)
@@ -150,7 +149,7 @@ impl ViewStream {
         })
     }
 
-    /// The view of a marked span, unless it was looked at already.
+    /// Returns the view of a marked span, unless it was processed already.
     fn marked(&mut self, start: Stamp, end: Stamp, pose_idx: u32) -> Option<View> {
         if start < self.used_until {
             return None;
@@ -160,7 +159,7 @@ impl ViewStream {
         self.view(pose_idx, (start, end))
     }
 
-    /// The view of a rest; nothing where it is short or was looked at already.
+    /// Returns the view of a rest; `None` if it is short or was processed already.
     fn rested(&mut self, (since, end): (Stamp, Stamp)) -> Option<View> {
         let (start, end) = (since.plus_s(SETTLE_S).max(self.used_until), end.plus_s(-0.1));
         if end.since_s(start) < SHORTEST_REST_S {
@@ -178,12 +177,12 @@ impl ViewStream {
         let view = view_of_span(self.window.as_slices().0, &self.robot, pose_idx, span)?;
         self.used_until = span.1;
         self.n_views += 1;
-        // An arm settles from both sides: which way its sensors' shafts are turned is known in motion alone.
+        // An arm settles from both sides: only motion shows to which side its sensors' shafts are turned.
         Some(View { approach: [0.0; MAX_JOINTS], ..view })
     }
 
-    /// Whether the images tell of a motion that no sensor does: one may have failed. By most of the tags, for an id may
-    /// be misread.
+    /// True if the images show a motion that no sensor shows: one may have failed. Most of the tags decide, because an
+    /// id may be misread.
     fn images_move(&self, (start, end): (Stamp, Stamp)) -> bool {
         let mut seen: BTreeMap<u32, [[[f64; 2]; 4]; 2]> = BTreeMap::new();
         for (_, message) in &self.window {
@@ -201,7 +200,7 @@ impl ViewStream {
         2 * seen.values().filter(moves).count() > n_twice
     }
 
-    /// The view of one image of a moving arm.
+    /// Returns the view of one image of a moving arm.
     fn moving(&mut self, image: Stamp) -> Option<View> {
         let (start, end) = (image.plus_s(-ABOUT_IMAGE_S), image.plus_s(ABOUT_IMAGE_S));
         if start < self.used_until {
@@ -223,7 +222,7 @@ impl ViewStream {
         }
         at_image(&mut view, &about, image);
         for (approach, rate) in view.approach.iter_mut().zip(view.rate_rad_s.iter()) {
-            // A slower one has the sign of its noise.
+            // The sign of a slower rate is noise.
             *approach = if rate.abs() < 0.5 * SLOWEST_RAD_S { 0.0 } else { rate.signum() };
         }
         self.moved_at = Some(view.travel_rad);
@@ -242,7 +241,7 @@ impl ViewStream {
     }
 }
 
-/// The readings' line at the time of the image: their mean is at the mean of their own stamps.
+/// Moves the readings' mean along their line to the time of the image: it lies at the mean of their own stamps.
 fn at_image(view: &mut View, about: &[(Stamp, Message)], image: Stamp) {
     let readings = about.iter().filter_map(|(_, message)| match message {
         Message::JointSensors(sample) => Some(image.since_s(sample.stamp)),
@@ -253,12 +252,12 @@ fn at_image(view: &mut View, about: &[(Stamp, Message)], image: Stamp) {
     view.travel_rad = JointAngles::from_fn(view.travel_rad.len(), |j| view.travel_rad[j] + view.rate_rad_s[j] * late_s);
 }
 
-/// Whether a joint moved while the view was taken.
+/// True if a joint moved during the view.
 pub(crate) fn is_moving(view: &View) -> bool {
     view.rate_rad_s.iter().any(|rate| rate.abs() > SLOWEST_RAD_S)
 }
 
-/// Readings of another arm, and what is no number, are not looked at.
+/// True if the readings are of this arm and finite.
 fn is_usable(sample: &JointSensorSample, robot: &Robot) -> bool {
     sample.counts.len() == robot.n_joints() && sample.counts.iter().all(|counts| counts.is_finite())
 }

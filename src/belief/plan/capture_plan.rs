@@ -1,7 +1,7 @@
-//! The whole of a capture before anything moves: poses, the paths between them, and what each keeps clear.
+//! The whole plan of a capture before any motion: poses, the paths between them, and their clearances.
 //!
-//! What a session does with the arm in hand, done on paper: the arm is taken to stand at its stowed pose, and to be as
-//! wrong as the datasheet, or an earlier calibration, allows.
+//! It plans the session without the arm. The arm is assumed to stand at its stowed pose, with errors as large as the
+//! datasheet, or an earlier calibration, allows.
 
 use crate::plan::constants::capture_plan::{PROVEN_TO_M, SAMPLE_RAD};
 use armcal_core::codes::{Code, Coded, Warning};
@@ -25,28 +25,28 @@ use armcal_core::routine::{CaptureSettings, Margins, MoveGoal, Routine, Step};
 use armcal_core::sensor::ArmSensors;
 use armcal_core::streams::JointAngles;
 
-/// What is believed of an arm that has not moved yet.
+/// Belief about an arm that has not moved yet.
 #[derive(Clone, Debug)]
 pub struct ArmBelief {
-    /// Sensors believed in.
+    /// Believed sensors.
     pub sensors: ArmSensors,
-    /// How far the true angles may be from those of `sensors`.
+    /// Bounds on the difference of the true angles and those of `sensors`.
     pub bounds: JointErrorBounds,
-    /// Where the two come from; `None`: the datasheet.
+    /// Calibration that gave `sensors` and `bounds`; `None`: the datasheet.
     pub calibration: Option<Calibration>,
 }
 
 impl ArmBelief {
-    /// The datasheet's sensors and their worst case.
+    /// Returns the datasheet's sensors and their worst case.
     #[must_use]
     pub fn datasheet(robot: &Robot) -> Self {
         Self { sensors: ArmSensors::nominal(robot), bounds: JointErrorBounds::datasheet(robot), calibration: None }
     }
 
-    /// An earlier calibration, as if it had been made just now.
+    /// Returns the belief of an earlier calibration, as if it had been made just now.
     ///
     /// # Errors
-    /// When it is another arm's.
+    /// If the calibration is of another arm.
     pub fn of(robot: &Robot, calibration: Calibration) -> Result<Self, CalibrationFileError> {
         let sensors = calibration.sensors(robot)?;
         let bounds = JointErrorBounds::believed(&calibration.scaled_robot(robot), &calibration, &sensors);
@@ -54,69 +54,69 @@ impl ArmBelief {
     }
 }
 
-/// What is planned for.
+/// Inputs of a capture plan.
 pub struct ItineraryRequest<'a> {
     /// Nominal arm.
     pub robot: &'a Robot,
     /// Task, capture settings and script.
     pub routine: &'a Routine,
-    /// With the jaws at rest.
+    /// Clearance model with the jaws at rest.
     pub clearance: &'a ClearanceModel<'a>,
-    /// With the jaws as they are at the task's targets.
+    /// Clearance model with the jaws as they are at the task's targets.
     pub clearance_at_targets: &'a ClearanceModel<'a>,
     /// Sensors and error bounds of the arm.
     pub belief: &'a ArmBelief,
 }
 
-/// Poses in the order of their visit, each with the way there.
+/// Poses in the order of visits, each with the path to it.
 #[derive(Clone, Debug)]
 pub struct CapturePlan {
     /// The stowed configuration, believed angles.
     pub start: JointAngles,
-    /// Views that a path leads to, in the order of their visit.
+    /// Views that a path leads to, in the order of visits.
     pub visits: Vec<PlannedVisit>,
-    /// Poses chosen that no path leads to.
+    /// Chosen poses that no path leads to.
     pub left_out: Vec<UnreachablePose>,
     /// Targets of the task that no pose reaches under this belief.
     pub warnings: Vec<Warning>,
-    /// Why there are no more views.
+    /// Reason why there are no more views.
     pub stop: StopReason,
-    /// By the arm's clock, from the start to the end of the last view; 0 without views.
+    /// Arm time from the start to the end of the last view, s; 0 without views.
     pub arm_time_s: f64,
 }
 
-/// One view and the way there.
+/// One view and the path to it.
 #[derive(Clone, Debug)]
 pub struct PlannedVisit {
     /// Angles, tags and predicted tool error.
     pub pose: PlannedPose,
-    /// From the visit before, or from the start.
+    /// Path from the visit before, or from the start.
     pub path: Path,
-    /// Time of the path alone.
+    /// Time of the path alone, s.
     pub duration_s: f64,
-    /// Least along the path.
+    /// Least clearance along the path.
     pub path_clearance: LeastClearance,
-    /// At the pose itself.
+    /// Least clearance at the pose itself.
     pub clearance: LeastClearance,
-    /// What is nearest to the believed arm at the pose.
+    /// Closest pair of the believed arm at the pose.
     pub nearest: ClosestPair,
-    /// Largest distance of each joint's true angle from the believed one.
+    /// Largest distance of each joint's true angle from the believed one, rad.
     pub error_bound_rad: JointAngles,
-    /// By the arm's clock since the start, when the view is taken.
+    /// Arm time since the start when the view is captured, s.
     pub arm_time_s: f64,
 }
 
-/// Free water beyond what the vehicle's motion takes, cut off at 0.4 m.
+/// Clearance beyond the bound on the vehicle's motion, cut off at 0.4 m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LeastClearance {
-    /// Of an arm exactly where it is believed to be; along a path by samples.
+    /// Clearance of the believed arm, m; along a path, the least of samples.
     pub believed_m: f64,
-    /// Of every arm within the bounds: proven.
+    /// Certified clearance of every arm within the bounds, m.
     pub proven_m: f64,
 }
 
 impl LeastClearance {
-    /// Along a path that is known to keep `margin_m`.
+    /// Returns the least clearance along a path that is known to keep `margin_m`.
     #[must_use]
     pub fn along(clearance: &ClearanceModel<'_>, bounds: &JointErrorBounds, path: &Path, margin_m: f64) -> Self {
         let all = path.edges().map(|edge| Self::on(clearance, bounds, &edge, margin_m));
@@ -126,7 +126,7 @@ impl LeastClearance {
         })
     }
 
-    /// The same for one edge.
+    /// Returns the least clearance along one edge that is known to keep `margin_m`.
     fn on(clearance: &ClearanceModel<'_>, bounds: &JointErrorBounds, edge: &Edge, margin_m: f64) -> Self {
         let Edge { from, to, .. } = edge;
         let samples = (from.max_abs_difference(to) / SAMPLE_RAD).ceil().max(1.0) as usize;
@@ -150,11 +150,11 @@ impl LeastClearance {
 pub struct UnreachablePose {
     /// Believed angles of the pose.
     pub angles: JointAngles,
-    /// Why there is no path.
+    /// Reason why there is no path.
     pub why: PathError,
 }
 
-/// Why nothing could be planned.
+/// Reason why nothing could be planned.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum ItineraryError {
@@ -171,7 +171,8 @@ pub enum ItineraryError {
 /// Plans the first capture of a routine, from the stowed pose.
 ///
 /// # Errors
-/// [`ItineraryError`] where nothing can be planned; single targets and poses that cannot be reached are named instead.
+/// [`ItineraryError`] if nothing can be planned. Single targets and poses that cannot be reached are listed in the
+/// plan.
 pub fn plan_itinerary(request: &ItineraryRequest<'_>, rng: &mut ChaCha8Rng) -> Result<CapturePlan, ItineraryError> {
     let capture = first_capture(request.routine);
     let bounds = match request.routine.capture.margins {
@@ -187,7 +188,7 @@ pub fn plan_itinerary(request: &ItineraryRequest<'_>, rng: &mut ChaCha8Rng) -> R
     Ok(CapturePlan { warnings, ..itinerary })
 }
 
-/// The first capture of the script: no calibration can come before it.
+/// Returns the first capture of the script: no calibration can come before it.
 fn first_capture(routine: &Routine) -> &CaptureSettings {
     let captures = routine.steps.iter().filter_map(|step| match step {
         Step::Capture(capture) => Some(capture),
@@ -199,7 +200,7 @@ fn first_capture(routine: &Routine) -> &CaptureSettings {
 struct Planner<'a> {
     request: &'a ItineraryRequest<'a>,
     capture: &'a CaptureSettings,
-    /// That clearance is kept for.
+    /// Error bounds for which clearance is kept.
     bounds: JointErrorBounds,
     limits: Vec<JointLimits>,
 }
@@ -229,7 +230,8 @@ impl Planner<'_> {
         }
     }
 
-    /// That the script's moves before its first calibration lead to poses that every arm within the bounds can take.
+    /// Checks that the script's moves before its first calibration lead to poses that every arm within the bounds can
+    /// take.
     fn check_moves(&self) -> Result<(), ItineraryError> {
         let until = self.request.routine.steps.iter().position(|step| matches!(step, Step::Calibrate(_)));
         let steps = &self.request.routine.steps[..until.unwrap_or(self.request.routine.steps.len())];
@@ -265,7 +267,7 @@ impl Planner<'_> {
         ))
     }
 
-    /// Believed angles at the targets that can be reached, and what is wrong with the others.
+    /// Returns the believed angles at the targets that can be reached, and warnings about the others.
     fn targets(&self, rng: &mut ChaCha8Rng) -> Result<(Vec<JointAngles>, Vec<Warning>), ItineraryError> {
         let targets_m = &self.request.routine.task.targets_m;
         let asked = TargetRequest { targets_m, preferred: None, margin_m: self.margin_m() };
@@ -306,7 +308,7 @@ impl Planner<'_> {
         Ok(choose_poses(&request, rng)?.poses)
     }
 
-    /// Goes from pose to pose in the order of visits, past those that no path leads to.
+    /// Plans the path to each pose in the order of visits, and skips those that no path leads to.
     fn visit(&self, poses: Vec<PlannedPose>, rng: &mut ChaCha8Rng) -> Result<CapturePlan, ItineraryError> {
         let path_planner = PathPlanner {
             clearance: self.request.clearance,

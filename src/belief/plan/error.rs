@@ -1,11 +1,11 @@
-//! Why there is no plan.
+//! Reasons why there is no plan.
 
 use armcal_core::codes::{Code, Coded};
 use armcal_core::kinematics::IkError;
 
 use crate::plan::path::PathError;
 
-/// Why there is no plan.
+/// Reason why there is no plan.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum PlanError {
@@ -45,7 +45,7 @@ pub enum PlanError {
 }
 
 impl PlanError {
-    /// The same, where the target has number `number` in the task's list.
+    /// Returns the error with the target's number set to `number`, its position in the task's list.
     #[must_use]
     pub fn of_target(mut self, number: usize) -> Self {
         if let Self::TargetOutOfReach { target, .. } | Self::TargetTooClose { target, .. } = &mut self {

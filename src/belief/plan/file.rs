@@ -1,4 +1,4 @@
-//! plan.toml: a plan as operators, checks and pictures read it.
+//! plan.toml: a plan for operators, checks and renderings.
 
 use crate::plan::constants::file::{COUNT_DIGITS, LENGTH_DIGITS, RAD_DIGITS, TIME_DIGITS};
 use armcal_core::codes::Code;
@@ -18,12 +18,11 @@ use armcal_core::robot::{FileIssue, Robot, RobotError, read_text};
 use armcal_core::schema::{first_line, schema_of};
 use armcal_core::streams::{CaptureSet, JointAngles, MAX_JOINTS};
 
-/// One plan, as its file has it. Angles are believed ones, in rad; counts are what the arm's controller is sent for
-/// them.
+/// One plan. Angles are estimated joint angles, rad; counts are the values sent to the arm's controller for them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PlanFile {
-    /// Of the format: 1.
+    /// Version of the format: 1.
     pub version: u32,
     /// [`Kind::Plan`].
     #[serde(default = "Kind::plan")]
@@ -34,52 +33,53 @@ pub struct PlanFile {
     pub robot: String,
     /// Name of the vehicle.
     pub vehicle: String,
-    /// Of the plan's random numbers.
+    /// Seed of the plan's random numbers.
     pub seed: u64,
-    /// Of the routine with what was replaced in it, the robot's and the vehicle's files, the prior and the program's
+    /// Hash of the routine with its overrides, the robot's and the vehicle's files, the prior and the program's
     /// version.
     pub inputs_hash: String,
-    /// `datasheet`, or the hash of the messages that the calibration given as a prior rests on.
+    /// `datasheet`, or the hash of the messages from which the calibration given as a prior was estimated.
     pub prior: String,
-    /// Joints in the order of all lists, base first.
+    /// Names of the joints in the order of all lists, base first.
     pub joints: Vec<String>,
-    /// Free water kept beyond what the sensors may hide, m.
+    /// Clearance kept in addition to the sensors' error bounds, m.
     pub margin_m: f64,
-    /// Believed angles where the arm starts.
+    /// Estimated angles at the arm's start, rad.
     pub start_rad: Vec<f64>,
-    /// Readings there under the belief.
+    /// Sensor readings at the start by the estimate, counts.
     pub start_counts: Vec<f64>,
-    /// What of the task cannot be reached under this belief.
+    /// Targets of the task that cannot be reached under this estimate.
     pub warnings: Vec<Warning>,
-    /// Sums over the plan.
+    /// Totals over the plan.
     pub totals: PlanTotals,
-    /// In the order of visits.
+    /// Planned views in the order of visits.
     pub pose: Vec<PoseTable>,
-    /// `path[n]` leads to `pose[n]`.
+    /// Paths: `path[n]` leads to `pose[n]`.
     pub path: Vec<PathTable>,
-    /// Poses chosen that no path leads to.
+    /// Chosen poses that no path leads to.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub left_out: Vec<LeftOutTable>,
 }
 
-/// Sums over a plan.
+/// Totals over a plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PlanTotals {
     /// Number of planned views.
     pub poses: usize,
-    /// Poses chosen that no path leads to.
+    /// Number of chosen poses that no path leads to.
     pub left_out: usize,
-    /// Paths, coming to rest and looking.
+    /// Arm time for paths, settling and dwell, s.
     pub arm_time_s: f64,
-    /// Paths alone.
+    /// Time of the paths alone, s.
     pub motion_s: f64,
-    /// Least over all paths, for every arm within the error bounds.
+    /// Least certified clearance over all paths, for every arm within the error bounds, m.
     pub least_clearance_m: f64,
-    /// Root mean square over the task's targets after the last view; absent where nothing predicts it.
+    /// Predicted root mean square tool error over the task's targets after the last view, m; absent if nothing predicts
+    /// it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub predicted_tool_error_m: Option<f64>,
-    /// Why there are no more views.
+    /// Reason why there are no more views.
     pub stop_reason: StopReason,
 }
 
@@ -87,72 +87,75 @@ pub struct PlanTotals {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PoseTable {
-    /// From 1, in the order of visits.
+    /// Number of the view, from 1, in the order of visits.
     pub number: usize,
-    /// Whether the fit may use it.
+    /// Use of the view: for the fit, or held out.
     pub set: SetName,
-    /// Believed angles.
+    /// Estimated angles, rad.
     pub angles_rad: Vec<f64>,
-    /// Set-point: the readings there under the belief.
+    /// Set-point: the sensor readings there by the estimate, counts.
     pub raw_counts: Vec<f64>,
-    /// Largest distance of each joint's true angle from the believed one.
+    /// Largest distance of each joint's true angle from the estimated one, rad.
     pub error_bound_rad: Vec<f64>,
-    /// Root mean square over the task's targets once this view and those before it are fitted; absent where unknown.
+    /// Predicted root mean square tool error over the task's targets once this view and those before it are fitted, m;
+    /// absent if unknown.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub predicted_tool_error_m: Option<f64>,
-    /// Of an arm that is where it is believed to be, beyond what the vehicle's motion takes; 0.4 stands for all above.
+    /// Clearance of an arm at the estimated angles, beyond the bound on the vehicle's motion, m; 0.4 stands for all
+    /// above.
     pub clearance_m: f64,
-    /// Of every arm within the error bounds.
+    /// Certified clearance of every arm within the error bounds, m.
     pub proven_clearance_m: f64,
-    /// The two that are nearest; absent where nothing is within 0.4 m.
+    /// Names of the two closest parts; absent if nothing is within 0.4 m.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub clearance_between: Vec<String>,
-    /// By the arm's clock since the start, when the view is taken.
+    /// Arm time since the start when the view is captured, s.
     pub arm_time_s: f64,
-    /// Surveyed tags that the view is planned for.
+    /// Surveyed tags for which the view is planned.
     pub tags: Vec<TagTable>,
 }
 
-/// What a view is for.
+/// Use of a view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SetName {
-    /// The fit uses it.
+    /// Used by the fit.
     Fit,
-    /// Only the verdict uses it.
+    /// Held out: used only by the verdict.
     HeldOut,
 }
 
-/// A tag that a view is planned for.
+/// A tag for which a view is planned.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TagTable {
     /// Number of the tag.
     pub id: u32,
-    /// That the camera sees it, under the belief.
+    /// Probability that the camera sees the tag, under the estimate.
     pub probability: f64,
 }
 
-/// The way to one view.
+/// The path to one view.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PathTable {
-    /// 0 is the start.
+    /// Number of the pose at which the path starts; 0 is the start.
     pub from: usize,
-    /// Number of the pose that it leads to.
+    /// Number of the pose at which the path ends.
     pub to: usize,
-    /// Time of the motion alone.
+    /// Time of the motion alone, s.
     pub duration_s: f64,
-    /// Least of an arm that is where it is believed to be, by samples.
+    /// Least clearance of an arm at the estimated angles along the path, by samples, m.
     pub clearance_m: f64,
-    /// Least of every arm within the error bounds.
+    /// Least certified clearance of every arm within the error bounds along the path, m.
     pub proven_clearance_m: f64,
-    /// Both ends included; straight lines in joint space between, each from rest to rest.
+    /// Estimated angles of all waypoints, both ends included, rad. Straight lines in joint space connect them, each
+    /// from rest to rest.
     pub waypoints_rad: Vec<Vec<f64>>,
-    /// Readings at the waypoints under the belief.
+    /// Sensor readings at the waypoints by the estimate, counts.
     pub waypoints_counts: Vec<Vec<f64>>,
-    /// Of the edge behind each waypoint but the last; those that must be driven slowly take longer than their joints
-    /// need.
+    /// Duration of the edge after each waypoint but the last, s. Edges that must be driven slowly take longer than
+    /// their joints need.
     pub edge_durations_s: Vec<f64>,
 }
 
@@ -160,9 +163,9 @@ pub struct PathTable {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LeftOutTable {
-    /// Believed angles.
+    /// Estimated angles, rad.
     pub angles_rad: Vec<f64>,
-    /// Why there is no path.
+    /// Reason why there is no path.
     pub reason: String,
 }
 
@@ -179,7 +182,7 @@ const HEAD: &str = "\
 ";
 
 impl PlanFile {
-    /// The itinerary with what it was planned for. `header` gives names and hashes; the rest of it is replaced.
+    /// Returns the itinerary with its inputs. `header` gives names and hashes; the rest of it is replaced.
     #[must_use]
     pub fn new(header: PlanHeader, itinerary: &CapturePlan, belief: &ArmBelief, robot: &Robot) -> Self {
         let writer = Writer { belief, robot, timing: Timing::new(robot) };
@@ -218,7 +221,7 @@ impl PlanFile {
         }
     }
 
-    /// The file's text.
+    /// Returns the text of plan.toml.
     ///
     /// # Panics
     /// Never: every value here has a TOML form.
@@ -293,22 +296,22 @@ impl PlanFile {
     }
 }
 
-/// Names and hashes of what was planned for.
+/// Names and hashes of the inputs of a plan.
 #[derive(Clone, Debug)]
 pub struct PlanHeader {
     /// Name of the routine.
     pub routine: String,
     /// Name of the vehicle.
     pub vehicle: String,
-    /// Of the plan's random numbers.
+    /// Seed of the plan's random numbers.
     pub seed: u64,
-    /// See [`PlanFile::inputs_hash`].
+    /// Hash of all inputs, see [`PlanFile::inputs_hash`].
     pub inputs_hash: String,
-    /// See [`PlanFile::margin_m`].
+    /// Clearance kept, m, see [`PlanFile::margin_m`].
     pub margin_m: f64,
 }
 
-/// Turns visits into tables.
+/// Converts visits to tables.
 struct Writer<'a> {
     belief: &'a ArmBelief,
     robot: &'a Robot,
@@ -377,7 +380,7 @@ fn rounded(value: f64, digits: f64) -> f64 {
     (value * digits).round() / digits + 0.0
 }
 
-/// Clearances are promises: never more than was found.
+/// Rounds a clearance down, because it is guaranteed.
 fn floored(value: f64, digits: f64) -> f64 {
     (value * digits).floor() / digits
 }

@@ -1,4 +1,4 @@
-//! What can be seen to be wrong with arm, vehicle, scene and task before anything moves.
+//! Checks of arm, vehicle, scene and task for errors that can be detected before any motion.
 
 use crate::plan::constants::scene_check::{DRAWS_PER_TAG, EVEN_DRAWS, INSIDE_M};
 use armcal_core::codes::{Code, Warning};
@@ -19,29 +19,29 @@ use armcal_core::routine::{Routine, Step};
 use armcal_core::streams::JointAngles;
 use armcal_core::text::counted;
 
-/// What is looked at.
+/// Inputs of the check.
 pub struct SceneCheck<'a> {
     /// Nominal arm on its vehicle.
     pub robot: &'a Robot,
     /// Task, script and margins.
     pub routine: &'a Routine,
-    /// With the jaws at rest.
+    /// Clearance model with the jaws at rest.
     pub clearance: &'a ClearanceModel<'a>,
-    /// With the jaws as they are at the task's targets.
+    /// Clearance model with the jaws as they are at the task's targets.
     pub clearance_at_targets: &'a ClearanceModel<'a>,
 }
 
-/// What is wrong.
+/// Issues found by the check.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SceneIssues {
-    /// A run would be refused, or the files contradict each other.
+    /// Issues for which a run would be refused, or contradictions between the files.
     pub errors: Vec<String>,
-    /// What a run goes on without.
+    /// Issues that do not prevent a run.
     pub warnings: Vec<Warning>,
 }
 
 impl SceneCheck<'_> {
-    /// Looks at the stowed arm, the tags and the targets.
+    /// Checks the stowed arm, the tags and the targets.
     #[must_use]
     pub fn issues(&self, rng: &mut ChaCha8Rng) -> SceneIssues {
         let mut issues = SceneIssues::default();
@@ -70,7 +70,7 @@ impl SceneCheck<'_> {
         self.robot.tags.iter().filter(|tag| tag.is_known()).filter_map(inside).collect()
     }
 
-    /// Tags that no pose sees, of all that were drawn.
+    /// Reports the tags that no drawn pose sees.
     fn look_for_tags(&self, issues: &mut SceneIssues, rng: &mut ChaCha8Rng) {
         let (robot, visibility) = (self.robot, VisibilityModel::default());
         let limits = JointErrorBounds::none(robot).safe_limits(robot);
@@ -150,7 +150,7 @@ mod tests {
             check.issues(&mut stream_rng(1, "check"))
         }
 
-        /// A box about a place of the vehicle's frame.
+        /// Adds a box at a point of the vehicle's frame.
         fn with_box(mut self, name: &str, at_m: [f64; 3], size_m: [f64; 3]) -> Self {
             let owner_from_shape = nalgebra::Isometry3::translation(at_m[0], at_m[1], at_m[2]);
             let placed = PlacedShape { owner_from_shape, shape: Shape::Box { size_m }, color_rgb: [0; 3] };
@@ -177,7 +177,7 @@ mod tests {
         let around = site("titan4-quickstart.toml");
         let at_m = around.tag_in_vehicle_m(5);
         let around = around.with_box("lamp", at_m, [0.3; 3]);
-        // A plate right before the tag, which looks to starboard.
+        // A plate directly in front of the tag, which faces starboard.
         let covered = site("titan4-quickstart.toml");
         let [x, y, z] = covered.tag_in_vehicle_m(6);
         let covered = covered.with_box("plate", [x, y - 0.08, z], [0.5, 0.02, 0.5]);

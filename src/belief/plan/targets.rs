@@ -15,10 +15,10 @@ use armcal_core::robot::Robot;
 use armcal_core::routine::{ReachSettings, Routine, Step};
 use armcal_core::streams::JointAngles;
 
-/// Solves every target under one belief, near `preferred` postures where given.
+/// Solves every target under one belief, near `preferred` configurations if given.
 ///
-/// For each target the believed joint angles, or [`PlanError::TargetOutOfReach`] with the distance that remains, or
-/// [`PlanError::TargetTooClose`] with what is near.
+/// Returns the believed joint angles of each target, [`PlanError::TargetOutOfReach`] with the remaining distance, or
+/// [`PlanError::TargetTooClose`] with the nearest parts.
 pub fn plan_targets(
     robot: &Robot,
     clearance: &ClearanceModel<'_>,
@@ -43,18 +43,18 @@ pub fn plan_targets(
         .collect()
 }
 
-/// What to reach and how.
+/// Targets to reach, with preferences and margin.
 pub struct TargetRequest<'a> {
     /// Tool positions, base frame.
     pub targets_m: &'a [[f64; 3]],
-    /// Postures to stay near, one a target.
+    /// Configurations to stay near, one per target.
     pub preferred: Option<&'a [JointAngles]>,
-    /// Clearance to keep.
+    /// Clearance to keep, m.
     pub margin_m: f64,
 }
 
-/// Believed angles at the task's targets. Those that are reached for before any calibration must be clear for every arm
-/// within the bounds; for the others it is enough that the believed arm gets there.
+/// Returns the believed angles at the task's targets. Targets that are reached before any calibration must be clear for
+/// every arm within the bounds. For the others it is enough that the believed arm is clear.
 pub fn plan_task(
     robot: &Robot,
     clearance: &ClearanceModel<'_>,
@@ -86,14 +86,14 @@ pub fn plan_task(
     planned
 }
 
-/// Whether jaws close on a target before any calibration, so that the task is planned for open jaws; after it targets
-/// are planned anew.
+/// True if the jaws close on a target before any calibration, so that the task is planned for open jaws. After a
+/// calibration, targets are planned again.
 #[must_use]
 pub fn grips_at_first(steps: &[Step]) -> bool {
     first_reaches(steps).any(|reach| reach.touch)
 }
 
-/// Targets that are reached for before any calibration.
+/// Returns the targets that are reached before any calibration.
 fn reached_at_first(steps: &[Step]) -> BTreeSet<usize> {
     first_reaches(steps).flat_map(|reach| reach.targets.iter().copied()).collect()
 }
@@ -115,7 +115,7 @@ struct TargetSolver<'a> {
 }
 
 impl TargetSolver<'_> {
-    /// The clear solution that is nearest to the preferred posture, or to the stowed one.
+    /// Returns the clear solution nearest to the preferred configuration, or to the stowed one.
     fn solve(
         &self,
         target: usize,
@@ -143,7 +143,7 @@ impl TargetSolver<'_> {
                     }
                 }
             }
-            // A solution next to the preferred posture is what was asked for.
+            // A solution next to the preferred configuration is what the request asked for.
             if attempt == 0 && preferred.is_some() && best.is_some() {
                 break;
             }
@@ -175,7 +175,7 @@ fn random_seed(robot: &Robot, settings: &IkSettings, rng: &mut ChaCha8Rng) -> Jo
     })
 }
 
-/// Whether the tool point lies on the last joint's axis, so that this joint cannot move it.
+/// True if the tool point lies on the last joint's axis, so that this joint cannot move it.
 fn on_tool_axis(robot: &Robot) -> bool {
     let last = &robot.chain.joints()[robot.tool.mount.n_joints - 1];
     let point = robot.tool.mount.link_from_frame.translation.vector;

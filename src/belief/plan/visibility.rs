@@ -1,4 +1,4 @@
-//! Which tags a pose is expected to see.
+//! Tags that a pose is expected to show.
 
 use crate::plan::constants::visibility::{BORDER_PX, EDGE_RAD, MAX_INCIDENCE_RAD, RANGE_M, SIGHT_END_M};
 use nalgebra::{Isometry3, Point3, Vector3};
@@ -12,15 +12,15 @@ use armcal_core::streams::JointAngles;
 /// Conditions under which a detector reads a tag reliably.
 #[derive(Clone, Copy, Debug)]
 pub struct VisibilityModel {
-    /// Largest distance from the camera to the tag's centre.
+    /// Largest distance from the camera to the tag's centre, m.
     pub max_range_m: f64,
-    /// Smallest distance from the camera to the tag's centre.
+    /// Smallest distance from the camera to the tag's centre, m.
     pub min_range_m: f64,
-    /// Between the tag's normal and the line to the camera.
+    /// Largest angle between the tag's normal and the line to the camera, rad.
     pub max_incidence_rad: f64,
-    /// Kept free at the edge of the lens's field of view.
+    /// Width kept free at the edge of the lens's field of view, rad.
     pub edge_rad: f64,
-    /// Kept free at the border of the image.
+    /// Width kept free at the border of the image, px.
     pub border_px: f64,
 }
 
@@ -43,9 +43,9 @@ impl VisibilityModel {
         }
     };
 
-    /// Indices of the surveyed tags that `robot` at `angles` sees, occlusion not yet considered.
+    /// Returns the indices of the surveyed tags that `robot` at `angles` sees, before occlusion.
     pub fn in_view<'a>(&'a self, robot: &'a Robot, poses: &LinkPoses) -> impl Iterator<Item = usize> + use<'a> {
-        // All in the frame of the tags, which the arm may carry.
+        // All poses are in the frame of the tags, which the arm may carry.
         let tags_from_camera = camera_in_tags(robot, poses);
         let camera_from_tags = tags_from_camera.inverse();
         let eye = tags_from_camera.translation.vector;
@@ -69,8 +69,8 @@ impl VisibilityModel {
             .map(|(idx, _)| idx)
     }
 
-    /// Whether the camera sees the tag on the gripper, whose links hide it at some angles. It is meant to be near: only
-    /// the incidence, the image and what lies between count.
+    /// True if the camera sees the tag on the gripper, whose links hide it at some angles. This tag may be nearer than
+    /// others: only incidence, image and occlusion count.
     #[must_use]
     pub fn sees_gripper_tag(
         &self,
@@ -103,7 +103,7 @@ impl VisibilityModel {
         })
     }
 
-    /// What hides the first of the tags in view that something hides.
+    /// Returns the name of the shape that hides the first hidden tag in view.
     #[must_use]
     pub fn hidden_by<'a>(
         &self,
@@ -115,7 +115,7 @@ impl VisibilityModel {
         self.in_view(robot, &poses).find_map(|idx| self.tag_hidden_by(robot, clearance, &poses, idx))
     }
 
-    /// What hides a corner of a tag (by its index).
+    /// Returns the name of the shape that hides a corner of a tag (by its index).
     pub(crate) fn tag_hidden_by<'a>(
         &self,
         robot: &Robot,
@@ -131,7 +131,7 @@ impl VisibilityModel {
         })
     }
 
-    /// Indices of the tags in view that nothing hides.
+    /// Returns the indices of the tags in view that no shape hides.
     #[must_use]
     pub fn visible(&self, robot: &Robot, clearance: &ClearanceModel<'_>, angles: &JointAngles) -> Vec<usize> {
         let poses = robot.chain.link_poses(angles);
@@ -139,7 +139,7 @@ impl VisibilityModel {
         self.in_view(robot, &poses).filter(|&idx| !self.is_hidden(robot, &poses, &sights, idx)).collect()
     }
 
-    /// Whether something hides a corner of a tag (by its index).
+    /// True if a shape hides a corner of a tag (by its index).
     pub(crate) fn is_hidden(&self, robot: &Robot, poses: &LinkPoses, sights: &Sights<'_>, idx: usize) -> bool {
         let tag = &robot.tags[idx];
         let base_from_tag = robot.base_from_tags_at(poses) * tag.base_from_tag.isometry();
@@ -147,7 +147,7 @@ impl VisibilityModel {
     }
 }
 
-/// The camera in the frame of the tags.
+/// Returns the pose of the camera in the frame of the tags.
 fn camera_in_tags(robot: &Robot, poses: &LinkPoses) -> Isometry3<f64> {
     let base_from_camera = poses.frame(&robot.camera.mount);
     if robot.is_watched() { poses.frame(&robot.tag_frame).inv_mul(&base_from_camera) } else { base_from_camera }
@@ -163,7 +163,7 @@ mod tests {
     use armcal_core::stats::stream_rng;
     use rand::RngExt;
 
-    /// Tags that the arm carries are seen as tags that stand where it carries them.
+    /// Tags that the arm carries are seen like fixed tags at the same poses.
     #[test]
     fn carried_tags_are_seen_where_they_are() {
         let (robot, vehicle) = (watched_titan(), vehicle());

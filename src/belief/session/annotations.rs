@@ -1,11 +1,11 @@
-//! The tags found in an image, as marks on it for viewers.
+//! Image annotations of detected tags, for viewers.
 
 use crate::session::constants::annotations::{LINE_LOOP, OUTLINE};
 use armcal_core::log::ros::{ImageAnnotations, PixelPoint, PointsAnnotation, TextAnnotation, Time};
 use armcal_core::streams::{Message, TagDetection, TagDetections};
 use armcal_core::time::Stamp;
 
-/// Brings an image and its detections together, whichever comes first.
+/// Joins an image and its detections, in either order of arrival.
 #[derive(Default)]
 pub(crate) struct ImageMarks {
     image: Option<Stamp>,
@@ -13,7 +13,7 @@ pub(crate) struct ImageMarks {
 }
 
 impl ImageMarks {
-    /// The marks, where this message is the second of the two.
+    /// Returns the annotations if this message is the second of the two.
     pub(crate) fn hear(&mut self, message: &Message) -> Option<ImageAnnotations> {
         match message {
             Message::Image(image) => self.image = Some(image.stamp),

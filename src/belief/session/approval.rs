@@ -1,4 +1,4 @@
-//! An operator's word before each motion.
+//! Approval of each motion by an operator.
 
 use crate::plan::Path;
 use crate::session::constants::approval::{HOLD_S, TOLD_RAD};
@@ -7,10 +7,10 @@ use crate::session::{Approval, MotionAhead, SessionError};
 use armcal_core::streams::LogLevel;
 
 impl Driver<'_> {
-    /// Comes back when the motion may begin.
+    /// Returns when the motion may begin.
     ///
     /// # Errors
-    /// [`SessionError::Interrupted`] when it may not.
+    /// [`SessionError::Interrupted`] if it may not.
     pub(crate) fn ask(&mut self, path: &Path, clearance_m: Option<f64>) -> Result<(), SessionError> {
         if !self.progress.wants_to_approve() {
             return Ok(());

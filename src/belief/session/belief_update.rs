@@ -14,12 +14,12 @@ use armcal_core::sensor::ArmSensors;
 use armcal_core::streams::{JointAngles, LogLevel};
 
 impl ScriptRunner<'_, '_> {
-    /// Whether this capture estimates as it goes.
+    /// True if this capture updates the estimate between views.
     pub(crate) fn replans(&self, capture: &CaptureSettings) -> bool {
         capture.replan_every > 0 && self.setup.routine.method == Method::Bundle
     }
 
-    /// The bounds that clearance is kept for.
+    /// Returns the bounds for which clearance is kept.
     pub(crate) fn kept_clear(&self, bounds: JointErrorBounds) -> JointErrorBounds {
         match self.setup.routine.capture.margins {
             Margins::Belief => bounds,
@@ -27,15 +27,15 @@ impl ScriptRunner<'_, '_> {
         }
     }
 
-    /// Estimates from the views captured since the last calibration and goes on by that; where nothing can be told yet,
-    /// by what was believed before.
+    /// Estimates from the views captured since the last calibration and continues with the result. If nothing can be
+    /// estimated yet, it keeps the belief before.
     pub(crate) fn update_estimate(&mut self) -> Result<Option<Calibration>, SessionError> {
         let recording = self.driver.recorder.read_back()?;
         let began_s = self.driver.progress.wall_s();
         let accepted = self.accepted.as_ref();
         let mut found = interim_estimate(&recording, self.setup.robot, self.views_since, accepted);
         if accepted.is_some() && found.is_err() {
-            // Something happened to the arm since: the new views alone tell how it is now.
+            // The arm may have changed since the accepted calibration, so only the new views describe it.
             found = interim_estimate(&recording, self.setup.robot, self.views_since, None);
         }
         self.tally.calibration_wall_s += self.driver.progress.wall_s() - began_s;
@@ -59,7 +59,7 @@ impl ScriptRunner<'_, '_> {
         Ok(Some(calibration))
     }
 
-    /// Goes back to what was believed before the running estimates: the views came to nothing.
+    /// Restores the belief before the interim estimates, because the views gave no calibration.
     pub(crate) fn forget_running(&mut self) {
         let Some(SavedBelief { sensors, bounds, fresh }) = self.before_running.take() else { return };
         (self.bounds, self.fresh) = (bounds, fresh);
@@ -73,8 +73,7 @@ impl ScriptRunner<'_, '_> {
         JointErrorBounds::believed(&calibration.scaled_robot(self.setup.robot), calibration, sensors)
     }
 
-    /// Root mean square of the tool's position error that `calibration` expects over the task, m; `None` without a
-    /// task.
+    /// Returns the expected root mean square tool error of `calibration` over the task, m; `None` without a task.
     pub(crate) fn expected_tool_error_m(&self, calibration: &Calibration) -> Option<f64> {
         if !self.driver.held.is_empty() {
             return calibration.predicted_tool_error_m.map(|summary| summary.median);

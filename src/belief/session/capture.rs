@@ -1,4 +1,4 @@
-//! Plans views and visits them, and plans anew as they come in.
+//! Plans views, visits them, and replans as views are captured.
 
 use crate::batch::marked_calibrations::MIN_VIEWS;
 use crate::checks::refusal_conditions::fewest_views;
@@ -17,37 +17,37 @@ use armcal_core::stats::stream_rng;
 use armcal_core::streams::{CaptureSet, JointAngles, JointCounts, LogLevel, MarkKind, Phase};
 use armcal_core::time::Stamp;
 
-/// A capture under way.
+/// State of a capture.
 struct CaptureRun<'a> {
     settings: &'a CaptureSettings,
     began: Stamp,
     n_fit: usize,
     n_held_out: usize,
-    /// A calibration from fewer fitted views is refused, however good it is.
+    /// Number of fitted views below which a calibration is refused, regardless of its quality.
     n_for_verdict: usize,
     tried: usize,
     blocked: usize,
-    /// Poses on the way to which the arm met something, and those at which it did not settle.
+    /// Number of poses with a contact on the path to them, and number of poses at which the arm did not settle.
     met: usize,
     restless: usize,
-    /// Of these, the last ones in a row.
+    /// Number of consecutive failures among these at the end.
     in_vain: usize,
-    /// The last views in a row that saw no tag.
+    /// Number of consecutive views without a tag at the end.
     blind: usize,
-    /// Readings at the captured views, and the tags (index) that were seen.
+    /// Readings at the captured views, and the detected tags (index).
     taken: Vec<(JointCounts, Vec<usize>)>,
-    /// Poses that were tried in vain.
+    /// Poses that were tried without a captured view.
     failed: Vec<JointAngles>,
-    /// Of each tag, sightings that were predicted and those that came true.
+    /// Predicted number of detections of each tag, and in `seen` the observed part of it.
     expected: Vec<f64>,
     seen: Vec<f64>,
-    /// The running estimate, and how many views it has seen.
+    /// The interim estimate, and the number of views captured before its last update.
     belief: Option<Calibration>,
     renewed_at: usize,
-    /// Fitted views after which the plan predicts that the tool error is small enough.
+    /// Number of fitted views after which the plan predicts a sufficiently small tool error.
     enough_at: Option<usize>,
     expected_tool_error_m: Option<f64>,
-    /// Drawn from the present belief.
+    /// Arms sampled from the present belief.
     ensemble: Option<ArmEnsemble>,
 }
 
@@ -78,7 +78,7 @@ impl<'a> CaptureRun<'a> {
         }
     }
 
-    /// From the first view again: a joint that failed has made another arm of it.
+    /// Restarts from the first view, because a failed joint has changed the arm.
     fn anew(&self, robot: &Robot, began: Stamp) -> Self {
         let Self { tried, blocked, met, restless, .. } = *self;
         Self { tried, blocked, met, restless, ..Self::new(self.settings, robot, began) }
@@ -109,7 +109,7 @@ impl<'a> CaptureRun<'a> {
                 || (self.captured() > self.renewed_at && self.enough_at.is_some_and(|n| self.n_fit >= n)))
     }
 
-    /// Why it is no use to go on.
+    /// Returns the reason to end the capture after too many consecutive failures.
     fn is_in_vain(&self) -> Option<String> {
         let Self { met, restless, in_vain, .. } = *self;
         (in_vain >= MOST_IN_VAIN).then(|| {
@@ -120,7 +120,7 @@ impl<'a> CaptureRun<'a> {
         })
     }
 
-    /// Why no more views are wanted.
+    /// Returns the reason why no more views are wanted.
     fn enough(&self, now: Stamp) -> Option<String> {
         let CaptureSettings { poses, held_out, .. } = self.settings;
         let most = (poses + held_out) as usize + SPARE_TRIES;
@@ -134,12 +134,12 @@ impl<'a> CaptureRun<'a> {
             return Some(why);
         }
         let stop = StopReason::decide(self.settings, &state)?;
-        // Views for the verdict are wanted whatever the fit says.
+        // Held-out views are wanted regardless of the fit.
         (stop != StopReason::Poses || self.wanted() == [0, 0]).then(|| stop.to_string())
     }
 }
 
-/// How a visit came out.
+/// Outcome of a visit.
 enum Visited {
     Captured,
     Failed,
@@ -152,7 +152,7 @@ impl ScriptRunner<'_, '_> {
         Ok(self.choose(&views)?)
     }
 
-    /// The views captured so far, as they are believed to be now.
+    /// Returns the views captured so far, under the present belief.
     fn taken(&self, views: &CaptureRun<'_>) -> Vec<CapturedView> {
         let conditions = self.driver.conditions();
         let view = |(counts, tags): &(JointCounts, Vec<usize>)| CapturedView {
@@ -188,12 +188,12 @@ impl ScriptRunner<'_, '_> {
         )
     }
 
-    /// Visits views and records what is seen, until there are enough.
+    /// Visits views and records them until there are enough.
     pub(crate) fn capture(&mut self, capture: &CaptureSettings) -> Result<(), SessionError> {
         let mut views = CaptureRun::new(capture, &self.robot, self.driver.now());
         let replans = self.replans(capture);
         let ready = self.planned.as_mut().and_then(|planned| planned.first_capture.take());
-        // Planned before anything moved; the belief is still the same unless a calibration came in between.
+        // This plan was made before any motion; the belief is still the same unless a calibration came in between.
         let mut plan = ready.filter(|_| self.epochs.len() == 1);
         if replans {
             self.capture_at_start(&mut views)?;
@@ -240,7 +240,7 @@ impl ScriptRunner<'_, '_> {
         self.end_capture(&views, why)
     }
 
-    /// Says why there are no more views; an error where there are too few for any calibration.
+    /// Logs why there are no more views. Returns an error if there are too few for any calibration.
     fn end_capture(&mut self, views: &CaptureRun<'_>, why: String) -> Result<(), SessionError> {
         let CaptureRun { tried, blocked, met, restless, .. } = *views;
         let why = match self.driver.flow.weak_pump() {
@@ -273,7 +273,7 @@ impl ScriptRunner<'_, '_> {
         self.driver.log(LogLevel::Info, &text)
     }
 
-    /// Renews belief and margins; whether anything changed.
+    /// Updates belief and margins. Returns true if anything changed.
     fn renew_views(&mut self, views: &mut CaptureRun<'_>) -> Result<bool, SessionError> {
         views.renewed_at = views.captured();
         self.driver.phase(Phase::Plan)?;
@@ -294,11 +294,11 @@ impl ScriptRunner<'_, '_> {
         Ok(true)
     }
 
-    /// Where the arm stands nothing can be hit: what tags can be seen from there tell where it is.
+    /// Captures a view where the arm stands: no motion is needed, and the visible tags locate the arm.
     fn capture_at_start(&mut self, views: &mut CaptureRun<'_>) -> Result<(), SessionError> {
         let here = self.driver.set_point();
         let tags = VisibilityModel::default().visible(&self.robot, &self.clearance, &here);
-        // Where a joint stands that nobody has seen, only a look can tell.
+        // Only a view can locate a joint that no view has shown yet.
         if tags.is_empty() && self.unlocated().is_none() {
             return Ok(());
         }
@@ -314,7 +314,7 @@ impl ScriptRunner<'_, '_> {
         Ok(())
     }
 
-    /// Visits the poses of a plan in their order, as far as the next renewal.
+    /// Visits the poses of a plan in their order, until the next update is due.
     fn visit_some(&mut self, plan: &PosePlan, views: &mut CaptureRun<'_>) -> Result<(), SessionError> {
         let replans = self.replans(views.settings);
         for pose in &plan.poses {
@@ -345,7 +345,7 @@ impl ScriptRunner<'_, '_> {
             if let Visited::Failed = self.stand_and_look(pose, views)?
                 && replans
             {
-                // What was wrong there is worth a thought before the next pose.
+                // The failure may change the plan before the next pose.
                 return Ok(());
             }
         }
@@ -387,7 +387,7 @@ impl ScriptRunner<'_, '_> {
         Ok(Visited::Captured)
     }
 
-    /// Holds the tags that were seen against those that should have been.
+    /// Compares the detected tags with the predicted ones.
     fn learn(&mut self, pose: &PlannedPose, views: &mut CaptureRun<'_>) -> Result<(), SessionError> {
         let counts = self.driver.counts()?;
         let ids_seen = &self.driver.recorder.tags_seen()?.ids;
@@ -401,7 +401,7 @@ impl ScriptRunner<'_, '_> {
         Ok(())
     }
 
-    /// Notes how far each link may be from where it is believed to be, to be held against the truth where there is one.
+    /// Records the predicted displacement of each link, for comparison with the truth where that is known.
     fn note_visit(&mut self, pose: &PlannedPose, views: &mut CaptureRun<'_>) -> Result<(), SessionError> {
         let believed = self.driver.believed_angles()?;
         let ensemble = match views.ensemble.take() {

@@ -1,196 +1,194 @@
-//! Constants that decide something in `session`: unit, source and effect of each, by the file that uses it.
+//! Constants that affect results of `session`: unit, source and effect of each, by the file that uses it.
 
 pub(crate) mod annotations {
     use armcal_core::log::ros::Color;
 
-    /// A closed line.
+    /// Marker type of a closed line.
     pub(crate) const LINE_LOOP: u8 = 2;
-    /// Colour of a found tag's outline and number; shares of red, green, blue and opacity.
+    /// Colour of a detected tag's outline and number; shares of red, green, blue and opacity.
     pub(crate) const OUTLINE: Color = Color { r: 0.1, g: 0.9, b: 0.3, a: 1.0 };
 }
 
 pub(crate) mod approval {
-    /// How long a held arm waits before it asks again, s.
+    /// Time that a held arm waits before it asks again, s.
     pub(crate) const HOLD_S: f64 = 5.0;
-    /// An operator is told of the joints that move by more, rad: less is nothing at the digits that are told.
+    /// Least joint motion that an operator is told, rad: the displayed digits hide smaller ones.
     pub(crate) const TOLD_RAD: f64 = 5e-4;
 }
 
 pub(crate) mod capture {
-    /// A second look at the margins comes early: the first few views tell most.
+    /// Number of views after which the first update comes early, because the first few views have the most information.
     pub(crate) const FIRST_RENEWAL: usize = 3;
-    /// Tries at poses, beside those wanted, after which a capture goes no further.
+    /// Number of tries, in addition to the wanted poses, after which a capture ends.
     pub(crate) const SPARE_TRIES: usize = 10;
-    /// So many poses in a row at which the arm did not settle, or met something on its way, end a capture.
+    /// Number of consecutive poses without settling, or with a contact on the way, that end a capture.
     pub(crate) const MOST_IN_VAIN: usize = 6;
-    /// Sightings as predicted that a tag is given in advance.
+    /// Prior number of detections as predicted that each tag is credited with.
     pub(crate) const TRUST_IN_ADVANCE: f64 = 2.0;
 }
 
 pub(crate) mod contact {
-    /// A joint must be off for this long: spikes of a worn sensor are shorter, s.
+    /// Least duration of a deviation for a contact, s: spikes of a worn sensor are shorter.
     pub(crate) const PERSISTS_S: f64 = 0.08;
-    /// Periods that are looked back at most.
+    /// Largest number of past periods that are checked.
     pub(crate) const MAX_PERIODS: usize = 32;
-    /// Multiple of what has been usual that is no longer usual.
+    /// Multiple of the usual deviation above which a deviation is unusual.
     pub(crate) const UNUSUAL: f64 = 2.5;
-    /// Share of the distance within which a joint counts as at its set-point that is no touch, whatever has been usual.
+    /// Share of the distance at which a joint counts as at its set-point: no smaller deviation is a contact.
     pub(crate) const NO_TOUCH: f64 = 0.5;
-    /// What is taken for usual until something has been learnt: seconds behind a moving set-point, and distance from a
-    /// resting one.
+    /// Initial usual deviations: lag behind a moving set-point, s, and distance from a resting one, rad.
     pub(crate) const FIRST_LAG_S: f64 = 0.3;
     pub(crate) const FIRST_REST_RAD: f64 = 0.02;
-    /// Edges that this first guess weighs as much as, and edges that are remembered.
+    /// Number of edges by which the initial values are weighted, and number of edges that are remembered.
     pub(crate) const FIRST_WEIGHT: f64 = 2.0;
     pub(crate) const REMEMBERED: f64 = 30.0;
-    /// A set-point's rate is still felt for about this long after it has gone down, s.
+    /// Time constant with which the effect of a set-point's rate decays, s.
     pub(crate) const RATE_MEMORY_S: f64 = 0.4;
-    /// Shares of the joint's rate above which a lag is learnt, and below which an error at rest is.
+    /// Shares of the joint's largest rate: a lag is learnt above the first, an error at rest below the second.
     pub(crate) const MOVING: f64 = 0.15;
     pub(crate) const RESTING: f64 = 0.01;
-    /// Nor do they by noise, standard deviations.
+    /// Multiple of the noise std that a jump of the reading must exceed.
     pub(crate) const NOISE_SIGMAS: f64 = 8.0;
 }
 
 pub(crate) mod flow {
-    /// Flow is that of a span of so long, s.
+    /// Length of the span over which flow is averaged, s.
     pub(crate) const SPAN_S: f64 = 0.5;
-    /// A sound arm lags, and yet moves most of the oil that it is asked to move.
+    /// Least share of the requested oil flow that a sound arm moves in spite of its lag.
     pub(crate) const SOUND_SHARE: f64 = 0.6;
 }
 
 pub(crate) mod following {
-    /// A word that is the same for this long, while the set-point leaves by `LEFT_RAD`, is stuck, s.
+    /// Time for which a reading stays the same, while the set-point leaves by `LEFT_RAD`, before it counts as stuck, s.
     pub(crate) const SAME_S: f64 = 0.15;
     pub(crate) const LEFT_RAD: f64 = 0.03;
-    /// A word that leapt and stood still for so long is dead: spikes are shorter, s.
+    /// Time for which a reading stands still after a jump before it counts as dead, s: spikes are shorter.
     pub(crate) const LEAPT_S: f64 = 0.3;
-    /// A joint has been at rest when reading and set-point stood still, near each other, for so long, s.
+    /// Time for which reading and set-point stand still near each other before the joint counts as at rest, s.
     pub(crate) const REST_S: f64 = 0.3;
-    /// Readings of a joint at rest lie within so many standard deviations of the noise, and two counts.
+    /// Multiple of the noise std, in addition to two counts, within which readings of a joint at rest lie.
     pub(crate) const NOISE_SIGMAS: f64 = 10.0;
-    /// No joint turns faster than this many times its rate.
+    /// Multiple of its largest rate that no joint exceeds.
     pub(crate) const REACHABLE: f64 = 3.0;
-    /// A sensor with less noise may read the same for long, counts; as may one whose word did not flicker for so many
-    /// periods at rest.
+    /// Noise below which a sensor may read the same for long, counts. So may one whose reading changed in fewer than
+    /// `FLICKERS` periods at rest.
     pub(crate) const NOISY_COUNTS: f64 = 1.0;
     pub(crate) const FLICKERS: u32 = 30;
-    /// Suspected contacts of a joint that has not moved, after which it is probed.
+    /// Number of suspected contacts of a joint that has not moved, after which it is probed.
     pub(crate) const SUSPECTED: u32 = 2;
-    /// A joint that has not moved while its set-point went so far, rad, and so many times as far as noise does, is
-    /// locked.
+    /// Set-point travel, rad, and multiple of the noise range, after which a joint that has not moved counts as locked.
     pub(crate) const DECISIVE_RAD: f64 = 0.1;
     pub(crate) const DECISIVE_OVER_NOISE: f64 = 3.0;
-    /// A set-point that changes by less in a period stands, counts.
+    /// Least change of a set-point per period that counts as motion, counts.
     pub(crate) const SET_STANDS_COUNTS: f64 = 1e-6;
 }
 
 pub(crate) mod grip {
-    /// The jaws are where they were told within this, m.
+    /// Tolerance of the jaws' opening, m.
     pub(crate) const ARRIVED_M: f64 = 1e-3;
-    /// Waited beyond twice the closing time, s.
+    /// Waiting time in addition to twice the closing time, s.
     pub(crate) const PATIENCE_S: f64 = 2.0;
-    /// Jaws that are told less than this beyond rest are at rest, m.
+    /// Tolerance within which commanded jaws count as at rest, m.
     pub(crate) const AS_AT_REST_M: f64 = 1e-6;
 }
 
 pub(crate) mod held_joint {
-    /// How far a joint may creep while its valve is shut, one sigma: 1 deg an hour. Assumed.
+    /// Std of the creep rate of a joint with a shut valve: 1 deg an hour. Assumed.
     pub(crate) const CREEP_RAD_PER_S: f64 = 4.85e-6;
-    /// Where a joint was found this long ago is looked for again where it matters, s.
+    /// Age after which a located joint is located again where it matters, s.
     pub(crate) const OLD_S: f64 = 1800.0;
 }
 
 pub(crate) mod keeping_up {
-    /// Poses that tell where a joint stands, and enough for a verdict.
+    /// Number of poses that locate a joint, and suffice for a verdict.
     pub(crate) const LOCATING_POSES: u32 = 14;
 }
 
 pub(crate) mod motion {
-    /// Backing out takes so many times as long as coming did.
+    /// Ratio of the duration of backing out to that of the same motion forward.
     pub(crate) const BACK_OUT_SLOWNESS: f64 = 2.5;
-    /// The arm counts as settled when it has stood for this long, s.
+    /// Time for which the arm must stand to count as settled, s.
     pub(crate) const REST_S: f64 = 0.4;
-    /// A long wait is asked at this distance whether it shall go on, s.
+    /// Interval at which a long wait asks whether to continue, s.
     pub(crate) const WAIT_STRIDE_S: f64 = 600.0;
     pub(crate) const SETTLE_LIMIT_S: f64 = 12.0;
-    /// Believed angles and commands are recorded each so many control periods.
+    /// Number of control periods between two records of believed angles and commands.
     pub(crate) const BELIEF_EVERY: u64 = 4;
 }
 
 pub(crate) mod reach {
-    /// How long the arm is watched at a target, s.
+    /// Dwell at a target, s.
     pub(crate) const REACH_DWELL_S: f64 = 0.6;
 }
 
 pub(crate) mod scale_identification {
-    /// How long each view of an excursion is watched, s.
+    /// Dwell at each view of an excursion, s.
     pub(crate) const DWELL_S: f64 = 1.0;
-    /// What the sensor's nonlinearity may bend the slope by over a short excursion, relative.
+    /// Largest relative effect of the sensor's nonlinearity on the slope over a short excursion.
     pub(crate) const LOCAL_SLOPE: f64 = 0.03;
-    /// Multiple of one sigma that is kept clear for.
+    /// Multiple of the std for which clearance is kept.
     pub(crate) const SIGMAS: f64 = 3.0;
-    /// An excursion that is not clear is tried again at this share of its size.
+    /// Factor on the size of an excursion that is not clear.
     pub(crate) const SHRINK: f64 = 0.75;
-    /// An excursion of no more than this share of its wanted size tells no scale.
+    /// Least share of its wanted size at which an excursion determines a scale.
     pub(crate) const LEAST_SHARE: f64 = 0.1;
 }
 
 pub(crate) mod script {
-    /// Shares of the clearance that are tried in this order for a path from a place that the whole of it does not let
-    /// the arm leave.
+    /// Shares of the clearance, in the order of tries, for a path from a pose that the arm cannot leave with the whole
+    /// clearance.
     pub(crate) const START_SHARES: [f64; 3] = [0.5, 0.2, 0.05];
-    /// How far from a joint the arm may be that its link's turn moves, m.
+    /// Largest distance of the arm's points from a joint whose link rotates, m.
     pub(crate) const LINK_REACH_M: f64 = 2.0;
 }
 
 pub(crate) mod settling {
-    /// No sensor, smoothed, has moved by more than this, rad, and by what its own noise leaves of it ...
+    /// Largest motion of a smoothed reading beyond its noise at which the arm stands, rad ...
     pub(crate) const STILL_RAD: f64 = 0.0008;
-    /// ... while it was this near to its set-point (a controller may leave a steady error), rad.
+    /// ... within this distance of its set-point (a controller may leave a steady error), rad.
     pub(crate) const NEAR_RAD: f64 = 0.02;
     /// Share of a new reading in the smoothed one: a tenth of a second at 100 Hz.
     pub(crate) const SMOOTHING: f64 = 0.1;
-    /// Multiple of a smoothed reading's own deviation that is no motion.
+    /// Multiple of a smoothed reading's std that does not count as motion.
     pub(crate) const NOISE_SIGMAS: f64 = 4.0;
 }
 
 pub(crate) mod touch {
-    /// The tip goes on behind the drawn surface by at most this much, m.
+    /// Largest distance that the tip moves beyond the nominal surface, m.
     pub(crate) const BEYOND_M: f64 = 0.05;
-    /// What is usual is learnt up to here before the drawn surface, m.
+    /// Distance before the nominal surface up to which the usual deviation is learnt, m.
     pub(crate) const LEARNT_BEFORE_M: f64 = 0.035;
-    /// Of the tip on its way to the surface, and back, m/s.
+    /// Speed of the tip on its way to the surface, and back, m/s.
     pub(crate) const SPEED_M_S: f64 = 0.006;
     pub(crate) const BACK_SPEED_M_S: f64 = 0.02;
-    /// Distance of the configurations that are solved for on the way, m.
+    /// Distance between the solved configurations on the way, m.
     pub(crate) const STRIDE_M: f64 = 0.005;
-    /// Largest change of a joint over such a stride, rad: else the way has two branches.
+    /// Largest change of a joint over such a stride, rad: a larger one shows that the way has two branches.
     pub(crate) const MAX_STRIDE_RAD: f64 = 0.05;
-    /// What the believed arm keeps clear on the slow way, m: of the touched part with all but its tip, and of the rest.
+    /// Clearance of the believed arm on the slow way, m: of the touched part to all but the tip, and of the rest.
     pub(crate) const PART_CLEARANCE_M: f64 = 0.008;
     pub(crate) const REST_CLEARANCE_M: f64 = 0.004;
-    /// Starts of the inverse kinematics beside where the arm is.
+    /// Number of random starts of the inverse kinematics, in addition to the present configuration.
     pub(crate) const RANDOM_SEEDS: usize = 40;
-    /// Until the pressed arm stands, s.
+    /// Time until the pressed arm stands, s.
     pub(crate) const REST_S: f64 = 1.0;
-    /// Weight of directions that no touch has told yet over those that one has.
+    /// Weight of directions that no touch has determined yet, relative to those that one has.
     pub(crate) const UNTOLD: f64 = 100.0;
-    /// A tool this far behind what is usual has been held up, m ...
+    /// Deviation of the tool beyond the usual that counts as held up, m ...
     pub(crate) const HELD_UP_M: f64 = 0.0015;
-    /// ... if it is more than so many standard deviations of the free way ...
+    /// ... if it exceeds this multiple of the std on the free way ...
     pub(crate) const HELD_UP_SIGMAS: f64 = 6.0;
     /// ... for this long, s.
     pub(crate) const LASTS_S: f64 = 0.1;
-    /// Of the smoothing, s.
+    /// Time constant of the smoothing, s.
     pub(crate) const SMOOTHING_S: f64 = 0.1;
 }
 
 pub(crate) mod transforms {
-    /// Least time between two messages, s: viewers draw no more.
+    /// Least time between two messages, s: viewers draw no faster.
     pub(crate) const SPACING_S: f64 = 0.1;
-    /// Most time between two of a resting arm, s.
+    /// Largest time between two messages of a resting arm, s.
     pub(crate) const REST_SPACING_S: f64 = 2.0;
-    /// An arm of which no joint left its drawn angle by more is at rest, rad: 1 mm at 2 m.
+    /// Largest joint change since the last drawing at which an arm is at rest, rad: 1 mm at 2 m.
     pub(crate) const STEP_RAD: f64 = 5e-4;
 }

@@ -1,10 +1,10 @@
-//! Whether the arm has run into something, by what it was told and what its own sensors say.
+//! Contact detection from commands and the arm's own sensors.
 //!
-//! A hydraulic joint is always a little behind its set-point: by a time that its valve takes, and, at rest, by what
-//! load and friction leave. How much is this arm's own matter and is learnt while it moves; a joint that stays farther
-//! off than that has been held up, or pushed away. This is the classical test of a residual against a threshold that
-//! goes with the motion (De Luca and Mattone 2003 do it with momentum, for arms that measure torques; this one measures
-//! angles alone).
+//! A hydraulic joint is always behind its set-point: by a time that its valve takes, and, at rest, by an error from
+//! load and friction. Both are properties of the arm and are learnt while it moves. A joint that stays farther off has
+//! been held up, or pushed away. This is the classical test of a residual against a threshold that depends on the
+//! motion. De Luca and Mattone (2003) apply it to momentum, for arms that measure torques; this arm measures only
+//! angles.
 
 use crate::session::constants::contact::{
     FIRST_LAG_S, FIRST_REST_RAD, FIRST_WEIGHT, MAX_PERIODS, MOVING, NO_TOUCH, NOISE_SIGMAS, PERSISTS_S, RATE_MEMORY_S,
@@ -15,17 +15,17 @@ use crate::session::settling::NEAR_RAD;
 use armcal_core::robot::Robot;
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
-/// A joint that is where nothing but a touch explains it.
+/// A deviation of a joint that only a contact explains.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ContactEvent {
     pub joint: usize,
-    /// From the reading to the set-point, rad.
+    /// Difference of set-point and reading, rad.
     pub behind_rad: f64,
-    /// What has been usual at this rate, times what is allowed of it, rad.
+    /// Usual deviation at this rate times the allowed factor, rad.
     pub allowed_rad: f64,
 }
 
-/// Follows set-points and readings, one pair a control period.
+/// Follows set-points and readings, one pair per control period.
 #[derive(Clone, Debug)]
 pub(crate) struct ContactDetector {
     period_s: f64,
@@ -34,29 +34,29 @@ pub(crate) struct ContactDetector {
 
 #[derive(Clone, Debug)]
 struct JointWatch {
-    /// Declared to have failed, or pressed against something on purpose: its readings prove nothing.
+    /// False if the joint is declared failed, or pressed against something on purpose: its readings prove nothing.
     is_watched: bool,
     max_rate_rad_s: f64,
-    /// A full turn of the sensor's word, rad.
+    /// Angle of a full turn of the sensor's word, rad.
     turn_rad: f64,
     jump_rad: f64,
-    /// Set-point and reading of the period before.
+    /// Set-point and reading of the period before, rad.
     last: Option<(f64, f64)>,
-    /// Largest rate of the set-point lately, rad/s.
+    /// Largest recent rate of the set-point, rad/s.
     rate_rad_s: f64,
     recent_rad: [f64; MAX_PERIODS],
     next: usize,
     lag_s: AdaptiveThreshold,
     rest_rad: AdaptiveThreshold,
-    /// Its reading has jumped, and not come back.
+    /// True if its reading has jumped, and not returned.
     has_jumped: bool,
 }
 
-/// A running largest value, edge by edge.
+/// Running largest value over the edges.
 #[derive(Clone, Copy, Debug)]
 struct AdaptiveThreshold {
     value: f64,
-    /// Of this edge, where there is one.
+    /// Largest value of this edge, if any.
     now: Option<f64>,
     edges: f64,
 }
@@ -70,7 +70,7 @@ impl AdaptiveThreshold {
         self.now = Some(self.now.map_or(value, |now| now.max(value)));
     }
 
-    /// Larger values count at once, smaller ones by and by.
+    /// Takes over the edge's value: larger values count at once, smaller ones gradually.
     fn take(&mut self) {
         let Some(now) = self.now.take() else { return };
         let share = 1.0 / (FIRST_WEIGHT + self.edges).min(REMEMBERED);
@@ -98,7 +98,7 @@ impl ContactDetector {
         Self { period_s, joints: joints.collect() }
     }
 
-    /// Takes one period; gives the joint that is farthest beyond what is allowed, if any is.
+    /// Takes in one period. Returns the joint that exceeds its allowed deviation most, if any.
     pub fn update(&mut self, set_point: &JointAngles, reading: &JointAngles) -> Option<ContactEvent> {
         let mut worst: Option<ContactEvent> = None;
         for (joint, watch) in self.joints.iter_mut().enumerate().take(MAX_JOINTS) {
@@ -113,7 +113,7 @@ impl ContactDetector {
         worst
     }
 
-    /// A motion without a touch is over: what it showed is usual.
+    /// Learns the deviations of a finished motion without a contact as usual.
     pub fn learn(&mut self) {
         for watch in &mut self.joints {
             watch.lag_s.take();
@@ -121,7 +121,7 @@ impl ContactDetector {
         }
     }
 
-    /// What a touch showed is not usual; the joints begin anew from where they are.
+    /// Forgets the deviations of a contact; the joints start again from their present state.
     pub fn forget(&mut self) {
         for watch in &mut self.joints {
             (watch.lag_s.now, watch.rest_rad.now) = (None, None);
@@ -131,7 +131,7 @@ impl ContactDetector {
 }
 
 impl JointWatch {
-    /// (distance behind, distance allowed) where the first is more than the second and has been for long enough.
+    /// Returns the deviation and the allowed deviation, rad, if the first has exceeded the second for long enough.
     fn update(&mut self, set_rad: f64, reading_rad: f64, period_s: f64) -> Option<(f64, f64)> {
         if !self.is_watched {
             return None;
@@ -161,7 +161,7 @@ impl JointWatch {
         None
     }
 
-    /// By how much it has been off, to one side, in all of the last periods.
+    /// Returns the least deviation over the last periods if all have the same sign, rad; otherwise 0.
     fn lasting_rad(&mut self, behind_rad: f64, period_s: f64) -> f64 {
         let periods = ((PERSISTS_S / period_s).round() as usize).clamp(1, MAX_PERIODS);
         self.recent_rad[self.next % periods] = behind_rad;
@@ -203,7 +203,8 @@ mod tests {
         armcal_core::robot::load(&folder).expect("the robot reads")
     }
 
-    /// An arm whose joint 0 follows with a lag, by noisy readings, to and fro; what is done to it is asked each period.
+    /// A simulated arm whose joint 0 follows with a lag, to and fro, with noisy readings; a callback acts on it in each
+    /// period.
     struct Bench {
         watch: ContactDetector,
         rng: rand_chacha::ChaCha8Rng,
@@ -217,8 +218,8 @@ mod tests {
             Self { watch: ContactDetector::new(robot, PERIOD_S), rng, joint_rad: 0.0, noise_rad: 0.001 }
         }
 
-        /// One edge at `rate` and a rest; `act` changes the joint after each period, and the reading. Gives when a bump
-        /// was told, s.
+        /// Runs one edge at `rate_rad_s` and a rest; `act` changes the joint and the reading after each period. Returns
+        /// the time of a detected contact, s.
         fn edge(&mut self, to: f64, rate_rad_s: f64, mut act: impl FnMut(f64, &mut f64, &mut f64)) -> Option<f64> {
             let from = WAY_RAD - to;
             let duration_s = WAY_RAD / rate_rad_s;
@@ -256,7 +257,7 @@ mod tests {
         for seed in 1..=40 {
             let mut bench = Bench::warmed(&robot, seed);
             assert_eq!(bench.edge(WAY_RAD, 0.3, |_, _, _| {}), None);
-            // Something stands at 0.4 rad; the joint comes to it at its fastest.
+            // An obstacle stands at 0.4 rad; the joint reaches it at its highest rate.
             let mut touched_s = None;
             let found_s = bench.edge(0.0, 0.3, |t_s, joint, reading| {
                 if *joint < 0.4 {
@@ -285,7 +286,7 @@ mod tests {
         }
     }
 
-    /// Wild readings, a sensor that slips, a faster motion than any before: none of them is a touch.
+    /// Wild readings, a slipping sensor and a faster motion than any before are not taken for a contact.
     #[test]
     fn what_is_no_touch_is_not_taken_for_one() {
         let robot = titan();

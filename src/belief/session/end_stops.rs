@@ -1,8 +1,8 @@
-//! Presses joints against their nominal end stops, one after the other, as joint limits wants them (Williams 1991).
+//! Presses joints against their nominal end stops, one after the other, to measure joint limits (Williams 1991).
 //!
-//! Each joint goes alone from the stowed pose, past its nominal stop by as much as its sensor may be wrong, so that
-//! every arm within the bounds comes to its stop. Where the vehicle, the arm itself or the seafloor may be in the way
-//! of any of them, the stop is refused and named: this is what makes the method useless on many vehicles.
+//! Each joint moves alone from the stowed pose, past its nominal stop by its error bound. So every arm within the
+//! bounds reaches its stop. If the vehicle, the arm itself or the seafloor may be in the way of any of them, the stop
+//! is refused with the reason. For that reason the method is useless on many vehicles.
 
 use crate::plan::{Edge, Path};
 use crate::session::SessionError;
@@ -35,7 +35,7 @@ impl ScriptRunner<'_, '_> {
         Ok(())
     }
 
-    /// One stop and back, or a line in the log why not.
+    /// Drives to one stop and back, or logs why not.
     fn stop(&mut self, joint: usize, angle_rad: f64, way: f64, dwell_s: f64) -> Result<(), SessionError> {
         let from = self.driver.set_point();
         let beyond_rad = angle_rad + way * self.bounds.error_rad(joint, angle_rad);

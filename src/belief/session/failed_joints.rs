@@ -1,5 +1,5 @@
-//! Goes on with an arm some of whose joints have failed: belief, bounds and plans without them, and what is still
-//! reachable.
+//! Continues with an arm some of whose joints have failed: belief, bounds and plans without them, and the targets that
+//! are still reachable.
 
 use crate::file::calibration::Calibration;
 use crate::file::failed_joint::FailedJointTable;
@@ -15,7 +15,7 @@ use armcal_core::robot::FailedKind;
 use armcal_core::streams::JointAngles;
 
 impl ScriptRunner<'_, '_> {
-    /// Takes account of joints that were given up since it was last asked; whether there are any.
+    /// Takes account of joints held since the last call. Returns true if there are any.
     pub(crate) fn take_up_failures(&mut self) -> bool {
         let n_known = self.n_held;
         if self.driver.held.len() == n_known {
@@ -24,7 +24,7 @@ impl ScriptRunner<'_, '_> {
         self.n_held = self.driver.held.len();
         for held in &mut self.driver.held[n_known..] {
             held.bound_rad += self.bounds.error_rad(held.joint, held.angle_rad);
-            // Views of before are those of an arm whose joint still moved.
+            // Earlier views are of an arm whose joint still moved.
             (self.began, self.views_since) = (held.since, held.since);
         }
         self.hold_failed();
@@ -32,27 +32,27 @@ impl ScriptRunner<'_, '_> {
         true
     }
 
-    /// Held joints where they are believed to stand, for all plans.
+    /// Fixes the held joints at their believed angles, for all plans.
     pub(crate) fn hold_failed(&mut self) {
         hold_in(&self.driver.held, &mut self.robot);
         let bounds = std::mem::replace(&mut self.bounds, JointErrorBounds::none(&self.robot));
         self.bounds = self.kept_clear(holding_bounds(&self.driver.held, bounds));
     }
 
-    /// Sensors believed in from now on.
+    /// Notes the sensors believed from now on.
     pub(crate) fn note_belief(&mut self, certainty: Certainty) {
         let calibration = self.epochs.last().and_then(|epoch| epoch.calibration.clone());
         self.begin_epoch(calibration, certainty);
     }
 
-    /// The same by a calibration. Of the tool of an arm with joints that were given up nobody says how sure it is.
+    /// Notes the sensors believed from now on by a calibration. With held joints the certainty of the tool is unknown.
     pub(crate) fn begin_epoch(&mut self, calibration: Option<Calibration>, certainty: Certainty) {
         let certainty = if self.driver.held.is_empty() { certainty } else { Certainty::Unknown };
         let (from, sensors) = (self.driver.now(), self.driver.sensors.clone());
         self.epochs.push(Epoch { from, sensors, calibration, certainty });
     }
 
-    /// Where the camera has the held joints by `calibration`.
+    /// Locates the held joints at the angles that the camera gives by `calibration`.
     pub(crate) fn locate_held(&mut self, calibration: &Calibration) {
         let names = self.robot.joint_names();
         for held in &mut self.driver.held {
@@ -64,7 +64,7 @@ impl ScriptRunner<'_, '_> {
         }
     }
 
-    /// Gives up the joints before the tool whose sensors a calibration found to have failed.
+    /// Holds the joints proximal to the tool whose sensors failed according to a calibration.
     pub(crate) fn hold_found(&mut self, calibration: &Calibration) -> Result<(), SessionError> {
         let names = self.robot.joint_names();
         let found = |table: &FailedJointTable| {
@@ -76,13 +76,13 @@ impl ScriptRunner<'_, '_> {
         };
         let found: Vec<(usize, FailedKind)> = calibration.failed_joint.iter().filter_map(found).collect();
         for &(joint, kind) in &found {
-            // The arm was told to move it.
+            // The arm was commanded to move it.
             let kind = if kind.stands_still() { FailedKind::Locked } else { kind };
             self.driver.hold_joint(joint, kind)?;
             if kind != FailedKind::Locked
                 && let Some(held) = self.driver.held.last_mut()
             {
-                // Since when it tells nothing is not known.
+                // The time since which its sensor has failed is unknown.
                 held.bound_rad = self.robot.sensors[joint].half_range_rad;
             }
         }
@@ -92,13 +92,13 @@ impl ScriptRunner<'_, '_> {
         Ok(())
     }
 
-    /// Whether the place of some joint before the tool is unknown: no target can be reached for.
+    /// Returns a joint proximal to the tool whose angle is unknown, if any: with it, no target can be reached.
     pub(crate) fn unlocated(&self) -> Option<&HeldJoint> {
         let n = self.robot.tool.mount.n_joints;
         self.driver.held.iter().find(|held| !held.is_located && held.joint < n)
     }
 
-    /// Notes which of `targets` held joints leave within reach; `plans` are those without them.
+    /// Notes which of `targets` stay reachable with the held joints; `plans` are those without these joints.
     pub(crate) fn note_reachable(&mut self, targets: &[usize], plans: &[Result<JointAngles, PlanError>]) {
         if self.driver.held.is_empty() {
             return;
@@ -106,7 +106,7 @@ impl ScriptRunner<'_, '_> {
         let lost: Vec<usize> = targets.iter().zip(plans).filter(|(_, plan)| plan.is_err()).map(|(t, _)| *t).collect();
         let targets_m: Vec<[f64; 3]> = lost.iter().map(|&t| self.setup.routine.task.targets_m[t]).collect();
         let request = TargetRequest { targets_m: &targets_m, preferred: None, margin_m: self.margin_m() };
-        // By a sound arm: what it cannot reach either is no failed joint's fault.
+        // The plans of a sound arm show the targets that no arm reaches.
         let none = JointErrorBounds::none(self.setup.robot);
         let sound = plan_targets(self.setup.robot, &self.clearance, &none, &request, &mut self.rng);
         let needs = lost.iter().zip(&sound).filter(|(_, plan)| plan.is_ok()).map(|(target, _)| *target).collect();

@@ -1,12 +1,11 @@
-//! Whether the arm moves as much oil as its set-points ask for: a pump far below the datasheet's figure leaves it
-//! behind.
+//! Detects a weak pump: the arm moves much less oil than its set-points request.
 
 use crate::plan::constants::motion_timing::S_PER_MIN;
 use crate::session::constants::flow::{SOUND_SHARE, SPAN_S};
 use armcal_core::robot::Robot;
 use armcal_core::streams::JointAngles;
 
-/// The largest flows so far.
+/// Largest flows so far.
 pub(crate) struct FlowWatch {
     displacement_l_per_rad: Vec<f64>,
     pump_l_per_min: Option<f64>,
@@ -14,7 +13,7 @@ pub(crate) struct FlowWatch {
     span_s: f64,
     /// Set-point and angles at the start of the span.
     start: Option<[JointAngles; 2]>,
-    /// Asked for and moved, L/min.
+    /// Largest requested and moved flow, L/min.
     most_l_per_min: [f64; 2],
 }
 
@@ -31,12 +30,12 @@ impl FlowWatch {
         }
     }
 
-    /// Whether a span ends with the control period of this number.
+    /// True if a span ends with the control period of this number.
     pub fn is_due(&self, period: u64) -> bool {
         period.is_multiple_of(self.periods)
     }
 
-    /// Takes set-point and believed angles at the end of a span.
+    /// Takes in set-point and believed angles at the end of a span.
     pub fn update(&mut self, now: [JointAngles; 2]) {
         if let Some(start) = self.start.replace(now) {
             for k in 0..2 {
@@ -47,7 +46,7 @@ impl FlowWatch {
         }
     }
 
-    /// What a pump would look like that gives far less than robot.toml says.
+    /// Returns the message about a pump that gives far less than robot.toml states, if it seems to.
     pub fn weak_pump(&self) -> Option<String> {
         let (pump, [asked, moved]) = (self.pump_l_per_min?, self.most_l_per_min);
         (moved < SOUND_SHARE * asked.min(pump)).then(|| {
@@ -63,7 +62,7 @@ impl FlowWatch {
 mod tests {
     use super::*;
 
-    /// An arm that follows, late, and one that gets a third of the oil.
+    /// An arm that follows late is sound, and one that gets a third of the oil is not.
     #[test]
     fn a_weak_pump_is_told_from_a_late_arm() {
         let folder = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots/titan4");

@@ -1,10 +1,10 @@
-//! Whether each joint follows its set-points, by its raw word alone.
+//! Detects joints that do not follow their set-points, only from the raw reading.
 //!
-//! Three failures are told from a contact, which stops a joint that was moving: a word that stays the same to the count
-//! while the set-point leaves (`stuck`: a live sensor is noisy); a word that leapt farther than any joint turns and
-//! stands still there, away from the set-point (`dead`); and a joint that has stood where it was at rest since before
-//! the set-point left (`locked`). A joint in cold oil starts late, so that this takes three suspected contacts and a
-//! set-point that has gone far: at the third the joint is probed, and the contact not obeyed until it moves or has not.
+//! A contact stops a joint that was moving; three failures differ from it. `stuck`: the reading stays the same to the
+//! count while the set-point leaves, though a live sensor is noisy. `dead`: the reading jumped farther than any joint
+//! turns and stands still there, away from the set-point. `locked`: the joint has stood at its rest since before the
+//! set-point left. A joint in cold oil starts late, so `locked` takes three suspected contacts and a long way of the
+//! set-point. At the third the joint is probed: the contact is ignored until it moves or has not.
 
 use crate::session::constants::following::{
     DECISIVE_OVER_NOISE, DECISIVE_RAD, FLICKERS, LEAPT_S, LEFT_RAD, NOISE_SIGMAS, NOISY_COUNTS, REACHABLE, REST_S,
@@ -15,7 +15,7 @@ use armcal_core::robot::{FailedKind, Robot};
 use armcal_core::sensor::wrap_symmetric;
 use armcal_core::streams::JointCounts;
 
-/// Follows set-points and words, one pair a control period.
+/// Follows set-points and raw readings, one pair per control period.
 pub(crate) struct FollowWatch {
     period_s: f64,
     joints: Vec<JointFollow>,
@@ -24,27 +24,27 @@ pub(crate) struct FollowWatch {
 struct JointFollow {
     wrap_counts: f64,
     noise_counts: f64,
-    /// Largest difference of readings at rest.
+    /// Largest difference of readings at rest, counts.
     rest_counts: f64,
-    /// Largest step in one period.
+    /// Largest step of a reading in one period, counts.
     leap_counts: f64,
     counts_per_rad: f64,
-    /// Word and set-point of the period before.
+    /// Reading and set-point of the period before, counts.
     last: Option<(f64, f64)>,
     same_s: f64,
-    /// Set-point when the word began to stay the same.
+    /// Set-point when the reading began to stay the same, counts.
     set_at_same: f64,
-    /// Word about which it stands still, and for how long.
+    /// Reading about which it stands still, counts, and the duration, s.
     anchor: f64,
     still_s: f64,
     set_still_s: f64,
     has_leapt: bool,
     has_rested: bool,
-    /// Set-point at that rest.
+    /// Set-point at that rest, counts.
     set_at_rest: f64,
-    /// Contacts suspected since.
+    /// Number of contacts suspected since.
     n_suspected: u32,
-    /// Periods at rest in which the word changed.
+    /// Number of periods at rest in which the reading changed.
     n_flickers: u32,
 }
 
@@ -75,7 +75,7 @@ impl FollowWatch {
         Self { period_s, joints: joints.collect() }
     }
 
-    /// Takes one period; gives a joint whose sensor has failed by now.
+    /// Takes in one period. Returns a joint whose sensor has failed by now.
     pub(crate) fn update(&mut self, set_point: &JointCounts, word: &JointCounts) -> Option<(usize, FailedKind)> {
         let mut failed = None;
         for (joint, watch) in self.joints.iter_mut().enumerate() {
@@ -85,13 +85,13 @@ impl FollowWatch {
         failed
     }
 
-    /// Whether `joint` has stood still since it was at rest at its set-point.
+    /// True if `joint` has stood still since it was at rest at its set-point.
     #[cfg(test)]
     pub(crate) fn has_not_moved(&self, joint: usize) -> bool {
         self.joints[joint].has_rested
     }
 
-    /// Whether that is because it is locked.
+    /// True if `joint` stands still because it is locked.
     pub(crate) fn is_locked(&self, joint: usize) -> bool {
         self.joints[joint].is_locked()
     }
@@ -102,7 +102,7 @@ impl FollowWatch {
         watch.n_suspected += u32::from(watch.has_rested);
     }
 
-    /// Whether `joint` is to go on, contact or not, until it has moved or proves to be locked.
+    /// True if `joint` continues in spite of a contact, until it has moved or proves to be locked.
     pub(crate) fn is_probed(&self, joint: usize) -> bool {
         let watch = &self.joints[joint];
         watch.has_rested && watch.n_suspected >= SUSPECTED && !watch.is_locked()
@@ -157,7 +157,7 @@ mod tests {
     const PERIOD_S: f64 = 0.01;
     const JOINT: usize = 2;
 
-    /// What becomes of an edge of 0.5 rad at 0.25 rad/s after a rest; `word` makes the word of the exact one.
+    /// Simulates an edge of 0.5 rad at 0.25 rad/s after a rest; `word` makes the reading from the exact one.
     fn told(seed: u64, mut word: impl FnMut(f64, f64) -> f64) -> (Option<(f64, FailedKind)>, bool) {
         let robot = crate::fixture::titan();
         let spec = &robot.sensors[JOINT];
@@ -195,14 +195,14 @@ mod tests {
             assert!(matches!(stuck.0, Some((at_s, FailedKind::Stuck)) if at_s < 1.3), "{stuck:?}");
             let dead = told(seed, |t_s, word| if t_s < 0.8 { word } else { 0.0 });
             assert!(matches!(dead.0, Some((at_s, FailedKind::Dead)) if at_s < 1.2), "{dead:?}");
-            // Locked: noise goes on, and the joint stands.
+            // Locked joint: noise continues, and the joint stands.
             let mut first = None;
             let locked = told(seed, |t_s, word| {
                 let here = *first.get_or_insert(word);
                 if t_s < 1.0 { word } else { here + (word * 7.0).rem_euclid(3.0) - 1.0 }
             });
             assert_eq!(locked, (None, true));
-            // Spikes, and a slip that the controller works off.
+            // Spikes, and a slip that the controller corrects.
             let spikes = |t_s: f64, word: f64| if (t_s * 100.0) as u32 % 40 < 5 { word + 500.0 } else { word };
             assert_eq!(told(seed, spikes).0, None);
             let slip = |t_s: f64, word: f64| if t_s > 1.5 { word + 300.0 * (1.5 - t_s).exp() } else { word };

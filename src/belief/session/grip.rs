@@ -1,4 +1,4 @@
-//! Opens and closes the gripper, and keeps room for open jaws.
+//! Opens and closes the gripper, and keeps clearance for open jaws.
 
 use crate::session::constants::grip::{ARRIVED_M, AS_AT_REST_M, PATIENCE_S};
 use std::rc::Rc;
@@ -9,7 +9,7 @@ use crate::session::runner::ScriptRunner;
 use armcal_core::streams::{GripperCommand, LogLevel, Mark, MarkKind, Message};
 
 impl ScriptRunner<'_, '_> {
-    /// Drives the jaws to `opening`, 0 (closed) .. 1 (open), and waits until they are there. From then on the arm keeps
+    /// Drives the jaws to `opening`, 0 (closed) to 1 (open), and waits until they arrive. From then on the arm keeps
     /// their width clear, until they are no wider than at rest.
     pub(crate) fn grip(&mut self, step: usize, opening: f64) -> Result<(), SessionError> {
         let wrong = |problem: String| SessionError::Step { step, problem };
@@ -19,7 +19,7 @@ impl ScriptRunner<'_, '_> {
         let crowded = |run: &Self| run.jaws.open.find_violation(&run.driver.set_point(), &run.bounds, 0.0);
         let open = Rc::clone(&self.jaws.open);
         if is_wide && (crowded(self).is_some() || !self.can_leave(&open)) {
-            // Folded up for a view the arm may be in its own jaws' way; where it is stowed there is room on any vehicle
+            // In a folded configuration the arm may block its own jaws; the stowed pose has had room on every vehicle
             // so far.
             let stowed = self.robot.stowed;
             self.go(&stowed)?;
@@ -28,7 +28,7 @@ impl ScriptRunner<'_, '_> {
         if is_wide && let Some(nearest) = crowded(self) {
             return Err(wrong(format!("there is no room to open the jaws: {nearest} would come too close")));
         }
-        // Opening jaws need their room at once, closing ones until they are closed.
+        // Opening jaws need their clearance at once, closing jaws until they are closed.
         if is_wide {
             self.clearance = Rc::clone(&self.jaws.open);
         }
@@ -49,7 +49,7 @@ impl ScriptRunner<'_, '_> {
         self.grip(step, 1.0)
     }
 
-    /// The jaws as the arm carries them.
+    /// Moves the jaws to their rest opening.
     pub(crate) fn rest_jaws(&mut self, step: usize) -> Result<(), SessionError> {
         let rest = self.robot.gripper.as_ref().map(|gripper| gripper.rest_opening_m / gripper.opening_max_m);
         rest.map_or(Ok(()), |opening| self.grip(step, opening))
@@ -57,15 +57,15 @@ impl ScriptRunner<'_, '_> {
 }
 
 impl<'a> ScriptRunner<'a, '_> {
-    /// For the targets that are planned before anything moves: with open jaws if one is touched before a calibration,
-    /// after which they are planned anew.
+    /// Returns the clearance model for the targets planned before any motion. It has open jaws if one of them is
+    /// touched before a calibration; after that they are planned again.
     pub(crate) fn clearance_at_targets(&self) -> Rc<ClearanceModel<'a>> {
         if grips_at_first(&self.setup.routine.steps) { Rc::clone(&self.jaws.open) } else { Rc::clone(&self.clearance) }
     }
 }
 
 impl crate::session::motion::Driver<'_> {
-    /// Tells the jaws and waits until they are there; `false` when they are not within `limit_s`.
+    /// Commands the jaws and waits until they arrive; returns false if they do not within `limit_s`.
     fn grip(&mut self, opening: f64, opening_m: f64, limit_s: f64) -> Result<bool, SessionError> {
         self.arm.grip(opening)?;
         let stamp = self.now();

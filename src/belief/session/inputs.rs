@@ -12,7 +12,7 @@ pub struct SessionInputs<'a> {
     pub vehicle: &'a Vehicle,
     /// Script, scene, task and settings.
     pub routine: &'a Routine,
-    /// How the routine's calibrations are made: its method, with the solver of those that go by positions.
+    /// Calibration method of the routine, with the solver for methods that use positions.
     pub method: CalibrationMethod,
     /// Seed of planning; a simulated arm has its own.
     pub seed: u64,

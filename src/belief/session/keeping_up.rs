@@ -1,4 +1,4 @@
-//! Works by the online belief, and asks for a calibration pose or two where the next task would miss its tolerance.
+//! Works with the online estimate, and requests a calibration pose or two if the next task would miss its tolerance.
 
 use crate::plan::JointErrorBounds;
 use crate::say::finding::FindingKind;
@@ -15,12 +15,11 @@ use armcal_core::routine::{CalibrateSettings, CalibrateViews, CaptureSettings, O
 use armcal_core::streams::{JointAngles, LogLevel, PriorSource};
 
 impl ScriptRunner<'_, '_> {
-    /// Follows the recording from its start, and what comes from now on: as the arm is believed to be by its links and
-    /// scales.
+    /// Follows the recording from its start and all later messages, for the arm with its believed links and scales.
     pub(crate) fn begin_online(&mut self) -> Result<(), SessionError> {
         let so_far = self.driver.recorder.read_back()?;
         let mut online = OnlineBelief::of(self.robot.clone(), &so_far);
-        // What happened before is in the calibration.
+        // The calibration includes earlier events.
         online.take_events();
         self.driver.recorder.online = Some(online);
         if self.accepted.is_none() {
@@ -30,8 +29,8 @@ impl ScriptRunner<'_, '_> {
         Ok(())
     }
 
-    /// Before a task: what happened is told, the belief of now is worked by, and views are asked for where they are
-    /// needed. Gives the reason where the tool is still not known well enough for the task.
+    /// Prepares a task: reports events, updates the belief, and requests views if they are needed. Returns the reason
+    /// if the tool is still not known well enough for the task.
     pub(crate) fn keep_up(
         &mut self,
         settings: &WorkSettings,
@@ -50,7 +49,7 @@ impl ScriptRunner<'_, '_> {
             return Ok(Err(format!("{joint} was given up, and nobody knows where it stands")));
         }
         let Ok(posture) = self.postures_near(&[settings.target_of(number)], &[*rest])?.remove(0) else {
-            // Why it is out of reach is told where it is gone to.
+            // The motion itself reports why the target is out of reach.
             return Ok(Ok(()));
         };
         if settings.poses > 0 {
@@ -67,8 +66,8 @@ impl ScriptRunner<'_, '_> {
         })
     }
 
-    /// Calibration poses, where the tool would miss its tolerance at `posture`. What was found of joints without a
-    /// sensor long ago is looked for again first.
+    /// Requests calibration poses if the tool would miss its tolerance at `posture`. Joints without a sensor that were
+    /// located long ago are located again first.
     fn ask_for_poses(&mut self, poses: u32, posture: &JointAngles) -> Result<(), SessionError> {
         let (now, tolerance_m) = (self.driver.now(), self.setup.routine.task.tolerance_m);
         let mut error_m = self.u95_m(posture).unwrap_or(0.0);
@@ -100,13 +99,13 @@ impl ScriptRunner<'_, '_> {
         self.asked.push(AskedPoses { time_s, views, arm_time_s, u95_m });
     }
 
-    /// A joint before the tool that was given up and was not found standing still.
+    /// True if the joint is proximal to the tool, and was not found standing still.
     fn is_needed_and_lost(&self, held: &HeldJoint) -> bool {
         let is_found = self.standing.iter().any(|stands| stands.joint == held.joint);
         held.joint < self.robot.tool.mount.n_joints && !is_found && held.locked_std_rad().is_none()
     }
 
-    /// Where a joint that was given up stands, only views can tell.
+    /// Locates held joints by views, because no sensor does.
     fn locate_given_up(&mut self) -> Result<(), SessionError> {
         let n_held = self.driver.held.len();
         if self.unlocated().is_none() || n_held <= self.n_looked_for {
@@ -116,21 +115,21 @@ impl ScriptRunner<'_, '_> {
         self.locate()
     }
 
-    /// A capture and a calibration of its views, as many as one needs.
+    /// Captures as many views as a calibration needs, and calibrates.
     fn locate(&mut self) -> Result<(), SessionError> {
         self.driver.log(LogLevel::Info, "calibrates to find where the joints stand that were given up")?;
         self.standing.clear();
         let (time_s, views) = self.capture_between(LOCATING_POSES)?;
         if views > 0 {
             let links = self.epochs.last().map(Epoch::links);
-            // What was accepted before may be hours old.
+            // An earlier calibration may be hours old.
             let prior = PriorSource::Fresh;
             let settings = CalibrateSettings { prior, views: CalibrateViews::New, on_refusal: OnRefusal::Continue };
             match self.try_calibrate(&settings) {
                 Ok(None) => self.note_standing(),
-                // Views of a joint that creeps contradict each other.
+                // Views of a creeping joint contradict each other.
                 Ok(Some(_refused)) => {}
-                // Too few of them show tags; the arm does what it can do without that joint.
+                // Too few views show tags; the arm continues without that joint.
                 Err(SessionError::Calib(why)) => {
                     self.driver.log(LogLevel::Warn, &format!("where they stand is not known: {why}"))?;
                 }
@@ -144,15 +143,15 @@ impl ScriptRunner<'_, '_> {
         Ok(())
     }
 
-    /// Notes where the joints stand that were given up and that the last calibration saw.
+    /// Notes the angles of the held joints that the last calibration saw.
     fn note_standing(&mut self) {
         let since = self.driver.now();
         let located = self.driver.held.iter().filter(|held| held.is_located);
         self.standing = located.map(|held| StandingJoint::new(held, since)).collect();
     }
 
-    /// A capture between two tasks; one that comes to nothing is told of. When it began, s since the start, and its
-    /// views.
+    /// Captures views between two tasks, and logs a failure. Returns the start, s since the start of the run, and the
+    /// number of views.
     fn capture_between(&mut self, poses: u32) -> Result<(f64, usize), SessionError> {
         let (time_s, n_views) = (self.driver.elapsed_s(), self.tally.poses);
         let general = self.setup.routine.capture;
@@ -170,7 +169,7 @@ impl ScriptRunner<'_, '_> {
         Ok((time_s, self.tally.poses - n_views))
     }
 
-    /// What happened is told, and the belief of now is worked by; nothing where none is followed.
+    /// Reports events and updates the belief from the online estimate, if there is one.
     pub(crate) fn take_up_news(&mut self) -> Result<(), SessionError> {
         self.tell_events()?;
         let now = self.driver.now();
@@ -187,7 +186,7 @@ impl ScriptRunner<'_, '_> {
         self.driver.recorder.online.as_ref()?.u95_at_m(at)
     }
 
-    /// A joint whose sensor says nothing any more is given up.
+    /// Reports events, and holds a joint whose sensor has failed.
     fn tell_events(&mut self) -> Result<(), SessionError> {
         let events = self.driver.recorder.online.as_mut().map(OnlineBelief::take_events);
         for event in events.unwrap_or_default() {
@@ -204,13 +203,13 @@ impl ScriptRunner<'_, '_> {
         Ok(())
     }
 
-    /// From now on the arm is believed to be as it is believed online, once a calibration was accepted.
+    /// Adopts the online estimate as the belief, once a calibration was accepted.
     fn work_by_online(&mut self) {
         let Some(online) = self.driver.recorder.online.as_ref().filter(|_| self.accepted.is_some()) else { return };
         let Some(covariance) = online.covariance() else { return };
         let sensors = online.sensors();
         let bounds = JointErrorBounds::by_covariance(&self.robot, &covariance, &sensors);
-        // What time and temperature may have done since is in the covariance.
+        // The covariance includes the effects of time and temperature since then.
         self.fresh = None;
         self.bounds = self.kept_clear(bounds);
         self.hold_failed();
@@ -218,7 +217,7 @@ impl ScriptRunner<'_, '_> {
         self.note_belief(Certainty::Online(covariance));
     }
 
-    /// What is left of it at the end.
+    /// Returns the outcome of the online estimate at the end.
     pub(crate) fn end_online(&mut self) -> Option<OnlineOutcome> {
         let asked = std::mem::take(&mut self.asked);
         Some(self.driver.recorder.online.take()?.end(asked))

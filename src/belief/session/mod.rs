@@ -1,11 +1,11 @@
 //! Sessions: a routine's script carried out on any [`Arm`](armcal_core::streams::Arm), known only through its messages.
 //!
-//! `prepare` plans before the first motion, `script` carries out the steps: `reach`, `work`, `capture` (with
+//! `prepare` plans before the first motion. `script` carries out the steps: `reach`, `work`, `capture` (with
 //! `belief_update`), `grip`, `touch`, `scale_identification`, `end_stops`. `motion` drives the arm, `settling` detects
-//! rest, `contact` detects contacts, `following` joints that do not follow (`held_joint`, `failed_joints`), and
-//! `approval` asks an operator before a motion. `online_belief` hears what is recorded, `keeping_up` works by it.
-//! `recorder` keeps every message, with `transforms` and `annotations` for viewers; `outcome` is the result, with how
-//! sure the arm was of its tool (`tool_belief`).
+//! rest, `contact` detects contacts, `following` joints that do not follow (`held_joint`, `failed_joints`). `approval`
+//! asks an operator before a motion. `online_belief` takes in the recorded messages, and `keeping_up` works with it.
+//! `recorder` keeps every message, with `transforms` and `annotations` for viewers. `outcome` is the result, with the
+//! arm's uncertainty of its tool (`tool_belief`).
 
 mod annotations;
 mod approval;

@@ -1,5 +1,4 @@
-//! Drives an arm along believed angles and waits until its own sensors say that it stands, or that it has met
-//! something.
+//! Drives an arm along believed angles and waits until its own sensors show that it stands, or has made contact.
 
 use crate::session::constants::motion::{BACK_OUT_SLOWNESS, BELIEF_EVERY, REST_S, SETTLE_LIMIT_S, WAIT_STRIDE_S};
 use nalgebra::Vector3;
@@ -20,7 +19,7 @@ use armcal_core::streams::{
 };
 use armcal_core::time::Stamp;
 
-/// The arm, what is recorded of it, and the sensors as believed at the moment.
+/// The arm, its recorder, and the presently believed sensors.
 pub(crate) struct Driver<'b> {
     robot: &'b Robot,
     pub(crate) arm: &'b mut dyn Arm,
@@ -28,7 +27,7 @@ pub(crate) struct Driver<'b> {
     pub sensors: ArmSensors,
     pub progress: &'b mut dyn Progress,
     start: Stamp,
-    /// Where the arm was last told to be, believed angles.
+    /// Last commanded set-point, believed angles.
     set_point: JointAngles,
     ticks: u64,
     pub motion_s: f64,
@@ -37,37 +36,37 @@ pub(crate) struct Driver<'b> {
     bumps: ContactDetector,
     following: FollowWatch,
     pub flow: FlowWatch,
-    /// How often the arm has met something.
+    /// Number of contacts so far.
     pub n_met: usize,
-    /// Why there was no path the last time.
+    /// Reason why there was no path the last time.
     pub why_blocked: Option<String>,
-    /// Joints that have failed and are left where they are.
+    /// Failed joints that are held in place.
     pub held: Vec<HeldJoint>,
-    /// The last motion's waypoints, for the way back.
+    /// Waypoints of the last motion, for the way back.
     came: Vec<JointAngles>,
 }
 
-/// How a motion ended.
+/// Outcome of a motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[must_use]
 pub enum MotionOutcome {
     Arrived,
-    /// The joint was held up or pushed off; the arm has gone back the way it came.
+    /// The joint was held up or pushed off; the arm has backed out along its path.
     Bumped {
         joint: usize,
-        /// Where the arm believed to be when it stopped.
+        /// Believed angles when the arm stopped.
         at: JointAngles,
     },
 }
 
-/// What is looked out for on the way.
+/// Contact monitoring during a motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum ContactMonitoring {
     Bumps,
     Nothing,
 }
 
-/// How waiting for rest ended.
+/// Outcome of waiting for rest.
 enum SettleOutcome {
     Still,
     PushedOff(ContactEvent),
@@ -82,10 +81,10 @@ impl<'b> Driver<'b> {
         progress: &'b mut dyn Progress,
     ) -> Result<Self, SessionError> {
         let start = arm.now();
-        // One period, to learn where the arm is.
+        // One period gives the first readings.
         arm.step(recorder)?;
         let counts = recorder.latest_counts.ok_or(SessionError::NoReadings)?;
-        // Sensors that begin are the datasheet's, the same under all conditions.
+        // Initial sensors are the datasheet's, the same under all conditions.
         let set_point = sensors.angles(&counts);
         let (timing, bumps) = (Timing::new(robot), ContactDetector::new(robot, arm.period_s()));
         let following = FollowWatch::new(robot, arm.period_s());
@@ -126,23 +125,23 @@ impl<'b> Driver<'b> {
         self.set_point
     }
 
-    /// Where the arm believes to be by its latest readings.
+    /// Returns the believed angles by the latest readings.
     pub fn believed_angles(&self) -> Result<JointAngles, SessionError> {
         Ok(self.sensors.angles_under(&self.counts()?, &self.conditions()))
     }
 
-    /// What the arm last heard of its surroundings.
+    /// Returns the latest measured conditions.
     pub fn conditions(&self) -> Conditions {
         let Recorder { oil_c, pressure_pa, .. } = *self.recorder;
         Conditions { oil_c, pressure_pa, stamp: Some(self.arm.now()) }
     }
 
-    /// The readings that the set-point stands for under the sensors of now.
+    /// Returns the readings at the set-point by the present sensors.
     fn set_point_counts(&self) -> JointCounts {
         holding_counts(&self.held, self.sensors.counts_under(&self.set_point, &self.conditions()))
     }
 
-    /// The latest raw readings.
+    /// Returns the latest raw readings.
     pub fn counts(&self) -> Result<JointCounts, SessionError> {
         self.recorder.latest_counts.ok_or(SessionError::NoReadings)
     }
@@ -165,25 +164,25 @@ impl<'b> Driver<'b> {
         Ok(self.arm.fault(number)?)
     }
 
-    /// Takes over other sensors; the arm stays where it is, only what that is called changes.
+    /// Replaces the believed sensors; the arm does not move, only its believed angles change.
     pub fn believe(&mut self, sensors: ArmSensors) {
         let sensors = holding_sensors(&self.held, sensors);
         self.set_point = sensors.angles_under(&self.set_point_counts(), &self.conditions());
         self.sensors = sensors;
     }
 
-    /// Gives a joint up that has failed: it is left where it is, and the recording says so.
+    /// Declares a joint failed: it is held in place, and the recording says so.
     pub fn hold_joint(&mut self, joint: usize, kind: FailedKind) -> Result<(), SessionError> {
         let counts = self.counts()?[joint];
         let read_rad = self.believed_angles()?[joint];
-        // The word of a broken wire tells nothing: it was near its set-point before.
+        // The reading of a broken wire gives no information: the joint was near its set-point before.
         let angle_rad = if kind == FailedKind::Dead { self.set_point[joint] } else { read_rad };
         let (since, astray_rad) = (self.arm.now(), HeldJoint::astray_rad(self.robot, joint, kind));
         let is_located = kind == FailedKind::Locked;
         self.held.push(HeldJoint { joint, kind, since, counts, angle_rad, bound_rad: astray_rad, is_located });
         self.believe(self.sensors.clone());
         self.command()?;
-        // Whatever its sensor is worth: from now on it stands at one angle.
+        // Regardless of its sensor, the joint stands at one angle from now on.
         self.record_failed(&[FailedJoint { joint, kind: FailedKind::Locked }])?;
         let what = match kind {
             FailedKind::Stuck => "its reading stands still to the count while its set-point moves",
@@ -197,7 +196,7 @@ impl<'b> Driver<'b> {
         self.log(LogLevel::Warn, &text)
     }
 
-    /// Gives the joints up that have stayed where they rested while their set-points left.
+    /// Holds the joints that have stayed at rest while their set-points left.
     fn hold_unmoved(&mut self, is_suspect: impl Fn(usize, f64) -> bool) -> Result<bool, SessionError> {
         let believed = self.believed_angles()?;
         let n_held = self.held.len();
@@ -210,7 +209,7 @@ impl<'b> Driver<'b> {
         Ok(self.held.len() > n_held)
     }
 
-    /// Stops where the arm is; what still swings then is no contact.
+    /// Stops at the present angles; motion that still decays then is no contact.
     fn stop_here(&mut self) -> Result<(), SessionError> {
         self.set_point = self.believed_angles()?;
         self.command()?;
@@ -221,7 +220,7 @@ impl<'b> Driver<'b> {
         Ok(())
     }
 
-    /// Drives no joint faster from now on; as fast as the robot's file allows with `None`.
+    /// Limits every joint's rate from now on; `None` restores the limits of the robot's file.
     pub(crate) fn limit_rates(&mut self, rate_rad_s: Option<f64>) {
         let full = Timing::new(self.robot);
         self.timing = rate_rad_s.map_or(full.clone(), |rate| full.limited_to(rate));
@@ -239,13 +238,13 @@ impl<'b> Driver<'b> {
         self.record(&Message::Task(ReachTask { stamp, targets_m, tolerance_m }))
     }
 
-    /// The tags, where the vehicle brings its own: the estimator has nothing but the recording and the robot's file.
+    /// Records the survey if the vehicle has its own: the estimator has only the recording and the robot's file.
     pub fn record_survey(&mut self, vehicle: &Vehicle) -> Result<(), SessionError> {
         let Some(survey) = &vehicle.survey else { return Ok(()) };
         self.record(&Message::Survey(RecordedSurvey::new(self.arm.now(), survey, self.robot.tag_link())))
     }
 
-    /// What the operator says of the arm goes the way of all that the estimator knows.
+    /// The operator's declarations are recorded, because the estimator has only the recording.
     pub fn record_failed(&mut self, failed: &[FailedJoint]) -> Result<(), SessionError> {
         let now = self.arm.now();
         failed.iter().try_for_each(|failed| {
@@ -294,7 +293,7 @@ impl<'b> Driver<'b> {
         Ok(())
     }
 
-    /// Tells the arm to stay where it was last sent, and the recording why it ends here.
+    /// Commands the arm to stay at its last set-point, and records why it ends here.
     pub(crate) fn interrupt(&mut self) -> Result<SessionError, SessionError> {
         self.command()?;
         let (stamp, at_s) = (self.arm.now(), self.elapsed_s());
@@ -304,7 +303,7 @@ impl<'b> Driver<'b> {
         Ok(SessionError::Interrupted { at_s })
     }
 
-    /// What [`Self::follow`] would do.
+    /// Returns the motion that [`Self::follow`] would make.
     pub(crate) fn ahead(&self, path: &Path, clearance_m: Option<f64>) -> MotionAhead {
         MotionAhead {
             joints: self.robot.joint_names(),
@@ -316,7 +315,7 @@ impl<'b> Driver<'b> {
         }
     }
 
-    /// Stays for a while.
+    /// Stays at the set-point for `seconds`.
     pub(crate) fn hold(&mut self, seconds: f64) -> Result<(), SessionError> {
         let until = self.arm.now().plus_s(seconds);
         while self.arm.now() < until {
@@ -325,12 +324,12 @@ impl<'b> Driver<'b> {
         Ok(())
     }
 
-    /// Moves along the path, from rest to rest on each edge, unless it meets something: then it stops, and backs out.
+    /// Moves along the path, from rest to rest on each edge. On contact it stops and backs out.
     pub fn follow(&mut self, path: &Path) -> Result<MotionOutcome, SessionError> {
         self.follow_told(path, None)
     }
 
-    /// The same, with the path's clearance for an operator who is asked.
+    /// Moves along the path as [`Self::follow`] does, with the path's clearance for an operator who is asked.
     pub fn follow_told(&mut self, path: &Path, clearance_m: Option<f64>) -> Result<MotionOutcome, SessionError> {
         self.ask(path, clearance_m)?;
         for (n, edge) in path.edges().enumerate() {
@@ -349,7 +348,7 @@ impl<'b> Driver<'b> {
         Ok(MotionOutcome::Arrived)
     }
 
-    /// The same where a joint is meant to be held up: it is driven against its stop, or comes from there.
+    /// Moves along the path without contact monitoring: a joint is driven against its stop, or comes from there.
     pub fn follow_unmonitored(&mut self, path: &Path) -> Result<(), SessionError> {
         self.ask(path, None)?;
         for edge in path.edges() {
@@ -364,7 +363,7 @@ impl<'b> Driver<'b> {
         self.held.iter().any(|held| held.joint == joint)
     }
 
-    /// One control period towards a set-point near the last one, whatever is met.
+    /// Makes one control period towards a set-point near the last one, without contact monitoring.
     pub(crate) fn follow_point(&mut self, to: &JointAngles) -> Result<(), SessionError> {
         self.set_point = *to;
         self.command()?;
@@ -373,18 +372,18 @@ impl<'b> Driver<'b> {
         Ok(())
     }
 
-    /// A contact that was meant is over.
+    /// Ends an intended contact.
     pub(crate) fn forget_contact(&mut self) {
         self.bumps.forget();
         self.came = vec![self.set_point];
     }
 
-    /// Where the tool is by the latest readings, base frame, m.
+    /// Returns the tool position by the latest readings, base frame, m.
     pub(crate) fn believed_tool_m(&self) -> Result<Vector3<f64>, SessionError> {
         Ok(self.tool_m(&self.believed_angles()?))
     }
 
-    /// Where it was last sent.
+    /// Returns the tool position at the last set-point, base frame, m.
     pub(crate) fn set_tool_m(&self) -> Vector3<f64> {
         self.tool_m(&self.set_point)
     }
@@ -417,7 +416,7 @@ impl<'b> Driver<'b> {
         Ok(None)
     }
 
-    /// Stops where the arm is and goes back the way it came, slowly.
+    /// Stops at the present angles and backs out slowly along the path.
     fn retreat(&mut self, bump: ContactEvent) -> Result<MotionOutcome, SessionError> {
         self.n_met += 1;
         let ContactEvent { joint, behind_rad, allowed_rad } = bump;
@@ -444,8 +443,8 @@ impl<'b> Driver<'b> {
         Ok(MotionOutcome::Bumped { joint, at })
     }
 
-    /// Waits until the arm stands at its set-point; `false` when it does not within the limit, or is pushed off: then
-    /// it goes back the way it came.
+    /// Waits until the arm stands at its set-point. Returns false if it does not within the limit, or is pushed off;
+    /// then it backs out.
     pub fn settle(&mut self) -> Result<bool, SessionError> {
         match self.stand()? {
             Some(SettleOutcome::Still) => Ok(true),
@@ -466,7 +465,7 @@ impl<'b> Driver<'b> {
         }
     }
 
-    /// Waits until the arm stands at its set-point, or is pushed off it; `None` when neither comes within the limit.
+    /// Waits until the arm stands at its set-point, or is pushed off it; `None` if neither happens within the limit.
     fn stand(&mut self) -> Result<Option<SettleOutcome>, SessionError> {
         let mut stillness = SettlingDetector::new(self.believed_angles()?);
         let mut waited_s = 0.0;
@@ -487,7 +486,7 @@ impl<'b> Driver<'b> {
         Ok(None)
     }
 
-    /// Waits until the arm stands while `joint` is pressed against something; `false` when it does not within the
+    /// Waits until the arm stands while `joint` is pressed against something; returns false if it does not within the
     /// limit.
     pub fn press(&mut self, joint: usize) -> Result<bool, SessionError> {
         let mut stillness = SettlingDetector::new(self.believed_angles()?);
@@ -496,7 +495,7 @@ impl<'b> Driver<'b> {
             self.step()?;
             waited_s += self.arm.period_s();
             let now = self.believed_angles()?;
-            // The pressed joint stands where it stands, not where it was sent.
+            // The pressed joint stands at its reading, not at its set-point.
             let there = JointAngles::from_fn(now.len(), |j| if j == joint { now[j] } else { self.set_point[j] });
             if stillness.update(&now, &there, self.arm.period_s()) >= REST_S {
                 return Ok(true);
@@ -505,7 +504,7 @@ impl<'b> Driver<'b> {
         Ok(false)
     }
 
-    /// Stands for `seconds` and marks the span; gives how many tags were seen in it.
+    /// Stands for `seconds` and marks the span. Returns the number of tags detected in it.
     pub fn dwell(&mut self, seconds: f64, kind: MarkKind) -> Result<usize, SessionError> {
         let start = self.arm.now();
         self.recorder.begin_count()?;

@@ -1,4 +1,4 @@
-//! The online belief at work: it hears what is recorded.
+//! The online estimate in a session: it takes in the recorded messages.
 
 use serde::{Deserialize, Serialize};
 
@@ -13,40 +13,40 @@ use armcal_core::sensor::ArmSensors;
 use armcal_core::streams::{JointAngles, Message};
 use armcal_core::time::Stamp;
 
-/// A belief that hears every message as it is recorded.
+/// An online estimate that takes in every message as it is recorded.
 pub(crate) struct OnlineBelief {
     follower: Follower,
     log: BeliefLog,
-    /// What nobody was told yet.
+    /// Events that were not reported yet.
     events: Vec<OnlineEvent>,
 }
 
 /// Calibration poses between two tasks.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AskedPoses {
-    /// When they were asked for, since the start, s.
+    /// Time of the request, s since the start.
     pub time_s: f64,
-    /// Views that came of it.
+    /// Number of captured views.
     pub views: usize,
-    /// Time that they took, s.
+    /// Arm time that they took, s.
     pub arm_time_s: f64,
-    /// Error of the tool that 5 % exceed at the next target, before and after, m; `None` where a joint was looked for.
+    /// Tool error that 5 % exceed at the next target, before and after, m; `None` if a joint was to be located.
     pub u95_m: Option<[f64; 2]>,
 }
 
-/// What was believed online.
+/// Outcome of the online estimate.
 #[derive(Clone, Debug)]
 pub struct OnlineOutcome {
-    /// Over time.
+    /// Estimate and events over time.
     pub log: BeliefLog,
-    /// Whether the tool is known within the task's tolerance at the end; `None` without a belief.
+    /// True if the tool is known within the task's tolerance at the end; `None` without an estimate.
     pub is_good_enough: Option<bool>,
-    /// Calibration poses that it asked for.
+    /// Calibration poses that it requested.
     pub asked: Vec<AskedPoses>,
 }
 
 impl OnlineBelief {
-    /// Of an arm by all that was recorded so far.
+    /// Returns the online estimate of an arm from the recording so far.
     pub(crate) fn of(robot: Robot, so_far: &Recording) -> Self {
         let follower = Follower::new(robot, OnlineSettings::default());
         let mut online = Self { follower, log: BeliefLog::default(), events: Vec::new() };
@@ -54,7 +54,7 @@ impl OnlineBelief {
         online
     }
 
-    /// Of the sensors under the conditions of now.
+    /// Returns the covariance of the sensors under the present conditions.
     pub(crate) fn covariance(&self) -> Option<ParameterCovariance> {
         let (sensors, conditions) = (self.follower.sensors(), self.follower.conditions());
         let covariance = self.follower.estimator().covariance(conditions)?;
@@ -67,12 +67,12 @@ impl OnlineBelief {
         self.log.hear(&self.follower, events);
     }
 
-    /// What happened since this was last asked for.
+    /// Returns the events since the last call.
     pub(crate) fn take_events(&mut self) -> Vec<OnlineEvent> {
         std::mem::take(&mut self.events)
     }
 
-    /// Joints that were given up, and one sigma of where they are believed to stand, rad.
+    /// Takes in the held joints, each with the std of its angle, rad.
     pub(crate) fn hold(&mut self, held: impl Iterator<Item = (usize, f64)>) {
         held.for_each(|(joint, std_rad)| self.follower.stands_still(joint, std_rad));
     }
@@ -85,7 +85,7 @@ impl OnlineBelief {
         self.follower.u95_at_m(angles)
     }
 
-    /// What is left of it at the end.
+    /// Returns the outcome at the end.
     pub(crate) fn end(mut self, asked: Vec<AskedPoses>) -> OnlineOutcome {
         let events = self.follower.finish();
         self.log.hear(&self.follower, events);

@@ -1,4 +1,4 @@
-//! What a run leaves, as far as the arm itself can tell.
+//! Outcome of a run, as far as the arm itself can know it.
 
 use std::fmt;
 
@@ -14,50 +14,50 @@ use armcal_core::streams::{JointAngles, ReachAttempt};
 use armcal_core::time::Stamp;
 use serde::{Deserialize, Serialize};
 
-/// What came out.
+/// Outcome of a run.
 #[derive(Debug)]
 pub struct Outcome {
-    /// The last one, accepted or refused.
+    /// The last calibration, accepted or refused.
     pub calibration: Calibration,
-    /// Poses at which the arm settled and was recorded.
+    /// Number of poses at which the arm settled and was recorded.
     pub poses: usize,
-    /// Poses given up: no path, or the arm did not settle.
+    /// Number of abandoned poses: no path, or the arm did not settle.
     pub poses_skipped: usize,
-    /// Targets given up, in the order of time.
+    /// Abandoned targets, in the order of time.
     pub skipped_targets: Vec<SkippedTarget>,
-    /// Time of the whole run, by the arm's clock.
+    /// Arm time of the whole run, s.
     pub duration_s: f64,
     /// Time for which the arm was moving, not standing, s.
     pub motion_s: f64,
     /// Time spent in the script's `wait` steps, s.
     pub waited_s: f64,
-    /// Time that the estimator itself took, by the watcher's clock.
+    /// Time that the estimator itself took, by the caller's clock, s.
     pub calibration_wall_s: f64,
-    /// What the arm believed, since when.
+    /// Beliefs of the arm, each with its start.
     pub epochs: Vec<Epoch>,
     /// Captured views, in their order.
     pub visits: Vec<Visit>,
     /// Updates of the interim estimate, over all captures.
     pub renewals: Vec<EstimateUpdate>,
-    /// Why the last capture took no more views.
+    /// Reason why the last capture took no more views.
     pub capture_ended: Option<String>,
-    /// In the order of the script.
+    /// Reaches in the order of the script.
     pub reaches: Vec<ReachStep>,
-    /// Every limit in the order of the script, with those that it did not come to.
+    /// Every limit in the order of the script, including those that the script did not reach.
     pub asserts: Vec<AssertResult>,
-    /// Why the script ended before its last step.
+    /// Reason why the script ended before its last step.
     pub stopped: Option<String>,
-    /// Joints that were given up, in the order of time.
+    /// Held joints, in the order of time.
     pub held: Vec<HeldJoint>,
-    /// What they left within reach, by the last reach.
+    /// Targets still reachable with the held joints, by the last reach.
     pub still_reachable: Option<StillReachable>,
-    /// What was believed online; `None` where no step works by it.
+    /// Outcome of the online estimate; `None` if no step uses it.
     pub online: Option<OnlineOutcome>,
 }
 
 impl Outcome {
-    /// The calibrations of the run: accepted ones with the times since which they were believed, then the last one, if
-    /// it was refused, with the end of its last view.
+    /// Returns the calibrations of the run. Accepted ones come with the start of their use. The last one, if refused,
+    /// comes with the end of its last view.
     #[must_use]
     pub fn calibrations(&self) -> Vec<(Stamp, &Calibration)> {
         let mut found: Vec<(Stamp, &Calibration)> = Vec::new();
@@ -74,18 +74,18 @@ impl Outcome {
     }
 }
 
-/// Which targets of a reach an arm with joints that are given up still reaches.
+/// Targets of a reach that an arm with held joints still reaches.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StillReachable {
     /// Names of the joints.
     pub joints: Vec<String>,
-    /// How many targets a plan and a path lead to.
+    /// Number of targets with a plan and a path.
     pub reachable: usize,
-    /// How many were asked for.
+    /// Number of requested targets.
     pub of: usize,
     /// Numbers of the targets that a sound arm would reach.
     pub needs: Vec<usize>,
-    /// Numbers of those that have a plan, and no path, or did not come to rest.
+    /// Numbers of the targets that have a plan, but no path, or at which the arm did not come to rest.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub no_path: Vec<usize>,
 }
@@ -99,27 +99,27 @@ impl fmt::Display for StillReachable {
     }
 }
 
-/// The sensors that the arm believed in from a moment on.
+/// The sensors that the arm believed from one time on.
 #[derive(Clone, Debug)]
 pub struct Epoch {
     /// Start of this belief, by the arm's clock.
     pub from: Stamp,
-    /// Sensors believed in from then until the next epoch.
+    /// Believed sensors from then until the next epoch.
     pub sensors: ArmSensors,
-    /// Where they come from; `None` for the datasheet.
+    /// Calibration that gave them; `None` for the datasheet.
     pub calibration: Option<Calibration>,
-    /// How well they are known.
+    /// Source of their uncertainty.
     pub certainty: Certainty,
 }
 
 impl Epoch {
-    /// The links believed in, beyond the drawing.
+    /// Returns the believed corrections of the links relative to the nominal model.
     #[must_use]
     pub fn links(&self) -> LinkCorrections {
         self.calibration.as_ref().map(Calibration::link_corrections).unwrap_or_default()
     }
 
-    /// How well the tool's place is known; `None` where nobody says.
+    /// Returns the uncertainty of the tool position; `None` if it is unknown.
     #[must_use]
     pub fn tool_belief(&self, robot: &Robot) -> Option<ToolBelief> {
         match &self.certainty {
@@ -135,32 +135,32 @@ impl Epoch {
     }
 }
 
-/// A captured view, and what was believed just before it.
+/// A captured view, and the belief just before it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Visit {
     /// Start of the dwell, by the arm's clock.
     pub at: Stamp,
-    /// Joint angles by the readings under the belief of that moment.
+    /// Joint angles by the readings under the belief at that time.
     pub believed: JointAngles,
-    /// Views that this belief rests on.
+    /// Number of views on which this belief is based.
     pub belief_views: usize,
-    /// Of the end of each link, from the first joint's on: the distance from where it is believed to be that is
-    /// exceeded with a probability of 1 %, m.
+    /// Distance between true and believed end of each link, from the first joint's on, that is exceeded with a
+    /// probability of 1 %, m.
     pub link_q99_m: Vec<f64>,
-    /// Root mean square over the task, m.
+    /// Expected root mean square tool error over the task, m.
     pub expected_tool_error_m: Option<f64>,
     /// Sum over the surveyed tags of the probability that the camera sees them there.
     pub tags_expected: f64,
 }
 
-/// A renewal of the belief while views were captured.
+/// An update of the belief during a capture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EstimateUpdate {
     /// Number of views captured so far in this capture.
     pub views: usize,
-    /// Since the capture began.
+    /// Arm time since the capture began, s.
     pub elapsed_s: f64,
-    /// Root mean square over the task, m.
+    /// Expected root mean square tool error over the task, m.
     pub expected_tool_error_m: f64,
 }
 
@@ -169,19 +169,19 @@ pub struct EstimateUpdate {
 pub struct ReachStep {
     /// Number of the step in the script, from 1.
     pub step: usize,
-    /// Whether it is a `work` step.
+    /// True if it is a `work` step.
     pub is_work: bool,
-    /// Targets that it asks for.
+    /// Number of requested targets.
     pub targets: usize,
-    /// Whether the arm believed in a calibration.
+    /// Calibration state of the arm: before or after a calibration.
     pub attempt: ReachAttempt,
     /// Start of the step, by the arm's clock.
     pub start: Stamp,
-    /// End of the step.
+    /// End of the step, by the arm's clock.
     pub end: Stamp,
 }
 
-/// A target of a `reach` step that the arm did not come to rest at.
+/// A target of a `reach` step at which the arm did not come to rest.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SkippedTarget {
     /// Number of the step in the script, from 1.
@@ -198,25 +198,25 @@ impl fmt::Display for SkippedTarget {
     }
 }
 
-/// One limit of an `assert` step, and how it came out.
+/// One limit of an `assert` step, and its result.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AssertResult {
     /// Number of the step in the script, from 1.
     pub step: usize,
-    /// The figure that the limit is for.
+    /// The figure that is limited.
     pub figure: AssertFigure,
-    /// In the figure's unit; a minimum for the clearance, else a maximum.
+    /// Limit in the figure's unit; a minimum for the clearance, otherwise a maximum.
     pub limit: f64,
-    /// `None`: the arm itself cannot know it, or there is no such figure.
+    /// Value of the figure; `None` if the arm itself cannot know it, or there is no such figure.
     pub value: Option<f64>,
-    /// When it was asked; `None` if the script did not come to it.
+    /// Time of the check; `None` if the script did not reach it.
     pub at: Option<Stamp>,
-    /// The last reach before it, an index into [`Outcome::reaches`].
+    /// Index into [`Outcome::reaches`] of the last reach before it.
     pub last_reach: Option<usize>,
 }
 
 impl AssertResult {
-    /// Whether the limit holds; `None` where the figure is not known.
+    /// Returns true if the limit holds; `None` if the figure is unknown.
     #[must_use]
     pub fn holds(&self) -> Option<bool> {
         Some(self.figure.holds(self.value?, self.limit))

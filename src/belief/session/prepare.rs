@@ -7,7 +7,7 @@ use armcal_core::routine::{CaptureSettings, Step};
 use armcal_core::streams::{JointAngles, Phase};
 
 impl ScriptRunner<'_, '_> {
-    /// Plans all that can be planned, so that a task that cannot be done is refused before anything moves.
+    /// Plans as much as possible, so that an infeasible task is refused before any motion.
     pub fn prepare(&mut self) -> Result<(), SessionError> {
         let routine = self.setup.routine;
         let margin_m = self.margin_m();
@@ -21,7 +21,7 @@ impl ScriptRunner<'_, '_> {
             return Err(PlanError::StartTooClose { clearance_m, nearest, needed_m }.into());
         }
         let nearest = self.clearance.nearest_under(&start, &self.bounds, margin_m);
-        // An arm that can look before it moves will know better where it is by then.
+        // An arm with tags in view is located better before it moves.
         if nearest.distance_m < margin_m && !looks_first {
             let (clearance_m, needed_m) = (nearest.true_distance_m(), nearest.needed_m(margin_m));
             return Err(PlanError::StartTooClose { clearance_m, nearest: nearest.to_string(), needed_m }.into());
@@ -37,7 +37,7 @@ impl ScriptRunner<'_, '_> {
                     self.planned = self.planned.take().map(|planned| Planned { first_capture: Some(plan), ..planned });
                 }
                 Err(why) if !looks_first => return Err(why),
-                // No look finds more than an arm finds that knows where it is.
+                // A view locates no arm better than one that is already known exactly.
                 Err(_) => self.check_views_of_believed_arm(capture)?,
             }
         }
@@ -47,7 +47,7 @@ impl ScriptRunner<'_, '_> {
         Ok(())
     }
 
-    /// That there is a view at all for an arm without errors, tried with draws of its own.
+    /// Checks that an arm without errors has any view at all, with separate random draws.
     fn check_views_of_believed_arm(&mut self, capture: &CaptureSettings) -> Result<(), SessionError> {
         let (bounds, rng) = (JointErrorBounds::none(&self.robot), self.rng.clone());
         let bounds = std::mem::replace(&mut self.bounds, bounds);
@@ -61,7 +61,7 @@ impl ScriptRunner<'_, '_> {
     }
 }
 
-/// The first capture; no calibration can come before it.
+/// Returns the first capture; no calibration can come before it.
 fn first_capture(steps: &[Step]) -> Option<&CaptureSettings> {
     steps.iter().find_map(|step| match step {
         Step::Capture(capture) => Some(capture),

@@ -4,23 +4,23 @@ use armcal_core::streams::{JointAngles, Phase};
 
 /// Interface to the caller of a run: progress, clock, stop requests and approval of motions.
 pub trait Progress {
-    /// `done` of `total` steps of `phase` are over; `simulated_s` since the start by the arm's clock.
+    /// Reports that `done` of `total` steps of `phase` are over; `simulated_s` is the arm time since the start.
     fn update(&mut self, phase: Phase, done: usize, total: usize, simulated_s: f64);
 
-    /// Seconds on the caller's clock since any fixed moment; the session itself has only the arm's clock.
+    /// Returns the seconds on the caller's clock since any fixed time; the session itself has only the arm's clock.
     fn wall_s(&self) -> f64;
 
-    /// Whether the run must end; asked in every control period.
+    /// True if the run must end; asked in every control period.
     fn stop_requested(&self) -> bool {
         false
     }
 
-    /// Whether [`Self::approve`] is to be asked before each motion.
+    /// True if [`Self::approve`] is to be asked before each motion.
     fn wants_to_approve(&self) -> bool {
         false
     }
 
-    /// The operator's answer to the next motion; asked again after each [`Approval::Hold`].
+    /// Returns the operator's answer to the next motion; asked again after each [`Approval::Hold`].
     fn approve(&mut self, ahead: &MotionAhead) -> Approval {
         let _ = ahead;
         Approval::Approve
@@ -32,13 +32,13 @@ pub trait Progress {
 pub struct MotionAhead {
     /// Names of the joints, base first.
     pub joints: Vec<String>,
-    /// Believed.
+    /// Believed angles at the start, rad.
     pub from: JointAngles,
-    /// Believed.
+    /// Believed angles at the end, rad.
     pub to: JointAngles,
     /// Number of straight edges of the path.
     pub edges: usize,
-    /// Planned time from rest to rest, without settling.
+    /// Planned time from rest to rest, without settling, s.
     pub duration_s: f64,
     /// Certified clearance of every arm within the error bounds, m, less the bound of the vehicle's motion; `None` for
     /// motions with another proof (scale identification, end stops).
@@ -50,7 +50,7 @@ pub struct MotionAhead {
 pub enum Approval {
     /// The motion begins.
     Approve,
-    /// The arm waits where it is, and asks again.
+    /// The arm waits at its pose, and asks again.
     Hold,
     /// The session ends here, with its recording kept; the text says why.
     Abort(String),

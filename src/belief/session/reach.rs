@@ -1,4 +1,4 @@
-//! Reaches for the task's targets under the sensors believed in.
+//! Reaches for the task's targets under the believed sensors.
 
 use crate::plan::{TargetRequest, plan_targets};
 use crate::session::SessionError;
@@ -8,12 +8,12 @@ use crate::session::runner::ScriptRunner;
 use armcal_core::routine::ReachSettings;
 use armcal_core::streams::{JointAngles, LogLevel, MarkKind, Phase, ReachAttempt};
 
-/// Where the arm is to go, or has come to rest; or why not.
+/// A value, such as a target configuration, or the reason why there is none.
 pub(crate) type OrReason<T> = Result<T, String>;
 
 impl ScriptRunner<'_, '_> {
-    /// Goes to each target and rests there for a moment; if it is to be touched, with open jaws, which then close on
-    /// it.
+    /// Moves to each target and rests there for a moment. A target to be touched is approached with open jaws, which
+    /// then close on it.
     pub(crate) fn reach(&mut self, step: usize, settings: &ReachSettings) -> Result<(), SessionError> {
         let ReachSettings { targets, touch } = settings;
         if *touch {
@@ -77,8 +77,8 @@ impl ScriptRunner<'_, '_> {
         Ok(())
     }
 
-    /// Says once what the targets ask beyond what the calibration in use saw, if that is more than straight lines: a
-    /// fitted shape is worth nothing where there were no views.
+    /// Warns once if the targets need more than the calibrated ranges, unless only straight lines were fitted: a fitted
+    /// shape is worthless where there were no views.
     pub(crate) fn warn_beyond(&mut self, postures: &[OrReason<JointAngles>]) -> Result<(), SessionError> {
         let calibration = self.epochs.last().and_then(|epoch| epoch.calibration.as_ref());
         let Some(calibration) = calibration.filter(|c| c.reference.is_some()) else { return Ok(()) };
@@ -96,8 +96,8 @@ impl ScriptRunner<'_, '_> {
         self.driver.log(LogLevel::Warn, &text)
     }
 
-    /// Believed angles at each target. A target that a calibration puts out of reach is no reason to lose the rest: it
-    /// is named and left out.
+    /// Returns the believed angles at each target. A target that a calibration puts out of reach is logged and skipped,
+    /// so that the rest is not lost.
     fn postures(
         &mut self,
         targets: &[usize],
@@ -112,7 +112,7 @@ impl ScriptRunner<'_, '_> {
         self.postures_near(targets, &preferred)
     }
 
-    /// Believed angles at each target, near preferred ones where given.
+    /// Returns the believed angles at each target, near preferred ones if given.
     pub(crate) fn postures_near(
         &mut self,
         targets: &[usize],

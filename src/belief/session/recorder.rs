@@ -1,4 +1,4 @@
-//! Keeps every message and remembers the latest of those that the loop steers by.
+//! Records every message and keeps the latest of those that the control loop needs.
 
 use std::collections::{BTreeSet, VecDeque};
 
@@ -10,31 +10,31 @@ use armcal_core::log::{LogError, Recording, RecordingWriter, RosMessage, read_re
 use armcal_core::streams::{JointCounts, LateMessages, MarkKind, Message, Sink, SinkError, Thermometer};
 use armcal_core::time::Stamp;
 
-/// Hears every message after it was recorded. It must not wait.
+/// Callback for every recorded message. It must not block.
 pub type MessageListener = Box<dyn FnMut(Stamp, &Message) + Send>;
 
 /// A recording being written, and the latest readings.
 pub struct Recorder {
     pub(crate) writer: RecordingWriter,
     pub(crate) latest_counts: Option<JointCounts>,
-    /// Latest of the oil's thermometer.
+    /// Latest reading of the oil's thermometer, degrees C.
     pub(crate) oil_c: Option<f64>,
-    /// Latest of the depth gauge.
+    /// Latest reading of the depth gauge, Pa.
     pub(crate) pressure_pa: Option<f64>,
-    /// Latest measured gap between the jaws.
+    /// Latest measured gap between the jaws, m.
     pub(crate) opening_m: Option<f64>,
     seen: TagsSeen,
-    /// Hears every message while the arm works.
+    /// Online estimate that takes in every message while the arm works.
     pub(crate) online: Option<OnlineBelief>,
     listener: Option<MessageListener>,
     /// Draws the arm for viewers.
     pub(crate) frames: Option<BelievedFrames>,
     image_marks: ImageMarks,
-    /// What waits for messages that are not there yet, and these.
+    /// Messages that are outstanding, and those that wait for them.
     waiting: VecDeque<Waiting>,
 }
 
-/// Tags seen since the count began.
+/// Tags detected since the count began.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct TagsSeen {
     pub n: usize,
@@ -47,7 +47,7 @@ enum Waiting {
 }
 
 impl Recorder {
-    /// Writes to `writer`; no reading is known yet.
+    /// Returns a recorder on `writer`; no reading is known yet.
     #[must_use]
     pub fn new(writer: RecordingWriter) -> Self {
         Self {
@@ -65,47 +65,47 @@ impl Recorder {
         }
     }
 
-    /// Tells every message, such as to a viewer. Nothing of the recording depends on it.
+    /// Passes every message to `listener`, for instance a viewer. The recording does not depend on it.
     #[must_use]
     pub fn with_listener(self, listener: Option<MessageListener>) -> Self {
         Self { listener, ..self }
     }
 
-    /// The same, with the arm as believed and the tags found in images for viewers.
+    /// Adds the believed arm and the tags detected in images, for viewers.
     #[must_use]
     pub fn with_frames(self, frames: BelievedFrames) -> Self {
         Self { frames: Some(frames), ..self }
     }
 
-    /// The recording so far, read from its bytes on disk.
+    /// Returns the recording so far, read from its bytes on disk.
     ///
     /// # Errors
-    /// [`LogError`] when it cannot be flushed or read.
+    /// [`LogError`] if it cannot be flushed or read.
     pub fn read_back(&mut self) -> Result<Recording, LogError> {
         self.settle()?;
         self.writer.flush()?;
         read_recording(self.writer.path())
     }
 
-    /// Counts the tags seen from here on.
+    /// Starts the count of detected tags.
     pub(crate) fn begin_count(&mut self) -> Result<(), LogError> {
         self.settle()?;
         self.seen = TagsSeen::default();
         Ok(())
     }
 
-    /// Tags seen since the count began.
+    /// Returns the tags detected since the count began.
     pub(crate) fn tags_seen(&mut self) -> Result<&TagsSeen, LogError> {
         self.settle()?;
         Ok(&self.seen)
     }
 
-    /// Waits for messages that are not there yet, and keeps all. Where some do not come, the others are kept.
+    /// Waits for outstanding messages, and records all. If some do not come, the others are recorded.
     pub(crate) fn settle(&mut self) -> Result<(), LogError> {
         self.catch_up(|late| Some(late.wait()))
     }
 
-    /// Keeps what waits, in order, up to the first messages that `take` does not get.
+    /// Records waiting messages, in order, up to the first ones that `take` does not get.
     fn catch_up(
         &mut self,
         take: impl Fn(&LateMessages) -> Option<Result<Vec<Message>, SinkError>>,
@@ -138,7 +138,7 @@ impl Recorder {
         result
     }
 
-    /// Writes a message and tells it.
+    /// Writes a message and passes it on.
     fn keep(&mut self, log_time: Stamp, message: &Message) -> Result<(), LogError> {
         if let Message::Detections(detections) = message {
             self.seen.n += detections.tags.len();
@@ -152,14 +152,14 @@ impl Recorder {
         if let Some(listener) = &mut self.listener {
             listener(log_time, message);
         }
-        // A view that was captured is on disk before the arm moves on.
+        // A captured view is on disk before the arm moves on.
         if needs_flush(message) {
             self.writer.flush()?;
         }
         Ok(())
     }
 
-    /// Writes what viewers draw by this message.
+    /// Writes the messages that viewers draw because of this one.
     fn draw(&mut self, log_time: Stamp, message: &Message) -> Result<(), LogError> {
         let Some(frames) = &mut self.frames else { return Ok(()) };
         if let Message::JointStates(states) = message
@@ -173,16 +173,16 @@ impl Recorder {
         Ok(())
     }
 
-    /// The writer, to add to the recording or to finish it.
+    /// Returns the writer, to add to the recording or to finish it.
     #[must_use]
     pub fn into_writer(mut self) -> RecordingWriter {
-        // A session that went well has settled. After a failure there is nobody to tell of another.
+        // A session without errors has settled. After a failure no caller can handle another one.
         let _ = self.settle();
         self.writer
     }
 }
 
-/// Whether a message is on disk before anything else happens.
+/// True if the message must be on disk before anything else happens.
 fn needs_flush(message: &Message) -> bool {
     match message {
         Message::Touch(_) => true,
@@ -216,7 +216,7 @@ impl Sink for Recorder {
 
     fn record_late(&mut self, log_time: Stamp, messages: LateMessages) -> Result<(), SinkError> {
         self.waiting.push_back(Waiting::Late(log_time, messages));
-        // Who follows the belief online asks it between messages.
+        // The online estimate is queried between messages.
         if self.online.is_some() {
             self.settle()?;
         }
@@ -253,7 +253,7 @@ mod tests {
         ]
     }
 
-    /// Thirty readings; every fifth comes with an image, which `record` passes on.
+    /// Records thirty readings; every fifth comes with an image, which `record` passes on.
     fn recorded(mut record: impl FnMut(&mut Recorder, i64)) -> (tempfile::TempDir, Recorder) {
         let folder = tempfile::tempdir().expect("a folder");
         let header = RecordingHeader::new(vec!["j1".to_owned()]);
@@ -273,7 +273,7 @@ mod tests {
         seen(n).iter().for_each(|message| recorder.record(at(n), message).expect("recorded"));
     }
 
-    /// Searches that have not ended, by image.
+    /// Pending detections, by image.
     type Searches = Vec<(i64, LateSender)>;
 
     fn later(recorder: &mut Recorder, n: i64, searches: &mut Searches) {
@@ -282,18 +282,18 @@ mod tests {
         searches.push((n, sender));
     }
 
-    /// The last image first.
+    /// Ends the pending detections, the last image first.
     fn end(searches: Searches) {
         searches.into_iter().rev().for_each(|(n, sender)| sender.send(Ok(seen(n))).expect("it waits"));
     }
 
-    /// However long a search takes, the recording has the same bytes.
+    /// The recording has the same bytes regardless of the duration of the detections.
     #[test]
     fn late_messages_keep_their_place() {
         let (at_once_folder, at_once) = recorded(now);
         let mut searches = Searches::new();
         let (late_folder, mut late) = recorded(|recorder, n| {
-            // The first two end while the arm goes on.
+            // The first two end while the arm continues.
             if n == 10 {
                 end(std::mem::take(&mut searches));
             }
@@ -319,12 +319,12 @@ mod tests {
         assert!(recording.messages.is_sorted_by_key(|(log_time, _)| *log_time));
     }
 
-    /// A search that fails is told, and what was recorded behind it is kept.
+    /// A failed detection is reported, and later messages are recorded.
     #[test]
     fn messages_that_never_come_are_told() {
         let mut searches = Searches::new();
         let (folder, mut recorder) = recorded(|recorder, n| later(recorder, n, &mut searches));
-        // Its sender is dropped.
+        // The sender of this one is dropped.
         searches.remove(3);
         end(searches);
         let error = recorder.settle().expect_err("one is missing").to_string();

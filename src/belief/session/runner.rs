@@ -1,4 +1,4 @@
-//! State of a script that is carried out.
+//! State of a running script.
 
 use std::rc::Rc;
 
@@ -28,21 +28,21 @@ pub(crate) struct Tally {
     pub calibration_wall_s: f64,
 }
 
-/// Bounds of a calibration, and when and how warm it was.
+/// Bounds of a calibration, with its time and oil temperature.
 pub(crate) struct FreshBounds {
     pub bounds: JointErrorBounds,
     pub at: Stamp,
     pub oil_c: Option<f64>,
 }
 
-/// The arm among what surrounds it, by its jaws.
+/// Clearance models of the arm, by its jaws.
 pub(crate) struct Jaws<'a> {
     pub at_rest: Rc<ClearanceModel<'a>>,
     pub open: Rc<ClearanceModel<'a>>,
 }
 
 impl<'a> Jaws<'a> {
-    /// Of an arm that may bend as far as `chain` can.
+    /// Returns the models of an arm that may sag as far as `chain` can.
     pub(crate) fn new(setup: &SessionInputs<'a>, chain: &Chain) -> Self {
         let model = || ClearanceModel::new(setup.robot, setup.vehicle, &setup.routine.scene).with_sag(chain);
         Self { at_rest: Rc::new(model()), open: Rc::new(model().with_open_jaws()) }
@@ -51,32 +51,32 @@ impl<'a> Jaws<'a> {
 
 pub(crate) struct ScriptRunner<'a, 'b> {
     pub setup: &'a SessionInputs<'a>,
-    /// With the sensor scales that were measured on the way.
+    /// Nominal robot with the sensor scales measured during the run.
     pub robot: Robot,
-    /// How wrong the sensors believed in may be by now.
+    /// Present error bounds of the believed sensors.
     pub bounds: JointErrorBounds,
-    /// And how wrong they were when they were new: none for a datasheet's, which hold for good.
+    /// Error bounds of the last calibration; `None` for the datasheet's, which do not age.
     pub fresh: Option<FreshBounds>,
-    /// While views are being captured: what was believed before.
+    /// Belief before the capture, while views are captured.
     pub before_running: Option<SavedBelief>,
     pub rng: ChaCha8Rng,
-    /// With the jaws as they are now.
+    /// Clearance model with the jaws as they are now.
     pub clearance: Rc<ClearanceModel<'a>>,
     pub jaws: Jaws<'a>,
     pub driver: Driver<'b>,
     pub planned: Option<Planned>,
-    /// Views captured from here on are of the arm as it is.
+    /// Time from which on captured views show the present arm.
     pub began: Stamp,
-    /// Views captured from here on have been in no calibration.
+    /// Time from which on captured views have been in no calibration.
     pub views_since: Stamp,
-    /// Normals of the surfaces that were touched, axes of the tool's link.
+    /// Normals of the touched surfaces, in axes of the tool's link.
     pub touched: Vec<Vector3<f64>>,
-    /// Views marked so far; numbers them.
+    /// Number of views marked so far, which numbers the next one.
     pub poses_marked: u32,
     pub calibration: Option<Calibration>,
-    /// The last one that was accepted.
+    /// The last accepted calibration.
     pub accepted: Option<Calibration>,
-    /// Captured views and what was believed there.
+    /// Captured views, with the belief at each.
     pub visits: Vec<Visit>,
     pub renewals: Vec<EstimateUpdate>,
     pub capture_ended: Option<String>,
@@ -84,24 +84,24 @@ pub(crate) struct ScriptRunner<'a, 'b> {
     pub epochs: Vec<Epoch>,
     pub reaches: Vec<ReachStep>,
     pub asserts: Vec<AssertResult>,
-    /// Joints that were given up, of which belief and plans know.
+    /// Number of held joints that belief and plans include.
     pub n_held: usize,
-    /// By the last reach with a joint that was given up.
+    /// Targets still reachable by the last reach with a held joint.
     pub still_reachable: Option<StillReachable>,
-    /// How many of the joints that were given up were looked for at work, and those found standing still.
+    /// Number of held joints that were searched at work, and the joints found standing still.
     pub n_looked_for: usize,
     pub standing: Vec<StandingJoint>,
-    /// What is known of the sensors, while the online belief asks for calibration poses.
+    /// Present covariance of the sensors, while the online estimate requests calibration poses.
     pub known: Option<ParameterCovariance>,
-    /// Calibration poses that the online belief asked for.
+    /// Calibration poses that the online estimate requested.
     pub asked: Vec<AskedPoses>,
 }
 
-/// What was planned before anything moved.
+/// Plans made before any motion.
 pub(crate) struct Planned {
     /// Believed angles at each of the task's targets.
     pub targets: Vec<JointAngles>,
-    /// For the first capture, if the sensors are still believed to be the datasheet's by then.
+    /// View plan of the first capture, valid if the belief is still the datasheet's by then.
     pub first_capture: Option<PosePlan>,
 }
 

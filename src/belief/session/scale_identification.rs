@@ -1,5 +1,5 @@
-//! Measures how many counts a radian has, for a sensor of which nobody knows: a small excursion that is safe for every
-//! scale, then a larger one that is safe for the scales that are left.
+//! Measures an unknown sensor scale, counts per radian: first a small excursion that is safe for every scale, then a
+//! larger one that is safe for the remaining scales.
 
 use crate::plan::{JointErrorBounds, Path, UnknownScale};
 use crate::session::SessionError;
@@ -21,7 +21,7 @@ impl ScriptRunner<'_, '_> {
         };
         self.driver.phase(Phase::Capture)?;
         self.progress_at(Phase::Capture, 0, 2);
-        // The arm lies where it was stowed, whatever this sensor says.
+        // The arm lies at its stowed pose, regardless of this sensor.
         let rest_rad = self.robot.stowed[joint];
         let mut sensors = self.driver.sensors.clone();
         let model = &mut sensors.models[joint];
@@ -58,14 +58,14 @@ impl ScriptRunner<'_, '_> {
         self.take_over(robot)
     }
 
-    /// The largest excursion up to `wanted_rad` (believed) that keeps clear for every scale that is possible.
+    /// Returns the largest excursion up to `wanted_rad` (believed) that keeps clear for every possible scale.
     fn clear_excursion(&self, step: usize, unknown: &UnknownScale, wanted_rad: f64) -> Result<f64, SessionError> {
         let bounds = JointErrorBounds::with_unknown_scale(&self.robot, unknown);
         let at = self.driver.set_point();
         let mut excursion_rad = wanted_rad;
         let mut nearest = String::new();
         while excursion_rad > LEAST_SHARE * wanted_rad {
-            // The error box at the end of the excursion holds every angle that the joint may pass on the way.
+            // The error box at the end of the excursion contains every angle that the joint may pass on the way.
             let end = JointAngles::from_fn(at.len(), |j| {
                 if j == unknown.joint { unknown.rest_rad + excursion_rad } else { at[j] }
             });
@@ -79,7 +79,7 @@ impl ScriptRunner<'_, '_> {
         Err(SessionError::Step { step, problem })
     }
 
-    /// Moves the joint to its rest plus each offset (believed, rad) and looks.
+    /// Moves the joint to its rest plus each offset (believed, rad) and captures a view there.
     fn excursion(&mut self, joint: usize, offsets_rad: &[f64]) -> Result<(), SessionError> {
         let rest = JointAngles::from_fn(self.robot.n_joints(), |j| {
             if j == joint { self.robot.stowed[j] } else { self.driver.set_point()[j] }
@@ -97,7 +97,7 @@ impl ScriptRunner<'_, '_> {
         Ok(())
     }
 
-    /// The scale by all views so far, from the recording's bytes, and the robot with it.
+    /// Returns the scale by all views so far, from the recording's bytes, and the robot with it.
     fn measured(&mut self, joint: usize) -> Result<(IdentifiedScale, Robot), SessionError> {
         let recording = self.driver.recorder.read_back()?;
         let (robot, scales) = identify_scales(&associate(&recording, self.setup.robot), self.setup.robot)?;
@@ -105,7 +105,7 @@ impl ScriptRunner<'_, '_> {
         Ok((scale, robot))
     }
 
-    /// From here on the sensor is an ordinary one with the measured scale.
+    /// Adopts the measured scale; from here on the sensor is an ordinary one.
     fn take_over(&mut self, robot: Robot) -> Result<(), SessionError> {
         let sensors = ArmSensors::nominal(&robot);
         self.bounds = JointErrorBounds::datasheet(&robot);
@@ -122,7 +122,7 @@ impl ScriptRunner<'_, '_> {
         self.scales_measured() == to_measure
     }
 
-    /// Sensors whose scale differs from the datasheet's by now.
+    /// Returns the number of sensors whose scale differs from the datasheet's by now.
     fn scales_measured(&self) -> usize {
         let differs = |(now, drawn): (&armcal_core::robot::JointSensorSpec, &armcal_core::robot::JointSensorSpec)| {
             now.counts_per_rad != drawn.counts_per_rad

@@ -1,4 +1,4 @@
-//! The steps of a routine's script, carried out in order.
+//! Runs the steps of a routine's script in order.
 
 use crate::session::constants::script::{LINK_REACH_M, START_SHARES};
 use std::rc::Rc;
@@ -21,7 +21,7 @@ use armcal_core::sensor::ArmSensors;
 use armcal_core::stats::stream_rng;
 use armcal_core::streams::{Arm, JointAngles, LogLevel, Mark, MarkKind, Message, Phase, ReachAttempt};
 
-/// Carries out the routine's script.
+/// Runs the routine's script.
 ///
 /// # Errors
 /// [`SessionError`]; the recording up to then stays readable.
@@ -69,7 +69,7 @@ pub fn run(
         driver,
     };
     run.bounds = run.kept_clear(JointErrorBounds::datasheet(setup.robot));
-    // A script that begins by measuring a sensor cannot plan before it has.
+    // A script that begins with a sensor's scale cannot plan before it is measured.
     if !setup.routine.steps.iter().any(|step| matches!(step, Step::Identify(_))) {
         run.prepare()?;
     }
@@ -85,8 +85,8 @@ impl ScriptRunner<'_, '_> {
         self.driver.progress.update(phase, done, total, elapsed_s);
     }
 
-    /// Clearance to keep; more by what links are off the drawing, which the bodies that clearances are computed with
-    /// follow.
+    /// Returns the clearance to keep, m. It includes the deviation of links from the nominal model, because clearances
+    /// are computed with nominal bodies.
     pub fn margin_m(&self) -> f64 {
         let links = self.epochs.last().map(Epoch::links).unwrap_or_default();
         let by_link = |link: &LinkCorrection| link.shift_m.norm() + LINK_REACH_M * link.turn_rad.norm();
@@ -94,7 +94,7 @@ impl ScriptRunner<'_, '_> {
         self.setup.routine.capture.clearance_m + by_links_m
     }
 
-    /// Whether the arm believes in a calibration.
+    /// Returns the calibration state of the belief: before or after a calibration.
     pub fn attempt(&self) -> ReachAttempt {
         match self.epochs.last().and_then(|epoch| epoch.calibration.as_ref()) {
             None => ReachAttempt::Before,
@@ -102,7 +102,7 @@ impl ScriptRunner<'_, '_> {
         }
     }
 
-    /// Carries out the steps; gives why it stopped before the last, if it did.
+    /// Runs the steps. Returns the reason if it stopped before the last.
     fn steps(&mut self) -> Result<Option<String>, SessionError> {
         let routine = self.setup.routine;
         for (index, step) in routine.steps.iter().enumerate() {
@@ -177,7 +177,7 @@ impl ScriptRunner<'_, '_> {
         })
     }
 
-    /// Goes to believed angles by a certified path; `false` when there is none.
+    /// Moves to believed angles by a certified path; returns false if there is none.
     pub fn go(&mut self, to: &JointAngles) -> Result<bool, SessionError> {
         let to = &with_held(&self.driver.held, to);
         let limits = self.bounds.safe_limits(&self.robot);
@@ -186,11 +186,11 @@ impl ScriptRunner<'_, '_> {
         let mut planner = PathPlanner { clearance, bounds, limits: &limits, margin_m };
         let mut outcome = planner.plan(&from, to, &mut self.rng);
         for share in START_SHARES {
-            // A new calibration, or open jaws, may find the arm nearer to something than it believed to be: it must get
-            // away.
+            // After a new calibration, or with open jaws, the arm may be nearer to something than it believed. It must
+            // be able to leave.
             let is_stuck = match &outcome {
                 Err(PathError::StartTooNear { .. }) => true,
-                // Clear where it stands, and not for what a joint strays by as soon as it moves.
+                // It is clear at rest, but not with the tracking error of a motion.
                 Err(PathError::Blocked { is_stuck, .. }) => *is_stuck || !planner.is_free_to_arrive(&from),
                 _ => false,
             };
@@ -219,14 +219,14 @@ impl ScriptRunner<'_, '_> {
         }
     }
 
-    /// Whether a path leads from here to where the arm is stowed, with what `clearance` keeps clear.
+    /// True if a path leads from here to the stowed pose, with the clearance of `clearance`.
     pub fn can_leave(&mut self, clearance: &ClearanceModel<'_>) -> bool {
         let limits = self.bounds.safe_limits(&self.robot);
         let planner = PathPlanner { clearance, bounds: &self.bounds, limits: &limits, margin_m: self.margin_m() };
         planner.plan(&self.driver.set_point(), &self.robot.stowed, &mut self.rng).is_ok()
     }
 
-    /// Believed angles there.
+    /// Returns the believed angles of the goal.
     pub fn goal(&self, goal: &MoveGoal) -> Result<JointAngles, String> {
         match goal {
             MoveGoal::Stowed => Ok(self.robot.stowed),
@@ -261,7 +261,7 @@ impl ScriptRunner<'_, '_> {
         Ok(())
     }
 
-    /// Calibrates from the recording's bytes; gives the reason if it was refused.
+    /// Calibrates from the recording's bytes. Returns the reason if the calibration was refused.
     pub(crate) fn calibrate(&mut self, settings: &CalibrateSettings) -> Result<Option<String>, SessionError> {
         let mark = self.begin_calibration(settings)?;
         self.driver.record(&mark)?;
@@ -269,8 +269,8 @@ impl ScriptRunner<'_, '_> {
         self.calibrate_marked(&recording)
     }
 
-    /// The same where the views may not be enough: the recording is marked only if a calibration comes of it, so that
-    /// others who read it do not fail there.
+    /// Calibrates if the views may not be enough. The recording is marked only if a calibration results, so that other
+    /// readers of it do not fail there.
     pub(crate) fn try_calibrate(&mut self, settings: &CalibrateSettings) -> Result<Option<String>, SessionError> {
         let mark = self.begin_calibration(settings)?;
         let mut recording = self.driver.recorder.read_back()?;
@@ -280,7 +280,7 @@ impl ScriptRunner<'_, '_> {
         Ok(refusal)
     }
 
-    /// The mark of its views.
+    /// Returns the mark of the calibration's views.
     fn begin_calibration(&mut self, settings: &CalibrateSettings) -> Result<Message, SessionError> {
         self.driver.phase(Phase::Calibrate)?;
         self.progress_at(Phase::Calibrate, 0, 1);
@@ -312,7 +312,7 @@ impl ScriptRunner<'_, '_> {
         Ok(refusal)
     }
 
-    /// Widens the bounds by what time and temperature have done to the sensors since the calibration.
+    /// Widens the bounds by the effects of time and temperature on the sensors since the calibration.
     pub fn age(&mut self) {
         let Some(fresh) = &self.fresh else { return };
         let warmed_k = self.driver.recorder.oil_c.zip(fresh.oil_c).map_or(0.0, |(now, then)| now - then);
@@ -351,7 +351,7 @@ impl ScriptRunner<'_, '_> {
         }
     }
 
-    /// A figure that the arm itself can tell.
+    /// Returns a figure that the arm itself can know.
     fn known(&self, figure: AssertFigure) -> Option<f64> {
         let calibration = self.calibration.as_ref();
         match figure {
@@ -371,7 +371,7 @@ impl ScriptRunner<'_, '_> {
         }
     }
 
-    /// Limits that the script did not come to.
+    /// Notes the limits that the script did not reach.
     fn pass_over(&mut self, rest: &[Step], before: usize) {
         for (offset, step) in rest.iter().enumerate() {
             if let Step::Assert(limits) = step {
@@ -384,7 +384,7 @@ impl ScriptRunner<'_, '_> {
     }
 }
 
-/// A plan that fails in the middle of a script is no wrong input any more: there is a recording to be kept.
+/// Converts a planning error in the middle of a script, which is no longer a wrong input: there is a recording to keep.
 fn after_motion(step: usize, error: SessionError) -> SessionError {
     match error {
         error @ (SessionError::Plan(_) | SessionError::NothingSeen { .. }) => {

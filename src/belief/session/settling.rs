@@ -1,15 +1,15 @@
-//! When an arm stands still, by its own noisy sensors.
+//! Detects that an arm stands still, from its own noisy sensors.
 
 pub(crate) use crate::session::constants::settling::NEAR_RAD;
 use crate::session::constants::settling::{NOISE_SIGMAS, SMOOTHING, STILL_RAD};
 use armcal_core::streams::JointAngles;
 
-/// Follows the readings since the arm was told to stop.
+/// Follows the readings since the arm was commanded to stop.
 pub(crate) struct SettlingDetector {
     smooth: JointAngles,
     /// Mean square of a reading's distance from the smoothed one, rad^2: noise, and lag while it moves.
     scatter: JointAngles,
-    /// Where it began to stand.
+    /// Smoothed angles at which the arm began to stand, rad.
     anchor: JointAngles,
     still_s: f64,
 }
@@ -19,7 +19,7 @@ impl SettlingDetector {
         Self { smooth: angles, scatter: JointAngles::zeros(angles.len()), anchor: angles, still_s: 0.0 }
     }
 
-    /// Takes one reading; gives for how long the arm has stood near `set_point`, s.
+    /// Takes in one reading. Returns the time for which the arm has stood near `set_point`, s.
     pub fn update(&mut self, now: &JointAngles, set_point: &JointAngles, period_s: f64) -> f64 {
         for joint in 0..now.len() {
             let apart = now[joint] - self.smooth[joint];
@@ -49,8 +49,8 @@ mod tests {
     const PERIOD_S: f64 = 0.01;
     const REST_S: f64 = 0.4;
 
-    /// Moves at `rate` towards zero, stops `left` before it, and is read with noise; gives when it counts as standing,
-    /// s.
+    /// Moves at `rate_rad_s` towards zero, stops `left_rad` before it, with noisy readings. Returns the time at which
+    /// it counts as standing, s.
     fn stood_at_s(rate_rad_s: f64, left_rad: f64, noise_rad: f64, seed: u64) -> Option<f64> {
         let mut rng = stream_rng(seed, "stillness");
         let set_point = JointAngles::zeros(2);
@@ -77,7 +77,7 @@ mod tests {
                     let at_s = stood_at_s(0.2, left_rad, noise_rad, seed).expect("it stands");
                     assert!(at_s > stopped_s && at_s < stopped_s + 3.0, "{noise_rad} {left_rad}: {stopped_s} {at_s}");
                 }
-                // 0.02 rad/s: 0.008 rad within the time that it must stand; it is there after 14 s.
+                // At 0.02 rad/s it moves 0.008 rad within the time that it must stand; it arrives after 14 s.
                 assert_eq!(stood_at_s(0.02, 0.0, noise_rad, seed), None, "{noise_rad}");
             }
         }

@@ -1,4 +1,4 @@
-//! How far the tool may be from where the arm believes it, as the arm itself can tell: for viewers.
+//! Uncertainty of the tool position, as the arm itself can know it: for viewers.
 
 use nalgebra::{DMatrix, Matrix3};
 
@@ -8,33 +8,33 @@ use armcal_core::robot::Robot;
 use armcal_core::sensor::{ArmSensors, Conditions};
 use armcal_core::streams::JointAngles;
 
-/// What says how well the sensors of an epoch are known.
+/// Source of the uncertainty of an epoch's sensors.
 #[derive(Clone, Debug)]
 pub enum Certainty {
-    /// Their datasheet.
+    /// The sensors' datasheet.
     Datasheet,
     /// The epoch's calibration.
     Calibration,
     /// An estimate from the views captured so far.
     Interim(Box<Calibration>),
-    /// The online belief, at the epoch's start.
+    /// The online estimate, at the epoch's start.
     Online(ParameterCovariance),
-    /// Nothing: a joint was given up.
+    /// No source: a joint is held.
     Unknown,
 }
 
-/// Sensors that are believed in, with how well they are known.
+/// Believed sensors, with their uncertainty.
 #[derive(Clone, Debug)]
 pub struct ToolBelief {
     robot: Robot,
     sensors: ArmSensors,
     covariance: ParameterCovariance,
-    /// The only conditions that the covariance is for; `None` for any.
+    /// The only conditions for which the covariance holds; `None` for any.
     at: Option<Conditions>,
 }
 
 impl ToolBelief {
-    /// Of sensors that are known by their datasheet alone.
+    /// Returns the belief of sensors known only by their datasheet.
     #[must_use]
     pub fn by_datasheet(robot: &Robot, sensors: &ArmSensors) -> Self {
         let covariance =
@@ -42,7 +42,7 @@ impl ToolBelief {
         Self { robot: robot.clone(), sensors: sensors.clone(), covariance, at: None }
     }
 
-    /// Of sensors by a calibration with its covariance; `None` without one, or for another robot.
+    /// Returns the belief of a calibration with its covariance; `None` without one, or for another robot.
     #[must_use]
     pub fn by_calibration(robot: &Robot, calibration: &Calibration) -> Option<Self> {
         let robot = calibration.scaled_robot(robot);
@@ -52,15 +52,16 @@ impl ToolBelief {
         is_known.then_some(Self { robot, sensors, covariance, at: None })
     }
 
-    /// Of sensors as believed online; time and temperature since their reference are in `covariance`.
+    /// Returns the belief of the online estimate; `covariance` includes time and temperature since the sensors'
+    /// reference.
     #[must_use]
     pub fn online(robot: Robot, sensors: &ArmSensors, covariance: &ParameterCovariance) -> Self {
         let at = Some(sensors.reference);
         Self { robot, sensors: sensors.clone(), covariance: covariance.clone(), at }
     }
 
-    /// Covariance of the tool's position (base frame, m^2) at believed `angles` under `conditions`; `None` where
-    /// nothing bounds it.
+    /// Returns the covariance of the tool's position (base frame, m^2) at believed `angles` under `conditions`; `None`
+    /// if it is unbounded.
     #[must_use]
     pub fn position_m2(&self, angles: &JointAngles, conditions: &Conditions) -> Option<Matrix3<f64>> {
         let conditions = self.at.as_ref().unwrap_or(conditions);

@@ -1,8 +1,8 @@
-//! Touches surveyed surfaces with the tool's tip, so that the arm's own sensors say where the tool is.
+//! Touches surveyed surfaces with the tool's tip, so that the arm's own sensors measure the tool position.
 //!
-//! The arm goes to a place before the surface by a certified path, then slowly along the surface's normal. There the
-//! believed arm alone is kept clear of everything but the touched part, for a contact is what it comes for. It feels
-//! it as its readings staying behind the set-point by more than on the free way before (`TouchDetector`).
+//! The arm moves by a certified path to a pose before the surface, then slowly along the surface's normal. On that slow
+//! way only the believed arm is kept clear, and of everything but the touched part, because a contact is intended. The
+//! contact is detected when readings stay behind the set-point by more than on the free way before (`TouchDetector`).
 
 use crate::plan::constants::targets::IK_TOLERANCE_M;
 use crate::session::constants::touch::{
@@ -20,12 +20,12 @@ use armcal_core::kinematics::{IkGoal, IkSettings, solve_position};
 use armcal_core::routine::TouchSettings;
 use armcal_core::streams::{JointAngles, LogLevel, Message, Phase, ToolTouch};
 
-/// Finds when the tool no longer follows.
+/// Detects that the tool no longer follows.
 #[derive(Clone, Debug)]
 struct TouchDetector {
     period_s: f64,
     smooth_m: Option<f64>,
-    /// Of the free way: number, mean, sum of squares about it.
+    /// Statistics of the free way: number, mean, sum of squares about it.
     learnt: (f64, f64, f64),
     behind_s: f64,
 }
@@ -35,7 +35,7 @@ impl TouchDetector {
         Self { period_s, smooth_m: None, learnt: (0.0, 0.0, 0.0), behind_s: 0.0 }
     }
 
-    /// Takes the distance by which the tool is behind its set-point.
+    /// Smooths the distance by which the tool is behind its set-point, m.
     fn smooth(&mut self, behind_m: f64) -> f64 {
         let share = (self.period_s / SMOOTHING_S).min(1.0);
         let before_m = self.smooth_m.unwrap_or(behind_m);
@@ -52,7 +52,7 @@ impl TouchDetector {
         self.learnt = (n, mean_m, squares + apart_m * (smooth_m - mean_m));
     }
 
-    /// By how much the tool is held up, m, if it is.
+    /// Returns the distance by which the tool is held up, m, if it is.
     fn felt_m(&mut self, behind_m: f64) -> Option<f64> {
         let (n, mean_m, squares) = self.learnt;
         let std_m = (squares / (n - 1.0).max(1.0)).sqrt();
@@ -63,7 +63,7 @@ impl TouchDetector {
     }
 }
 
-/// The slow way to a surface and behind it, at equal distances of the tip.
+/// The slow way to a surface and beyond it, at equal distances of the tip.
 struct SlowWay {
     waypoints: Vec<JointAngles>,
     length_m: f64,
@@ -81,7 +81,7 @@ impl SlowWay {
 }
 
 impl ScriptRunner<'_, '_> {
-    /// One touch and back, or a line in the log why not.
+    /// Makes one touch and returns, or logs why not.
     pub(crate) fn touch_surface(&mut self, step: usize, settings: &TouchSettings) -> Result<(), SessionError> {
         let Some(radius_m) = self.robot.tool.tip_radius_m else {
             let problem = "robot.toml has no [tool] tip_radius_m: nobody says what touches".to_owned();
@@ -142,7 +142,8 @@ impl ScriptRunner<'_, '_> {
         self.driver.log(LogLevel::Info, &format!("{} touched", settings.part))
     }
 
-    /// The way that tells most beside the touches before, among those on which the tip touches first.
+    /// Returns the way with the most information in addition to the touches before, among those on which the tip
+    /// touches first.
     fn slow_way(&mut self, settings: &TouchSettings, radius_m: f64) -> Option<SlowWay> {
         let setup = self.setup;
         let clearances = ClearanceModel::for_touch(setup.robot, setup.vehicle, &setup.routine.scene, &settings.part)
@@ -161,7 +162,7 @@ impl ScriptRunner<'_, '_> {
             let poses = self.robot.chain.link_poses(&way.waypoints[0]);
             let link = poses.link(self.robot.tool.mount.n_joints);
             let normal = link.rotation.inverse() * Vector3::from(settings.normal);
-            // As good as told is told; then the nearer one.
+            // Directions already determined count little; among equals, the nearer way wins.
             let worth = normal.dot(&(left * normal)) / (1.0 + 0.1 * way.waypoints[0].max_abs_difference(&here));
             if best.as_ref().is_none_or(|(most, _)| worth > *most) && self.is_clear(&way, settings, &clearances) {
                 best = Some((worth, way));
@@ -204,7 +205,8 @@ impl ScriptRunner<'_, '_> {
         Some(SlowWay { waypoints, length_m })
     }
 
-    /// Every arm within the bounds at its start, the believed one from there to the surface.
+    /// True if every arm within the bounds is clear at the start of the way, and the believed one from there to the
+    /// surface.
     fn is_clear(&self, way: &SlowWay, settings: &TouchSettings, [rest, part]: &[ClearanceModel<'_>; 2]) -> bool {
         if self.clearance.find_violation_arriving(&way.waypoints[0], &self.bounds, self.margin_m()).is_some() {
             return false;
@@ -221,8 +223,8 @@ impl ScriptRunner<'_, '_> {
 }
 
 impl Driver<'_> {
-    /// Goes along the way until the tool is held up; gives how far it came, and whether it was. Then it stands where
-    /// its readings are.
+    /// Moves along the way until the tool is held up. Returns the travelled distance, m, and true if it was held up.
+    /// The set-point is then at the readings.
     fn feel(&mut self, way: &SlowWay, normal: &Vector3<f64>, learnt_m: f64) -> Result<(f64, bool), SessionError> {
         let period_s = self.arm.period_s();
         let mut detector = TouchDetector::new(period_s);
@@ -242,7 +244,7 @@ impl Driver<'_> {
         Ok((way.length_m, false))
     }
 
-    /// Back along the way from `reached_m`.
+    /// Moves back along the way from `reached_m`.
     fn withdraw(&mut self, way: &SlowWay, reached_m: f64) -> Result<(), SessionError> {
         let n = (reached_m / (BACK_SPEED_M_S * self.arm.period_s())).ceil().max(1.0) as u64;
         for k in 1..=n {
@@ -259,7 +261,8 @@ mod tests {
     use armcal_core::stats::stream_rng;
     use rand_distr::{Distribution, StandardNormal};
 
-    /// Where a tool that follows with a lag and noise is felt to stop at a wall, m behind it; `None` if it is not.
+    /// Returns the distance beyond a wall at which the stop of a tool with lag and noise is detected, m; `None` if it
+    /// is not.
     fn felt_at(seed: u64, wall_m: f64, noise_m: f64) -> Option<f64> {
         const PERIOD_S: f64 = 0.01;
         let mut rng = stream_rng(seed, "feel");

@@ -1,4 +1,4 @@
-//! The arm as believed, as transforms for viewers.
+//! The believed arm as transforms, for viewers.
 
 use crate::session::constants::transforms::{REST_SPACING_S, SPACING_S, STEP_RAD};
 use nalgebra::{Isometry3, UnitQuaternion};
@@ -9,13 +9,13 @@ use armcal_core::robot::{FrameTree, Robot};
 use armcal_core::streams::{JointAngles, JointStateBelief};
 use armcal_core::time::Stamp;
 
-/// Where the links that move and the camera are believed to be, at most ten times a second.
+/// Poses of the moving links and the camera by the belief, at most ten times a second.
 pub struct BelievedFrames {
     tree: FrameTree,
     chain: Chain,
-    /// The camera's frame, its link, and where on that link; `None` where the URDF has a link of that name.
+    /// The camera's frame, its link and its mount on that link; `None` if the URDF has a link of that name.
     camera: Option<CameraFrame>,
-    /// What was last drawn.
+    /// Time and angles of the last transforms.
     drawn: Option<(Stamp, JointAngles)>,
 }
 
@@ -26,7 +26,7 @@ struct CameraFrame {
 }
 
 impl BelievedFrames {
-    /// Of an arm by its drawing, with the camera in the frame named `camera_frame`.
+    /// Returns the frames of the nominal arm, with the camera in the frame named `camera_frame`.
     #[must_use]
     pub fn new(robot: &Robot, tree: FrameTree, camera_frame: &str) -> Self {
         let mount = robot.camera.mount;
@@ -39,7 +39,7 @@ impl BelievedFrames {
         Self { tree, chain: robot.chain.clone(), camera, drawn: None }
     }
 
-    /// Draws the arm as `robot` is from now on: its links and its camera's mount as calibrated.
+    /// Adopts `robot` from now on: its calibrated links and camera mount.
     pub(crate) fn believe(&mut self, robot: &Robot) {
         self.chain = robot.chain.clone();
         if let Some(camera) = &mut self.camera {
@@ -48,7 +48,7 @@ impl BelievedFrames {
         self.drawn = None;
     }
 
-    /// The transforms at these angles; `None` where they were told a moment ago, or the arm has not moved since.
+    /// Returns the transforms at these angles; `None` if the last ones are too recent, or the arm has not moved since.
     pub(crate) fn hear(&mut self, states: &JointStateBelief) -> Option<TfMessage> {
         let JointStateBelief { stamp, angles } = states;
         if let Some((drawn_at, drawn)) = &self.drawn {
@@ -62,7 +62,7 @@ impl BelievedFrames {
         self.transforms(*stamp, &self.chain.link_poses(angles))
     }
 
-    /// `None` where the stamp has no ROS form: the message that brought it is refused elsewhere.
+    /// Returns `None` if the stamp has no ROS form: the message with that stamp is refused elsewhere.
     fn transforms(&self, stamp: Stamp, poses: &LinkPoses) -> Option<TfMessage> {
         let links = self.tree.moving.iter().map(|frame| {
             let place = single_precision(&frame.parent_from_child(poses));
@@ -75,7 +75,7 @@ impl BelievedFrames {
     }
 }
 
-/// The pose in numbers of single precision: their bytes compress, and no viewer has more.
+/// Rounds the pose to single precision: its bytes compress, and no viewer has more.
 fn single_precision(pose: &Isometry3<f64>) -> Isometry3<f64> {
     let short = |value: f64| f64::from(value as f32);
     let turn = UnitQuaternion::new_unchecked(pose.rotation.coords.map(short).into());
@@ -104,7 +104,7 @@ mod tests {
         JointStateBelief { stamp: SIMULATION_EPOCH.plus_s(at_s), angles }
     }
 
-    /// Messages of 20 s at 25 Hz.
+    /// Counts the messages of 20 s at 25 Hz.
     fn count(angle_rad: impl Fn(f64) -> f64) -> usize {
         let (robot, mut frames) = frames();
         (0..500).filter_map(|n| frames.hear(&state(&robot, f64::from(n) / 25.0, angle_rad(f64::from(n))))).count()
@@ -118,7 +118,7 @@ mod tests {
         assert!((160..=200).contains(&moving), "{moving}");
     }
 
-    /// The camera along the transforms from the base.
+    /// Returns the camera's pose by the transforms from the base.
     fn base_from_camera(message: &TfMessage) -> Isometry3<f64> {
         let mut at = "camera_wrist".to_owned();
         let mut from = Isometry3::identity();
@@ -152,7 +152,7 @@ mod tests {
             frames.believe(&robot);
             let message = frames.hear(&state(&robot, 10.0 * step as f64, angle_rad)).expect("told");
             assert!(is_near(&message, &robot) && !is_near(&message, &calibrated));
-            // A new belief is told at once.
+            // A new belief is published at once.
             frames.believe(&calibrated);
             let message = frames.hear(&state(&robot, 10.0 * step as f64 + 0.04, angle_rad)).expect("told");
             assert!(is_near(&message, &calibrated) && !is_near(&message, &robot));

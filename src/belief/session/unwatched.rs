@@ -1,4 +1,4 @@
-//! A session that nobody watches.
+//! A session without a watching caller.
 
 use crate::session::Progress;
 use armcal_core::streams::Phase;

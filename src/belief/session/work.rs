@@ -1,4 +1,4 @@
-//! Work: a target of the task every so often, tags that are passed by the way, and rest between.
+//! Work: a target of the task at intervals, tags that are passed on the way, and rest in between.
 
 use crate::session::SessionError;
 use crate::session::outcome::SkippedTarget;
@@ -9,7 +9,8 @@ use armcal_core::streams::{ImageDemand, JointAngles, LogLevel, MarkKind, Phase};
 use armcal_core::time::Stamp;
 
 impl ScriptRunner<'_, '_> {
-    /// Each task begins at its time, or as soon as the one before has ended; the step lasts as long as all of them.
+    /// Runs the tasks: each begins at its time, or as soon as the one before has ended. The step lasts as long as all
+    /// of them.
     pub(crate) fn work(&mut self, step: usize, settings: &WorkSettings) -> Result<(), SessionError> {
         let wrong = |problem: String| SessionError::Step { step, problem };
         let rest = self.goal(&settings.rest).map_err(wrong)?;
@@ -41,8 +42,8 @@ impl ScriptRunner<'_, '_> {
         Ok(())
     }
 
-    /// Goes to a target, by tags if it is this task's turn, and rests there for a moment: of all configurations that
-    /// reach it in one near that between tasks.
+    /// Moves to a target, by tags if it is this task's turn, and rests there for a moment. Of all configurations at the
+    /// target it takes one near that between tasks.
     fn task(
         &mut self,
         step: usize,
@@ -73,7 +74,7 @@ impl ScriptRunner<'_, '_> {
         }
     }
 
-    /// Passes a posture with tags in view, or stays there.
+    /// Passes a configuration with tags in view, or stays there for `seconds`.
     fn look(&mut self, at: &JointAngles, seconds: f64) -> Result<(), SessionError> {
         if seconds > 0.0 {
             return match self.arrive(&Ok(*at))? {
@@ -81,11 +82,11 @@ impl ScriptRunner<'_, '_> {
                 Err(reason) => self.driver.log(LogLevel::Warn, &format!("a look is left out: {reason}")),
             };
         }
-        // What is in the way is in the log.
+        // The log names the obstacle.
         self.go(at).map(drop)
     }
 
-    /// Goes to where the arm rests; where no path leads there it stays.
+    /// Moves to the rest configuration; if no path leads there, the arm stays.
     fn leave_for(&mut self, rest: &JointAngles) -> Result<(), SessionError> {
         self.driver.phase(Phase::Move)?;
         match self.arrive(&Ok(*rest))? {

@@ -15,42 +15,43 @@ use armcal_core::time::Stamp;
 /// The arm at rest for one target.
 #[derive(Clone, Debug)]
 pub struct ReachRest {
-    /// From the mark: before or after a calibration was believed in.
+    /// State of the mark: before or after a calibration.
     pub attempt: ReachAttempt,
     /// Number of the task's target, from 0.
     pub target_idx: usize,
-    /// Position of the target, base frame.
+    /// Position of the target, base frame, m.
     pub target_m: [f64; 3],
     /// Start of the mark, by the joint sensors' clock.
     pub start: Stamp,
-    /// End of the mark.
+    /// End of the mark, by the joint sensors' clock.
     pub end: Stamp,
-    /// Over the mark, as far as the recording tells.
+    /// Mean conditions over the mark, as far as they are recorded.
     pub conditions: Conditions,
-    /// Joint angles as believed under the sensors of that moment and these conditions.
+    /// Believed joint angles, by the sensors at that time and these conditions, rad.
     pub believed: JointAngles,
-    /// The tool as believed, by the links of that moment.
+    /// Believed pose of the tool, by the links at that time.
     pub believed_tool: Pose<Base, Tool>,
 }
 
-/// What the arm believed of itself from a stamp on.
+/// Belief of the arm from a stamp on.
 #[derive(Clone, Copy, Debug)]
 pub struct Belief<'a> {
-    /// When the belief began.
+    /// Start of the belief.
     pub from: Stamp,
-    /// The sensors believed in.
+    /// The believed sensors.
     pub sensors: &'a ArmSensors,
-    /// Beyond the drawing.
+    /// Link corrections relative to the nominal model.
     pub links: LinkCorrections,
 }
 
-/// The belief at `stamp`: the first of all before the first stamp. `beliefs` are in the order of time.
+/// Returns the belief at `stamp`, or the first one before the first stamp. `beliefs` are in the order of time.
 fn believed_at<'a>(beliefs: &[Belief<'a>], stamp: Stamp) -> Option<Belief<'a>> {
     let later = beliefs.partition_point(|belief| belief.from <= stamp);
     beliefs.get(later.saturating_sub(1)).copied()
 }
 
-/// Every reach of a recording, in the order of its marks. Marks without readings or without a target are left out.
+/// Returns every reach of a recording, in the order of its marks. Marks without readings or without a target are
+/// skipped.
 #[must_use]
 pub fn reaches(recording: &Recording, robot: &Robot, beliefs: &[Belief<'_>]) -> Vec<ReachRest> {
     let task = recording.messages.iter().find_map(|(_, message)| match message {
@@ -80,7 +81,7 @@ pub fn reaches(recording: &Recording, robot: &Robot, beliefs: &[Belief<'_>]) -> 
             let to = readings.partition_point(|sample| sample.stamp <= mark.end);
             let span = readings.get(from..to).filter(|span| !span.is_empty())?;
             let conditions = surroundings.over(mark.start, mark.end);
-            // Angles, not raw words, are averaged: the words wrap.
+            // Angles are averaged, not raw words, because words wrap.
             let mut readings: Vec<JointAngles> =
                 span.iter().map(|sample| sensors.angles_under(&sample.counts, &conditions)).collect();
             replace_dropouts(&mut readings);
@@ -112,7 +113,7 @@ mod tests {
     use armcal_core::streams::{JointSensorSample, Mark, ReachTask, TemperatureSample, Thermometer};
     use armcal_core::time::SIMULATION_EPOCH;
 
-    /// Ten of 61 readings are the word of a wiper that has lost its track.
+    /// Ten of 61 readings are dropouts of a wiper that has lost its track.
     #[test]
     fn dropouts_at_a_rest_do_not_move_the_tool_that_is_believed() {
         let folder = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots/titan4");
@@ -146,7 +147,7 @@ mod tests {
         assert!((rest[0] - robot.stowed[0]).abs() < 1e-9, "{rest:?}");
     }
 
-    /// Two rests with the same readings; in between the oil has warmed by 10 K.
+    /// Two rests have the same readings, but the oil warms by 10 K in between.
     #[test]
     fn a_rest_is_believed_under_its_own_conditions() {
         let folder = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots/titan4");

@@ -1,5 +1,5 @@
-//! An arm in a dive whose sensors change otherwise than the estimator's model says: temperature acts with a lag,
-//! pressure with hysteresis, offsets walk, and the datasheet's noise figures are wrong by two.
+//! An arm in a dive whose sensors differ from the estimator's model. Temperature acts with a lag, pressure with
+//! hysteresis, offsets walk, and the datasheet's noise is wrong by a factor of two.
 
 use rand_chacha::ChaCha8Rng;
 
@@ -21,7 +21,7 @@ const WALK_RAD_PER_SQRT_H: f64 = 0.02 * std::f64::consts::PI / 180.0;
 const RAD_PER_K: f64 = 0.02 * std::f64::consts::PI / 180.0;
 const RAD_PER_MPA: f64 = 2e-4;
 
-/// An arm under way.
+/// A simulated arm in a dive.
 #[derive(Clone)]
 pub(crate) struct Dive<'a> {
     robot: &'a Robot,
@@ -32,13 +32,13 @@ pub(crate) struct Dive<'a> {
     per_mpa: [f64; MAX_JOINTS],
     walk_rad: [f64; MAX_JOINTS],
     sensor_c: f64,
-    /// What pressure leaves behind, MPa: a play of a tenth of the depth's.
+    /// Pressure that acts on the sensors, MPa, with a hysteresis of a tenth of the depth's.
     acting_mpa: f64,
     now_s: f64,
     rng: ChaCha8Rng,
 }
 
-/// Depth in parts of the deepest: down in two hours, up in the last two.
+/// Returns the depth as a share of the deepest: down in two hours, up in the last two.
 fn depth_share(at_s: f64) -> f64 {
     let h = at_s / 3600.0;
     (h / 2.0).min((HOURS - h) / 2.0).clamp(0.0, 1.0)
@@ -83,7 +83,7 @@ impl<'a> Dive<'a> {
         }
     }
 
-    /// Lets time pass; the thermometer is heard.
+    /// Lets time pass, with thermometer readings.
     pub fn advance(&mut self, online: &mut OnlineEstimator, at_s: f64) {
         while self.now_s < at_s {
             self.advance_to((self.now_s + 30.0).min(at_s));
@@ -110,7 +110,7 @@ impl<'a> Dive<'a> {
         }
     }
 
-    /// Something happens to the arm: to the truth, or to the offsets that it started with.
+    /// Applies a fault to the truth, or to the initial offsets.
     pub fn befall(&mut self, happen: impl FnOnce(&mut Truth, &mut [f64; MAX_JOINTS])) {
         happen(&mut self.truth, &mut self.at_start);
         self.advance_to(self.now_s);
@@ -125,14 +125,14 @@ impl<'a> Dive<'a> {
         SIMULATION_EPOCH.plus_s(self.now_s)
     }
 
-    /// A view now, at a posture that happens to see tags.
+    /// Returns a view now, at a random configuration that shows tags.
     pub fn view(&mut self) -> View {
         let mut view = views(self.robot, &self.truth, &self.noise, 1, &mut self.rng).remove(0);
         (view.conditions, view.end) = (self.conditions(), self.stamp());
         view
     }
 
-    /// The tool as it is and as believed, at a posture of a task; and the covariance's opinion.
+    /// Returns the tool error at a configuration of a task, and its prediction by the covariance.
     pub fn task(&mut self, online: &OnlineEstimator) -> TaskError {
         let robot = self.robot;
         let posture = views(robot, &self.truth, &self.noise, 1, &mut self.rng).remove(0);
@@ -146,7 +146,7 @@ impl<'a> Dive<'a> {
             let correction = parameters.correction(j);
             correction.angle_rad(&robot.sensors[j], posture.travel_rad[j], &departure, 0.0)
         });
-        // Sensors beyond the camera are not what this is about.
+        // Joints distal to the camera are excluded from this comparison.
         let believed =
             JointAngles::from_fn(robot.n_joints(), |j| if j < robot.n_seen_joints() { believed[j] } else { angles[j] });
         let tool_m = |at: &JointAngles| robot.chain.frame(at, &robot.tool.mount).translation.vector;
@@ -175,7 +175,7 @@ pub(crate) struct TaskError {
     pub nees: f64,
 }
 
-/// A day: twenty views at first, then a view at each third task, none from the fourth hour to the sixth.
+/// Simulates a day: twenty views at first, then a view at each third task, none from the fourth hour to the sixth.
 fn day(robot: &Robot, seed: u64) -> (Vec<TaskError>, Vec<OnlineEvent>, OnlineEstimator) {
     let mut dive = Dive::new(robot, seed);
     let mut online = OnlineEstimator::new(robot.clone(), OnlineSettings::default());
@@ -237,7 +237,7 @@ fn the_tool_stays_known_all_day_and_the_prediction_is_right() {
     assert!((2.0..4.3).contains(&nees), "{nees}");
 }
 
-/// A few views at rest in the morning, and tags passed by hours later: these count, too.
+/// Tags passed hours after a few views at rest in the morning are used, too.
 #[test]
 fn tags_passed_after_a_short_start_are_used() {
     let robot = titan();

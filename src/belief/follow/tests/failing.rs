@@ -1,5 +1,4 @@
-//! Sensors that say something wrong now and then, joints without one, and what happens while something else is looked
-//! into.
+//! Sensors that fail intermittently, joints without a sensor, and faults that happen during a race.
 
 use crate::batch::tests::data::titan;
 use crate::follow::event::OnlineEvent;
@@ -11,7 +10,7 @@ fn lines(events: &[OnlineEvent]) -> Vec<String> {
     events.iter().map(OnlineEvent::to_line).collect()
 }
 
-/// Views in which a sensor is right say nothing against that it fails in others: it is named, and nothing else is.
+/// Views with a correct reading do not contradict intermittent failures: the sensor is reported, and nothing else is.
 #[test]
 fn a_sensor_that_fails_now_and_then_is_named() {
     assert_eq!(missed_failures(2), []);
@@ -24,7 +23,7 @@ fn a_sensor_that_fails_now_and_then_is_named_over_10_seeds() {
     assert!(missed.len() <= 1, "{missed:?}");
 }
 
-/// Cases with any other report: the seed and the report.
+/// Returns the cases with any other report: the seed and the report.
 fn missed_failures(n_seeds: u64) -> Vec<(u64, Vec<String>)> {
     let robot = titan();
     let mut missed = Vec::new();
@@ -36,7 +35,7 @@ fn missed_failures(n_seeds: u64) -> Vec<(u64, Vec<String>)> {
             let mut view = dive.view();
             if k % 4 == 0 {
                 view.travel_rad[joint] = -1.2;
-                // Of one tag, for which any explanation pays no more than that it does not belong.
+                // A view of one tag: any hypothesis costs as much as rejecting the tag.
                 view.tags.truncate(1);
             }
             online.add_view(&view);
@@ -52,8 +51,8 @@ fn missed_failures(n_seeds: u64) -> Vec<(u64, Vec<String>)> {
     missed
 }
 
-/// A joint whose sensor is left out stands where the tags show it, however far from there its reading is: no tag, no
-/// camera and no other sensor is blamed.
+/// A joint without a sensor stands where the tags show it, regardless of its reading: no tag, no camera and no other
+/// sensor is reported.
 #[test]
 fn a_reading_that_is_left_out_may_be_anything() {
     nothing_is_told_of_left_out_readings([1], 9);
@@ -82,7 +81,7 @@ fn nothing_is_told_of_left_out_readings(joints: impl IntoIterator<Item = usize>,
     assert_eq!(told, []);
 }
 
-/// Where no sensor tells of it that the camera crept on, the scatter of its images does.
+/// If no sensor shows that the camera crept on, the scatter of its images does.
 #[test]
 fn images_that_scatter_are_not_looked_at_where_a_sensor_failed() {
     let robot = titan();
@@ -92,7 +91,7 @@ fn images_that_scatter_are_not_looked_at_where_a_sensor_failed() {
     let mut creeping = still.clone();
     for tag in &mut creeping.tags {
         let TagMeasurement::Corners(mean) = &mut tag.measured else { continue };
-        // This dive's corners are twice as noisy as robot.toml says.
+        // This dive's corners are twice as noisy as robot.toml states.
         (mean.n_frames, mean.scatter_px2) = (5, 32.0 * (6.0 * robot.camera.corner_std_px).powi(2));
     }
     let mut failed = online.clone();
@@ -107,7 +106,7 @@ fn images_that_scatter_are_not_looked_at_where_a_sensor_failed() {
     assert_ne!(online.parameters(), before, "sensors average over the same time");
 }
 
-/// A sensor slips while a view of a misread tag is looked into, at once or some views later: it is named.
+/// A sensor that slips during a race about a misread tag, at once or some views later, is reported.
 #[test]
 fn a_slip_is_named_while_another_view_is_looked_into() {
     assert_eq!(missed_slips([(1, 4)]), []);
@@ -120,7 +119,7 @@ fn a_slip_is_named_while_another_view_is_looked_into_over_10_seeds() {
     assert!(missed.len() <= 2, "{missed:?}");
 }
 
-/// Cases with any other report: the seed, the number of views between, and the report.
+/// Returns the cases with any other report: the seed, the number of views between, and the report.
 fn missed_slips(cases: impl IntoIterator<Item = (u64, usize)>) -> Vec<(u64, usize, Vec<String>)> {
     let robot = titan();
     let mut missed = Vec::new();

@@ -1,5 +1,5 @@
-//! Faults at unknown times in a dive of one hour, each far beyond what the belief leaves open at a new posture: most
-//! are named, with the right joint or tag, and nothing else is.
+//! Faults at unknown times in a dive of one hour, each far beyond the uncertainty at a new configuration. Most are
+//! reported, with the correct joint or tag, and nothing else is.
 
 use std::ops::Range;
 use std::sync::LazyLock;
@@ -22,7 +22,7 @@ use crate::views::view::View;
 use armcal_core::robot::{FailedJoint, FailedKind, Robot};
 use armcal_core::spatial::exp;
 
-/// What happens at the view of that number after the first ones.
+/// Fault at the `AT`-th view after the first ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Happens {
     Nothing,
@@ -39,12 +39,12 @@ const AT: u32 = 5;
 
 type Hour<'a> = (OnlineEstimator, Dive<'a>);
 
-/// The hours of one seed are the same until something happens.
+/// Dives of one seed, identical until the fault.
 static UNTIL_IT_HAPPENS: Shared<u64, Hour<'static>> = Shared::new();
 static QUIET: Shared<u64, Hour<'static>> = Shared::new();
 static TITAN: LazyLock<Robot> = LazyLock::new(titan);
 
-/// An hour with a view every five minutes: the estimator then, and the dive.
+/// Returns the estimator after an hour with a view every five minutes, and the dive.
 pub(crate) fn after_an_hour(seed: u64, what: Happens) -> Hour<'static> {
     let hour = || {
         let before = UNTIL_IT_HAPPENS.get(seed, || until_it_happens(&TITAN, seed));
@@ -147,7 +147,7 @@ fn faults_are_named(n_seeds: u64) {
     assert!(!missed.iter().any(|what| matches!(what, Happens::Nothing)), "a false alarm");
 }
 
-/// Every other tag is on a boom that is bent: they are named together, and neither the camera nor a sensor is.
+/// Every other tag is on a boom that is bent: these tags are reported together, and neither the camera nor a sensor is.
 #[test]
 fn tags_on_one_carrier_are_named_together() {
     assert_eq!(named_together(1), 1);
@@ -159,7 +159,7 @@ fn tags_on_one_carrier_are_named_together_over_6_seeds() {
     assert!(named_together(6) >= 5);
 }
 
-/// In how many dives they are, and nothing else is.
+/// Returns the number of dives in which they are reported, and nothing else is.
 fn named_together(n_seeds: u64) -> u64 {
     let robot = titan();
     let mut right = 0;
@@ -192,8 +192,7 @@ fn named_together(n_seeds: u64) -> u64 {
     right
 }
 
-/// One view of a tag that was knocked aside is often enough, where others in it keep their places; a tag that is read
-/// as another one is no such.
+/// One view of a knocked tag is often enough if other tags in it keep their poses; a misread tag is not reported.
 #[test]
 fn one_view_tells_a_moved_tag_from_one_that_was_misread() {
     one_view_is_enough(0..1);
@@ -245,7 +244,7 @@ fn one_view_is_enough(seeds: Range<u64>) {
     assert!(2 * named >= n_seeds, "{named} of {n_seeds}");
 }
 
-/// A joint without a sensor is known by the camera in its views alone: no sensor says where the tool is at a task.
+/// In the views, only the camera determines a joint without a sensor; at a task nothing determines the tool's position.
 #[test]
 fn a_failed_sensor_leaves_the_tool_unknown() {
     let robot = titan();
@@ -261,8 +260,8 @@ fn a_failed_sensor_leaves_the_tool_unknown() {
     assert_eq!(online.take_events(), [], "what is known is not told again");
 }
 
-/// An oracle is sure of a slip by the views after it, holds it for likelier than any other slip, and is sure of nothing
-/// where nothing happened.
+/// An oracle is certain of a slip by the views after it, and ranks it above any other slip. It is certain of nothing if
+/// nothing happened.
 #[test]
 fn an_oracle_tells_what_happened_and_when_nothing_did() {
     let explanations: Vec<Vec<Fault>> = (0..4).map(|joint| vec![Fault::Slip(joint)]).collect();
@@ -284,8 +283,7 @@ fn an_oracle_tells_what_happened_and_when_nothing_did() {
     assert!(told >= 5, "{told} of 6");
 }
 
-/// A spot of a sensor's track that wears is named with its place, and nothing else is: the arm looks there twice, and
-/// elsewhere in between.
+/// A worn spot is reported with its place, and nothing else is: the arm visits it twice, and other places in between.
 #[test]
 fn a_worn_spot_is_named_with_its_place() {
     const SPOT_RAD: f64 = 0.3;
@@ -317,8 +315,8 @@ fn a_worn_spot_is_named_with_its_place() {
     assert!(missed.len() <= 1, "{missed:?}");
 }
 
-/// A low spot that the arm looks across every few minutes, each time too little to tell it, is named by all looks
-/// together; where nothing is worn, nothing is.
+/// A low spot that the arm crosses every few minutes, each time with too little evidence, is reported by all crossings
+/// together. Without wear nothing is reported.
 #[test]
 fn a_low_spot_is_named_by_looks_minutes_apart() {
     let (named, told) = named_spots(0..2);
@@ -366,8 +364,8 @@ fn named_spots(seeds: Range<u64>) -> (usize, OtherEvents) {
     (named, told)
 }
 
-/// A tag that hangs a little aside and is seen every few minutes, each time too little to tell it, is named by all
-/// looks together; where none was moved, none is.
+/// A slightly displaced tag that is seen every few minutes, each time with too little evidence, is reported by all
+/// views together. If no tag moved, none is reported.
 #[test]
 fn a_tag_a_little_aside_is_named_by_looks_minutes_apart() {
     let (named, told) = named_tags(0..2);
@@ -411,7 +409,7 @@ fn named_tags(seeds: Range<u64>) -> (usize, OtherEvents) {
     (named, told)
 }
 
-/// What was looked into of one tag hides no other, and what no view tells is not suspicious.
+/// Tests of one tag hide no other tag, and an undetermined direction is not suspicious.
 #[test]
 fn each_tag_is_suspicious_by_its_own_scores() {
     let (online, mut dive) = after_an_hour(0, Happens::Nothing);
@@ -423,14 +421,14 @@ fn each_tag_is_suspicious_by_its_own_scores() {
         hindsight.add(step, Scores { tags: vec![score], ..Scores::default() });
         hindsight.suspicious_tags().first().map(|it| it.tag)
     };
-    // By 20 mm, each view good to 1 mm.
+    // Displaced by 20 mm, with each view accurate to 1 mm.
     let mut far = || suspicious(1, [2e4, 0.0, 0.0], [1e6; 3]);
     assert_eq!([far(), far()], [None, Some(1)]);
-    // Surer than before it is not.
+    // The score has not grown since its test.
     assert_eq!(suspicious(1, [0.0; 3], [1e6; 3]), None);
     let mut near = || suspicious(2, [6e3, 0.0, 0.0], [1e6; 3]);
     assert_eq!([near(), near()], [None, Some(2)]);
-    // Thirty sigmas of one metre.
+    // Thirty sigmas with a std of one metre.
     let mut untold = || suspicious(3, [0.0, 0.0, 30.0], [1e6, 1e6, 1.0]);
     assert_eq!([untold(), untold()], [None, None]);
 }

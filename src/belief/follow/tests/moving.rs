@@ -1,4 +1,4 @@
-//! Images of a moving arm: the clock offset, whatever the sensors' slopes are, and the backlash.
+//! Images of a moving arm: the clock offset for any slopes of the sensors, and the backlash.
 
 use rand::RngExt;
 
@@ -9,11 +9,11 @@ use crate::follow::tests::drifting::Dive;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::robot::Robot;
 
-/// How much later than they were taken images are stamped, s.
+/// Delay of the images' stamps after the exposure, s.
 const LATE_S: f64 = 0.035;
 
-/// The clock offset and its sigma, s, after rests and images in motion by sensors of one slope, each image with a time
-/// error of its own.
+/// Returns the clock offset and its std, s, after rests and images in motion. All sensors have one slope, and each
+/// image has its own time error.
 fn found_clock_offset_s(robot: &Robot, seed: u64, slope: f64, jitter_s: f64) -> [f64; 2] {
     let mut dive = Dive::new(robot, seed);
     let (mut rates, mut jitter) = (rng(seed, "rates"), rng(seed, "jitter"));
@@ -37,7 +37,7 @@ fn found_clock_offset_s(robot: &Robot, seed: u64, slope: f64, jitter_s: f64) -> 
     online.clock_offset_s().expect("it runs")
 }
 
-/// A sensor whose angle turns by less than the datasheet has it moves by less in the time that its stamps are late.
+/// A sensor with a smaller slope than the datasheet's moves by less during the delay of its stamps.
 #[test]
 fn a_clock_offset_is_found_by_sensors_of_any_slope() {
     let robot = titan();
@@ -49,11 +49,11 @@ fn a_clock_offset_is_found_by_sensors_of_any_slope() {
     }
     println!("clock offsets, s: {found_s:?}");
     let mean_s = found_s.iter().sum::<f64>() / found_s.len() as f64;
-    // By the datasheet's slope it would be 1.7 ms short.
+    // With the datasheet's slope the offset would be 1.7 ms too small.
     assert!((mean_s - LATE_S).abs() < 0.8e-3, "{found_s:?}");
 }
 
-/// Where images have a time error of their own, too.
+/// The images have their own time error, too.
 #[test]
 fn a_clock_offset_is_as_uncertain_as_it_says() {
     let robot = titan();
@@ -68,8 +68,8 @@ fn a_clock_offset_is_as_uncertain_as_it_says() {
     assert!((0.5..1.5).contains(&rms), "{sigmas:?}");
 }
 
-/// Rests scatter by the backlash, for their sides are not known, and images in motion tell its size: of what a rest's
-/// angle is off by, it is a part, and is not added to it.
+/// Rests scatter by the backlash, because their sides are unknown, and images in motion determine its size. It is a
+/// part of a rest's angle error, and is not added to it.
 #[test]
 fn a_backlash_that_motion_tells_counts_once_at_rest() {
     let robot = titan();

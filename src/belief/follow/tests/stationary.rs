@@ -1,4 +1,4 @@
-//! Where nothing changes the belief is that of the batch of all views.
+//! Without drift the online estimate equals that of the batch of all views.
 
 use rand::seq::SliceRandom;
 
@@ -31,7 +31,7 @@ fn case(robot: &Robot, seed: u64, n_views: usize) -> Case {
     Case { scales, model, views }
 }
 
-/// The batch of some views under the case's scales.
+/// Returns the batch input of some views under the case's scales.
 fn input<'a>(robot: &'a Robot, case: &Case, views: &'a [View], reference: Conditions) -> BundleInput<'a> {
     BundleInput {
         robot,
@@ -44,7 +44,7 @@ fn input<'a>(robot: &'a Robot, case: &Case, views: &'a [View], reference: Condit
     }
 }
 
-/// Largest difference over the joints' parameters between belief and batch, in the batch's sigmas.
+/// Returns the largest difference over the joints' parameters between online estimate and batch, in the batch's sigmas.
 fn worst_sigmas(robot: &Robot, case: &Case, order: &[View]) -> f64 {
     let settings = OnlineSettings {
         model: Some(case.model.clone()),
@@ -87,8 +87,8 @@ fn belief_is_that_of_the_batch_in_any_order_of_the_views() {
     assert!(worst.iter().all(|sigmas| *sigmas < 0.1), "{worst:?}");
 }
 
-/// A camera and tags that hardly anybody placed: the belief of the first views is far from the last one, and what is
-/// well known must not leak into what is not on the way.
+/// Camera and tags with large prior errors: the first estimate is far from the last one. Information on well-known
+/// directions must not leak into others as the poses move.
 #[test]
 fn poses_that_move_far_carry_their_information_along() {
     let mut robot = titan();
@@ -110,6 +110,6 @@ fn poses_that_move_far_carry_their_information_along() {
     }
     worst.sort_by(f64::total_cmp);
     println!("largest difference over all columns, sigmas: {worst:.3?}");
-    // 0.36 and 0.52; with the derivative taken as one 0.53 and 0.81.
+    // The values are 0.36 and 0.52; with the derivative approximated as one, 0.53 and 0.81.
     assert!(worst[5] < 0.45 && worst[9] < 0.66, "{worst:?}");
 }

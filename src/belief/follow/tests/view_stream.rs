@@ -1,4 +1,4 @@
-//! From messages to views.
+//! Conversion of messages to views.
 
 use crate::batch::tests::data::titan;
 use crate::follow::tests::drifting::Dive;
@@ -9,8 +9,8 @@ use armcal_core::sensor::ArmSensors;
 use armcal_core::streams::{JointSensorSample, Message, TagDetection, TagDetections};
 use armcal_core::time::SIMULATION_EPOCH;
 
-/// Views of sensors that read the same for three seconds, while what the camera sees moves on by so many pixels an
-/// image.
+/// Returns views of sensors that read the same for three seconds, while the camera's images shift by `px_an_image`
+/// pixels each.
 fn views_at_rest(px_an_image: f64) -> Vec<View> {
     let robot = titan();
     let mut dive = Dive::new(&robot, 1);
@@ -39,7 +39,7 @@ fn views_at_rest(px_an_image: f64) -> Vec<View> {
     views
 }
 
-/// A joint whose sensor has failed may move on while all sensors read the same.
+/// A joint with a failed sensor may move while all sensors read the same.
 #[test]
 fn an_arm_whose_images_move_does_not_rest() {
     assert_eq!(views_at_rest(0.0).len(), 1);

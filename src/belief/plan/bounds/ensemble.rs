@@ -1,8 +1,7 @@
-//! Arms drawn from the belief: where the links may be when the sensors say where they are.
+//! Arms sampled from the belief: true link positions for given sensor readings.
 //!
-//! Quantiles of the links' displacement come from these arms by counting, with the exact kinematics: under the
-//! datasheet the errors are uniform and large, so that neither a normal distribution nor a linearization gives an
-//! honest 99 %.
+//! Quantiles of the links' displacement are counted over these arms with the exact kinematics. Under the datasheet the
+//! errors are uniform and large, so neither a normal distribution nor a linearization gives a valid 99 % quantile.
 
 use crate::plan::constants::bounds_ensemble::{BOUNDS_EASE, N_ARMS, N_PROPOSED};
 use nalgebra::{DVector, Point3};
@@ -17,25 +16,25 @@ use armcal_core::robot::{JointSensorSpec, Robot};
 use armcal_core::sensor::{ArmSensors, ConditionChange, Conditions};
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
-/// Arms as the belief allows them, each equally likely.
+/// Equally likely arms sampled from the belief.
 pub struct ArmEnsemble {
     sensors: ArmSensors,
     arms: Vec<Arm>,
-    /// What a row of `Arm::deviation` is.
+    /// Parameter of each row of `Arm::deviation`.
     parameters: Vec<Parameter>,
     n_joints: usize,
     departure: ConditionChange,
 }
 
-/// One arm's deviation from the believed one.
+/// Deviation of one sampled arm from the believed arm.
 struct Arm {
     deviation: DVector<f64>,
-    /// Of each joint, what no parameter describes, rad.
+    /// Error of each joint that no parameter describes, rad.
     residual_rad: [f64; MAX_JOINTS],
 }
 
 impl ArmEnsemble {
-    /// By the datasheet: gains and offsets anywhere within their bounds, every place equally likely.
+    /// Samples gains and offsets uniformly within their datasheet bounds.
     #[must_use]
     pub fn datasheet(robot: &Robot, rng: &mut ChaCha8Rng) -> Self {
         let joints = 0..robot.n_joints();
@@ -48,7 +47,7 @@ impl ArmEnsemble {
                 for (joint, spec) in robot.sensors.iter().enumerate() {
                     let gain = rng.random_range(-1.0..=1.0) * spec.gain_bound;
                     let offset_rad = rng.random_range(-1.0..=1.0) * spec.offset_bound_rad;
-                    // A reading r is made at the travel (r - o) / (1 + g).
+                    // A joint with reading r has the travel (r - o) / (1 + g).
                     deviation[2 * joint] = 1.0 / (1.0 + gain) - 1.0;
                     deviation[2 * joint + 1] = -offset_rad / (1.0 + gain);
                 }
@@ -63,8 +62,8 @@ impl ArmEnsemble {
         Self { sensors, arms, parameters, n_joints: robot.n_joints(), departure }
     }
 
-    /// By an estimate, under the conditions of now: by its covariance, within what the datasheet allows. Joints that it
-    /// did not determine are the datasheet's.
+    /// Samples arms from an estimate under the conditions `now`: from its covariance, within the datasheet's bounds.
+    /// Joints that the estimate did not determine are sampled from the datasheet.
     #[must_use]
     pub fn believed(robot: &Robot, calibration: &Calibration, now: &Conditions, rng: &mut ChaCha8Rng) -> Self {
         let robot = calibration.scaled_robot(robot);
@@ -79,7 +78,7 @@ impl ArmEnsemble {
             let spec = &robot.sensors[joint];
             let left_rad = covariance.residual_std_rad.map_or(spec.linearity_std_rad, |std_rad| std_rad[joint]);
             let has = |kind| covariance.parameters.contains(&Parameter { joint, kind });
-            // What changes with time and temperature, where the estimate has no term for it.
+            // Temperature and time effects for which the estimate has no term.
             let warmed_rad =
                 if has(ParameterKind::OffsetPerK) { 0.0 } else { spec.temperature_std_rad_per_k * departure.oil_k };
             let wandered_rad = spec.drift_std_rad_per_sqrt_h * departure.elapsed_h.abs().sqrt();
@@ -108,7 +107,7 @@ impl ArmEnsemble {
         Self { sensors, parameters, departure, ..ensemble }
     }
 
-    /// Where the drawn arms are when the sensors believed in say `believed`.
+    /// Returns the true angles of each sampled arm when its sensors read `believed`.
     pub fn arms<'a>(&'a self, believed: &'a JointAngles) -> impl Iterator<Item = JointAngles> + 'a {
         let travel: Vec<f64> =
             (0..self.n_joints).map(|j| self.sensors.models[j].travel_under_rad(believed[j], &self.departure)).collect();
@@ -126,8 +125,8 @@ impl ArmEnsemble {
         })
     }
 
-    /// Of the end of each link, from the first joint's on, the `quantile` of its distance from where it is believed to
-    /// be, m.
+    /// Returns the `quantile` of the distance between true and believed end of each link, m, from the first joint's
+    /// link on.
     #[must_use]
     pub fn link_displacement_quantiles_m(&self, robot: &Robot, believed: &JointAngles, quantile: f64) -> Vec<f64> {
         let there = link_ends(robot, &robot.chain.link_poses(believed));
@@ -142,10 +141,10 @@ impl ArmEnsemble {
     }
 }
 
-/// What the datasheet says of gains and offsets, where the estimate took a normal prior for it.
+/// Datasheet density of gains and offsets, which replaces the normal prior of the estimate.
 ///
-/// The estimate's density is the likelihood times that normal prior; what is believed is the likelihood times a uniform
-/// density within the datasheet's bounds. The two differ where the views have told little.
+/// The estimate's density is the likelihood times that normal prior. The belief is the likelihood times a uniform
+/// density within the datasheet's bounds. The two differ where the views determine little.
 struct Datasheet {
     joints: Vec<DatasheetJoint>,
 }
@@ -154,7 +153,7 @@ struct Datasheet {
 struct DatasheetJoint {
     gain_row: usize,
     offset_row: usize,
-    /// As estimated.
+    /// Estimated gain.
     gain: f64,
     offset_rad: f64,
     spec: JointSensorSpec,
@@ -176,7 +175,7 @@ impl Datasheet {
         Self { joints: joints.collect() }
     }
 
-    /// What is believed over what was drawn from, but for a factor.
+    /// Returns the importance weight, up to a factor: belief density over sampling density.
     fn weight(&self, deviation: &DVector<f64>) -> f64 {
         let mut exponent = 0.0;
         for joint in &self.joints {
@@ -194,8 +193,8 @@ impl Datasheet {
     }
 }
 
-/// Indices of `n` draws, each as often as its weight asks for (systematic resampling); all alike where no draw has any
-/// weight.
+/// Returns the indices of `n` draws, each as often as its weight requires (systematic resampling). If no draw has any
+/// weight, all draws are equally frequent.
 fn resampled(drawn: &[(DVector<f64>, f64)], n: usize) -> Vec<usize> {
     let total: f64 = drawn.iter().map(|(_, weight)| weight).sum();
     if !(total > 0.0 && total.is_finite()) {
@@ -214,7 +213,7 @@ fn resampled(drawn: &[(DVector<f64>, f64)], n: usize) -> Vec<usize> {
         .collect()
 }
 
-/// The ends of the links that joints move: the next joint's place, and the tool behind the last.
+/// Returns the end of each link that joints move: the next joint's origin, and the tool point after the last joint.
 #[must_use]
 pub fn link_ends(robot: &Robot, poses: &LinkPoses) -> Vec<Point3<f64>> {
     let n = robot.n_joints();
@@ -223,14 +222,14 @@ pub fn link_ends(robot: &Robot, poses: &LinkPoses) -> Vec<Point3<f64>> {
     ends
 }
 
-/// The value that a new draw exceeds with a probability of `1 - quantile`.
+/// Returns the value that a new draw exceeds with a probability of `1 - quantile`.
 fn order_statistic(values: &mut [f64], quantile: f64) -> f64 {
     let rank = (quantile * (values.len() + 1) as f64).ceil() as usize;
     let at = rank.clamp(1, values.len()) - 1;
     *values.select_nth_unstable_by(at, f64::total_cmp).1
 }
 
-/// Noise of the one reading that says where the joint is.
+/// Noise std of the one reading that locates the joint, rad.
 fn reading_std_rad(spec: &JointSensorSpec) -> f64 {
     spec.noise_std_counts / spec.counts_per_rad.abs()
 }
@@ -244,7 +243,7 @@ fn residual(rng: &mut ChaCha8Rng, std_rad: impl Fn(usize) -> f64, robot: &Robot)
     residual_rad
 }
 
-/// `L` with `L L^T = matrix`, eigenvalues that rounding made negative taken as zero; `None` where nothing was
+/// Returns `L` with `L L^T = matrix`, with eigenvalues that rounding made negative set to zero; `None` if nothing was
 /// determined.
 fn root_of(matrix: &nalgebra::DMatrix<f64>) -> Option<nalgebra::DMatrix<f64>> {
     if matrix.is_empty() || matrix.iter().any(|value| !value.is_finite()) {
@@ -271,7 +270,7 @@ mod tests {
         JointAngles::from_fn(robot.n_joints(), |j| rng.random_range(limits[j].lower_rad..=limits[j].upper_rad))
     }
 
-    /// Share of links, drawn arms and postures that are farther off than the quantile.
+    /// Returns the share of links, over sampled arms and configurations, whose displacement exceeds the quantile.
     fn share_beyond(robot: &Robot, ensemble: &ArmEnsemble, truth: &ArmEnsemble, rng: &mut ChaCha8Rng) -> f64 {
         let (mut links, mut beyond) = (0, 0);
         for _ in 0..POSTURES {
@@ -291,7 +290,7 @@ mod tests {
         beyond as f64 / links as f64
     }
 
-    /// Arms drawn anew, under the datasheet and under an estimate, are beyond the 99 % quantile in about 1 % of the
+    /// Newly sampled arms, under the datasheet and under an estimate, exceed the 99 % quantile in about 1 % of the
     /// cases.
     #[test]
     fn the_quantile_is_exceeded_as_often_as_it_says() {
@@ -314,8 +313,7 @@ mod tests {
         assert!((0.005..0.015).contains(&share), "estimates: {share} {shares:?}");
     }
 
-    /// Every arm of an estimate is within the bounds that planning keeps clear for, but for its reading's noise.
-    /// As after a first view that told nothing.
+    /// After a first view that determined nothing, the sampled arms are the datasheet's.
     #[test]
     fn an_estimate_that_determined_nothing_leaves_the_datasheets_arms() {
         let robot = titan();
@@ -330,6 +328,8 @@ mod tests {
         assert_eq!(arms(&believed), arms(&datasheet));
     }
 
+    /// Every arm of an estimate is within the bounds for which planning keeps clear, except for the noise of its
+    /// reading.
     #[test]
     fn bounds_hold_the_arms_that_the_estimate_allows() {
         let robot = titan();

@@ -1,11 +1,11 @@
-//! Error bounds from an estimate: how far its covariance lets each joint be off, as an envelope that is convex in the
+//! Error bounds from an estimate: the joint error that its covariance allows, as an envelope that is convex in the
 //! angle.
 //!
-//! Over the whole range the sigma `s(t)` of the joint's angle at travel t comes from the covariance of all of the
-//! joint's parameters (`s^2 = b(t)^T P b(t)`, b the derivative of the angle by them). Where a few views have told where
-//! the joint is at one angle and little of its gain, four sigma of a normal prior are far more than the datasheet's
-//! worst gain allows; there the bound is what the worst gain makes of the way from the angle that is known. The least
-//! `a + k |angle - pivot|` above the lesser of the two is the bound.
+//! Over the whole range the std `s(t)` of the joint's angle at travel t follows from the covariance of all of the
+//! joint's parameters: `s^2 = b(t)^T P b(t)`, with b the derivative of the angle by them. A few views may determine the
+//! joint at one angle, but hardly its gain. Then four sigma of a normal prior far exceed the error under the
+//! datasheet's worst gain. There the worst gain times the distance from the known angle limits it. The bound is the
+//! least `a + k |angle - pivot|` above the lesser of the two.
 
 use crate::file::calibration::Calibration;
 use crate::model::ParameterKind;
@@ -16,8 +16,8 @@ use armcal_core::robot::Robot;
 use armcal_core::sensor::{ArmSensors, ConditionChange, SensorModel};
 
 impl JointErrorBounds {
-    /// Of the sensors that `calibration` found, accepted or not; joints that it did not determine keep the datasheet's
-    /// bounds.
+    /// Returns the bounds of the sensors in `calibration`, accepted or not. Joints that it did not determine keep the
+    /// datasheet's bounds.
     ///
     /// `sensors` are the calibration's own.
     #[must_use]
@@ -25,7 +25,7 @@ impl JointErrorBounds {
         Self::by_covariance(robot, &calibration.parameter_covariance(robot), sensors)
     }
 
-    /// Of `sensors` that are known as well as `covariance` says.
+    /// Returns the bounds of `sensors` whose parameters have the covariance `covariance`.
     #[must_use]
     pub fn by_covariance(robot: &Robot, covariance: &ParameterCovariance, sensors: &ArmSensors) -> Self {
         let mut bounds = Self::datasheet(robot);
@@ -39,13 +39,13 @@ impl JointErrorBounds {
     }
 }
 
-/// One joint's sigma over its range.
+/// Std of one joint's angle over its range.
 struct AngleStd<'a> {
     model: &'a SensorModel,
     joint: usize,
     covariance: &'a ParameterCovariance,
     residual_std_rad: f64,
-    /// The farthest that the true gain may be from the estimated one, by the datasheet.
+    /// Largest difference of true and estimated gain that the datasheet allows.
     gain_reach: f64,
     linearity_std_rad: f64,
 }
@@ -58,7 +58,7 @@ impl<'a> AngleStd<'a> {
         let has_shape = kinds.any(|kind| matches!(kind, ParameterKind::Shape(_)));
         let own_residual_rad = covariance.residual_std_rad.map_or(spec.linearity_std_rad, |std_rad| std_rad[joint]);
         let residual_std_rad = if has_shape { own_residual_rad } else { own_residual_rad.max(spec.linearity_std_rad) };
-        // The reading's gain is 1 + g, the estimated one that of its inverse.
+        // The reading's gain is 1 + g, the estimated gain its inverse.
         let (gain, g) = (model.correction.gain, spec.gain_bound);
         let gain_reach = (gain - 1.0 / (1.0 + g)).abs().max((1.0 / (1.0 - g) - gain).abs());
         let linearity_std_rad = spec.linearity_std_rad;
@@ -70,7 +70,7 @@ impl<'a> AngleStd<'a> {
         self.covariance.angle_var_rad2(at, &ConditionChange::default(), self.residual_std_rad.powi(2)).sqrt()
     }
 
-    /// `None` where the covariance is none.
+    /// Returns `None` if the covariance is invalid.
     fn envelope(&self) -> Option<JointBound> {
         let half_range_rad = self.model.spec.half_range_rad;
         let travel = |k: usize| half_range_rad * (2.0 * k as f64 / (PLACES - 1) as f64 - 1.0);

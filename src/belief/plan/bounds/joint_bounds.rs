@@ -1,19 +1,19 @@
-//! How far each joint may truly be from where it is believed to be.
+//! Bounds on the difference of true and believed joint angles.
 
 use crate::plan::constants::bounds_joint_bounds::AGE_SIGMAS;
 use crate::plan::motion::tracking_error::TrackingErrorBound;
 use armcal_core::kinematics::JointLimits;
 use armcal_core::robot::{JointSensorSpec, Robot};
 
-/// Per joint, how far it may be off: least at one angle, and more by a slope on either side of it.
+/// Error bound of each joint: least at one angle, rising with a slope on either side of it.
 ///
-/// Convex in the angle, so that the largest error of a stretch is at one of its ends.
+/// The bound is convex in the angle, so that the largest error of a stretch is at one of its ends.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointErrorBounds {
     pub(crate) joints: Vec<JointBound>,
 }
 
-/// `at_pivot_rad + slope |angle - pivot_rad|`.
+/// Error bound of one joint: `at_pivot_rad + slope |angle - pivot_rad|`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct JointBound {
     pub pivot_rad: f64,
@@ -34,51 +34,51 @@ impl JointBound {
     }
 }
 
-/// What has passed since some bounds held.
+/// Time and temperature change since some bounds held.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Elapsed {
-    /// Time since then; less than 0 counts as 0.
+    /// Time since then, s; less than 0 counts as 0.
     pub seconds: f64,
     /// Change of the oil's temperature, K.
     pub warmed_k: f64,
 }
 
-/// A joint whose sensor's scale nobody knows, at a pose that is known otherwise (a mechanical rest).
+/// A joint with an unknown sensor scale at a pose that is otherwise known (a mechanical rest).
 #[derive(Clone, Copy, Debug)]
 pub struct UnknownScale {
     /// Index of the joint, base first.
     pub joint: usize,
-    /// Where it rests, rad.
+    /// Rest angle of the joint, rad.
     pub rest_rad: f64,
-    /// It turns at most this many times as far as believed, either way round.
+    /// Largest ratio of true to believed motion, in either direction.
     pub gain_max: f64,
 }
 
 impl JointErrorBounds {
-    /// The datasheet's worst case.
+    /// Returns the datasheet's worst case.
     #[must_use]
     pub fn datasheet(robot: &Robot) -> Self {
         Self { joints: robot.sensors.iter().map(JointBound::datasheet).collect() }
     }
 
-    /// The believed arm and no other: what a plan without any margin for wrong sensors keeps clear for.
+    /// Returns zero bounds: only the believed arm, without any margin for wrong sensors.
     #[must_use]
     pub fn none(robot: &Robot) -> Self {
         let nothing = |spec: &JointSensorSpec| JointBound { pivot_rad: spec.center_rad, at_pivot_rad: 0.0, slope: 0.0 };
         Self { joints: robot.sensors.iter().map(nothing).collect() }
     }
 
-    /// The same for all joints, about the middles of their ranges.
+    /// Returns equal bounds for all joints, each with its pivot at mid-range.
     #[cfg(test)]
     pub(crate) fn alike(robot: &Robot, at_pivot_rad: f64, slope: f64) -> Self {
         let bound = |spec: &JointSensorSpec| JointBound { pivot_rad: spec.center_rad, at_pivot_rad, slope };
         Self { joints: robot.sensors.iter().map(bound).collect() }
     }
 
-    /// The datasheet's bounds, but for one joint that is believed to rest where it does and moves no one knows how far.
+    /// Returns the datasheet's bounds, except for one joint with a known rest angle and an unknown scale.
     ///
-    /// A believed step `d` from the rest is a true one of `-gain_max d .. gain_max d`, so the error is at most
-    /// `(gain_max + 1) |d|` and the rest's own.
+    /// For a believed step `d` from the rest, the true step is between `-gain_max d` and `gain_max d`. So the error is
+    /// at most `(gain_max + 1) |d|` plus the error at rest.
     #[must_use]
     pub fn with_unknown_scale(robot: &Robot, unknown: &UnknownScale) -> Self {
         let mut bounds = Self::datasheet(robot);
@@ -90,7 +90,7 @@ impl JointErrorBounds {
         bounds
     }
 
-    /// These bounds some time after they held: offsets change with the oil's temperature and walk with time.
+    /// Returns these bounds some time after they held: offsets change with the oil's temperature and drift with time.
     #[must_use]
     pub fn widened(&self, robot: &Robot, age: Elapsed) -> Self {
         let mut bounds = self.clone();
@@ -98,31 +98,31 @@ impl JointErrorBounds {
             let by_temperature_rad = spec.temperature_std_rad_per_k * age.warmed_k;
             let by_time_rad = spec.drift_std_rad_per_sqrt_h * (age.seconds.max(0.0) / 3600.0).sqrt();
             let aged_rad = bound.at_pivot_rad + AGE_SIGMAS * by_temperature_rad.hypot(by_time_rad);
-            // The datasheet's worst case has all of it, unless these bounds were beyond it already.
+            // The datasheet's worst case includes all of it, unless these bounds already exceeded the worst case.
             bound.at_pivot_rad = aged_rad.min(JointBound::datasheet(spec).at_pivot_rad.max(bound.at_pivot_rad));
         }
         bounds
     }
 
-    /// A joint that stands within `bound_rad` of `angle_rad`, whatever its sensor says.
+    /// Sets the bound of a joint that stands within `bound_rad` of `angle_rad`, regardless of its sensor.
     pub fn hold(&mut self, joint: usize, angle_rad: f64, bound_rad: f64) {
         self.joints[joint] = JointBound { pivot_rad: angle_rad, at_pivot_rad: bound_rad, slope: 0.0 };
     }
 
-    /// Largest distance of the true angle of `joint` from `believed_rad`, rad.
+    /// Returns the largest distance of the true angle of `joint` from `believed_rad`, rad.
     #[must_use]
     pub fn error_rad(&self, joint: usize, believed_rad: f64) -> f64 {
         self.joints[joint].error_rad(believed_rad)
     }
 
-    /// How much that changes with the believed angle at most, rad/rad.
+    /// Returns the largest change of that error per change of the believed angle, rad/rad.
     pub(crate) fn slope(&self, joint: usize) -> f64 {
         self.joints[joint].slope
     }
 
-    /// The drawing's limits less the error there and what an arm overshoots that comes slowly: believed angles that no
-    /// arm within the bounds drives into a stop. A joint that may be off by more than its range leaves none: it stays
-    /// at the one farthest from both stops.
+    /// Returns the nominal limits less the error there and the overshoot of an arm that arrives slowly. At these
+    /// believed angles no arm within the bounds is driven into a stop. A joint whose error may exceed its range gets a
+    /// single angle, the one farthest from both stops.
     #[must_use]
     pub fn safe_limits(&self, robot: &Robot) -> Vec<JointLimits> {
         let arriving = TrackingErrorBound::arriving(robot);
@@ -143,7 +143,7 @@ impl JointErrorBounds {
     }
 }
 
-/// Their middle where they leave no angle.
+/// Returns the limits, or their middle if no angle lies between them.
 fn uncrossed(limits: JointLimits) -> JointLimits {
     if limits.lower_rad <= limits.upper_rad {
         return limits;
@@ -180,7 +180,7 @@ mod tests {
         assert!((worst - robot.sensors[0].offset_bound_rad / 0.95).abs() < 1e-9, "{worst}");
     }
 
-    /// Targets are looked for between these limits, and a random angle between crossed ones is none.
+    /// Targets are searched between these limits, and no random angle can be drawn between crossed ones.
     #[test]
     fn a_joint_that_may_be_off_by_more_than_its_range_has_one_angle_left() {
         let robot = titan();
@@ -194,7 +194,7 @@ mod tests {
         assert_eq!((limits[0].lower_rad, limits[0].upper_rad), (usual[0].lower_rad, usual[0].upper_rad));
     }
 
-    /// Every true scale up to the largest, either way round, keeps the joint within the bound.
+    /// Every true scale up to the largest, in either direction, keeps the joint within the bound.
     #[test]
     fn an_unknown_scale_is_bounded_by_the_farthest_that_the_joint_may_turn() {
         let robot = titan();

@@ -1,7 +1,7 @@
 //! Joint error bounds: the largest difference of true and believed joint angles.
 //!
 //! `joint_bounds`: from the datasheet, or from the covariance of an estimate (`estimate_bounds`); `ensemble`: arms
-//! drawn from the belief.
+//! sampled from the belief.
 
 pub(crate) mod ensemble;
 mod estimate_bounds;

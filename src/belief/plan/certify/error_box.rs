@@ -1,4 +1,4 @@
-//! Halves the joint errors where halving the edge does not help: one pair at a time, depth first.
+//! Halving of the joint errors where halving the edge does not help: one pair at a time, depth first.
 
 use crate::plan::certify::motion_bound::{ArmRegion, Split, Trend};
 use crate::plan::certify::sweep::{FINEST_M, Finding, OpenPair, Search, Sweep};
@@ -6,7 +6,7 @@ use crate::plan::clearance::pair::Pair;
 use crate::plan::constants::certify_error_box::MAX_REGIONS;
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
-/// A stretch of the edge, by shares of the way, and a box of errors.
+/// A stretch of the edge, as shares of its length, and a box of errors.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Region {
     along: [f64; 2],
@@ -14,7 +14,7 @@ pub(crate) struct Region {
 }
 
 impl Search<'_> {
-    /// Looks at one pair until every part of the stretch and of the errors on it is certified.
+    /// Tests one pair until every part of the stretch and of the errors on it is certified.
     pub(crate) fn search_pair(&mut self, open: &OpenPair, along: [f64; 2]) -> Option<(Pair, f64)> {
         let (sweep, model) = (self.sweep, self.sweep.model);
         let pair = model.pair(open.pair);
@@ -42,7 +42,7 @@ impl Search<'_> {
                 }
             }
         }
-        // Too many regions: what is left may be too near.
+        // Too many regions: the remaining ones may be too near.
         Some((pair, 0.0))
     }
 
@@ -56,7 +56,7 @@ impl Search<'_> {
 }
 
 impl Sweep<'_> {
-    /// Errors of a stretch: the largest on it, within those of the region it comes from.
+    /// Returns the errors of a stretch: the largest on it, within those of the enclosing region.
     pub(crate) fn region(&self, along: [f64; 2], within: Option<&Region>) -> Region {
         let mut error_rad = [[0.0; 2]; MAX_JOINTS];
         for (joint, error) in error_rad.iter_mut().enumerate().filter(|(joint, _)| self.model.has_error(*joint)) {
@@ -64,7 +64,7 @@ impl Sweep<'_> {
             let [low, high] = within.map_or([-most, most], |region| region.error_rad[joint]);
             *error = [low.max(-most), high.min(most)];
             if error[0] > error[1] {
-                // Nothing of this part of the errors is left on this stretch; a point of it keeps the region simple.
+                // The stretch has no error within this part; a point of it keeps the region simple.
                 *error = [error[0].min(most).max(-most); 2];
             }
         }
@@ -108,7 +108,7 @@ impl Sweep<'_> {
         }
     }
 
-    /// The distance at the corner of the region that the first order says is worst, if that is too near.
+    /// Returns the distance at the worst corner of the region, by the first order, if that is too near.
     pub(crate) fn worst_corner(&self, open: &OpenPair, region: &Region, trend: &Trend) -> Option<f64> {
         let share = if trend.along_m > 0.0 { region.along[0] } else { region.along[1] };
         let angles = JointAngles::from_fn(self.from.len(), |joint| {

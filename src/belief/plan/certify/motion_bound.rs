@@ -1,4 +1,4 @@
-//! The middle of a region of arms, and how far the joints can move the shapes within it.
+//! The middle of a region of arms, and bounds on the shapes' motion within the region.
 
 use parry3d::math::{Pose3, Vec3};
 
@@ -10,67 +10,69 @@ use armcal_core::kinematics::LinkPoses;
 use armcal_core::robot::parry_pose;
 use armcal_core::streams::MAX_JOINTS;
 
-/// The middle of a region and how far it reaches to either side.
+/// The middle of a region and its extent to either side.
 pub(crate) struct ArmRegion {
     base_from_body: [Pose3; MAX_JOINTS + 1],
     axes: [Vec3; MAX_JOINTS],
     origins: [Vec3; MAX_JOINTS],
     error_half_rad: [f64; MAX_JOINTS],
-    /// Half of the stretch, with its sign, and half of the errors together.
+    /// Half of the stretch, as an absolute value, plus half of the errors, rad.
     reach_rad: [f64; MAX_JOINTS],
-    /// Of the joints before.
+    /// Sum of `reach_rad` over the joints before each body.
     reach_before_rad: [f64; MAX_JOINTS + 1],
-    /// How half of the stretch moves each body, to first order: a point p by `push + turn x p`.
+    /// Motion of each body over half of the stretch, to first order: a point p moves by `push + turn x p`.
     turn: [Vec3; MAX_JOINTS + 1],
     push: [Vec3; MAX_JOINTS + 1],
     step_rad: [f64; MAX_JOINTS],
-    /// Whether the middle is itself an arm within the bounds.
+    /// True if the middle is itself an arm within the bounds.
     pub is_within: bool,
 }
 
-/// A moving shape at the middle of a region, and what bounds its motion within.
+/// A moving shape at the middle of a region, and bounds on its motion within the region.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct ShapeMotion {
     pub placed: Placed,
-    /// For each joint that moves it, a bound on its distance from that joint's axis over the region, m.
+    /// Upper bound on the shape's distance from the axis of each joint that moves it over the region, m.
     levers_m: [f64; MAX_JOINTS],
-    /// By the joints from this one on: the sum of lever times reach.
+    /// Sum of lever times reach over the joints from each joint on, m.
     coarse_m: [f64; MAX_JOINTS + 1],
-    /// The same with each term times half of its reach and that of all joints before.
+    /// Sum of lever times reach, each term times half of its reach and the reach of all joints before, m.
     bent_m: [f64; MAX_JOINTS + 1],
-    /// Of the stretch alone: no point of the shape goes farther from where it is in the middle.
+    /// Largest displacement of any point of the shape from its middle position over the stretch alone, m.
     pub stretch_m: f64,
-    /// What the vehicle's motion may take from its distance to what the world holds: at the middle, and at most.
+    /// Largest loss of distance to world-fixed shapes by the vehicle's motion, m: at the middle of the region, and
+    /// anywhere in it (`most_sway_m`).
     pub station_bound_m: f64,
     pub most_sway_m: f64,
 }
 
-/// Which halves to make of a region.
+/// The direction in which a region is halved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Split {
     Along,
     Error(usize),
 }
 
-/// The most that the joints move one shape against another within a region.
+/// Largest displacement of one shape against another by the joints within a region.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct MotionBound {
     pub total_m: f64,
-    /// To first order alone.
+    /// First-order part, m.
     pub first_m: f64,
 }
 
-/// To first order, where a region brings a pair nearest, and which joint has most to do with it.
+/// First-order direction in which a region brings a pair nearer, and the joint with the largest share in it.
 pub(crate) struct Trend {
-    /// Half of the stretch moves the pair apart by this.
+    /// Distance by which half of the stretch moves the pair apart, m.
     pub along_m: f64,
-    /// Half of each joint's errors moves it apart by this.
+    /// Distance by which half of each joint's errors moves the pair apart, m.
     pub error_m: [f64; MAX_JOINTS],
     pub split: Split,
 }
 
 impl ShapeMotion {
-    /// The most that the joints from `first_joint` on can move any point of the shape, m (Schwarzer, Saha and Latombe).
+    /// Returns the largest displacement of any point of the shape by the joints from `first_joint` on, m (Schwarzer,
+    /// Saha and Latombe).
     pub(crate) fn coarse_m(&self, first_joint: usize) -> f64 {
         self.coarse_m[first_joint]
     }
@@ -108,7 +110,7 @@ impl ArmRegion {
         region
     }
 
-    /// Puts a moving shape where it is and bounds its motion.
+    /// Places a moving shape and bounds its motion.
     pub(crate) fn place(&self, model: &ClearanceModel<'_>, shape: usize, moved: &mut ShapeMotion) {
         let body = model.body(shape);
         moved.placed = model.placed_on(shape, &self.base_from_body[body]);
@@ -132,11 +134,11 @@ impl ArmRegion {
         moved.most_sway_m = moved.station_bound_m + model.sway_growth(beyond_m);
     }
 
-    /// The most that the outer shape moves against `direction` within the region.
+    /// Returns the largest displacement of the outer shape against `direction` within the region.
     pub(crate) fn drift(&self, between: BodyPair, moved: &ShapeMotion, direction: Vec3) -> MotionBound {
         let BodyPair { first_joint, outer_body } = between;
         let coarse_m = moved.coarse_m[first_joint];
-        // Without a direction there is no first order.
+        // A zero direction has no first-order motion.
         if direction == Vec3::ZERO {
             return MotionBound { total_m: coarse_m, first_m: coarse_m };
         }
@@ -160,7 +162,7 @@ impl ArmRegion {
         MotionBound { total_m: f64::min(coarse_m, first_m + second_m), first_m }
     }
 
-    /// Where the region brings the pair nearest, and how to halve it.
+    /// Returns the first-order motion of the pair within the region, and how to halve the region.
     pub(crate) fn trend(&self, between: BodyPair, moved: &ShapeMotion, direction: Vec3) -> Trend {
         let placed = &moved.placed;
         let mut trend = Trend { along_m: 0.0, error_m: [0.0; MAX_JOINTS], split: Split::Along };

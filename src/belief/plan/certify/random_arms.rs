@@ -1,5 +1,5 @@
-//! Drawn arms of 4 to 8 joints, with joints without stops anywhere: what is certified holds for every arm within the
-//! bounds, whichever joint errs.
+//! Randomly drawn arms of 4 to 8 joints, with joints without stops anywhere: a certificate holds for every arm within
+//! the bounds, regardless of which joint errs.
 
 use std::fmt::Write as _;
 
@@ -19,7 +19,7 @@ const MARGIN_M: f64 = 0.03;
 const ROUNDING_M: f64 = 1e-9;
 const N_JOINTS: [usize; 4] = [4, 6, 7, 8];
 
-/// A box or a cylinder along most of the link, beside its axis.
+/// Returns a box or a cylinder along most of the link, off its axis.
 fn drawn_link(number: usize, length_m: f64, rng: &mut ChaCha8Rng) -> String {
     let (radius_m, beside_m): (f64, f64) = (rng.random_range(0.02..0.05), rng.random_range(-0.05..0.05));
     let shape = if rng.random_range(0.0..1.0) < 0.5 {
@@ -35,8 +35,8 @@ fn drawn_link(number: usize, length_m: f64, rng: &mut ChaCha8Rng) -> String {
     )
 }
 
-/// A serial arm with one joint without stops for certain (the first, a middle or the last one, by its number), and
-/// others by chance.
+/// Returns a serial arm. One joint (the first, a middle or the last one, by the arm's number) has no stops, and others
+/// may have none.
 fn drawn_arm(number: usize, rng: &mut ChaCha8Rng) -> Robot {
     let n = N_JOINTS[number % N_JOINTS.len()];
     let turns = [0, n / 2, n - 1][number / N_JOINTS.len() % 3];
@@ -94,7 +94,7 @@ fn drawn_arm(number: usize, rng: &mut ChaCha8Rng) -> Robot {
     load(folder.path()).expect("the drawn robot reads")
 }
 
-/// A deck under the arm, a post and a panel somewhere beside it.
+/// Returns a vehicle with a deck under the arm, and a post and a panel next to it at random positions.
 fn drawn_vehicle(rng: &mut ChaCha8Rng) -> Vehicle {
     let root = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
     let mut vehicle = load_vehicle(&root.join("robots/vehicles/work-class-front.toml")).expect("the vehicle reads");
@@ -114,7 +114,7 @@ fn drawn_pose(robot: &Robot, bounds: &JointErrorBounds, rng: &mut ChaCha8Rng) ->
     JointAngles::from_fn(robot.n_joints(), |j| rng.random_range(limits[j].lower_rad..=limits[j].upper_rad))
 }
 
-/// The least clearance that 150 arms of the box of errors have, every joint erring.
+/// Returns the least clearance of 150 arms in the error box, with errors in every joint.
 fn brute_m(clearance: &ClearanceModel<'_>, at: &JointAngles, bounds: &JointErrorBounds, rng: &mut ChaCha8Rng) -> f64 {
     let arms = (0..150).map(|_| some_arm(at, bounds, |_| true, rng));
     arms.map(|arm| clearance.nearest(&arm).distance_m).fold(clearance.nearest(at).distance_m, f64::min)
@@ -132,7 +132,7 @@ fn certificates_of_drawn_arms_hold_for_every_joints_error() {
         let mut clear = Vec::new();
         for _ in 0..400 {
             let at = drawn_pose(&robot, &bounds, &mut rng);
-            // Far from everything any proof holds.
+            // Far from all shapes any certificate holds.
             let is_near = clear.len() < 8 && clearance.nearest(&at).distance_m < 0.25;
             if is_near && clearance.find_violation(&at, &bounds, MARGIN_M).is_none() {
                 clear.push(at);

@@ -1,10 +1,10 @@
-//! Proves that every arm within the joint errors keeps clear, at one pose or along an edge.
+//! Certifies that every arm within the joint errors keeps clear, at one pose or along an edge.
 //!
-//! A pair of convex shapes with `gap` between their shadows on a direction keeps the distance `gap - drift`, where
-//! `drift` bounds what the joints can move the one against the other along that direction: exact to first order in the
-//! joints' motion, with a bound on the second. A region of arms (a stretch of the edge times a box of joint errors)
-//! whose pairs do not all pass is halved, and the halves have only those pairs to look at. Stretches are looked at from
-//! the coarse to the fine, over the whole edge, so that an arm that is too near ends the search early.
+//! A pair of convex shapes with `gap` between their shadows on a direction keeps the distance `gap - drift`. `drift`
+//! bounds the relative motion that the joints cause along that direction: exact to first order in the joints' motion,
+//! with a bound on the second. A region of arms is a stretch of the edge times a box of joint errors. A region whose
+//! pairs do not all pass is halved, and its halves test only those pairs. Stretches are tested from coarse to fine,
+//! over the whole edge, so that an arm that is too near ends the search early.
 
 use crate::plan::bounds::joint_bounds::JointErrorBounds;
 use crate::plan::clearance::pair::Pair;
@@ -18,56 +18,56 @@ use armcal_core::streams::{JointAngles, MAX_JOINTS};
 use crate::plan::certify::motion_bound::{ArmRegion, MotionBound, ShapeMotion, Split};
 use parry3d::math::Vec3;
 
-/// Believed angles on a straight line and all that the errors may make of them.
+/// Believed angles on a straight line, and all errors that the bounds allow around them.
 pub(crate) struct Sweep<'a> {
     pub model: &'a ClearanceModel<'a>,
     pub from: JointAngles,
     pub to: JointAngles,
-    /// `None`: the believed arm alone.
+    /// Joint error bounds; `None`: only the believed arm.
     pub bounds: Option<&'a JointErrorBounds>,
-    /// How far the arm leaves the line on top of that.
+    /// Bound on the deviation of the arm from the line, in addition to the joint errors.
     pub tracking_error: TrackingErrorBound,
-    /// Free water to keep, m.
+    /// Clearance to keep, m.
     pub margin_m: f64,
 }
 
-/// What a sweep found.
+/// Result of a sweep.
 pub(crate) struct Certificate {
-    /// The pair that some arm brings, or may bring, too near; the distance is in the terms of the margin. `None` proves
+    /// The pair that some arm brings, or may bring, too near, with the distance as the margin counts it. `None` proves
     /// that there is none.
     pub violation: Option<(Pair, f64)>,
-    /// Regions that were looked at: what it cost.
+    /// Number of tested regions, a measure of cost.
     pub n_regions: usize,
 }
 
-/// A pair that is not proven clear yet, by its number.
+/// A pair that is not certified yet, by its index.
 #[derive(Clone, Copy)]
 pub(crate) struct OpenPair {
     pub(crate) pair: usize,
-    /// That served the larger region best, or zero.
+    /// Direction that served the enclosing region best, or zero.
     pub(crate) direction: Vec3,
     pub(crate) lacking_m: f64,
     pub(crate) drift: MotionBound,
-    /// Whether the direction is that of the closest points.
+    /// True if the direction is that of the closest points.
     pub(crate) is_exact: bool,
 }
 
-/// A stretch of the edge, by shares of the way, and which open pairs it has to look at.
+/// A stretch of the edge, as shares of its length, and the open pairs to test on it.
 #[derive(Clone, Copy)]
 pub(crate) struct EdgeInterval {
     along: [f64; 2],
     open: [usize; 2],
 }
 
-/// What is known of a pair in a region.
+/// Result for one pair in a region.
 pub(crate) enum Finding {
     Clear,
-    /// An arm within the bounds; the distance is in the terms of the margin.
+    /// An arm within the bounds is too near; the distance is as the margin counts it.
     TooNear(f64),
     Open(OpenPair),
 }
 
-/// All that a search remembers.
+/// State of a search.
 pub(crate) struct Search<'a> {
     pub(crate) sweep: &'a Sweep<'a>,
     pub(crate) moved: Vec<ShapeMotion>,
@@ -77,20 +77,20 @@ pub(crate) struct Search<'a> {
 }
 
 impl OpenPair {
-    /// The same with what the joints can take from its distance; `None` where that leaves enough.
+    /// Returns the pair with the distance that the joints can take from it; `None` if enough is left.
     pub(crate) fn drifting(self, drift: MotionBound) -> Option<Self> {
         let lacking_m = self.lacking_m + drift.total_m;
         (lacking_m > 0.0).then_some(Self { lacking_m, drift, ..self })
     }
 
-    /// Whether an arm at a corner of the region is too near, as far as the first order says.
+    /// True if, to first order, an arm at a corner of the region is too near.
     pub(crate) fn has_near_corner(&self) -> bool {
         self.lacking_m - self.drift.total_m + self.drift.first_m > 0.0
     }
 }
 
 impl Sweep<'_> {
-    /// Looks for an arm that is too near.
+    /// Searches for an arm that is too near.
     pub(crate) fn verdict(&self) -> Certificate {
         let mut search = Search {
             sweep: self,
@@ -103,7 +103,7 @@ impl Sweep<'_> {
         Certificate { violation: too_near, n_regions: search.n_regions }
     }
 
-    /// The same, named.
+    /// Returns the violation with the names of its pair.
     pub(crate) fn first_too_near(&self) -> Option<ClosestPair> {
         self.verdict().violation.map(|(pair, distance_m)| self.model.named(pair, distance_m))
     }
@@ -112,16 +112,16 @@ impl Sweep<'_> {
         self.from[joint] + share * (self.to[joint] - self.from[joint])
     }
 
-    /// The most that a joint may be off on a stretch of the way, rad. The sensor's error is convex in the angle, so
-    /// that it is largest at an end.
+    /// Returns the largest error of a joint on a stretch of the edge, rad. The sensor's error is convex in the angle,
+    /// so that it is largest at an end.
     pub(crate) fn error_rad(&self, joint: usize, along: [f64; 2]) -> f64 {
         let Some(bounds) = self.bounds else { return 0.0 };
         let [begin, end] = along.map(|share| bounds.error_rad(joint, self.believed(joint, share)));
-        // Where the joint strays to, its sensor may err by more.
+        // The sensor's error may be larger at the angle to which the joint strays.
         f64::max(begin, end) + (1.0 + bounds.slope(joint)) * self.tracking_error.most_rad(joint, along)
     }
 
-    /// The middle of a stretch with all errors on it.
+    /// Returns the middle of a stretch with all errors on it.
     pub(crate) fn stretch_spot(&self, along: [f64; 2]) -> ArmRegion {
         let (middle, half) = (0.5 * (along[0] + along[1]), 0.5 * (along[1] - along[0]));
         let [mut step_rad, mut error_half_rad] = [[0.0; MAX_JOINTS]; 2];
@@ -138,20 +138,20 @@ impl Sweep<'_> {
         ArmRegion::new(&self.model.link_poses(&angles), angles.len(), step_rad, error_half_rad)
     }
 
-    /// What is known of one pair where the shapes are placed for a region.
+    /// Tests one pair, with its shapes placed for a region.
     pub(crate) fn test_pair(&self, open: &OpenPair, spot: &ArmRegion, moved: &[ShapeMotion]) -> Finding {
         let pair = self.model.pair(open.pair);
         let outer = &moved[pair.outer()];
         let other = self.model.other_at(pair, |inner| &moved[inner].placed);
         let between = self.model.between(pair);
         let (here_m, needed_m) = self.needed_m(pair, outer);
-        // The shapes' boxes alone may be farther apart than anything in the region can bring them.
+        // The distance between the shapes' boxes may already exceed any motion in the region.
         let apart_m = gap_m(&outer.placed.bounds, &other.bounds);
         if apart_m - outer.coarse_m(between.first_joint) >= needed_m {
             return Finding::Clear;
         }
         if apart_m >= here_m && outer.stretch_m > LONG_STRETCH_M {
-            // It will be halved whatever the first order says.
+            // The stretch will be halved regardless of the first order.
             let drift_m = outer.coarse_m(between.first_joint);
             let drift = MotionBound { total_m: drift_m, first_m: 0.0 };
             return Finding::Open(OpenPair { lacking_m: needed_m - apart_m + drift_m, drift, is_exact: true, ..*open });
@@ -183,8 +183,7 @@ impl Sweep<'_> {
         open.drifting(spot.drift(between, outer, direction)).map_or(Finding::Clear, Finding::Open)
     }
 
-    /// The same of a pair that is open and not too near, along the direction of its closest points; `None`: it is
-    /// clear.
+    /// Tests an open pair that is not too near again, along the direction of its closest points; `None`: it is clear.
     pub(crate) fn test_pair_exact(&self, open: &OpenPair, spot: &ArmRegion, moved: &[ShapeMotion]) -> Option<OpenPair> {
         let pair = self.model.pair(open.pair);
         let (outer, other) = (&moved[pair.outer()], self.model.other_at(pair, |inner| &moved[inner].placed));
@@ -194,7 +193,7 @@ impl Sweep<'_> {
         open.drifting(spot.drift(self.model.between(pair), outer, found.direction))
     }
 
-    /// The true distance that keeps the margin: at the middle of a region, and anywhere in it.
+    /// Returns the true distance that keeps the margin: at the middle of a region, and anywhere in it.
     pub(crate) fn needed_m(&self, pair: Pair, outer: &ShapeMotion) -> (f64, f64) {
         let needed_m = self.model.needed_m(pair, self.margin_m);
         if self.model.sways(pair) {
@@ -204,7 +203,7 @@ impl Sweep<'_> {
         }
     }
 
-    /// What is left of a pair's distance in the region at least, in the terms of the margin.
+    /// Returns the least distance of a pair in the region, as the margin counts it.
     pub(crate) fn least_m(&self, open: &OpenPair, outer: &ShapeMotion) -> (Pair, f64) {
         let pair = self.model.pair(open.pair);
         let (_, needed_m) = self.needed_m(pair, outer);
@@ -231,7 +230,7 @@ impl Search<'_> {
         self.open.extend((0..model.pairs().len()).filter(may_be).map(all));
         self.stretches
             .push(EdgeInterval { along: if is_edge { [0.0, 1.0] } else { [0.0; 2] }, open: [0, self.open.len()] });
-        // Pairs whose errors have to be split, with their stretch.
+        // Open pairs whose errors must be split, with their stretch.
         let mut with_errors: Vec<([f64; 2], OpenPair)> = Vec::new();
         let mut next = 0;
         while let Some(stretch) = self.next_stretch(&mut next) {
@@ -265,7 +264,7 @@ impl Search<'_> {
                 self.open.truncate(kept);
             }
         }
-        // The likeliest to fail first.
+        // The pair most likely to fail comes first.
         with_errors.sort_by(|a, b| b.1.lacking_m.total_cmp(&a.1.lacking_m));
         with_errors.into_iter().find_map(|(along, open)| self.search_pair(&open, along))
     }
@@ -279,7 +278,7 @@ impl Search<'_> {
         stretch
     }
 
-    /// An arm at one place of the edge that is too near, if it is so exactly there.
+    /// Returns a pair that is too near for the believed arm at one point of the edge, if any.
     pub(crate) fn probe(&mut self, share: f64) -> Option<(Pair, f64)> {
         let model = self.sweep.model;
         let angles = JointAngles::from_fn(self.sweep.from.len(), |joint| self.sweep.believed(joint, share));
@@ -306,7 +305,7 @@ impl Search<'_> {
         })
     }
 
-    /// Puts the shapes that a stretch has to look at where they are at its middle.
+    /// Places the shapes that a stretch tests at its middle.
     pub(crate) fn place(&mut self, along: [f64; 2], stretch: &EdgeInterval) -> ArmRegion {
         let spot = self.sweep.stretch_spot(along);
         let model = self.sweep.model;
@@ -321,7 +320,7 @@ impl Search<'_> {
         spot
     }
 
-    /// The open pair that lacks most, if any is open still along its own best direction.
+    /// Returns the open pair that lacks most distance, unless its own best direction clears every one.
     pub(crate) fn worst(&mut self, kept: usize, spot: &ArmRegion) -> Option<OpenPair> {
         loop {
             let lacking = |k: &usize| self.open[*k].lacking_m;
@@ -341,7 +340,7 @@ impl Search<'_> {
         }
     }
 
-    /// Looks at the pairs of a stretch; those that stay open are put behind all others, from where it says.
+    /// Tests the pairs of a stretch. Those that stay open are appended from the returned index on.
     pub(crate) fn sift(&mut self, stretch: &EdgeInterval, spot: &ArmRegion) -> Result<usize, (Pair, f64)> {
         let kept = self.open.len();
         for k in stretch.open[0]..stretch.open[1] {

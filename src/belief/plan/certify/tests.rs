@@ -1,4 +1,4 @@
-//! Against brute force: what is certified keeps clear wherever in the error box one looks.
+//! Comparison with brute force: certified configurations keep clear at every sampled point of the error box.
 
 use std::path::Path;
 
@@ -36,7 +36,7 @@ fn random_angles(robot: &Robot, bounds: &JointErrorBounds, rng: &mut ChaCha8Rng)
     JointAngles::from_fn(robot.n_joints(), |j| rng.random_range(limits[j].lower_rad..=limits[j].upper_rad))
 }
 
-/// The datasheet's bounds, and those after three calibrations: none of the joints, all but one, all.
+/// Returns the datasheet's bounds, and those after three calibrations: of no joint, of all but one, of all.
 fn several_bounds(robot: &Robot) -> Vec<JointErrorBounds> {
     let prior = JointErrorBounds::datasheet(robot);
     let all = JointErrorBounds::alike(robot, 0.014, 0.004);
@@ -45,7 +45,7 @@ fn several_bounds(robot: &Robot) -> Vec<JointErrorBounds> {
     vec![prior, all_but_one, all]
 }
 
-/// Any arm within the bounds; only the joints of `errs` may be off.
+/// Returns any arm within the bounds; only the joints selected by `errs` have errors.
 pub(super) fn some_arm(
     at: &JointAngles,
     bounds: &JointErrorBounds,
@@ -66,7 +66,7 @@ pub(super) fn some_arm(
     })
 }
 
-/// The least clearance that 2^5 corners, the middle and 60 more arms find.
+/// Returns the least clearance over 2^5 corners, the middle and 60 more arms.
 fn brute_m(clearance: &ClearanceModel<'_>, at: &JointAngles, bounds: &JointErrorBounds, rng: &mut ChaCha8Rng) -> f64 {
     let corner = |corner: usize| {
         JointAngles::from_fn(at.len(), |joint| {
@@ -98,7 +98,7 @@ fn a_certified_pose_is_clear_for_every_arm_and_few_clear_ones_are_refused() {
         }
         eprintln!("{clear} clear by brute force, {certified} certified");
         assert!(certified > 40, "{certified}");
-        // Brute force sees corners and some of the inside only; part of these few are truly too near.
+        // Brute force samples only corners and part of the inside; some of these few arms are truly too near.
         assert!(f64::from(clear - certified) < 0.06 * f64::from(clear), "{certified} of {clear}");
     }
 }
@@ -159,7 +159,7 @@ fn what_is_refused_has_a_name_and_a_distance_below_the_margin() {
     }
 }
 
-/// Open jaws take their width from the distances of the gripper, and from no others.
+/// Open jaws reduce the gripper's distances by their width, and no others.
 #[test]
 fn a_grown_gripper_is_nearer_and_nothing_else_is() {
     const GROWTH_M: f64 = 0.039;
@@ -176,7 +176,7 @@ fn a_grown_gripper_is_nearer_and_nothing_else_is() {
             [&nearest.first, &nearest.second].contains(&&"manipulator_link".to_owned())
         };
         if is_gripper(&before) {
-            // Not so near that jaws would touch, nor so far that nothing is told apart.
+            // Not so near that the jaws would touch, nor so far that the distances are cut off.
             if (0.08..0.39).contains(&before.distance_m) {
                 let nearer_m = before.distance_m - after.distance_m;
                 assert!((nearer_m - GROWTH_M).abs() < 1e-6, "{before:?} {after:?}");

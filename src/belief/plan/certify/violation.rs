@@ -1,4 +1,4 @@
-//! The questions that planning asks of the proof: which pair of some arm within the bounds comes too near.
+//! Interface of the certificate for planning: the pair that some arm within the bounds brings too near.
 
 use crate::plan::bounds::JointErrorBounds;
 use crate::plan::certify::sweep::{Certificate, Sweep};
@@ -8,8 +8,8 @@ use crate::plan::motion::edge::Edge;
 use armcal_core::streams::JointAngles;
 
 impl ClearanceModel<'_> {
-    /// A pair that some arm within `bounds` whose sensors read `believed` brings, or may bring, nearer than `margin_m`;
-    /// `None` proves that there is none.
+    /// Returns a pair that some arm within `bounds` whose sensors read `believed` brings, or may bring, nearer than
+    /// `margin_m`. `None` proves that there is none.
     #[must_use]
     pub fn find_violation(
         &self,
@@ -20,7 +20,7 @@ impl ClearanceModel<'_> {
         self.find_violation_along(&Edge::at_full_speed(*believed, *believed), bounds, margin_m)
     }
 
-    /// A pair that the believed arm alone, without any error, brings nearer than `margin_m` on the straight edge.
+    /// Returns a pair that the believed arm, without any error, brings nearer than `margin_m` on the straight edge.
     #[must_use]
     pub fn find_violation_exact(&self, from: &JointAngles, to: &JointAngles, margin_m: f64) -> Option<ClosestPair> {
         Sweep {
@@ -34,7 +34,7 @@ impl ClearanceModel<'_> {
         .first_too_near()
     }
 
-    /// As [`Self::find_violation`] where the arm comes to rest after a slow edge: with what its joints overshoot.
+    /// Does the same as [`Self::find_violation`] for an arm that comes to rest after a slow edge, overshoot included.
     #[must_use]
     pub fn find_violation_arriving(
         &self,
@@ -46,13 +46,14 @@ impl ClearanceModel<'_> {
         Some(self.named(pair, distance_m))
     }
 
-    /// The same, with what it took.
+    /// Returns the certificate of an arm that comes to rest after a slow edge, overshoot included.
     pub(crate) fn certify_arriving(&self, at: &JointAngles, bounds: &JointErrorBounds, margin_m: f64) -> Certificate {
         let tracking_error = TrackingErrorBound::arriving(self.robot);
         Sweep { model: self, from: *at, to: *at, bounds: Some(bounds), tracking_error, margin_m }.verdict()
     }
 
-    /// The same for every arm along an edge, driven as `Timing` has it: with what the joints stray on the way.
+    /// Returns a pair that some arm within `bounds` brings, or may bring, nearer than `margin_m` along an edge. The arm
+    /// is driven at the rates of `Timing`, and tracking errors are included.
     #[must_use]
     pub fn find_violation_along(&self, edge: &Edge, bounds: &JointErrorBounds, margin_m: f64) -> Option<ClosestPair> {
         self.sweep(edge, bounds, margin_m).first_too_near()
@@ -60,14 +61,14 @@ impl ClearanceModel<'_> {
 
     pub(crate) fn sweep<'b>(&'b self, edge: &Edge, bounds: &'b JointErrorBounds, margin_m: f64) -> Sweep<'b> {
         let tracking_error = TrackingErrorBound::new(self.robot, &self.timing, edge);
-        // The line to the middle of where the joints may come to rest.
+        // The line ends at the middle of the angles where the joints may come to rest.
         let to = JointAngles::from_fn(edge.to.len(), |joint| edge.to[joint] + tracking_error.middle_rad(joint));
         Sweep { model: self, from: edge.from, to, bounds: Some(bounds), tracking_error, margin_m }
     }
 
-    /// The closest pair over every arm within `bounds` whose sensors read `believed`, as far as the answer matters: its
-    /// distance is at least `enough_m` where all of them are proven to keep that, else it is that of one which does
-    /// not.
+    /// Returns the closest pair over every arm within `bounds` whose sensors read `believed`. If all of them are
+    /// certified to keep `enough_m`, its distance is at least that. Otherwise it is a pair that does not keep
+    /// `enough_m`.
     #[must_use]
     pub fn nearest_under(&self, believed: &JointAngles, bounds: &JointErrorBounds, enough_m: f64) -> ClosestPair {
         self.find_violation(believed, bounds, enough_m).unwrap_or_else(|| {

@@ -1,8 +1,8 @@
 //! Clearance between the arm and its environment at one configuration.
 //!
-//! `model` is the arm with its environment, `shapes` their collision shapes, `separation` the distance of two shapes,
-//! `pair` the tested pairs, `pair_distance` the distance that each pair needs; `self_collision` finds the pairs of
-//! links that can come near each other; `sight` says what stands on a line of sight.
+//! `model` is the arm with its environment, and `shapes` their collision shapes. `separation` is the distance of two
+//! shapes. `pair` names the tested pairs, `pair_distance` the distance that each needs. `self_collision` finds the
+//! pairs of links that can come near each other. `sight` finds shapes that block a line of sight.
 
 pub(crate) mod model;
 pub(crate) mod pair;

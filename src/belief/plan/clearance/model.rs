@@ -1,8 +1,8 @@
-//! Free water between the arm and everything else, for one arm or for every arm within the joint errors.
+//! Clearance between the arm and its environment, for one arm or for every arm within the joint errors.
 //!
-//! Moving shapes are the links' collision primitives; standing ones the vehicle's parts (fixed in the base frame),
-//! obstacles and the seafloor (fixed in the world; what the vehicle's motion about its station may do is added to the
-//! margin). Links closer than two joints apart cannot be told from a joint and are not tested against each other.
+//! Moving shapes are the links' collision primitives. Static shapes are the vehicle's parts (fixed in the base frame),
+//! obstacles and the seafloor (fixed in the world). The bound on the vehicle's station-keeping motion is added to the
+//! margin. Links closer than two joints apart always nearly touch and are not tested against each other.
 
 pub use crate::plan::constants::clearance_model::SELF_MARGIN_REDUCTION_M;
 pub(crate) use crate::plan::constants::clearance_model::TOUCHING_M;
@@ -23,24 +23,24 @@ use armcal_core::streams::{JointAngles, MAX_JOINTS};
 /// The closest pair and their distance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ClosestPair {
-    /// In the terms of the margin: of two links by `reduction_m` more than it is. Zero: touching or inside each other.
+    /// Distance as the margin counts it, m: that of two links plus `reduction_m`. Zero: touching or inside each other.
     pub distance_m: f64,
-    /// By how much nearer than the margin the pair may be, m: zero but for two links of the arm.
+    /// Reduction of the margin for this pair, m; zero except for two links of the arm.
     pub reduction_m: f64,
-    /// Name of the proximal link, or of the link where `second` is none; empty where nothing is near.
+    /// Name of the proximal link, or of the link if `second` is no link; empty if nothing is near.
     pub first: String,
-    /// Name of the other link, vehicle part, obstacle or seafloor; empty where nothing is near.
+    /// Name of the other link, vehicle part, obstacle or seafloor; empty if nothing is near.
     pub second: String,
 }
 
 impl ClosestPair {
-    /// The distance as it is, m.
+    /// Returns the true distance, m.
     #[must_use]
     pub fn true_distance_m(&self) -> f64 {
         (self.distance_m - self.reduction_m).max(0.0)
     }
 
-    /// The distance that the pair needs under a margin, m.
+    /// Returns the true distance that the pair needs under a margin, m.
     #[must_use]
     pub fn needed_m(&self, margin_m: f64) -> f64 {
         (margin_m - self.reduction_m).max(0.0)
@@ -53,31 +53,31 @@ impl std::fmt::Display for ClosestPair {
     }
 }
 
-/// The arm, what is around it, and which pairs may touch.
+/// The arm, its environment, and the pairs that may touch.
 pub struct ClearanceModel<'a> {
     pub(crate) robot: &'a Robot,
     pub(crate) moving: Vec<LinkShape>,
     pub(crate) standing: Vec<StaticShape>,
-    /// Of each joint: whether its error moves an outline in a way that matters.
+    /// True for each joint whose error moves an outline enough to count.
     pub(crate) has_error: [bool; MAX_JOINTS],
     pub(crate) pairs: Vec<Pair>,
-    /// Of each pair: whether it is of links that the robot's folder does not list as ever near each other.
+    /// True for each pair of links that the robot's folder does not list as ever near each other.
     pub(crate) is_unlisted: Vec<bool>,
-    /// By how much the gripper stands out beyond its shapes, m.
+    /// Distance by which the gripper extends beyond its shapes, m.
     pub(crate) gripper_growth_m: f64,
-    /// What sag may move, by the body whose near end gives, m ([`Chain::most_sag_m`]).
+    /// Largest displacement by sag, by the body whose proximal end bends, m ([`Chain::most_sag_m`]).
     pub(crate) sag_m: [f64; MAX_JOINTS + 1],
     pub(crate) sway: StationBound,
     pub(crate) timing: Timing,
 }
 
-/// How far the vehicle's motion about its station may move what it carries.
+/// Bound on the displacement of the vehicle and its arm by station keeping.
 pub(crate) struct StationBound {
-    /// Of its centre of mass.
+    /// Largest displacement of the vehicle's centre of mass, m.
     pub(crate) position_m: f64,
-    /// A metre from there.
+    /// Largest rotation, rad: the displacement per metre from the centre of mass.
     pub(crate) attitude_rad: f64,
-    /// Base frame.
+    /// Centre of mass in the base frame.
     pub(crate) center_of_mass: Vec3,
 }
 
@@ -94,14 +94,14 @@ impl StationBound {
 }
 
 impl<'a> ClearanceModel<'a> {
-    /// The arm on its vehicle in the scene, with the jaws at rest.
+    /// Returns the arm on its vehicle in the scene, with the jaws at rest.
     #[must_use]
     pub fn new(robot: &'a Robot, vehicle: &Vehicle, scene: &Scene) -> Self {
         let moving = moving(robot);
         let base_from_vehicle = *vehicle.vehicle_from_base.inverse().isometry();
         let mut standing: Vec<StaticShape> =
             vehicle.parts.iter().map(|part| StaticShape::new(&part.name, &part.placed, &base_from_vehicle)).collect();
-        // The vehicle's mean pose is the world's origin, so world = vehicle here; its motion is in the margin.
+        // The vehicle's mean pose is the world's origin, so world = vehicle here; the margin includes its motion.
         for obstacle in &scene.obstacles {
             standing.push(StaticShape::new(&obstacle.name, &obstacle.placed, &base_from_vehicle).of_world());
         }
@@ -111,8 +111,8 @@ impl<'a> ClearanceModel<'a> {
         Self::of(robot, moving, standing, StationBound::new(vehicle))
     }
 
-    /// For a touch of the vehicle's part of that name by the tool's tip: all but that part, and that part alone against
-    /// an arm without its tip.
+    /// Returns the models for a touch of the vehicle part `part` by the tool's tip. The first has all other shapes; the
+    /// second has only that part, and an arm without its tip.
     #[must_use]
     pub fn for_touch(robot: &'a Robot, vehicle: &Vehicle, scene: &Scene, part: &str) -> [Self; 2] {
         let all = Self::new(robot, vehicle, scene);
@@ -128,7 +128,7 @@ impl<'a> ClearanceModel<'a> {
         [of(moving(robot), rest), of(without_tip, touched)]
     }
 
-    /// Nothing around the arm but itself.
+    /// Returns the model of the arm without any environment.
     #[must_use]
     pub fn of_arm_alone(robot: &'a Robot) -> Self {
         let sway = StationBound { position_m: 0.0, attitude_rad: 0.0, center_of_mass: Vec3::ZERO };
@@ -158,19 +158,19 @@ impl<'a> ClearanceModel<'a> {
         }
     }
 
-    /// The same with a gripper that stands out by `growth_m` more than its shapes: its jaws are open.
+    /// Adds `growth_m` to the extent of the gripper's shapes, because its jaws are open.
     #[must_use]
     pub fn with_grown_gripper(self, growth_m: f64) -> Self {
         Self { gripper_growth_m: growth_m, ..self }
     }
 
-    /// The same for an arm that may bend as far as `chain` can: the shapes follow the straight one.
+    /// Allows for the largest sag of `chain`; the shapes follow the straight arm.
     #[must_use]
     pub fn with_sag(self, chain: &Chain) -> Self {
         Self { sag_m: chain.most_sag_m(), ..self }
     }
 
-    /// The same with its jaws as wide open as they go.
+    /// Opens the jaws as wide as they go.
     #[must_use]
     pub fn with_open_jaws(self) -> Self {
         let gripper = self.robot.gripper.as_ref();
@@ -178,14 +178,14 @@ impl<'a> ClearanceModel<'a> {
         self.with_grown_gripper(growth_m)
     }
 
-    /// The closest pair for one arm exactly at `angles`; distances are cut off at 0.4 m.
+    /// Returns the closest pair for one arm exactly at `angles`; distances are cut off at 0.4 m.
     #[must_use]
     pub fn nearest(&self, angles: &JointAngles) -> ClosestPair {
         let poses = self.robot.chain.link_poses(angles);
         self.nearest_below(&poses, FAR_M)
     }
 
-    /// Every two parts that overlap for one arm exactly at `angles`, and do not touch by design.
+    /// Returns every two parts that overlap for one arm exactly at `angles`, and do not touch by design.
     #[must_use]
     pub fn overlaps(&self, angles: &JointAngles) -> Vec<ClosestPair> {
         let placed = self.placed(&self.link_poses(angles));
@@ -203,7 +203,7 @@ impl<'a> ClearanceModel<'a> {
         found
     }
 
-    /// What a point lies deeper inside than `depth_m`, of what stands around the arm and its base link.
+    /// Returns the name of a static shape or base-link shape that contains a point deeper than `depth_m`.
     #[must_use]
     pub(crate) fn holder(&self, point_m: &Vector3<f64>, depth_m: f64) -> Option<&str> {
         let point = vec3(point_m);
@@ -216,7 +216,7 @@ impl<'a> ClearanceModel<'a> {
         standing.or_else(|| self.moving.iter().find(base).map(|m| m.name.as_str()))
     }
 
-    /// Whether one arm exactly at `angles` has anything nearer than `margin_m`.
+    /// True if one arm exactly at `angles` has any pair nearer than `margin_m`.
     #[must_use]
     pub fn is_nearer_than(&self, angles: &JointAngles, margin_m: f64) -> bool {
         self.nearest_below(&self.link_poses(angles), margin_m).distance_m < margin_m
@@ -273,8 +273,7 @@ impl<'a> ClearanceModel<'a> {
     }
 }
 
-/// Whether a joint has no stops and turns a slender tool, and nothing else, about its own axis: its error hardly moves
-/// an outline.
+/// True if a joint has no stops and turns only a slender tool about its own axis: its error hardly moves an outline.
 fn turns_round_tool(robot: &Robot, joint: usize) -> bool {
     let spec = &robot.chain.joints()[joint];
     let is_slender = |placed: &PlacedShape| {

@@ -1,9 +1,9 @@
 //! Pairs of shapes that may touch.
 
-/// Two shapes that may touch, the one that more joints move first.
+/// Two shapes that may touch; the one that more joints move comes first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Pair {
-    /// A link's shape and a standing one.
+    /// A link's shape and a static one.
     Standing { moving: usize, standing: usize },
     /// Two links' shapes, the outer first.
     Links { outer: usize, inner: usize },
@@ -18,7 +18,7 @@ impl Pair {
         }
     }
 
-    /// A bit for each moving shape of the pair.
+    /// Returns a bit for each moving shape of the pair.
     pub(crate) fn mask(self) -> u64 {
         match self {
             Self::Standing { moving, .. } => 1 << moving,

@@ -1,4 +1,4 @@
-//! What the proof of clearance asks of the model: shapes, places and how much distance a pair needs.
+//! Queries of the certificate on the model: shapes, their placement and the distance that a pair needs.
 
 use parry3d::math::{Pose3, Vec3};
 
@@ -20,7 +20,7 @@ impl ClearanceModel<'_> {
         &self.pairs
     }
 
-    /// Whether a joint's error counts: all but that of one that turns a round tool about its axis.
+    /// True if a joint's error counts: false only for a joint that turns a round tool about its axis.
     pub(crate) fn has_error(&self, joint: usize) -> bool {
         self.has_error[joint]
     }
@@ -41,7 +41,7 @@ impl ClearanceModel<'_> {
         &self.timing
     }
 
-    /// How far each joint may move the arm's farthest point at most, m/rad.
+    /// Returns the largest displacement of the arm's farthest point per radian of each joint, m/rad.
     pub(crate) fn levers_m(&self) -> [f64; MAX_JOINTS] {
         let longest = |joint: usize| self.moving.iter().map(|shape| shape.levers_m[joint]).fold(0.0, f64::max);
         std::array::from_fn(longest)
@@ -55,7 +55,7 @@ impl ClearanceModel<'_> {
         self.moving.len()
     }
 
-    /// Which body carries a moving shape.
+    /// Returns the body that carries a moving shape.
     pub(crate) fn body(&self, shape: usize) -> usize {
         self.moving[shape].body
     }
@@ -73,24 +73,24 @@ impl ClearanceModel<'_> {
         }
     }
 
-    /// Whether the vehicle's motion changes the pair's distance.
+    /// True if the vehicle's motion changes the pair's distance.
     pub(crate) fn sways(&self, pair: Pair) -> bool {
         matches!(pair, Pair::Standing { standing, .. } if self.standing[standing].is_of_world)
     }
 
-    /// How far the vehicle's motion may move a shape in the world, m: three sigma of its position, and of its attitude
-    /// times the distance from its centre of mass.
+    /// Returns the largest displacement of a shape against the world by the vehicle's motion, m. It is three sigma of
+    /// its position, plus three of its attitude times the distance from its centre of mass.
     pub(crate) fn station_bound_m(&self, placed: &Placed) -> f64 {
         let arm_m = (placed.center - self.sway.center_of_mass).length() + placed.radius_m;
         self.sway.position_m + self.sway_growth(arm_m)
     }
 
-    /// By how much more for a shape that much farther out, m.
+    /// Returns the growth of that displacement for a shape `farther_m` farther out, m.
     pub(crate) fn sway_growth(&self, farther_m: f64) -> f64 {
         self.sway.attitude_rad * farther_m
     }
 
-    /// An upper bound on the distance of a moving shape from the axis of a joint before it, m.
+    /// Returns an upper bound on the distance of a moving shape from the axis of a joint before it, m.
     pub(crate) fn lever_m(&self, shape: usize, joint: usize) -> f64 {
         self.moving[shape].levers_m[joint]
     }
@@ -106,7 +106,7 @@ impl ClearanceModel<'_> {
         }
     }
 
-    /// The pair's second shape where it is; `placed` gives that of a link.
+    /// Returns the pair's second shape at its placement; `placed` gives that of a link.
     pub(crate) fn other_at<'b>(&'b self, pair: Pair, placed: impl Fn(usize) -> &'b Placed) -> &'b Placed {
         match pair {
             Pair::Standing { standing, .. } => &self.standing[standing].placed,
@@ -114,7 +114,7 @@ impl ClearanceModel<'_> {
         }
     }
 
-    /// The distance of one pair at `angles`, in the terms of the margin, if it is below `margin_m`.
+    /// Returns the distance of one pair at `angles`, as the margin counts it, if it is below `margin_m`.
     pub(crate) fn distance_below(&self, pair: usize, angles: &JointAngles, margin_m: f64, guess: Vec3) -> Option<f64> {
         let (pair, poses) = (self.pairs[pair], self.link_poses(angles));
         let outer = self.moving[pair.outer()].placed(&poses);
@@ -128,7 +128,7 @@ impl ClearanceModel<'_> {
         is_below.then(|| self.in_margin_m(pair, found.distance_m, sway_m))
     }
 
-    /// The true distance at which a pair keeps `margin_m`, the vehicle's motion aside.
+    /// Returns the true distance at which a pair keeps `margin_m`, without the vehicle's motion.
     pub(crate) fn needed_m(&self, pair: Pair, margin_m: f64) -> f64 {
         let needed_m = match pair {
             Pair::Standing { .. } => margin_m,
@@ -137,13 +137,13 @@ impl ClearanceModel<'_> {
         needed_m.max(TOUCHING_M) + self.taken_m(pair)
     }
 
-    /// Whether a pair (by its number) is known to be never so near.
+    /// True if a pair (by its index) is known never to come within `distance_m`.
     pub(crate) fn never_within(&self, pair: usize, distance_m: f64) -> bool {
         self.is_unlisted[pair]
             && self.robot.self_pairs.as_ref().is_some_and(|stored| distance_m <= stored.near_m - UNSEEN_M)
     }
 
-    /// What open jaws and sag take from the distance of a pair. Links bend against each other only between their
+    /// Returns the loss of distance of a pair by open jaws and sag, m. Links bend against each other only between their
     /// bodies.
     fn taken_m(&self, pair: Pair) -> f64 {
         let bodies = match pair {
@@ -162,12 +162,12 @@ impl ClearanceModel<'_> {
         if grows { self.gripper_growth_m } else { 0.0 }
     }
 
-    /// A true distance in the terms of the margin; shapes that touch stay at zero. `sway_m`: what the vehicle's motion
-    /// may take from it.
+    /// Returns a true distance as the margin counts it, m; shapes that touch stay at zero. `sway_m`: largest loss of
+    /// distance by the vehicle's motion, m.
     pub(crate) fn in_margin_m(&self, pair: Pair, distance_m: f64, sway_m: f64) -> f64 {
         let distance_m = (distance_m - self.taken_m(pair)).max(0.0);
         match pair {
-            // An obstacle inside the margin for the vehicle's motion is as near as touching.
+            // An obstacle within the bound on the vehicle's motion counts as touching.
             Pair::Standing { .. } if self.sways(pair) => (distance_m - sway_m).max(0.0),
             Pair::Standing { .. } => distance_m,
             Pair::Links { .. } if distance_m > 0.0 => distance_m + SELF_MARGIN_REDUCTION_M,
@@ -184,7 +184,7 @@ impl ClearanceModel<'_> {
         }
     }
 
-    /// The pair at a distance in the terms of the margin.
+    /// Returns the pair with its names, at a distance as the margin counts it.
     pub(crate) fn named(&self, pair: Pair, distance_m: f64) -> ClosestPair {
         let (first, second) = self.names(pair);
         let reduction_m = if matches!(pair, Pair::Links { .. }) { SELF_MARGIN_REDUCTION_M } else { 0.0 };
@@ -204,8 +204,8 @@ mod tests {
     use armcal_core::routine::Scene;
     use armcal_core::stats::stream_rng;
 
-    /// No pair of the bent arm is nearer than the straight one's distance less what sag takes; what it takes from two
-    /// links of the forearm is a small part of what it takes from the tool and the vehicle.
+    /// No pair of the bent arm is nearer than the straight arm's distance less the loss by sag. The loss of two links
+    /// of the forearm is a small part of the loss between the tool and the vehicle.
     #[test]
     fn what_sag_takes_bounds_every_pair_of_the_bent_arm() {
         let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots");

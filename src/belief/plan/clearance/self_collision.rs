@@ -1,4 +1,4 @@
-//! Which links of an arm can ever come near each other, by sampling.
+//! Sampling of the links of an arm that can ever come near each other.
 
 pub(crate) use crate::plan::constants::clearance_self_collision::UNSEEN_M;
 use crate::plan::constants::clearance_self_collision::{NEAR_M, NEARLY_ALWAYS};
@@ -14,8 +14,8 @@ use armcal_core::robot::{Robot, SelfPair, SelfPairs};
 use armcal_core::stats::stream_rng;
 use armcal_core::streams::JointAngles;
 
-/// The nearest that each two links of the arm come to each other in `n` random configurations: within the joint limits,
-/// and beyond them by what the datasheet lets the sensors hide.
+/// Returns the least distance of each two links of the arm over `n` random configurations. They lie within the joint
+/// limits, extended by the sensor errors that the datasheet allows.
 #[must_use]
 pub fn sample_self_pairs(robot: &Robot, n: u64, seed: u64) -> SelfPairs {
     let clearance = ClearanceModel::of_arm_alone(robot);
@@ -35,7 +35,7 @@ pub fn sample_self_pairs(robot: &Robot, n: u64, seed: u64) -> SelfPairs {
     SelfPairs { seed, n, near_m: NEAR_M, pairs }
 }
 
-/// Links that overlap or are nearer to each other than `margin_m` at nearly all of `n` random configurations: no plan
+/// Returns the links that overlap or are nearer than `margin_m` at nearly all of `n` random configurations: no plan
 /// could keep them apart.
 #[must_use]
 pub fn always_near(robot: &Robot, margin_m: f64, n: u32, seed: u64) -> Vec<[String; 2]> {
@@ -54,8 +54,8 @@ pub fn always_near(robot: &Robot, margin_m: f64, n: u32, seed: u64) -> Vec<[Stri
     n_near.into_keys().map(|bodies| bodies.map(|body| robot.bodies[body].name.clone())).collect()
 }
 
-/// Angles at which no two links are nearer than `margin_m`, as near to the middle of the ranges as `n` guesses find
-/// them; `None` where none of them is clear.
+/// Returns angles at which no two links are nearer than `margin_m`: the first clear one of `n` guesses that spread from
+/// mid-range. `None` if no guess is clear.
 #[must_use]
 pub fn clear_angles(robot: &Robot, margin_m: f64, n: u32, seed: u64) -> Option<JointAngles> {
     let clearance = ClearanceModel::of_arm_alone(robot);
@@ -72,7 +72,7 @@ pub fn clear_angles(robot: &Robot, margin_m: f64, n: u32, seed: u64) -> Option<J
     (0..n).map(guess).find(|angles| !clearance.is_nearer_than(angles, margin_m))
 }
 
-/// The joints' own limits, or a whole turn.
+/// Returns the joints' own limits, or a whole turn.
 fn drawn_limits(robot: &Robot) -> Vec<JointLimits> {
     let turn = JointLimits { lower_rad: -std::f64::consts::PI, upper_rad: std::f64::consts::PI };
     robot.chain.joints().iter().map(|joint| joint.limits.unwrap_or(turn)).collect()
@@ -107,7 +107,7 @@ mod tests {
         armcal_core::robot::load(&folder).expect("the robot reads")
     }
 
-    /// The stored lists are those of the drawings: other samples bring no other links near.
+    /// The stored lists match the nominal models: other samples bring no other links near.
     #[test]
     fn no_links_outside_the_stored_list_come_near_in_other_samples() {
         for name in ["titan4", "titan4-gripper-tag", "kraft-predator"] {
@@ -139,7 +139,7 @@ mod tests {
         assert!(clear_angles(&robot, 0.03, 100, 1).is_none());
     }
 
-    /// A list that leaves a pair out changes what planning tests, and a true one changes no answer.
+    /// A list without one of the pairs changes the tests of planning, and a correct list changes no answer.
     #[test]
     fn planning_tests_the_pairs_of_the_list() {
         let all = Robot { self_pairs: None, ..robot("titan4") };

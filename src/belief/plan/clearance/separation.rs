@@ -1,4 +1,4 @@
-//! Two shapes apart: how far, and along which direction.
+//! Separation of two shapes: distance and direction.
 
 use parry3d::bounding_volume::Aabb;
 use parry3d::math::{Pose3, Vec3};
@@ -7,13 +7,13 @@ use parry3d::query::details::closest_points_support_map_support_map_with_params;
 use parry3d::query::gjk::{GJKResult, VoronoiSimplex};
 use parry3d::shape::SharedShape;
 
-/// What is inside the box around a shape, so that its shadows need no virtual call.
+/// Kind of the shape inside its box, so that its shadows need no virtual call.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum SupportShape {
     Box,
-    /// Along the second axis of its box.
+    /// A cylinder along the second axis of its box.
     Cylinder,
-    /// Along the third axis of its box; `core` is the share of its half length that is not cap.
+    /// A capsule along the third axis of its box; `core` is the share of its half length without the cap.
     Capsule {
         core: f64,
         radius_m: f64,
@@ -21,9 +21,9 @@ pub(crate) enum SupportShape {
     Ball {
         radius_m: f64,
     },
-    /// A convex hull: asked for its corners.
+    /// A convex hull, whose support is computed from its corners.
     Hull,
-    /// All that lies below a plane with this normal.
+    /// All points below a plane with this normal.
     HalfSpace {
         normal: Vec3,
     },
@@ -33,30 +33,30 @@ pub(crate) enum SupportShape {
 #[derive(Clone, Copy)]
 pub(crate) struct Placed {
     pub pose: Pose3,
-    /// A box along the base's axes.
+    /// Bounding box along the base's axes.
     pub bounds: Aabb,
-    /// Of the box around the shape in its own axes.
+    /// Centre of the box around the shape along its own axes.
     pub center: Vec3,
     pub half_axes: [Vec3; 3],
-    /// About the centre.
+    /// Radius of a sphere about the centre that holds the shape.
     pub radius_m: f64,
     pub outline: SupportShape,
 }
 
-/// Two shapes without their places.
+/// Two shapes without placement.
 pub(crate) struct Shapes<'a> {
     pub outer: &'a SharedShape,
     pub other: &'a SharedShape,
 }
 
-/// What lies between two shapes.
+/// Result of the distance computation of two shapes.
 pub(crate) struct Separation {
-    /// Zero: touching or inside each other.
+    /// Distance, m; zero: touching or inside each other.
     pub distance_m: f64,
-    /// Unit, from the other shape to the outer one; zero where no direction separates them (shapes that are not
+    /// Unit vector from the other shape to the outer one; zero if no direction separates them (shapes that are not
     /// convex).
     pub direction: Vec3,
-    /// A lower bound on the distance that holds along `direction`.
+    /// Lower bound on the distance that holds along `direction`, m.
     pub gap_m: f64,
 }
 
@@ -76,7 +76,7 @@ impl Placed {
         outline: SupportShape::Box,
     };
 
-    /// The most that `|direction . (p - center)|` can be for a point p of the shape; `direction` of any length.
+    /// Returns the largest `|direction . (p - center)|` over the points p of the shape; `direction` has any length.
     pub(crate) fn extent_m(&self, direction: Vec3) -> f64 {
         let [a, b, c] = self.half_axes.map(|half| direction.dot(half));
         match self.outline {
@@ -87,7 +87,7 @@ impl Placed {
         }
     }
 
-    /// The most that `direction . (p - center)` is.
+    /// Returns the largest `direction . (p - center)` over the points p of the shape.
     fn ahead_m(&self, shape: &SharedShape, direction: Vec3) -> f64 {
         match (self.outline, shape.as_support_map()) {
             (SupportShape::Hull, Some(hull)) => {
@@ -97,7 +97,7 @@ impl Placed {
         }
     }
 
-    /// From the other's box to this one's, unit; from centre to centre where they overlap.
+    /// Returns the unit vector from the other's box to this one's; from centre to centre if they overlap.
     pub(crate) fn rough_direction(&self, other: &Self) -> Vec3 {
         if let SupportShape::HalfSpace { normal } = other.outline {
             return normal;
@@ -108,14 +108,14 @@ impl Placed {
     }
 }
 
-/// Distance between two boxes along the axes, a lower bound on that of what they hold, m.
+/// Returns the distance of two axis-aligned boxes, a lower bound on that of the shapes inside, m.
 pub(crate) fn gap_m(a: &Aabb, b: &Aabb) -> f64 {
     let apart = (a.mins - b.maxs).max(b.mins - a.maxs).max(Vec3::ZERO);
     apart.length()
 }
 
 impl Shapes<'_> {
-    /// The gap between the shapes' shadows on a unit direction, a lower bound on their distance.
+    /// Returns the gap between the shapes' shadows on a unit direction, a lower bound on their distance, m.
     pub(crate) fn gap_along_m(&self, outer: &Placed, other: &Placed, direction: Vec3) -> f64 {
         let lowest = direction.dot(outer.center) - outer.ahead_m(self.outer, -direction);
         if let SupportShape::HalfSpace { normal } = other.outline {
@@ -126,7 +126,7 @@ impl Shapes<'_> {
     }
 }
 
-/// The distance of two shapes; `guess` is a direction to begin with, or zero.
+/// Returns the separation of two shapes; `guess` is an initial direction, or zero.
 pub(crate) fn separate(shapes: &Shapes<'_>, placed: [&Placed; 2], guess: Vec3) -> Separation {
     let [outer_at, other_at] = placed;
     if let SupportShape::HalfSpace { normal } = other_at.outline {

@@ -1,4 +1,4 @@
-//! The solid things that planning knows: links' shapes, which move, and what stands around the arm.
+//! Collision shapes of planning: the links' moving shapes and the static shapes around the arm.
 
 use crate::plan::constants::clearance_shapes::{EVERYWHERE_M, MIN_BODY_GAP};
 use nalgebra::{Isometry3, Vector3};
@@ -21,7 +21,7 @@ pub(crate) struct LinkShape {
     pub radius_m: f64,
     body_from_shape_pose: Pose3,
     box_m: ShapeBox,
-    /// For each joint before it, an upper bound on the distance of its points from that joint's axis over all angles.
+    /// Upper bound on the distance of its points from the axis of each joint before it, over all angles, m.
     pub levers_m: [f64; MAX_JOINTS],
 }
 
@@ -30,20 +30,20 @@ pub(crate) struct LinkShape {
 struct ShapeBox {
     center_m: Vec3,
     half_extents_m: Vec3,
-    /// Of a sphere about the centre that holds the shape.
+    /// Radius of a sphere about the centre that holds the shape, m.
     radius_m: f64,
     outline: SupportShape,
 }
 
-/// A shape that stands where it is.
+/// A static shape.
 pub(crate) struct StaticShape {
     pub name: String,
     pub shape: SharedShape,
     pub placed: Placed,
     pub center_m: Vector3<f64>,
-    /// Infinite for the seafloor.
+    /// Bounding radius, m; infinite for the seafloor.
     pub radius_m: f64,
-    /// Fixed in the world: the vehicle's motion moves the arm against it.
+    /// True if it is fixed in the world: the vehicle's motion moves the arm against it.
     pub is_of_world: bool,
 }
 
@@ -74,12 +74,12 @@ impl LinkShape {
         self.placed_on(&parry_pose(poses.link(self.body)))
     }
 
-    /// The same with the shape itself there.
+    /// Places the shape with its own frame at `base_from_shape`.
     pub fn placed_at(&self, base_from_shape: &Pose3) -> Placed {
         self.box_m.placed(base_from_shape)
     }
 
-    /// The same with its body in parry's terms.
+    /// Places the shape with its body at `base_from_body`, as parry's pose.
     pub fn placed_on(&self, base_from_body: &Pose3) -> Placed {
         self.placed_at(&(*base_from_body * self.body_from_shape_pose))
     }
@@ -102,7 +102,7 @@ impl ShapeBox {
         Self { center_m, half_extents_m, radius_m, outline }
     }
 
-    /// Puts the box, and the one along the base's axes around the shape, where the shape is.
+    /// Places the box, and computes the shape's bounding box along the base's axes.
     pub fn placed(&self, base_from_shape: &Pose3) -> Placed {
         let turn = Mat3::from_quat(base_from_shape.rotation);
         let half = self.half_extents_m;
@@ -129,7 +129,7 @@ impl ShapeBox {
     }
 }
 
-/// Every two shapes that are kept apart. What is fixed to the base stands where it is bolted on.
+/// Returns every two shapes that are kept apart. Shapes fixed to the base keep their mounting position.
 pub(crate) fn pairs(robot: &Robot, moving: &[LinkShape], standing: &[StaticShape]) -> Vec<Pair> {
     let mut pairs = Vec::new();
     for (i, shape) in moving.iter().enumerate().filter(|(_, shape)| shape.body > 0) {
@@ -156,7 +156,7 @@ impl StaticShape {
         }
     }
 
-    /// The same, fixed in the world instead of to the vehicle.
+    /// Marks the shape as fixed in the world instead of to the vehicle.
     pub fn of_world(self) -> Self {
         Self { is_of_world: true, ..self }
     }
@@ -167,7 +167,7 @@ impl StaticShape {
             name: "seafloor".to_owned(),
             shape: SharedShape::new(HalfSpace::new(Vec3::new(0.0, 0.0, 1.0))),
             placed: Placed {
-                // A tilted base tilts the half-space too, so no box leaves it out.
+                // A tilted base tilts the half-space too, so this box excludes none of it.
                 bounds: Aabb::new(Vec3::splat(-EVERYWHERE_M), Vec3::splat(EVERYWHERE_M)),
                 pose: parry_pose(&isometry),
                 center: vec3(&isometry.translation.vector),

@@ -1,7 +1,7 @@
-//! Lines of sight, and what stands on them.
+//! Lines of sight and the shapes that block them.
 //!
-//! Whether anything hides a tag is asked of many poses: shapes are placed once a pose, and one that stays clear of all
-//! rays to a tag's corners, or whose box a ray misses, is not asked for more.
+//! Tags are tested for occlusion at many poses, so shapes are placed once per pose. A shape that stays clear of all
+//! rays to a tag's corners, or whose box a ray misses, is not tested further.
 
 use crate::plan::constants::clearance_sight::{BESIDE, HOUSING_M, MISS_M};
 use nalgebra::{Isometry3, Point3, Vector3};
@@ -24,7 +24,7 @@ struct Ray {
 }
 
 impl Ray {
-    /// `skip_m` is left out at the far end; `None` where nothing is left.
+    /// Returns the ray without `skip_m` at its far end; `None` if nothing is left.
     fn between([from_m, to_m]: [&Vector3<f64>; 2], skip_m: f64) -> Option<Self> {
         let sight = to_m - from_m;
         let length = sight.norm();
@@ -44,7 +44,7 @@ impl Ray {
         shape.cast_ray(pose, &self.parry, self.reach_m, true).is_some()
     }
 
-    /// Whether it passes the box around a placed shape.
+    /// True if the ray passes outside the box around a placed shape.
     fn misses_box(&self, placed: &Placed) -> bool {
         let to_start = self.parry.origin - placed.center;
         let (mut enter_m, mut leave_m) = (0.0, self.reach_m);
@@ -70,17 +70,17 @@ impl Ray {
     }
 }
 
-/// All shapes where they are at one pose of the arm.
+/// Placements of all shapes at one pose of the arm.
 pub(crate) struct Sights<'a> {
     model: &'a ClearanceModel<'a>,
-    /// Of the moving shapes.
+    /// Centre of each moving shape, base frame.
     centers: [Vector3<f64>; MAX_COLLISION_SHAPES],
     poses: [Pose3; MAX_COLLISION_SHAPES],
     eye: Vector3<f64>,
 }
 
 impl<'a> Sights<'a> {
-    /// From the camera of the arm in these poses.
+    /// Places the shapes, and takes the eye at the arm's camera in these poses.
     pub(crate) fn new(model: &'a ClearanceModel<'a>, poses: &LinkPoses) -> Self {
         let mut sights = Self {
             model,
@@ -95,7 +95,7 @@ impl<'a> Sights<'a> {
         sights
     }
 
-    /// Whether something hides any of a tag's corners, `skip_m` before them.
+    /// True if a shape hides any of a tag's corners; the last `skip_m` before each corner does not count.
     pub(crate) fn hide(&self, base_from_tag: &Isometry3<f64>, corners: &[Point3<f64>; 4], skip_m: f64) -> bool {
         let corners = corners.map(|corner| (base_from_tag * corner).coords);
         let center = base_from_tag.translation.vector;
@@ -103,7 +103,7 @@ impl<'a> Sights<'a> {
         let rays = corners.map(|corner| Ray::between([&self.eye, &corner], skip_m));
         let sight = center - self.eye;
         let per_length2 = 1.0 / sight.norm_squared().max(1e-18);
-        // At the same share of its way, no ray is farther from the line to the centre than the corners from that.
+        // At the same share of its length, each ray is at most `half_m` away from the line to the centre.
         let is_far = |at: &Vector3<f64>, radius_m: f64| {
             let to_shape = at - self.eye;
             let share = (to_shape.dot(&sight) * per_length2).clamp(0.0, 1.0);
@@ -125,13 +125,13 @@ impl<'a> Sights<'a> {
 }
 
 impl ClearanceModel<'_> {
-    /// Whether something stands on the line between two points of the base frame; `skip_m` is left out at its far end.
+    /// True if a shape blocks the line between two points of the base frame; `skip_m` is left out at its far end.
     #[must_use]
     pub fn blocks_sight(&self, poses: &LinkPoses, from_m: &Vector3<f64>, to_m: &Vector3<f64>, skip_m: f64) -> bool {
         self.sight_blocker(poses, [from_m, to_m], skip_m).is_some()
     }
 
-    /// The name of what stands there.
+    /// Returns the name of the blocking shape.
     pub(crate) fn sight_blocker(&self, poses: &LinkPoses, ends_m: [&Vector3<f64>; 2], skip_m: f64) -> Option<&str> {
         let ray = Ray::between(ends_m, skip_m)?;
         let stands = |s: &&StaticShape| ray.distance_m(&s.center_m) <= s.radius_m && ray.hits(&s.placed.pose, &s.shape);
@@ -155,7 +155,8 @@ mod tests {
     use armcal_core::stats::stream_rng;
     use armcal_core::streams::JointAngles;
 
-    /// What is left out early changes no answer: the corners' rays asked of every shape say the same.
+    /// Early rejection of shapes changes no answer: testing the corners' rays against every shape gives the same
+    /// result.
     #[test]
     fn a_tag_is_hidden_where_the_ray_to_a_corner_is_blocked() {
         let root = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots");

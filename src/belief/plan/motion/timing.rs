@@ -1,8 +1,8 @@
-//! How long motions take: rest to rest on each edge, within the joints' rates and the pump's flow.
+//! Durations of motions: rest to rest on each edge, within the joints' rates and the pump's flow.
 //!
-//! All joints go the same share of their way at the same time, by a cubic `s = u^2 (3 - 2 u)` of the share `u` of time;
-//! its rate is largest at the middle, 1.5 times its mean. An edge takes as long as the slowest of its joints needs, and
-//! as the pump needs for all of them: `sum_j D_j |rate_j| <= Q`, with `D_j` the oil that joint j takes a radian.
+//! All joints complete the same share of their travel at the same time: the cubic `s = u^2 (3 - 2 u)` of the time share
+//! `u`. Its rate is largest at the middle, 1.5 times its mean. An edge takes as long as its slowest joint needs, and as
+//! the pump needs for all joints: `sum_j D_j |rate_j| <= Q`. `D_j` is the oil volume per radian of joint j.
 
 use crate::plan::constants::motion_timing::{CUBIC_PEAK, S_PER_MIN};
 pub(crate) use crate::plan::constants::motion_timing::{RATE_SHARE, SETTLE_S};
@@ -10,18 +10,18 @@ use crate::plan::motion::edge::{Edge, Path};
 use armcal_core::robot::Robot;
 use armcal_core::streams::JointAngles;
 
-/// What the joints and the pump allow.
+/// Limits of the joints' rates and the pump's flow.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Timing {
-    /// Set-points go no faster, rad/s.
+    /// Largest rate of each joint's set-points, rad/s.
     rate_rad_s: Vec<f64>,
     displacement_l_per_rad: Vec<f64>,
-    /// That set-points use, L/s; infinite where no limit is known.
+    /// Flow that set-points use, L/s; infinite if no limit is known.
     flow_l_per_s: f64,
 }
 
 impl Timing {
-    /// Limits of the nominal drives and the pump, less a share for the controller.
+    /// Returns the limits of the nominal drives and the pump, less a share for the controller.
     #[must_use]
     pub fn new(robot: &Robot) -> Self {
         Self {
@@ -31,19 +31,20 @@ impl Timing {
         }
     }
 
-    /// The same for joints of which none shall go faster than `rate_rad_s`.
+    /// Returns these limits with every joint's rate limited to `rate_rad_s`.
     #[must_use]
     pub fn limited_to(&self, rate_rad_s: f64) -> Self {
         Self { rate_rad_s: self.rate_rad_s.iter().map(|rate| rate.min(rate_rad_s)).collect(), ..self.clone() }
     }
 
-    /// Of an edge at its speed, s; 0 where nothing moves.
+    /// Returns the duration of an edge at its speed, s; 0 if nothing moves.
     #[must_use]
     pub fn edge_duration_s(&self, edge: &Edge) -> f64 {
         edge.time_scale * self.least_duration_s(&edge.from, &edge.to)
     }
 
-    /// Of the straight edge between two poses as quickly as rates and flow allow, s; 0 where nothing moves.
+    /// Returns the shortest duration of the straight edge between two poses within rates and flow, s; 0 if nothing
+    /// moves.
     #[inline]
     #[must_use]
     pub fn least_duration_s(&self, from: &JointAngles, to: &JointAngles) -> f64 {
@@ -56,7 +57,7 @@ impl Timing {
         CUBIC_PEAK * f64::max(slowest_s, oil_l / self.flow_l_per_s)
     }
 
-    /// The set-point on an edge after `share_of_time` (0 to 1) of its duration.
+    /// Returns the set-point on an edge after `share_of_time` (0 to 1) of its duration.
     #[inline]
     #[must_use]
     pub fn set_point(from: &JointAngles, to: &JointAngles, share_of_time: f64) -> JointAngles {
@@ -64,7 +65,7 @@ impl Timing {
         JointAngles::from_fn(from.len(), |j| from[j] + share * (to[j] - from[j]))
     }
 
-    /// Largest rate of each joint on an edge, rad/s, not negative; 0 where it does not move.
+    /// Returns the largest rate of each joint on an edge, rad/s, not negative; 0 if the joint does not move.
     #[must_use]
     pub fn peak_rates_rad_s(&self, edge: &Edge) -> JointAngles {
         let (from, to, duration_s) = (&edge.from, &edge.to, self.edge_duration_s(edge));
@@ -73,7 +74,7 @@ impl Timing {
         })
     }
 
-    /// Of a path, with rest at each waypoint, s.
+    /// Returns the duration of a path, with rest at each waypoint, s.
     #[must_use]
     pub fn path_duration_s(&self, path: &Path) -> f64 {
         path.edges().map(|edge| self.edge_duration_s(&edge)).sum()
@@ -97,7 +98,7 @@ mod tests {
         JointAngles::from_fn(robot.n_joints(), |_| rng.random_range(-1.0..1.0))
     }
 
-    /// Rates and flow by differences of set-points; one of the limits is met, neither is passed.
+    /// Checks rates and flow by differences of set-points: one of the limits is reached, none is exceeded.
     #[test]
     fn set_points_keep_to_rates_and_flow_and_use_one_of_them_up() {
         let mut robot = titan();

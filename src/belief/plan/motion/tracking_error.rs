@@ -1,10 +1,10 @@
-//! How far the arm leaves the straight line of an edge while it moves: its joints lag, droop and overshoot, each its
-//! own way.
+//! Deviation of the arm from the straight line of an edge while it moves: each joint lags, droops and overshoots by its
+//! own amount.
 //!
-//! Set-points go rest to rest by a cubic (`timing`), whose rate at the share `u` of time is `4 u (1 - u)` of its
-//! largest. A joint that lags by up to `lag_spread_s` more or less than the others is off the line by that times its
-//! rate, though never by more than it was to move so far, and by a droop in proportion to the rate; an overshoot comes
-//! at the end of the edge, ahead for the most part. What does not move does not stray.
+//! Set-points move rest to rest by a cubic (`timing`). Its rate at the time share `u` is `4 u (1 - u)` of its largest.
+//! A joint's lag may differ from the others' by up to `lag_spread_s`. It then leaves the line by that time times its
+//! rate, but never by more than its travel so far. Droop is proportional to the rate. An overshoot comes at the end of
+//! the edge, mostly ahead. A joint that does not move does not deviate.
 
 use crate::plan::constants::motion_tracking_error::BEHIND;
 use crate::plan::motion::edge::{Edge, SLOWEST};
@@ -12,20 +12,20 @@ use crate::plan::motion::timing::{RATE_SHARE, Timing};
 use armcal_core::robot::Robot;
 use armcal_core::streams::MAX_JOINTS;
 
-/// Bounds on the straying along one edge.
+/// Bounds on the tracking error along one edge.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TrackingErrorBound {
-    /// Where the joint is fastest, rad.
+    /// Lag of each joint at its largest rate, rad.
     lag_rad: [f64; MAX_JOINTS],
     droop_rad: [f64; MAX_JOINTS],
-    /// How far it is to move, rad.
+    /// Travel of each joint, rad.
     way_rad: [f64; MAX_JOINTS],
-    /// The least and the most at the end of the edge, rad.
+    /// Least and largest error of each joint at the end of the edge, rad.
     end_rad: [[f64; 2]; MAX_JOINTS],
 }
 
 impl TrackingErrorBound {
-    /// On an edge, driven as `timing` says.
+    /// Returns the bounds for an edge, driven as `timing` defines.
     #[must_use]
     pub fn new(robot: &Robot, timing: &Timing, edge: &Edge) -> Self {
         let mut tracking_error = Self::default();
@@ -47,29 +47,29 @@ impl TrackingErrorBound {
         tracking_error
     }
 
-    /// Where an edge ends that was driven as slowly as any, whichever it was: what its joints overshoot at most.
+    /// Returns the bounds at the end of any edge driven at the lowest speed: the largest overshoot of its joints.
     #[must_use]
     pub fn arriving(robot: &Robot) -> Self {
         let beyond_rad = robot.drive.motion.overshoot_rad * RATE_SHARE / SLOWEST;
         Self { end_rad: [[-beyond_rad, beyond_rad]; MAX_JOINTS], ..Self::default() }
     }
 
-    /// How far a joint is off the edge's end at most, rad.
+    /// Returns the largest distance of a joint from the edge's end, rad.
     #[must_use]
     pub fn end_rad(&self, joint: usize) -> f64 {
         let [least_rad, most_rad] = self.end_rad[joint];
         most_rad.max(-least_rad)
     }
 
-    /// The middle of where the joint may come to rest, off the edge's end, rad; on the way in proportion to the share
-    /// of it.
+    /// Returns the middle of the joint's possible rest angles, relative to the edge's end, rad. On the edge it applies
+    /// in proportion to the completed share.
     #[must_use]
     pub fn middle_rad(&self, joint: usize) -> f64 {
         let [least_rad, most_rad] = self.end_rad[joint];
         0.5 * (least_rad + most_rad)
     }
 
-    /// The most by which a joint is off that middle between two shares of the way, rad.
+    /// Returns the largest distance of a joint from that middle between two shares of the edge, rad.
     #[must_use]
     pub fn most_rad(&self, joint: usize, along: [f64; 2]) -> f64 {
         let ([least_rad, most_rad], rate, far) = (self.end_rad[joint], most_rate(along), along[1].max(along[0]));
@@ -78,13 +78,13 @@ impl TrackingErrorBound {
     }
 }
 
-/// An upper bound on the cubic's rate, as a share of its largest, between two shares of the way.
+/// Returns an upper bound on the cubic's rate, as a share of its largest, between two shares of the travel.
 fn most_rate(along: [f64; 2]) -> f64 {
     let (low, high) = (along[0].min(along[1]), along[0].max(along[1]));
     if low <= 0.5 && high >= 0.5 {
         return 1.0;
     }
-    // From the nearer end; the cubic is symmetric about the middle.
+    // Share of the travel from the nearer end; the cubic is symmetric about the middle.
     let way = if high < 0.5 { high } else { 1.0 - low };
     // way = u^2 (3 - 2 u) is at least 2 u^2 in the first half, and the rate grows with u there.
     let most_u = (0.5 * way).sqrt();
@@ -109,7 +109,7 @@ mod tests {
         }
     }
 
-    /// Where an edge ends a joint may be ahead by its overshoot, and behind by a quarter of it, whichever way it came.
+    /// At the end of an edge a joint may be ahead by its overshoot, and behind by a quarter of it, for both directions.
     #[test]
     fn an_edge_ends_ahead_for_the_most_part() {
         let folder = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots/titan4");
@@ -139,7 +139,7 @@ mod tests {
         }
     }
 
-    /// Each joint lags by a time of its own: none is farther off the line than the bound says.
+    /// Each joint has its own lag; none leaves the line by more than the bound.
     #[test]
     fn joints_that_lag_differently_stay_within_the_bound() {
         let folder = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots/titan4");
@@ -162,7 +162,7 @@ mod tests {
                 let late = Timing::set_point(&from, &to, (u - motion.lag_spread_s / duration_s).clamp(0.0, 1.0));
                 let lag_rad = (late[joint] - at[joint]).abs();
                 let bound_rad = tracking_error.most_rad(joint, [share; 2]);
-                // The cubic has slowed down by the end of the lag: before the end, the bound needs no help.
+                // In the second half the rate falls during the lag, so only the first half tests the lag bound alone.
                 if u < 0.5 {
                     assert!(lag_rad <= bound_rad + 1e-12, "joint {joint} at {u}: {lag_rad} {bound_rad}");
                     closest = if from[joint] == to[joint] { closest } else { closest.min(bound_rad - lag_rad) };

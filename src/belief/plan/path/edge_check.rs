@@ -10,37 +10,37 @@ use armcal_core::streams::JointAngles;
 /// Plans paths under one belief.
 #[derive(Clone, Copy)]
 pub struct PathPlanner<'a> {
-    /// The arm and what is around it.
+    /// The arm and its environment.
     pub clearance: &'a ClearanceModel<'a>,
     /// Joint errors for which the margin is kept.
     pub bounds: &'a JointErrorBounds,
     /// Range of the believed angles, one per joint.
     pub limits: &'a [JointLimits],
-    /// Free water to keep, m.
+    /// Clearance to keep, m.
     pub margin_m: f64,
 }
 
 impl PathPlanner<'_> {
-    /// Whether every arm within the bounds keeps the margin at rest at `angles`.
+    /// True if every arm within the bounds keeps the margin at rest at `angles`.
     #[must_use]
     pub fn is_free(&self, angles: &JointAngles) -> bool {
         self.clearance.find_violation(angles, self.bounds, self.margin_m).is_none()
     }
 
-    /// Whether every arm within the bounds keeps the margin when it comes to `angles` slowly.
+    /// True if every arm within the bounds keeps the margin when it arrives slowly at `angles`.
     #[must_use]
     pub fn is_free_to_arrive(&self, angles: &JointAngles) -> bool {
         self.clearance.find_violation_arriving(angles, self.bounds, self.margin_m).is_none()
     }
 
-    /// Whether every arm within the bounds keeps the margin along the straight edge, if it goes slowly enough.
+    /// True if every arm within the bounds keeps the margin along the straight edge at the lowest speed.
     #[must_use]
     pub fn is_edge_free(&self, from: &JointAngles, to: &JointAngles) -> bool {
         self.keeps_clear(&Edge { from: *from, to: *to, time_scale: SLOWEST }, &mut 0)
     }
 
-    /// How slow the straight edge must be driven for that, as little as will do; `None` where no slowness up to
-    /// `at_most` does. `n_regions` grows by what it cost.
+    /// Returns the least time scaling at which the straight edge keeps the margin; `None` if none up to `at_most` does.
+    /// `n_regions` grows by the number of tested regions.
     pub(crate) fn time_scale(
         &self,
         from: &JointAngles,
@@ -56,7 +56,7 @@ impl PathPlanner<'_> {
         let [quickest, .., slowest] = *levels else {
             return levels.first().copied().filter(|&only| holds(only));
         };
-        // Most are clear at full speed; of the others, the slowest tells whether to go on.
+        // Most edges are clear at full speed; for the others, the slowest decides whether to continue.
         if holds(quickest) {
             return Some(quickest);
         }
@@ -71,14 +71,14 @@ impl PathPlanner<'_> {
         Some(levels[slow])
     }
 
-    /// Whether every arm within the bounds keeps the margin along the edge at its speed.
+    /// True if every arm within the bounds keeps the margin along the edge at its speed.
     pub(crate) fn keeps_clear(&self, edge: &Edge, n_regions: &mut usize) -> bool {
         let verdict = self.clearance.sweep(edge, self.bounds, self.margin_m).verdict();
         *n_regions += verdict.n_regions;
         verdict.violation.is_none()
     }
 
-    /// Whether no joint overshoots its limits at the end of the edge by more than they leave room for.
+    /// True if no joint overshoots its limits at the end of the edge by more than the room that they leave.
     pub(crate) fn is_within_limits(&self, edge: &Edge) -> bool {
         let tracking_error = TrackingErrorBound::new(self.clearance.robot(), self.clearance.timing(), edge);
         let arriving = TrackingErrorBound::arriving(self.clearance.robot());
@@ -86,13 +86,13 @@ impl PathPlanner<'_> {
             let JointLimits { lower_rad, upper_rad } = self.limits[j];
             let way_rad = edge.to[j] - edge.from[j];
             let left_rad = if way_rad > 0.0 { upper_rad - edge.to[j] } else { edge.to[j] - lower_rad };
-            // What is beyond its limits already comes back.
+            // A joint already beyond its limits may return.
             way_rad == 0.0 || tracking_error.end_rad(j) <= left_rad.max(0.0) + arriving.end_rad(j)
         })
     }
 }
 
-/// A place on the straight way.
+/// Returns a point on the straight edge.
 pub(crate) fn between(from: &JointAngles, to: &JointAngles, share: f64) -> JointAngles {
     JointAngles::from_fn(from.len(), |j| if from[j] == to[j] { from[j] } else { from[j] + share * (to[j] - from[j]) })
 }

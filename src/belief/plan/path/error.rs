@@ -3,7 +3,7 @@
 use armcal_core::codes::{Code, Coded};
 use armcal_core::streams::JointAngles;
 
-/// Why there is no path.
+/// Reason why there is no path.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum PathError {
@@ -16,11 +16,11 @@ pub enum PathError {
     Blocked {
         tried: usize,
         nearest: String,
-        /// Zero: some arm within the bounds touches.
+        /// Distance, m; zero: some arm within the bounds touches.
         distance_m: f64,
-        /// How far of the straight way an edge from the start is certified, 0 to 1.
+        /// Share of the straight edge, from the start, that is certified, 0 to 1.
         free_share: f64,
-        /// Whether no edge at all was found that leaves the start.
+        /// True if no edge was found that leaves the start.
         is_stuck: bool,
     },
     #[error("the start is too near: {distance_m:.3} m between {nearest}; {needed_m:.3} m are needed (0: in collision)")]
@@ -34,7 +34,7 @@ pub enum PathError {
         nearest: String,
         distance_m: f64,
         needed_m: f64,
-        /// On the straight line from the start, found by halving it: free itself, the way there not looked at.
+        /// Nearest free angles on the straight line from the start, found by halving; the way there is not tested.
         nearest_free: JointAngles,
     },
     #[error(

@@ -1,7 +1,7 @@
 //! Paths between configurations that keep the margin for every arm within the joint errors.
 //!
-//! `planner` tries the straight edge; where it is blocked, `rrt_connect` and shortcuts. `edge_check` certifies each
-//! edge instead of sampling it.
+//! `planner` tries the straight edge; if it is blocked, `rrt_connect` and shortcuts. `edge_check` certifies each edge
+//! instead of sampling it.
 
 mod edge_check;
 mod error;

@@ -1,7 +1,7 @@
 //! Path planning between two configurations.
 //!
-//! The straight edge is tried first. Where it is blocked, RRT-Connect (`rrt_connect`) searches a path, and shortcuts
-//! make it faster. An error names the closest goal that can be reached on the straight edge.
+//! The straight edge is tried first. If it is blocked, RRT-Connect (`rrt_connect`) searches a path, and shortcuts make
+//! it faster. An error names the closest goal that can be reached on the straight edge.
 
 use crate::plan::constants::path_planner::{HALVINGS, PLACES, ROUNDING_RAD};
 use rand_chacha::ChaCha8Rng;
@@ -15,7 +15,7 @@ use armcal_core::kinematics::JointLimits;
 use armcal_core::streams::JointAngles;
 
 impl PathPlanner<'_> {
-    /// A path from `from` to `to`.
+    /// Returns a path from `from` to `to`.
     ///
     /// # Errors
     /// [`PathError`]: start or goal are too near or out of range, or no path was found within the budget.
@@ -34,7 +34,7 @@ impl PathPlanner<'_> {
         }
     }
 
-    /// A goal may be beyond what is safe only where the start is farther beyond.
+    /// Checks that the goal is within the safe limits, or no farther beyond them than the start.
     fn check_limits(&self, from: &JointAngles, to: &JointAngles) -> Result<(), PathError> {
         for (joint, limits) in self.limits.iter().enumerate().filter(|(joint, _)| self.clearance.has_stops(*joint)) {
             let JointLimits { lower_rad, upper_rad } = *limits;
@@ -67,7 +67,7 @@ impl PathPlanner<'_> {
         let nearest: Option<ClosestPair> = places
             .filter_map(|angles| self.clearance.find_violation(&angles, self.bounds, self.margin_m))
             .min_by(|a, b| a.distance_m.total_cmp(&b.distance_m))
-            // Between the places, or by what the joints stray on the way.
+            // The violation may be between the sampled points, or caused by the tracking error.
             .or_else(|| {
                 let edge = Edge { from: *from, to: *to, time_scale: SLOWEST };
                 self.clearance.find_violation_along(&edge, self.bounds, self.margin_m)
@@ -82,7 +82,7 @@ impl PathPlanner<'_> {
     }
 }
 
-/// The largest share found for which `holds`, by halving between 0, where it does, and 1, where it does not.
+/// Returns the largest share found for which `holds`, by halving between 0, where it does, and 1, where it does not.
 fn halved(holds: impl Fn(f64) -> bool) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..HALVINGS {

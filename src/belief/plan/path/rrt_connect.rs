@@ -1,9 +1,9 @@
 //! RRT-Connect (Kuffner and LaValle 2000) over certified edges, and shortcuts.
 //!
-//! Two trees grow from start and goal. Samples are the stowed pose first, then draws about the straight way and over
-//! all of the joints' ranges in turn. Work is counted in regions that certifying looks at, so that a search ends after
-//! the same work on every machine. A path found is made quicker: waypoints are left out, then random places on it are
-//! connected directly as long as both edges about the shortcut are certified too.
+//! Two trees grow from start and goal. Samples are the stowed pose first, then draws about the straight edge (every
+//! third) or over all joint ranges. Work is counted in regions that certification tests, so that a search ends after
+//! the same work on every machine. The path found is then made faster. Waypoints are left out; then random points on it
+//! are connected directly if both edges around the shortcut are certified too.
 
 use crate::plan::constants::path_rrt_connect::{
     ABOUT_RAD, LEAST_GAIN, LEAST_WEIGHT, MAX_REGIONS, MAX_SAMPLES, MAX_SHORTCUTS, SHORTCUT_REGIONS, STEP_RAD,
@@ -25,7 +25,7 @@ pub(crate) struct RrtConnect<'a, 'b> {
 }
 
 struct Tree {
-    /// Angles and parent.
+    /// Angles and parent index of each node.
     nodes: Vec<(JointAngles, usize)>,
 }
 
@@ -44,12 +44,12 @@ impl<'a, 'b> RrtConnect<'a, 'b> {
         self.n_tried
     }
 
-    /// Whether no edge was found that leaves the start.
+    /// True if no edge was found that leaves the start.
     pub fn is_stuck(&self) -> bool {
         self.trees[0].nodes.len() == 1
     }
 
-    /// Waypoints from start to goal; `None` when none were found within the budget.
+    /// Returns waypoints from start to goal; `None` if none were found within the budget.
     pub fn search(&mut self, rng: &mut ChaCha8Rng) -> Option<Vec<JointAngles>> {
         while self.n_regions < MAX_REGIONS && self.n_tried < MAX_SAMPLES {
             let sample = self.sample(rng);
@@ -68,7 +68,7 @@ impl<'a, 'b> RrtConnect<'a, 'b> {
         None
     }
 
-    /// Joints that have the same angle at both ends stay there.
+    /// Returns a sample; joints that have the same angle at both ends stay there.
     fn sample(&self, rng: &mut ChaCha8Rng) -> JointAngles {
         let [from, to] = [0, 1].map(|tree| self.trees[tree].nodes[0].0);
         let stays = |j: usize| from[j] == to[j];
@@ -91,7 +91,7 @@ impl<'a, 'b> RrtConnect<'a, 'b> {
         })
     }
 
-    /// If it is driven slowly enough.
+    /// True if the edge keeps the margin at the lowest speed.
     fn is_edge_free(&mut self, from: &JointAngles, to: &JointAngles) -> bool {
         self.planner.keeps_clear(&Edge { from: *from, to: *to, time_scale: SLOWEST }, &mut self.n_regions)
     }
@@ -110,7 +110,7 @@ impl<'a, 'b> RrtConnect<'a, 'b> {
         self.is_edge_free(&from, &to).then(|| self.trees[tree].add(to, near))
     }
 
-    /// Grows a tree straight towards `target` until it gets there (its node) or is stopped (`None`).
+    /// Grows a tree straight towards `target` until it arrives (its node) or is blocked (`None`).
     fn connect(&mut self, tree: usize, target: &JointAngles) -> Option<usize> {
         let mut at = self.nearest(tree, target);
         loop {
@@ -133,12 +133,12 @@ impl<'a, 'b> RrtConnect<'a, 'b> {
         nearest.1
     }
 
-    /// The same way made quicker, each edge at the highest speed that it allows.
+    /// Returns a faster path through these waypoints, each edge at the highest speed that it allows.
     pub fn shortened(&mut self, waypoints: &[JointAngles], rng: &mut ChaCha8Rng) -> Path {
         self.n_regions = 0;
         let mut path = Path::at(waypoints[0]);
         for edge in waypoints.windows(2) {
-            // The search has certified the slowest.
+            // The search has certified the lowest speed.
             path.push(edge[1], self.time_scale(&edge[0], &edge[1], SLOWEST).unwrap_or(SLOWEST));
         }
         path = self.thinned(path);
@@ -162,7 +162,7 @@ impl<'a, 'b> RrtConnect<'a, 'b> {
         self.planner.clearance.timing().path_duration_s(path)
     }
 
-    /// Leaves out waypoints where a straight edge across them is certified and takes no longer.
+    /// Leaves out waypoints if a straight edge across them is certified and takes no longer.
     fn thinned(&mut self, path: Path) -> Path {
         let mut short = Path::at(path.waypoints[0]);
         let mut at = 0;
@@ -176,7 +176,7 @@ impl<'a, 'b> RrtConnect<'a, 'b> {
         short
     }
 
-    /// The slowness of the edge from one waypoint to a later one, where it is certified and saves time.
+    /// Returns the time scaling of the edge from one waypoint to a later one, if it is certified and saves time.
     fn across(&mut self, path: &Path, at: usize, far: usize) -> Option<f64> {
         let timing = self.planner.clearance.timing();
         let (from, to) = (&path.waypoints[at], &path.waypoints[far]);
@@ -184,9 +184,9 @@ impl<'a, 'b> RrtConnect<'a, 'b> {
         self.time_scale(from, to, along_s / timing.least_duration_s(from, to))
     }
 
-    /// The path with a straight edge from place `a` to place `b` on it (waypoint and share of the edge behind it),
-    /// where that saves time and its three new edges are certified: a part of an edge is driven at other rates than the
-    /// whole.
+    /// Returns the path with a straight edge from point `a` to point `b` on it (waypoint and share of the edge after
+    /// it). `None` unless that saves time and all three new edges are certified: a part of an edge is driven at other
+    /// rates than the whole.
     fn shortcut(&mut self, path: &Path, a: f64, b: f64) -> Option<Path> {
         let (before, after) = (a.floor() as usize, b.floor() as usize);
         if before == after {
@@ -204,7 +204,7 @@ impl<'a, 'b> RrtConnect<'a, 'b> {
             (after + 1..path.n_edges()).for_each(|k| shorter.push(path.edge(k).to, path.edge(k).time_scale));
             shorter
         };
-        // What the other two edges leave at the highest speed is what each may take.
+        // Each edge may take the time that the other two leave at the highest speed.
         let spare_s = enough_s - self.duration_s(&shorter([1.0; 3]));
         if spare_s <= 0.0 {
             return None;
@@ -231,7 +231,7 @@ impl Tree {
         self.nodes.len() - 1
     }
 
-    /// From a node to the root.
+    /// Returns the angles from a node to the root.
     fn branch(&self, mut node: usize) -> Vec<JointAngles> {
         let mut branch = vec![self.nodes[node].0];
         while node != 0 {

@@ -1,4 +1,4 @@
-//! Paths in the three vehicles' sites, and the names of what cannot be done.
+//! Paths in the three vehicles' sites, and the errors of infeasible ones.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -45,7 +45,7 @@ fn site(vehicle: &str) -> Site {
     Site { robot, vehicle, scene }
 }
 
-/// A pose at which the believed arm touches something.
+/// Returns a pose at which the believed arm touches something.
 fn random_too_near(clearance: &ClearanceModel<'_>, planner: &PathPlanner<'_>, rng: &mut ChaCha8Rng) -> JointAngles {
     loop {
         let at = random(planner, rng);
@@ -55,7 +55,7 @@ fn random_too_near(clearance: &ClearanceModel<'_>, planner: &PathPlanner<'_>, rn
     }
 }
 
-/// The waypoints' time with each edge at the highest speed that it allows.
+/// Returns the waypoints' time with each edge at the highest speed that it allows.
 fn duration_s(planner: &PathPlanner<'_>, waypoints: &[JointAngles]) -> f64 {
     let mut path = Path::at(waypoints[0]);
     for edge in waypoints.windows(2) {
@@ -64,8 +64,8 @@ fn duration_s(planner: &PathPlanner<'_>, waypoints: &[JointAngles]) -> f64 {
     planner.clearance.timing().path_duration_s(&path)
 }
 
-/// In all three sites, under wide and narrow bounds: paths are found, keep clear wherever one looks, and are the same
-/// again.
+/// In all three sites, under wide and narrow bounds, paths are found, keep clear at every sampled arm, and are
+/// reproducible.
 #[test]
 fn paths_are_found_and_keep_clear_and_are_the_same_again() {
     for name in ["open-frame", "tight-basket", "under-ice"] {
@@ -94,7 +94,7 @@ fn paths_are_found_and_keep_clear_and_are_the_same_again() {
                         let share = f64::from(step) / 10.0;
                         let on_line = between(&edge.from, &edge.to, share);
                         for _ in 0..20 {
-                            // Off the line first, then off what the sensors say.
+                            // The arm leaves the line first, then the angles that the sensors read.
                             let sign = |rng: &mut ChaCha8Rng| f64::from(rng.random_range(-1..=1));
                             let arm = JointAngles::from_fn(on_line.len(), |j| {
                                 if j >= 5 {
@@ -142,7 +142,7 @@ fn shortcuts_make_paths_quicker_and_never_slower() {
     assert!(after_s < 0.75 * before_s, "{before_s} {after_s}");
 }
 
-/// An edge is driven as quickly as it may be: at the next higher speed some arm that overshoots comes too near.
+/// An edge is driven at the highest certified speed: at the next higher speed some arm that overshoots comes too near.
 #[test]
 fn edges_near_things_are_driven_slowly_and_the_others_are_not() {
     let site = site("tight-basket");
@@ -205,7 +205,7 @@ fn ends_that_cannot_be_are_named_with_the_nearest_that_can() {
             Err(PathError::GoalTooNear { nearest, distance_m, needed_m, nearest_free }) => {
                 of_vehicle += i32::from(parts(&nearest));
                 assert!(distance_m < needed_m, "{nearest}");
-                // It is free, and a 256th of the way on it is not.
+                // The named pose is free, and a 256th of the edge farther it is not.
                 assert!(planner.is_free_to_arrive(&nearest_free));
                 let way_rad = free.max_abs_difference(&inside);
                 let share = free.max_abs_difference(&nearest_free) / way_rad;
@@ -256,7 +256,7 @@ fn a_blocked_way_says_what_blocks_it_and_how_far_it_is_free() {
         if planner.time_scale(&from, &to, SLOWEST, &mut 0).is_some() {
             continue;
         }
-        // As a search says that has found no way round.
+        // The search is as one that has found no path.
         let error = planner.blocked(&from, &to, &RrtConnect::new(&planner, &from, &to));
         let PathError::Blocked { tried: 0, nearest, distance_m, free_share, is_stuck: true } = &error else {
             panic!("{error:?}")
@@ -268,8 +268,8 @@ fn a_blocked_way_says_what_blocks_it_and_how_far_it_is_free() {
     }
 }
 
-/// Where some arm just keeps the margin no edge is proven to keep it, in whichever direction: a search says so, and
-/// half the margin lets the arm leave.
+/// If some arm barely keeps the margin, no edge in any direction can be certified. A search reports that, and half the
+/// margin lets the arm leave.
 #[test]
 fn a_start_at_the_verge_of_its_margin_cannot_be_left() {
     let site = site("tight-basket");

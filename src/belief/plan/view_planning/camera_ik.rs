@@ -1,9 +1,9 @@
-//! Inverse kinematics of the camera: its eye to a place, its optical axis along a direction. Before a camera that
-//! stands still it is a tag that comes to a place, its normal along a direction.
+//! Inverse kinematics of the camera: its optical centre at a point, its optical axis along a direction. For a fixed
+//! camera it is a tag that moves to a point, with its normal along a direction.
 //!
-//! Levenberg's damped least squares on five numbers: the origin's distance (m) and the axis's turn `a x a*` (rad,
-//! weighted by the range, so that both count as displacements at the tag). The arm need not get there: what it comes to
-//! is tested like any other pose.
+//! Levenberg's damped least squares on five numbers: the origin's distance (m) and the axis's turn `a x a*` (rad). The
+//! turn is weighted by the range, so that both count as displacements at the tag. The arm need not reach the goal: the
+//! result is tested like any other pose.
 
 use crate::plan::constants::view_planning_camera_ik::{BESIDE_RAD, DAMPING, MAX_STEP_RAD, RANGES_M, STEPS};
 use nalgebra::{SMatrix, SVector, UnitQuaternion, Vector3};
@@ -16,18 +16,18 @@ use armcal_core::numeric::{LeastSquares, Proposal, StopRule, minimize};
 use armcal_core::robot::{Robot, SurveyedTag};
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
-/// Where a frame of the arm shall be and where its z axis shall point, base frame.
+/// Target position of a frame of the arm and target direction of its z axis, base frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct CameraGoal {
-    /// The camera's, or that of a tag that the arm carries.
+    /// Frame of the camera, or of a tag that the arm carries.
     pub frame: Attachment,
     pub origin_m: Vector3<f64>,
-    /// Unit.
+    /// Target direction of the z axis, unit vector.
     pub axis: Vector3<f64>,
 }
 
 impl CameraGoal {
-    /// From a good range and incidence at a tag that is drawn evenly.
+    /// Draws a goal at a useful range and incidence from a randomly chosen tag.
     pub(crate) fn draw(robot: &Robot, visibility: &VisibilityModel, rng: &mut ChaCha8Rng) -> Option<Self> {
         if robot.tags.is_empty() {
             return None;
@@ -35,7 +35,7 @@ impl CameraGoal {
         let tag = &robot.tags[rng.random_range(0..robot.tags.len())];
         let highest_m = RANGES_M[1].min(visibility.max_range_m);
         let range_m = rng.random_range(RANGES_M[0].max(visibility.min_range_m).min(highest_m - 1e-3)..highest_m);
-        // Evenly over the cone about the tag's normal.
+        // Uniform over the cone about the tag's normal.
         let cos = 1.0 - rng.random_range(0.0..1.0) * (1.0 - visibility.max_incidence_rad.cos());
         let sin = (1.0_f64 - cos * cos).max(0.0).sqrt();
         let around = rng.random_range(0.0..std::f64::consts::TAU);
@@ -49,8 +49,8 @@ impl CameraGoal {
         Some(Self { frame: robot.camera.mount, origin_m, axis: (beside - out).normalize() })
     }
 
-    /// A tag at this range from a camera that stands still, in the direction that is its optical axis's and `beside`.
-    /// `from_tag`: the line back to the camera in the tag's axes, unit.
+    /// Returns the goal of a carried tag at this range from a fixed camera, in the direction of its optical axis plus
+    /// an offset. `from_tag`: unit vector from the tag to the camera, in the tag's axes.
     fn of_carried_tag(
         robot: &Robot,
         tag: &SurveyedTag,
@@ -60,7 +60,7 @@ impl CameraGoal {
     ) -> Self {
         let base_from_camera = &robot.camera.mount.link_from_frame;
         let sight = (base_from_camera.rotation * Vector3::z() + beside).normalize();
-        // Of all turns of the tag about the line of sight one: the goal does not ask for another.
+        // One of all rotations of the tag about the line of sight: the goal leaves this rotation free.
         let along = UnitQuaternion::rotation_between(from_tag, &-sight).unwrap_or_else(UnitQuaternion::identity);
         let Attachment { n_joints, link_from_frame } = robot.tag_frame;
         let frame = Attachment { n_joints, link_from_frame: link_from_frame * tag.base_from_tag.isometry() };
@@ -68,7 +68,7 @@ impl CameraGoal {
         Self { frame, origin_m, axis: along * Vector3::z() }
     }
 
-    /// The joints before the frame, from `seed`; the others stay.
+    /// Returns the angles from `seed` with the joints before the frame solved; the others stay.
     pub(crate) fn solve(&self, robot: &Robot, limits: &[JointLimits], seed: &JointAngles) -> JointAngles {
         let error = self.error(robot, seed);
         let mut search = Search { goal: self, robot, limits, angles: *seed, error, trial: *seed, trial_error: error };
@@ -76,7 +76,7 @@ impl CameraGoal {
         search.angles
     }
 
-    /// Place (m), then direction.
+    /// Returns the position error (m), then the direction error.
     fn error(&self, robot: &Robot, angles: &JointAngles) -> SVector<f64, 6> {
         let base_from_frame = robot.chain.frame(angles, &self.frame);
         let off_m = self.origin_m - base_from_frame.translation.vector;
@@ -91,7 +91,7 @@ impl CameraGoal {
         let mut out = SMatrix::<f64, 6, MAX_JOINTS>::zeros();
         for joint in 0..n {
             let moved = poses.point_jacobian(joint, &base_from_frame.translation.vector);
-            // The axis turns by omega x a; of `a x a*` that is the part of omega across the axis.
+            // The axis turns by omega x a; in `a x a*` that is the part of omega across the axis.
             let omega = poses.turn_jacobian(joint);
             let turned = omega - axis * axis.dot(&omega);
             out.fixed_view_mut::<3, 1>(0, joint).copy_from(&moved);
@@ -135,7 +135,7 @@ impl LeastSquares for Search<'_> {
 
     fn trial_cost(&mut self) -> Option<f64> {
         self.trial_error = self.goal.error(self.robot, &self.trial);
-        // Against its limits the arm goes nowhere: that is no step that helps.
+        // A step against the limits does not move the arm, so it does not help.
         Some(self.trial_error.norm()).filter(|trial| *trial < self.error.norm())
     }
 
@@ -153,7 +153,7 @@ mod tests {
         robot.chain.joints().iter().map(|joint| joint.limits.unwrap_or(without)).collect()
     }
 
-    /// The camera of a random pose is found again from another: place and direction within the tolerance of a look.
+    /// From another pose, the camera reaches its position and direction at a random pose, within a small tolerance.
     #[test]
     fn the_camera_gets_where_another_pose_has_it() {
         let robot = crate::plan::view_planning::fixture::titan();
@@ -176,8 +176,8 @@ mod tests {
         assert!(there * 10 > n * 9, "{there} of {n}");
     }
 
-    /// Of goals before a camera that stands still some are met, and where they are the tag that was meant is in view
-    /// as a rule: a direction may lie beside the image of a narrow lens.
+    /// Some goals before a fixed camera are reached, and there the intended tag is usually in view. A direction may lie
+    /// outside the image of a narrow lens.
     #[test]
     fn a_carried_tag_gets_before_the_camera() {
         let robot = crate::plan::view_planning::fixture::watched_titan();

@@ -1,9 +1,9 @@
-//! Poses that may be taken: they see enough tags for most arms that the belief allows, and keep clear for every one.
+//! Candidate poses: they show enough tags to most arms that the belief allows, and keep clear for every one.
 //!
-//! Drawn in turn evenly over the narrowed joint ranges, from boxes of growing size around where the arm is (under a
-//! wide belief only poses near the present one are certain to be clear), and by the camera's inverse kinematics at the
-//! tags. Cheap tests come first: field of view, clearance of the believed arm, probability of the tags, the
-//! certificate, what hides them.
+//! Draws come in turn from three sources. One is uniform over the narrowed joint ranges. One uses boxes of growing size
+//! around the arm's configuration, because under wide bounds only poses near it are certified. One is the camera's
+//! inverse kinematics at the tags. Cheap tests come first: field of view, clearance of the believed arm, probability of
+//! the tags, the certificate, occlusion.
 
 use crate::plan::constants::view_planning_candidates::{
     BOX_SHARES, FAILED_RADIUS_RAD, MAX_BLOCKED, MAX_DRAWS, MAX_REGIONS, MOST_TAGS, N_ARMS, R8, TARGET_DISTANCE_M,
@@ -21,39 +21,39 @@ use armcal_core::kinematics::{JointLimits, LinkPoses};
 use armcal_core::robot::Robot;
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
-/// A pose that may be taken.
+/// A pose that may be chosen.
 #[derive(Clone, Debug)]
 pub(crate) struct Candidate {
     pub angles: JointAngles,
-    /// (tag, probability that it is seen).
+    /// Index of each tag and the probability that the camera sees it.
     pub tags: Vec<(usize, f64)>,
-    /// Whether it shows a tag whose place is known, to most arms within the bounds.
+    /// True if it shows a tag with a known pose to most arms within the bounds.
     pub shows_known_tag: bool,
-    /// Whether it was drawn evenly over the joint ranges.
+    /// True if it was drawn uniformly over the joint ranges.
     pub is_even: bool,
 }
 
-/// What became of the draws that were refused.
+/// Counts of the rejected draws, by reason.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct InfeasibleCounts {
     pub tried: usize,
-    /// How many draws have 0, 1, .. tags in view; the last counts all beyond.
+    /// Number of draws with 0, 1, ... tags in view; the last counts all beyond.
     by_tags: [usize; MOST_TAGS + 1],
-    /// The tag in view of a pose that came nearest to being clear, and by how much it lacks.
+    /// A tag in view of the pose that came nearest to being clear, and that pose's closest pair.
     nearest: Option<(u32, ClosestPair)>,
-    /// See enough tags with the believed arm, but not with most that the belief allows.
+    /// Draws that show enough tags to the believed arm, but not to most arms that the belief allows.
     unsure: usize,
-    /// See enough, and have their tool at a target.
+    /// Draws that show enough tags, with the tool at a target.
     at_target: usize,
-    /// Keep clear and have enough tags in view, and something hides them: what, and how many poses.
+    /// Names of shapes that hide tags of clear poses with enough tags in view, and the number of such poses.
     hidden: Vec<(String, usize)>,
-    /// See enough tags, and some arm within the bounds comes too near.
+    /// Draws that show enough tags, but some arm within the bounds comes too near.
     blocked: usize,
-    /// Whether certificates took so much that the search ended before its time.
+    /// True if the certificates' budget ended the search early.
     is_cut_short: bool,
 }
 
-/// Where a draw comes from.
+/// Source of a draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Source {
     Uniform,
@@ -64,7 +64,7 @@ enum Source {
 impl Source {
     const ALL: [Self; 3] = [Self::Uniform, Self::Local, Self::CameraIk];
 
-    /// What a draw that comes to nothing counts, in candidates: sources have equal shares as long as they give any.
+    /// Returns the cost of a failed draw, in candidates: sources have equal shares as long as they give any.
     fn draw_cost(self) -> f64 {
         match self {
             Self::Uniform | Self::Local => 0.02,
@@ -73,33 +73,33 @@ impl Source {
     }
 }
 
-/// Draws and tests.
+/// State of the search: draws and tests.
 pub(crate) struct Search<'a> {
     request: &'a PoseRequest<'a>,
     limits: Vec<JointLimits>,
-    /// Joint errors in units of the bounds, -1..1.
+    /// Joint errors of the sampled arms in units of the bounds, -1 to 1.
     errors: [[f64; MAX_JOINTS]; N_ARMS],
-    /// Of the draw at hand.
+    /// Sampled arms of the current draw.
     arms: Vec<DrawnArm>,
-    /// Regions that certificates have looked at.
+    /// Number of regions that certificates have tested.
     n_regions: usize,
     pub refused: InfeasibleCounts,
 }
 
-/// One of the arms that stand for the belief.
+/// One of the sampled arms that represent the belief.
 struct DrawnArm {
     poses: LinkPoses,
-    /// Tags in view, were there nothing to hide them.
+    /// Tags in view, before occlusion.
     in_view: Vec<usize>,
 }
 
-/// Joints from this one on do not move camera and tags against each other; they stay where they are, but for those that
-/// turn a tag on the gripper.
+/// Returns the first joint from which on no joint moves camera and tags against each other. These joints keep their
+/// angles, except those that turn a tag on the gripper.
 fn n_seen(robot: &Robot) -> usize {
     robot.n_seen_joints()
 }
 
-/// Whether a joint turns the tag on the gripper in the camera's view: then the views need many of its angles.
+/// True if a joint turns the tag on the gripper in the camera's view: then the views need many of its angles.
 fn shows_gripper_tag(robot: &Robot, joint: usize) -> bool {
     robot.gripper_tag.is_some_and(|tag| tag.joints(&robot.camera.mount).contains(&joint))
 }
@@ -117,7 +117,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Up to `enough` candidates.
+    /// Returns up to `enough` candidates.
     pub(crate) fn gather(&mut self, enough: usize, rng: &mut ChaCha8Rng) -> Vec<Candidate> {
         let mut found: Vec<Candidate> = Vec::with_capacity(enough);
         let mut spent = [0.0_f64; Source::ALL.len()];
@@ -157,7 +157,7 @@ impl<'a> Search<'a> {
             }
             Source::CameraIk => {
                 let even = self.draw_in(None, rng);
-                // From a pose that is known to be good, or from anywhere.
+                // Starts from a pose that is known to be good, or from anywhere.
                 let seed = if found.is_empty() { even } else { found[rng.random_range(0..found.len())].angles };
                 let n = n_seen(self.request.robot);
                 let seed = JointAngles::from_fn(seed.len(), |j| if j < n { seed[j] } else { even[j] });
@@ -167,7 +167,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Evenly over the ranges, or over a box around the start that is `share` of them to either side.
+    /// Draws uniformly over the ranges, or over a box around the start that extends by `share` of them to either side.
     fn draw_in(&self, share: Option<f64>, rng: &mut ChaCha8Rng) -> JointAngles {
         let robot = self.request.robot;
         let start = self.request.start;
@@ -189,7 +189,7 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// Cheap tests first; most draws fail at the first.
+    /// Tests a draw; cheap tests come first, because most draws fail at the first.
     fn assess(&mut self, angles: JointAngles) -> Option<Candidate> {
         let request = self.request;
         let robot = request.robot;
@@ -240,7 +240,7 @@ impl<'a> Search<'a> {
         }
         let tags = self.expected_tags();
         if tags.iter().map(|(_, share)| share).sum::<f64>() < min_tags as f64 {
-            // In view they are, for most arms.
+            // The tags are in view for most arms, so a shape hides them.
             let blocker = request.visibility.hidden_by(robot, request.clearance, &angles).unwrap_or("the arm itself");
             self.refused.count_hidden(blocker);
             return None;
@@ -260,7 +260,7 @@ impl<'a> Search<'a> {
         self.request.detection_rate.get(tag).copied().unwrap_or(1.0).clamp(0.0, 1.0)
     }
 
-    /// Draws the arms; gives the expected number of tags in view, were there nothing to hide them.
+    /// Samples the arms and returns the expected number of tags in view, before occlusion.
     fn expected_in_view(&mut self, angles: &JointAngles) -> f64 {
         let (robot, visibility) = (self.request.robot, self.request.visibility);
         let mut arms = std::mem::take(&mut self.arms);
@@ -278,7 +278,7 @@ impl<'a> Search<'a> {
         seen.map(|&tag| self.trust(tag)).sum::<f64>() / N_ARMS as f64
     }
 
-    /// Tags with the share of the drawn arms that see them, times how far that can be trusted.
+    /// Returns each tag with the share of the sampled arms that see it, times the trust in that tag.
     fn expected_tags(&self) -> Vec<(usize, f64)> {
         let (robot, visibility) = (self.request.robot, self.request.visibility);
         let mut count = vec![0usize; robot.tags.len()];
@@ -293,8 +293,8 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Errors between the bounds by the distribution that the sum of a gain's and an offset's uniform error has: a
-/// triangle.
+/// Returns errors between the bounds with a triangular distribution, that of the sum of two uniform errors (gain and
+/// offset).
 fn errors() -> [[f64; MAX_JOINTS]; N_ARMS] {
     let mut step = 1.0;
     let steps: [f64; MAX_JOINTS] = std::array::from_fn(|_| {
@@ -317,7 +317,7 @@ impl InfeasibleCounts {
         }
     }
 
-    /// Why there is none, with the nearest thing that would work.
+    /// Returns the error that there is no pose, with the nearest alternative that would work.
     pub(crate) fn no_pose(&self, request: &PoseRequest<'_>) -> PlanError {
         PlanError::NoUsefulPose {
             min_tags: request.capture.min_tags,
@@ -328,7 +328,7 @@ impl InfeasibleCounts {
         }
     }
 
-    /// The nearest thing that would work, in words.
+    /// Describes the nearest alternative that would work.
     pub(crate) fn hint(&self, request: &PoseRequest<'_>) -> String {
         let min_tags = request.capture.min_tags as usize;
         if request.robot.tags.is_empty() {
@@ -350,7 +350,7 @@ impl InfeasibleCounts {
                 "every arm that the belief allows was to be clear at each of them, which took too long to prove";
             return format!("{poses}: the belief is very wide; check the joint sensors, and their noise in robot.toml");
         }
-        // The last test that any draw came to.
+        // The last test that any draw reached.
         if let Some((blocker, n)) = self.hidden.iter().max_by_key(|(_, n)| *n) {
             return format!("{n} poses keep clear and have enough tags in view, but `{blocker}` hides them");
         }
@@ -383,7 +383,7 @@ mod tests {
     use crate::plan::view_planning::fixture::Site;
     use armcal_core::stats::stream_rng;
 
-    /// Some arm within such bounds meets something wherever it goes; to prove it for each pose would take minutes.
+    /// Within such bounds some arm collides at every pose; to prove it for each pose would take minutes.
     #[test]
     fn a_belief_that_is_very_wide_ends_the_search_by_budget() {
         let mut site = Site::titan();
@@ -392,7 +392,7 @@ mod tests {
         let request = site.request(&clearance);
         let mut search = Search::new(&request);
         search.gather(300, &mut stream_rng(1, "plan"));
-        // The last certificate may go beyond.
+        // The last certificate may exceed the budget.
         assert!((MAX_REGIONS..MAX_REGIONS + 500_000).contains(&search.n_regions), "{}", search.n_regions);
         insta::assert_snapshot!("wide_bounds", search.refused.hint(&request));
     }

@@ -1,9 +1,9 @@
-//! What a view is worth: by how much it lowers the logarithm of the measure that views are chosen by.
+//! Value of a view: the reduction of the logarithm of the design criterion.
 //!
-//! A view with `G = twists basis` and unit noise takes `P G^T S^-1 G P` off the covariance P, `S = I + G P G^T` (6 x
-//! 6). With the measure's rows L and `Y = L P G^T S^(-T/2)` (6 columns) the tool's variance, and the sum of variances,
-//! fall by `|Y|^2`, the volume by the factor `det(I - Y^T Y)`, and the largest variance becomes that of
-//! `L P L^T - Y Y^T`. G is never written out: P is taken to the few directions first.
+//! A view with `G = twists basis` and unit noise takes `P G^T S^-1 G P` off the covariance P. Here `S = I + G P G^T` (6
+//! x 6). With the criterion's rows L, let `Y = L P G^T S^(-T/2)` (6 columns). The tool's variance, and the sum of
+//! variances, fall by `|Y|^2`. The volume falls by the factor `det(I - Y^T Y)`. The largest variance becomes that of `L
+//! P L^T - Y Y^T`. G is never computed: P is first projected on the few directions.
 
 use nalgebra::{Cholesky, DMatrix, Matrix6, SMatrix, SymmetricEigen};
 
@@ -16,47 +16,47 @@ use armcal_core::streams::MAX_JOINTS;
 
 type Linear = SMatrix<f64, MAX_LINEAR, MAX_LINEAR>;
 
-/// What is to become small.
+/// Variance to be minimised.
 #[derive(Clone, Debug)]
 pub(crate) struct DesignObjective {
     criterion: PoseCriterion,
-    /// L: of the tool's position at the targets over the root of their number, or of gains and offsets in units of
-    /// their priors.
+    /// Rows L: tool position at the targets over the root of their number, or gains and offsets in units of their
+    /// priors.
     rows: DMatrix<f64>,
-    /// What no view lowers.
+    /// Variance that no view lowers.
     floor: f64,
 }
 
-/// The covariance after the views taken so far.
+/// Covariance after the views captured so far.
 #[derive(Clone, Debug)]
 pub(crate) struct DesignState {
     measure: DesignObjective,
     n_joints: usize,
     covariance: DMatrix<f64>,
-    /// `L P`; for the volume `C^-1 L P`, where `C C^T = L P L^T`.
+    /// Matrix `L P`; for the volume `C^-1 L P`, where `C C^T = L P L^T`.
     reach: DMatrix<f64>,
-    /// `L P L^T` of gains and offsets; beyond them zero.
+    /// Matrix `L P L^T` of gains and offsets; beyond them zero.
     linear: Linear,
-    /// Logarithm of the measure, a variance.
+    /// Logarithm of the criterion, a variance.
     pub ln_value: f64,
 }
 
-/// Rows of `P E^T`.
+/// Selection of rows of `P E^T`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Rows {
     All,
-    /// Those that `E P E^T` needs.
+    /// Rows that `E P E^T` needs.
     OfProducts,
 }
 
 /// Memory for [`DesignState::gain`].
 #[derive(Clone, Debug)]
 pub(crate) struct Scratch {
-    /// `P E^T`, one column for each joint.
+    /// Matrix `P E^T`, one column for each joint.
     by_joint: DMatrix<f64>,
-    /// `L P E^T`.
+    /// Matrix `L P E^T`.
     reached: DMatrix<f64>,
-    /// Y.
+    /// Matrix Y.
     told: DMatrix<f64>,
 }
 
@@ -65,7 +65,7 @@ impl DesignObjective {
         Self { criterion: PoseCriterion::ToolError, rows, floor }
     }
 
-    /// Of the sensors' gains and offsets, in units of their priors.
+    /// Returns the criterion of the sensors' gains and offsets, in units of their priors.
     pub(crate) fn of_sensors(criterion: PoseCriterion, unknowns: &ParameterPrior) -> Self {
         let is_linear = |kind: ParameterKind| matches!(kind, ParameterKind::Gain | ParameterKind::Offset);
         let linear: Vec<usize> = columns(unknowns.n_joints)
@@ -95,7 +95,7 @@ impl DesignState {
         state
     }
 
-    /// The state after `captured` views.
+    /// Returns the state after `captured` views.
     pub(crate) fn after(measure: DesignObjective, unknowns: &ParameterPrior, captured: &[WhitenedView]) -> Self {
         let mut state = Self::new(measure, unknowns);
         let mut scratch = state.scratch();
@@ -113,7 +113,7 @@ impl DesignState {
         }
     }
 
-    /// Logarithm of the measure now less that after `view`: not negative.
+    /// Returns the logarithm of the criterion now less that after `view`: not negative.
     pub(crate) fn gain(&self, view: &WhitenedView, scratch: &mut Scratch) -> f64 {
         let Some(half) = self.whitened(view, &mut scratch.by_joint, Rows::OfProducts) else { return 0.0 };
         self.reach_along(view, &mut scratch.reached);
@@ -136,7 +136,7 @@ impl DesignState {
         match self.measure.criterion {
             PoseCriterion::ToolError | PoseCriterion::Random | PoseCriterion::AOptimal => {
                 let lowered: f64 = told.iter().map(|y| y * y).sum();
-                // The rest of what was subtracted from is rounding.
+                // A variance below this floor is rounding error.
                 (self.ln_value.exp() - lowered).max(1e-24).ln()
             }
             PoseCriterion::DOptimal => {
@@ -158,13 +158,13 @@ impl DesignState {
         }
     }
 
-    /// Takes `view`: its rank-6 update of the covariance, and what follows from it.
+    /// Adds `view`: its rank-6 update of the covariance, and the derived matrices.
     pub(crate) fn take(&mut self, view: &WhitenedView, scratch: &mut Scratch) {
         self.add(view, scratch);
         self.renew();
     }
 
-    /// Takes `view` into the covariance alone: views may follow, and [`Self::renew`] has to before anything is asked.
+    /// Adds `view` to the covariance only. More views may follow; [`Self::renew`] must precede any query.
     pub(crate) fn add(&mut self, view: &WhitenedView, scratch: &mut Scratch) {
         let Some(half) = self.whitened(view, &mut scratch.by_joint, Rows::All) else { return };
         let n = self.covariance.nrows();
@@ -183,7 +183,7 @@ impl DesignState {
         self.covariance.gemm(-1.0, &moved, &moved.transpose(), 1.0);
     }
 
-    /// What the covariance means for the measure.
+    /// Recomputes the matrices and the value of the criterion from the covariance.
     pub(crate) fn renew(&mut self) {
         self.reach = &self.measure.rows * &self.covariance;
         let linear = &self.reach * self.measure.rows.transpose();
@@ -211,7 +211,7 @@ impl DesignState {
         (0..self.n_joints).chain(MAX_JOINTS..N_DIRECTIONS)
     }
 
-    /// `S^(-1/2) twists`, with these rows of `P E^T` of the joints in `by_joint`; `None` where S overflows.
+    /// Returns `S^(-1/2) twists`, and writes these rows of `P E^T` of the joints to `by_joint`; `None` if S overflows.
     fn whitened(&self, view: &WhitenedView, by_joint: &mut DMatrix<f64>, rows: Rows) -> Option<Twists> {
         let n = self.covariance.nrows();
         let at = self.n_joints * WIDTH;
@@ -244,7 +244,7 @@ impl DesignState {
         Cholesky::new(spread)?.l().solve_lower_triangular(&view.twists)
     }
 
-    /// `L P E^T`, a column for each direction.
+    /// Computes `L P E^T`, a column for each direction.
     fn reach_along(&self, view: &WhitenedView, reached: &mut DMatrix<f64>) {
         let n_rows = self.reach.nrows();
         let at = self.n_joints * WIDTH;
@@ -266,25 +266,26 @@ impl DesignState {
     }
 }
 
-/// Logarithm of the largest eigenvalue.
+/// Returns the logarithm of the largest eigenvalue.
 fn largest(matrix: &Linear) -> f64 {
     let values = SymmetricEigen::new(*matrix).eigenvalues;
     values.max().max(1e-24).ln()
 }
 
-/// Columns of `n_rows` from `start` on, each with its weight.
+/// Returns the start of each column of `n_rows` from `start` on, with its weight.
 fn weighted(weights: &[f64; WIDTH], start: usize, n_rows: usize) -> [(usize, f64); WIDTH] {
     std::array::from_fn(|k| (start + k * n_rows, weights[k]))
 }
 
-/// The sum of weighted columns, in the order of the terms: where each begins in `columns`, and its weight.
+/// Computes the sum of weighted columns, in the order of the terms: each has the start of its column in `columns`, and
+/// its weight.
 fn combine(out: &mut [f64], columns: &[f64], terms: &[(usize, f64)]) {
     let n_wide = combine_lanes::<8>(out, 0, columns, terms);
     let n_pairs = combine_lanes::<2>(out, n_wide, columns, terms);
     combine_lanes::<1>(out, n_pairs, columns, terms);
 }
 
-/// The same of as many whole lanes as there are from row `first` on; sums stay in registers. Gives the first row left.
+/// Computes the sum for all whole lanes from row `first` on, with sums in registers. Returns the first row left.
 fn combine_lanes<const N: usize>(out: &mut [f64], first: usize, columns: &[f64], terms: &[(usize, f64)]) -> usize {
     let (lanes, _) = out[first..].as_chunks_mut::<N>();
     let mut row = first;

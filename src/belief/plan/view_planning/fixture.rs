@@ -1,4 +1,4 @@
-//! The Titan among its vehicle, for tests.
+//! The Titan on its vehicle, for tests.
 
 use std::path::Path;
 
@@ -33,7 +33,7 @@ pub(crate) fn titan() -> Robot {
     load(&root().join("robots/titan4")).expect("the robot reads").mounted_on(&vehicle()).expect("it fits")
 }
 
-/// Before a camera that stands still, with tags on its gripper.
+/// Returns a Titan before a fixed camera, with tags on its gripper.
 pub(crate) fn watched_titan() -> Robot {
     load(&root().join("robots/titan4-watched")).expect("the robot reads").mounted_on(&vehicle()).expect("it fits")
 }
@@ -42,7 +42,7 @@ pub(crate) fn clearance_of<'a>(robot: &'a Robot, vehicle: &Vehicle) -> Clearance
     ClearanceModel::new(robot, vehicle, &Scene { seafloor_z_m: Some(-2.2), obstacles: Vec::new() })
 }
 
-/// What a request refers to.
+/// Owner of the data that a request refers to.
 pub(crate) struct Site {
     pub robot: Robot,
     pub vehicle: Vehicle,
@@ -106,7 +106,7 @@ impl Site {
         }
     }
 
-    /// The plan of a seed by a criterion, of `enough` candidates.
+    /// Returns the plan of a seed by a criterion, from `enough` candidates.
     pub(crate) fn plan(&mut self, seed: u64, choose: PoseCriterion, enough: usize) -> Result<PosePlan, PlanError> {
         self.capture.criterion = choose;
         let clearance = self.clearance();
@@ -116,14 +116,14 @@ impl Site {
     }
 }
 
-/// An arm as it really is, drawn from the priors.
+/// A true arm, drawn from the priors.
 pub(crate) struct Truth {
     pub parameters: JointParameters,
     mount: Isometry3<f64>,
     tags: Vec<Isometry3<f64>>,
 }
 
-/// Images of a view.
+/// Number of images of a view.
 const N_FRAMES: usize = 5;
 
 pub(crate) fn normal(rng: &mut ChaCha8Rng) -> f64 {
@@ -158,7 +158,7 @@ impl Truth {
         })
     }
 
-    /// What is seen from the poses of a plan.
+    /// Returns the views that the true arm captures at the poses of a plan.
     pub(crate) fn views(
         &self,
         clearance: &ClearanceModel<'_>,
@@ -194,7 +194,7 @@ impl Truth {
         plan.poses.iter().enumerate().map(of).filter(|view| !view.tags.is_empty()).collect()
     }
 
-    /// Distance of the tool by `found` from where it is, for sensors that read as if the arm were at `believed`.
+    /// Returns the error of the tool position by `found`, m, for sensors that read as if the arm were at `believed`.
     pub(crate) fn tool_error_m(&self, robot: &Robot, found: &JointParameters, believed: &JointAngles) -> f64 {
         let tool = |parameters: &JointParameters| {
             let angles = Self { parameters: *parameters, mount: self.mount, tags: Vec::new() }.angles(robot, believed);

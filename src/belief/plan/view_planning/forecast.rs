@@ -1,9 +1,9 @@
-//! The tool error to be expected once views are fitted, every tag with a survey error of its own.
+//! Predicted tool error once views are fitted, with a separate survey error of each tag.
 //!
-//! The information of joints, mount and tags together: a view with the camera's twists by parameters B, by tags
-//! `-Ad_i`, and by its own joint errors D (variance s^2) adds `sum G_i^T H_i G_i` with `G_i = [B, -Ad_i]`, less what
-//! its own errors take: `V (diag(1/s^2) + D^T H D)^-1 V^T`, `V = sum G_i^T H_i D`. These are the normal equations of
-//! `bundle` at what is believed.
+//! The information covers joints, mount and tags together. A view has the camera's twists by parameters B, by tags
+//! `-Ad_i`, and by its own joint errors D (variance s^2). It adds `sum G_i^T H_i G_i` with `G_i = [B, -Ad_i]`, less the
+//! loss by its own errors: `V (diag(1/s^2) + D^T H D)^-1 V^T`, `V = sum G_i^T H_i D`. These are the normal equations of
+//! `bundle` at the believed parameters.
 
 use crate::explain::constants::calibration_prior::{MAX_ROUNDING, ROUNDING};
 use crate::plan::constants::view_planning_forecast::{EDGE_SHARE, EDGES, MIN_STD};
@@ -16,23 +16,23 @@ use armcal_core::robot::Robot;
 use armcal_core::stats::quantile;
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
-/// What is known of joints, mount and tags.
+/// Information on joints, mount and tags.
 #[derive(Clone, Debug)]
 pub(crate) struct Forecast {
     information: DMatrix<f64>,
-    /// Columns of the unknowns that are not known exactly.
+    /// Columns of the parameters that are not known exactly.
     kept: Vec<usize>,
     n_joints: usize,
     joint_info: [f64; MAX_JOINTS],
     task: Task,
 }
 
-/// The tool at the targets.
+/// Tool at the targets.
 #[derive(Clone, Debug)]
 pub(crate) struct Task {
-    /// Tool position by parameters, three rows a target, over the root of the number of targets.
+    /// Derivative of the tool position by parameters, three rows per target, over the root of the number of targets.
     pub rows: DMatrix<f64>,
-    /// Variance that no view of the camera lowers, m^2: what parameters leave of each sensor, and joints behind the
+    /// Variance that no view of the camera lowers, m^2: the residual error of each sensor, and joints distal to the
     /// camera.
     pub floor_m2: f64,
 }
@@ -40,7 +40,7 @@ pub(crate) struct Task {
 impl Task {
     pub(crate) fn new(request: &PoseRequest<'_>, unknowns: &ParameterPrior) -> Self {
         let robot = request.robot;
-        // Without a task any posture may be one: the present stands for it.
+        // Without a task any configuration may be one: the present one represents it.
         let here = [*request.start];
         let postures = if request.task.is_empty() { &here[..] } else { request.task };
         let share = (postures.len() as f64).sqrt().recip();
@@ -66,9 +66,9 @@ impl Task {
 }
 
 impl Task {
-    /// The rows, and ten more for what lies beyond the task: each joint at both edges of what `angles` reach, as far as
-    /// it moves the tool at the targets, with the share [`EDGE_SHARE`] of the whole. Margins shrink where joints are
-    /// known, and there are tasks after this one.
+    /// Returns the rows, and two more per joint for configurations beyond the task, with the share [`EDGE_SHARE`] of
+    /// the whole. They are each joint at both edges of the range of `angles`, by its effect on the tool at the targets.
+    /// Margins shrink where joints are known, and other tasks may follow.
     pub(crate) fn with_edges(&self, robot: &Robot, n_joints: usize, angles: &[JointAngles]) -> DMatrix<f64> {
         let n_rows = self.rows.nrows();
         let mut rows = self.rows.clone().resize_vertically(n_rows + 2 * n_joints, 0.0);
@@ -88,7 +88,7 @@ impl Task {
     }
 }
 
-/// Variance of the angle of a joint that the camera does not see move, rad^2.
+/// Returns the variance of the angle of a joint whose motion the camera does not see, rad^2.
 fn unseen_rad2(request: &PoseRequest<'_>, joint: usize, angle_rad: f64) -> f64 {
     let spec = &request.robot.sensors[joint];
     let found = request.belief.and_then(|belief| belief.joint.get(joint));
@@ -99,7 +99,7 @@ fn unseen_rad2(request: &PoseRequest<'_>, joint: usize, angle_rad: f64) -> f64 {
 
 impl Forecast {
     pub(crate) fn new(robot: &Robot, unknowns: &ParameterPrior, task: Task) -> Option<Self> {
-        // Without the survey's common error: here each tag has its own.
+        // The survey's common error is left out: here each tag has its own.
         let n = unknowns.n() - 6;
         let kept: Vec<usize> = (0..n).filter(|&k| unknowns.covariance[(k, k)] > 0.0).collect();
         let prior = DMatrix::from_fn(kept.len(), kept.len(), |i, k| unknowns.covariance[(kept[i], kept[k])]);
@@ -110,7 +110,7 @@ impl Forecast {
             for k in 0..6 {
                 let std = if k < 3 { surveyed.position_std_m } else { surveyed.rotation_std_rad };
                 let at = kept.len() + 6 * tag + k;
-                // Nothing known is a little: the equations stay regular.
+                // A small information on unknown tags keeps the equations regular.
                 information[(at, at)] = if std.is_finite() { std.max(MIN_STD).powi(-2) } else { 1e-4 };
             }
         }
@@ -122,7 +122,7 @@ impl Forecast {
         let n_common = self.kept.len();
         let n_rows = 6 * view.sights.len();
         let n = self.information.nrows();
-        // Rows of each tag whitened by the root of its information.
+        // Rows of each tag, whitened by the root of its information.
         let mut rows = DMatrix::zeros(n_rows, n);
         let mut own = DMatrix::zeros(n_rows, self.n_joints);
         let by_parameter = self.by_parameter(view);
@@ -147,7 +147,7 @@ impl Forecast {
         self.information.gemm_tr(-1.0, &half, &half, 1.0);
     }
 
-    /// Twists of the camera by each of the kept parameters.
+    /// Returns the twists of the camera by each of the kept parameters.
     fn by_parameter(&self, view: &ViewJacobian) -> SMatrixX {
         let at = self.n_joints * WIDTH;
         let mut out = SMatrixX::zeros(self.kept.len());
@@ -163,7 +163,7 @@ impl Forecast {
         out
     }
 
-    /// Mean over the targets of the tool's variance, m^2; infinite where the equations have no inverse.
+    /// Returns the mean over the targets of the tool's variance, m^2; infinite if the equations are singular.
     pub(crate) fn tool_variance_m2(&self) -> f64 {
         let Some(factor) = Cholesky::new(self.information.clone()) else { return f64::INFINITY };
         let rows = &self.task.rows;
@@ -178,10 +178,11 @@ impl Forecast {
     }
 }
 
-/// Six rows, as many columns as there are parameters.
+/// Matrix of six rows and one column per parameter.
 type SMatrixX = nalgebra::OMatrix<f64, nalgebra::Const<6>, nalgebra::Dyn>;
 
-/// With an inverse in spite of the rounding of a calibration's file.
+/// Returns a factor of the matrix, which may be indefinite by the rounding of a calibration's file; `None` if it is
+/// still singular.
 fn regular(matrix: DMatrix<f64>) -> Option<Cholesky<f64, nalgebra::Dyn>> {
     let mut share = 0.0;
     while share < MAX_ROUNDING {

@@ -1,9 +1,9 @@
-//! What is not known of the arm, as one covariance that every view makes smaller.
+//! Covariance of the arm's parameters before the views, which every view reduces.
 //!
-//! Columns: of each joint that moves camera and tags against each other gain, offset and the coefficients of its
-//! nonlinearity ([`WIDTH`] in all), then the camera's mount (translation m, rotation rad, on the right) and the
-//! survey's common error (a twist of all tags together in their frame). The covariance is what the estimator `bundle`
-//! takes for its prior, or the running estimate's.
+//! The columns of each joint that moves camera and tags against each other are gain, offset and the coefficients of its
+//! nonlinearity ([`WIDTH`] in all). The camera mount follows (translation m, rotation rad, on the right), then the
+//! survey's common error (a twist of all tags together in their frame). The covariance is the prior of the estimator
+//! `bundle`, or that of the interim estimate.
 
 use crate::plan::constants::view_planning_parameter_prior::UNKNOWN_STD;
 pub(crate) use crate::plan::constants::view_planning_parameter_prior::{N_COMMON, WIDTH};
@@ -19,19 +19,19 @@ use armcal_core::sensor::{N_SHAPE, nonlinearity_basis};
 use armcal_core::spatial::adjoint;
 use armcal_core::streams::MAX_JOINTS;
 
-/// Ways that a view's camera can be moved by what is not known: each joint's angle, and the common ones.
+/// Number of directions in which unknown parameters can move a view's camera: each joint's angle, and the common ones.
 pub(crate) const N_DIRECTIONS: usize = MAX_JOINTS + N_COMMON;
 
-/// d(angle)/d(parameter) of each joint before the camera.
+/// Derivative d(angle)/d(parameter) of each joint before the camera.
 pub(crate) type Basis = [[f64; WIDTH]; MAX_JOINTS];
 
-/// What is not known before the views to come.
+/// Covariance and noise scales before the planned views.
 #[derive(Clone, Debug)]
 pub(crate) struct ParameterPrior {
-    /// Joints that move camera and tags against each other.
+    /// Number of joints that move camera and tags against each other.
     pub n_joints: usize,
     pub covariance: DMatrix<f64>,
-    /// What each joint is off in each view anew, rad.
+    /// Std of each joint's error that is independent between views, rad.
     pub joint_std_rad: [f64; MAX_JOINTS],
     /// Corner noise over the datasheet's.
     pub noise: f64,
@@ -41,7 +41,7 @@ impl ParameterPrior {
     pub(crate) fn of(request: &PoseRequest<'_>) -> Self {
         let robot = request.robot;
         let scales = scales(robot, request.belief);
-        // Views that are given are counted one by one, on top of what the first of them started from.
+        // Given views are counted one by one, on top of the prior of the first of them.
         let known = if request.taken.is_empty() { request.belief } else { request.prior };
         let n_joints = robot.n_seen_joints();
         let at = n_joints * WIDTH;
@@ -73,7 +73,7 @@ impl ParameterPrior {
     }
 }
 
-/// The joints' parameters in the order of their columns.
+/// Returns the joints' parameters in the order of their columns.
 pub(crate) fn columns(n_joints: usize) -> impl Iterator<Item = Parameter> {
     let of_joint = || {
         let shape = (0..N_SHAPE as u8).map(ParameterKind::Shape);
@@ -82,7 +82,7 @@ pub(crate) fn columns(n_joints: usize) -> impl Iterator<Item = Parameter> {
     (0..n_joints).flat_map(move |joint| of_joint().map(move |kind| Parameter { joint, kind }))
 }
 
-/// d(angle)/d(parameter) of one joint at a believed angle.
+/// Returns d(angle)/d(parameter) of one joint at a believed angle.
 pub(crate) fn basis(robot: &Robot, joint: usize, angle_rad: f64) -> [f64; WIDTH] {
     let spec = &robot.sensors[joint];
     let travel_rad = angle_rad - spec.center_rad;
@@ -94,7 +94,7 @@ pub(crate) fn basis(robot: &Robot, joint: usize, angle_rad: f64) -> [f64; WIDTH]
     })
 }
 
-/// The datasheet's sizes, or those that the data of the running estimate gave.
+/// Returns the datasheet's noise and prior scales, or those fitted by the interim estimate.
 fn scales(robot: &Robot, belief: Option<&Calibration>) -> Hyperparameters {
     let mut scales = Hyperparameters::datasheet(robot);
     let Some(belief) = belief else { return scales };
@@ -112,7 +112,7 @@ fn scales(robot: &Robot, belief: Option<&Calibration>) -> Hyperparameters {
     scales
 }
 
-/// Puts the rows that `known` has in place of the datasheet's.
+/// Replaces the datasheet's rows by those of `known`.
 fn take_over(known: &Calibration, robot: &Robot, parameters: &[Parameter], covariance: &mut DMatrix<f64>) {
     let row = |name: &str| known.covariance.parameters.iter().position(|known| known == name);
     let mut rows: Vec<Option<usize>> = parameters.iter().map(|p| row(&p.name(robot))).collect();
@@ -125,7 +125,7 @@ fn take_over(known: &Calibration, robot: &Robot, parameters: &[Parameter], covar
     }
 }
 
-/// Puts what is known of the sensors by now in place of the rows so far; the mount is told apart from them.
+/// Replaces the sensors' rows by the present covariance of the sensors, which has no correlation with the mount.
 fn take_over_sensors(known: &ParameterCovariance, parameters: &[Parameter], covariance: &mut DMatrix<f64>) {
     let rows: Vec<Option<usize>> = parameters.iter().map(|p| known.parameters.iter().position(|k| k == p)).collect();
     for (i, row) in rows.iter().enumerate() {
@@ -139,7 +139,8 @@ fn take_over_sensors(known: &ParameterCovariance, parameters: &[Parameter], cova
     }
 }
 
-/// Of the error that all tags share: `(sum A_i^T P_i^-1 A_i)^-1` with the survey's P_i and `A_i = Ad(tag from base)`.
+/// Returns the covariance of the error that all tags share: `(sum A_i^T P_i^-1 A_i)^-1` with the survey's P_i and `A_i
+/// = Ad(tag from base)`.
 fn survey_covariance(robot: &Robot) -> Matrix6<f64> {
     let mut info = Matrix6::identity() * UNKNOWN_STD.powi(-2);
     for tag in robot.tags.iter().filter(|tag| tag.is_known()) {

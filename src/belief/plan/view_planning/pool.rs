@@ -17,14 +17,14 @@ use crate::plan::view_planning::visit_order::Tour;
 use armcal_core::routine::PoseCriterion;
 use armcal_core::streams::{CaptureSet, JointAngles};
 
-/// Poses that see enough tags and keep clear.
+/// Candidate poses: they show enough tags and keep clear.
 #[derive(Clone, Debug)]
 pub struct PosePool {
     candidates: Vec<Candidate>,
     refused: InfeasibleCounts,
 }
 
-/// What the worth of poses rests on.
+/// Models on which the value of poses depends.
 pub(crate) struct DesignInputs {
     unknowns: ParameterPrior,
     optics: CornerModel,
@@ -38,7 +38,7 @@ impl DesignInputs {
         Self { unknowns, optics, timing: Timing::new(request.robot) }
     }
 
-    /// The views that are taken already, linearized.
+    /// Returns the captured views, linearized.
     fn taken(&self, request: &PoseRequest<'_>) -> Vec<ViewJacobian> {
         let look = |view: &CapturedView| {
             let tags: Vec<(usize, f64)> = view.tags.iter().map(|&tag| (tag, 1.0)).collect();
@@ -52,7 +52,7 @@ impl PosePool {
     /// Draws until there are `enough`, or no more are found.
     ///
     /// # Errors
-    /// [`PlanError::NoUsefulPose`] where there is none, [`PlanError::TooFewTags`] where there can be none.
+    /// [`PlanError::NoUsefulPose`] if there is none, [`PlanError::TooFewTags`] if there can be none.
     pub fn gather(request: &PoseRequest<'_>, enough: usize, rng: &mut ChaCha8Rng) -> Result<Self, PlanError> {
         let (min_tags, n_tags) = (request.capture.min_tags, request.robot.tags.len());
         if n_tags > 0 && min_tags as usize > n_tags {
@@ -73,14 +73,14 @@ impl PosePool {
         self.candidates.len()
     }
 
-    /// Never: [`Self::gather`] fails instead.
+    /// Returns false: [`Self::gather`] fails instead.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.candidates.is_empty()
     }
 
-    /// Chooses `request.n_fit` views for the fit and `n_held_out` for the verdict, by `request.capture.choose`; fewer
-    /// where there are fewer and the choice will be renewed anyway (`capture.replan_every`).
+    /// Chooses `request.n_fit` views for the fit and `n_held_out` for the verdict, by `request.capture.choose`. It
+    /// returns fewer if there are fewer and the capture replans anyway (`capture.replan_every`).
     ///
     /// # Errors
     /// [`PlanError::TooFewPoses`].
@@ -99,7 +99,7 @@ impl PosePool {
         }
         let picker = self.picker(request, &setup);
         let chosen = picker.pick(request.n_fit);
-        // Where the choice is renewed soon, the most telling for their time come first; the rest is a short tour.
+        // If the capture replans soon, the most informative views for their time come first; the rest is a short tour.
         let first = picker.most_informative_first(&chosen, request.capture.replan_every as usize);
         let order = self.ordered(&tour, &chosen, &self.drawn(request.n_held_out, &chosen, rng), first);
         Ok(self.plan(request, &setup, order))
@@ -110,7 +110,7 @@ impl PosePool {
         &self.candidates
     }
 
-    /// What each candidate tells.
+    /// Returns the whitened Jacobians of each candidate.
     pub(crate) fn whitened_views(&self, request: &PoseRequest<'_>, setup: &DesignInputs) -> Vec<WhitenedView> {
         let (robot, unknowns) = (request.robot, &setup.unknowns);
         let telling = |Candidate { angles, tags, .. }: &Candidate| {
@@ -144,20 +144,20 @@ impl PosePool {
         }
     }
 
-    /// `n` of those that were drawn evenly over the joint ranges; of all where these are too few.
+    /// Returns `n` of the candidates drawn uniformly over the joint ranges; of all candidates if these are too few.
     fn drawn_evenly(&self, n: usize, rng: &mut ChaCha8Rng) -> Vec<usize> {
         let others: Vec<usize> = (0..self.candidates.len()).filter(|&k| !self.candidates[k].is_even).collect();
         let too_few = self.candidates.len() - others.len() < n;
         self.drawn(n, if too_few { &[] } else { &others }, rng)
     }
 
-    /// `n` candidates at random, none of `but`.
+    /// Returns `n` candidates at random, none of `but`.
     fn drawn(&self, n: usize, but: &[usize], rng: &mut ChaCha8Rng) -> Vec<usize> {
         let mut left: Vec<usize> = (0..self.candidates.len()).filter(|k| !but.contains(k)).collect();
         (0..n.min(left.len())).map(|_| left.swap_remove(rng.random_range(0..left.len()))).collect()
     }
 
-    /// `first`, then the others by a short tour.
+    /// Returns `first`, then the others by a short tour.
     fn ordered(
         &self,
         tour: &Tour<'_>,
@@ -220,7 +220,7 @@ pub fn choose_poses(request: &PoseRequest<'_>, rng: &mut ChaCha8Rng) -> Result<P
     PosePool::gather(request, (wanted * CANDIDATES_PER_POSE).max(MIN_CANDIDATES), rng)?.choose(request, rng)
 }
 
-/// Time of a view besides the way to it, s.
+/// Time of a view without the path to it, s.
 fn view_s(request: &PoseRequest<'_>) -> f64 {
     SETTLE_S + request.capture.dwell_s
 }

@@ -9,21 +9,22 @@ use armcal_core::robot::Robot;
 use armcal_core::routine::CaptureSettings;
 use armcal_core::streams::{CaptureSet, JointAngles};
 
-/// Poses in the order of their visit.
+/// Poses in the order of visits.
 #[derive(Clone, Debug)]
 pub struct PosePlan {
-    /// In the order of visits, held-out views among them.
+    /// Poses in the order of visits, held-out views included.
     pub poses: Vec<PlannedPose>,
-    /// Root mean square tool error at the targets, m, after a fit of all poses; that of `bundle` at the believed arm.
+    /// Predicted root mean square tool error at the targets after a fit of all poses, m, as `bundle` predicts it at the
+    /// believed arm.
     pub predicted_tool_error_m: f64,
-    /// The same before any of them.
+    /// Predicted root mean square tool error at the targets before any of these views, m.
     pub tool_error_before_m: f64,
-    /// Fitted views, in this order, after which the tool error is predicted to be below `capture.stop_at_tool_error_m`;
-    /// `None` without that limit, or where these views do not reach it.
+    /// Number of fitted views, in this order, after which the predicted tool error is below
+    /// `capture.stop_at_tool_error_m`. `None` without that limit, or if these views do not reach it.
     pub needed: Option<usize>,
-    /// Time of the arm, s: motion from rest to rest, settling (1 s assumed) and the dwell.
+    /// Arm time, s: motion from rest to rest, settling (1 s assumed) and the dwell.
     pub arm_time_s: f64,
-    /// Number of configurations that the choice was from.
+    /// Number of candidates to choose from.
     pub candidates: usize,
     /// Number of configurations drawn to find the candidates.
     pub tried: usize,
@@ -32,22 +33,23 @@ pub struct PosePlan {
 /// A planned view.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlannedPose {
-    /// Whether the fit may use it.
+    /// Use of the view: for the fit, or held out.
     pub set: CaptureSet,
-    /// Believed.
+    /// Believed angles, rad.
     pub angles: JointAngles,
-    /// Tags of the survey (index) and the probability that the camera sees them there.
+    /// Index of each visible tag of the survey, and the probability that the camera sees it.
     pub tags: Vec<(usize, f64)>,
-    /// Root mean square over the task's targets, once this view and those visited before it are fitted.
+    /// Predicted root mean square tool error over the task's targets once this view and those visited before it are
+    /// fitted, m.
     pub predicted_tool_error_m: f64,
 }
 
-/// A captured view that the belief rests on.
+/// A captured view on which the belief is based.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CapturedView {
-    /// Believed.
+    /// Believed angles, rad.
     pub angles: JointAngles,
-    /// Tags of the survey (index) that were seen.
+    /// Indices of the detected tags of the survey.
     pub tags: Vec<usize>,
 }
 
@@ -55,7 +57,7 @@ pub struct CapturedView {
 pub struct PoseRequest<'a> {
     /// Nominal arm, with the tags of the survey.
     pub robot: &'a Robot,
-    /// The arm and what is around it.
+    /// The arm and its environment.
     pub clearance: &'a ClearanceModel<'a>,
     /// Joint errors for which the margin is kept.
     pub bounds: &'a JointErrorBounds,
@@ -63,9 +65,9 @@ pub struct PoseRequest<'a> {
     pub visibility: &'a VisibilityModel,
     /// Criterion, margin, dwell and limits of the capture.
     pub capture: &'a CaptureSettings,
-    /// Views for the fit that are still to be chosen, and for the verdict.
+    /// Number of fitted views still to be chosen.
     pub n_fit: usize,
-    /// Views for the verdict that are still to be chosen.
+    /// Number of held-out views still to be chosen.
     pub n_held_out: usize,
     /// The interim estimate; `None`: the datasheets.
     pub belief: Option<&'a Calibration>,
@@ -74,7 +76,7 @@ pub struct PoseRequest<'a> {
     pub taken: &'a [CapturedView],
     /// Prior of the estimate before the first of `taken`; `None`: the datasheets.
     pub prior: Option<&'a Calibration>,
-    /// What is known of the sensors by now, if that is not what `belief` and `prior` say.
+    /// Present covariance of the sensors, if it differs from that of `belief` and `prior`.
     pub known: Option<&'a ParameterCovariance>,
     /// Observed over predicted number of detections of each tag of the robot; 1: as predicted.
     pub detection_rate: &'a [f64],
@@ -82,8 +84,8 @@ pub struct PoseRequest<'a> {
     pub failed: &'a [JointAngles],
     /// Joint angles of the arm at the task's targets.
     pub task: &'a [JointAngles],
-    /// Tool positions of the task. No capture pose is near them, so that the task tests configurations that are not
-    /// fitted.
+    /// Tool positions of the task, base frame, m. No capture pose is near them, so that the task tests configurations
+    /// that are not fitted.
     pub targets_m: &'a [[f64; 3]],
     /// Believed angles from which the first path starts.
     pub start: &'a JointAngles,

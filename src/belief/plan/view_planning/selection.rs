@@ -1,9 +1,9 @@
-//! Which of the candidates: greedily the most telling for the arm's time, then by exchange.
+//! Selection among the candidates: greedily by information per arm time, then by exchange.
 //!
-//! A pick is worth its gain (the fall of the measure's logarithm) over the root of the time that it adds to the tour:
-//! cost-benefit greedy (Leskovec et al. 2007) with the exponent [`TIME_POWER`]. Gains fall as views come in, so a gain
-//! computed earlier is taken for an upper bound, and most candidates need not be looked at again (lazy greedy, Minoux
-//! 1978). Exchange then puts one candidate in place of one pick as long as `ln measure + TIME_POWER ln time` falls.
+//! A pick's score is its gain (the fall of the criterion's logarithm) over a power of the time that it adds to the
+//! tour: cost-benefit greedy (Leskovec et al. 2007) with the exponent [`TIME_POWER`]. Gains fall as views are added, so
+//! an earlier gain is an upper bound. Most candidates then need no second evaluation (lazy greedy, Minoux 1978).
+//! Exchange then replaces one pick by one candidate as long as `ln criterion + TIME_POWER ln time` falls.
 
 use crate::plan::constants::view_planning_selection::{LEAST_GAIN, MAX_ROUNDS, ROUNDING, SHORTLIST, TIME_POWER};
 use crate::plan::view_planning::candidates::Candidate;
@@ -12,30 +12,30 @@ use crate::plan::view_planning::view_information::WhitenedView;
 use crate::plan::view_planning::visit_order::Tour;
 use armcal_core::streams::JointAngles;
 
-/// What is picked from, and for what.
+/// Candidates and criteria of the selection.
 pub(crate) struct ViewSelector<'a> {
     pub candidates: &'a [Candidate],
-    /// What each of them tells.
+    /// Whitened Jacobians of each candidate.
     pub whitened_views: Vec<WhitenedView>,
     pub tour: Tour<'a>,
     /// Time of a view at rest, s.
     pub view_s: f64,
-    /// The first of so many in a row shows a known tag, as long as there are such candidates.
+    /// Length of a group of views whose first view shows a known tag, as long as there are such candidates.
     pub anchored_every: usize,
-    /// Before the picks; the views taken already are in it.
+    /// State before the picks; it includes the captured views.
     pub design: DesignState,
 }
 
-/// What a candidate's gain is worth.
+/// Score of a candidate by its index and gain.
 type Score<'a> = dyn Fn(usize, f64) -> f64 + 'a;
-/// Whether a candidate may be taken.
+/// True if the candidate of this index may be picked.
 type May<'a> = dyn Fn(usize) -> bool + 'a;
 
 /// Upper bounds of the candidates' gains.
 struct LazyGains {
-    /// Negative for picked candidates.
+    /// Upper bound of each gain; negative for picked candidates.
     bounds: Vec<f64>,
-    /// Whether the bound is the gain itself.
+    /// True if the bound is the gain itself.
     is_fresh: Vec<bool>,
 }
 
@@ -61,7 +61,7 @@ impl Picks {
 }
 
 impl ViewSelector<'_> {
-    /// `n` of them, or all; indices.
+    /// Returns the indices of `n` picks, or of all candidates.
     pub(crate) fn pick(&self, n: usize) -> Vec<usize> {
         let picks = self.exchanged(self.greedy(n));
         picks.order
@@ -84,7 +84,7 @@ impl ViewSelector<'_> {
             }
             let score = |k: usize, gain: f64| gain / (self.view_s + places[k].1).powf(TIME_POWER);
             let Some(best) = self.best(&design, &mut scratch, &mut gains, (&score, &may)) else {
-                // Of those that may be taken none is left.
+                // No candidate that may be picked is left.
                 if must_anchor { continue } else { break }
             };
             let candidate = &self.candidates[best];
@@ -95,7 +95,7 @@ impl ViewSelector<'_> {
         picks
     }
 
-    /// The candidate of the highest score; stale gains are renewed from the highest bound on.
+    /// Returns the candidate of the highest score; stale gains are recomputed from the highest bound on.
     fn best(
         &self,
         design: &DesignState,
@@ -150,14 +150,15 @@ impl ViewSelector<'_> {
     }
 
     pub(crate) fn exchanged(&self, mut picks: Picks) -> Picks {
-        // Where the last exchange of the round before was, and what that looked at: behind it nothing of that helped.
+        // Place of the last exchange in the round before, and its shortlist: after this place no candidate of that list
+        // helped.
         let mut looked_at: Option<(usize, Vec<usize>)> = None;
         for _ in 0..MAX_ROUNDS {
             let shortlist = self.shortlist(&picks);
             let is_new = |k: &usize| looked_at.as_ref().is_none_or(|(_, before)| !before.contains(k));
             let news: Vec<usize> = shortlist.iter().copied().filter(is_new).collect();
             let mut helped_at = None;
-            // After the picks before the place.
+            // State after the picks before this place.
             let mut before = self.design.clone();
             for place in 0..picks.order.len() {
                 let is_as_before = helped_at.is_none() && looked_at.as_ref().is_some_and(|(last, _)| place > *last);
@@ -178,7 +179,7 @@ impl ViewSelector<'_> {
         picks
     }
 
-    /// The same with all that was looked at before looked at anew.
+    /// Exchanges picks without skipping candidates that were already tested.
     #[cfg(test)]
     pub(crate) fn exchanged_plainly(&self, mut picks: Picks) -> Picks {
         for _ in 0..MAX_ROUNDS {
@@ -207,8 +208,8 @@ impl ViewSelector<'_> {
         gains.into_iter().take(SHORTLIST).map(|(_, k)| k).collect()
     }
 
-    /// The picks with one other in place of the one at `place`, if that is better; `before` is the state after the
-    /// picks before that.
+    /// Returns the picks with the one at `place` replaced by another, if that is better. `before` is the state after
+    /// the picks before that.
     fn exchange(&self, picks: &Picks, place: usize, before: &DesignState, shortlist: &[usize]) -> Option<Picks> {
         let out = picks.order[place];
         let rest = picks.without(place);
@@ -242,7 +243,7 @@ impl ViewSelector<'_> {
         Some(better)
     }
 
-    /// The same as [`Self::greedy`] with every gain renewed in every turn.
+    /// Does the same as [`Self::greedy`], with every gain recomputed in every turn.
     #[cfg(test)]
     pub(crate) fn eager(&self, n: usize) -> Vec<usize> {
         let mut design = self.design.clone();
@@ -268,13 +269,13 @@ impl ViewSelector<'_> {
         picks.order
     }
 
-    /// `ln measure + TIME_POWER ln time`: what an exchange lowers.
+    /// Objective `ln criterion + TIME_POWER ln time` that an exchange lowers.
     #[cfg(test)]
     pub(crate) fn objective(&self, picks: &Picks) -> f64 {
         self.ln_value(&picks.order) + TIME_POWER * self.time_s(picks).max(1e-9).ln()
     }
 
-    /// The first `n` of `chosen` to visit: each time that of the highest gain for its time from where the arm then is.
+    /// Returns the first `n` of `chosen` to visit: each time that of the highest gain per time from the arm's position.
     pub(crate) fn most_informative_first(&self, chosen: &[usize], n: usize) -> Vec<usize> {
         let mut design = self.design.clone();
         let mut scratch = design.scratch();

@@ -1,10 +1,10 @@
-//! When a capture ends.
+//! Stop criterion of a capture.
 
 use armcal_core::routine::CaptureSettings;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Why a capture ends.
+/// Reason why a capture ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum StopReason {
@@ -14,25 +14,25 @@ pub enum StopReason {
     Poses,
     /// `capture.max_time_s` has passed.
     Time,
-    /// No configuration is left that sees enough tags and keeps clear.
+    /// No configuration is left that shows enough tags and keeps clear.
     NoPoseLeft,
 }
 
-/// Where a capture stands.
+/// Progress of a capture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CaptureState {
-    /// Fitted views captured.
+    /// Number of fitted views captured.
     pub captured: usize,
-    /// Poses that may still be visited.
+    /// Number of poses that may still be visited.
     pub left: usize,
-    /// Since its start, by the arm's clock.
+    /// Arm time since the start of the capture, s.
     pub elapsed_s: f64,
-    /// Root mean square at the task's targets; `None` where nothing has been estimated.
+    /// Predicted root mean square tool error at the task's targets, m; `None` if nothing has been estimated.
     pub predicted_tool_error_m: Option<f64>,
 }
 
 impl StopReason {
-    /// What ends a capture at `state`, the good reason first; `None`: go on.
+    /// Returns the reason to end a capture at `state`, the achieved accuracy first; `None`: continue.
     #[must_use]
     pub fn decide(capture: &CaptureSettings, state: &CaptureState) -> Option<Self> {
         if let (Some(limit_m), Some(predicted_m)) = (capture.stop_at_tool_error_m, state.predicted_tool_error_m)

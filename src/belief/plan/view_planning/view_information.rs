@@ -1,11 +1,11 @@
-//! A view to come, linearized: what its tags' corners will tell of the camera's pose.
+//! Linearized planned view: the information of its tags' corners on the camera's pose.
 //!
-//! The camera's pose perturbed on the right by `xi` (translation, rotation) moves a point p of its frame by
-//! `-rho - omega x p`, so that one tag has the information `H = sum over corners J^T W J`, J = d(pixel)/d(xi), W the
-//! inverse of the corner noise. Parameters move the camera in the frame of the tags by
-//! `xi = sum_j d_j (b_j . p_j) + mount - Ad(camera from tags) survey`, d_j the twist that joint j gives it: of a camera
-//! that stands still before tags on the arm the opposite of the tags' own. The joints' own errors of a view add
-//! `sum_j d_j d_j^T s_j^2` to the noise `H^-1`.
+//! A perturbation of the camera's pose on the right by `xi` (translation, rotation) moves a point p of its frame by
+//! `-rho - omega x p`. So one tag has the information `H = sum over corners J^T W J`, with J = d(pixel)/d(xi) and W the
+//! inverse of the corner noise. Parameters move the camera in the frame of the tags by `xi = sum_j d_j (b_j . p_j) +
+//! mount - Ad(camera from tags) survey`, with d_j the camera's twist by joint j. For a fixed camera before tags on the
+//! arm, d_j is the opposite of the tags' twist. The joints' own errors of a view add `sum_j d_j d_j^T s_j^2` to the
+//! noise `H^-1`.
 
 use crate::plan::constants::view_planning_view_information::{FRAMES_PER_S, OWN_SURVEY_SHARE, REFERENCE_RANGE_M};
 use nalgebra::{Cholesky, Isometry3, Matrix6, SMatrix, Vector3};
@@ -17,20 +17,20 @@ use armcal_core::robot::Robot;
 use armcal_core::spatial::adjoint;
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
-/// Columns: each joint's angle, mount, survey.
+/// Twists of the camera; columns: each joint's angle, mount, survey.
 pub(crate) type Twists = SMatrix<f64, 6, N_DIRECTIONS>;
 
-/// One tag of a view.
+/// Information of one tag of a view.
 #[derive(Clone, Debug)]
 pub(crate) struct TagInformation {
     pub tag: usize,
-    /// On the camera's pose, right.
+    /// Information on the camera's pose, perturbed on the right.
     pub info: Matrix6<f64>,
-    /// Ad(camera from tag).
+    /// Adjoint Ad(camera from tag).
     pub adjoint: Matrix6<f64>,
 }
 
-/// A view linearized.
+/// Linearized view.
 #[derive(Clone, Debug)]
 pub(crate) struct ViewJacobian {
     pub basis: Basis,
@@ -38,17 +38,17 @@ pub(crate) struct ViewJacobian {
     pub sights: Vec<TagInformation>,
 }
 
-/// What a view tells, its noise made one: `z = twists (basis p, common) + unit noise`.
+/// Information of a view, whitened: `z = twists (basis p, common) + unit noise`.
 #[derive(Clone, Debug)]
 pub(crate) struct WhitenedView {
     pub basis: Basis,
     pub twists: Twists,
 }
 
-/// What looks at the tags.
+/// Noise model of the tags' corners.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct CornerModel {
-    /// Images that a view's corners are the mean of.
+    /// Number of images over which a view's corners are averaged.
     pub n_frames: f64,
     /// Corner noise over the datasheet's.
     pub noise: f64,
@@ -59,7 +59,7 @@ impl CornerModel {
         Self { n_frames: (FRAMES_PER_S * dwell_s).floor().max(1.0), noise }
     }
 
-    /// Information of one tag on the camera's pose; `None` where the lens does not see all its corners.
+    /// Returns the information of one tag on the camera's pose; `None` if the lens does not see all its corners.
     pub(crate) fn information(
         &self,
         robot: &Robot,
@@ -78,8 +78,8 @@ impl CornerModel {
         Some(rows.iter().zip(weights).map(|(row, weight)| row.tr_mul(row) * weight).sum())
     }
 
-    /// Inverse variance of each corner's coordinates, px^-2: robot.toml's at the reference range, and by the model of
-    /// corner noise at others.
+    /// Returns the inverse variance of each corner's coordinates, px^-2: that of robot.toml at the reference range,
+    /// scaled by the corner-noise model at other ranges.
     fn weights(&self, robot: &Robot, corners_px: &[[f64; 2]; 4], range_m: f64, size_m: f64) -> [f64; 4] {
         let usual_px2 = reference_px2(robot.camera.lens.focal_px()[0], size_m);
         let stated_px2 = (robot.camera.corner_std_px * self.noise).powi(2) / self.n_frames;
@@ -103,7 +103,7 @@ impl CornerModel {
     }
 }
 
-/// A coordinate's variance by the same model at the reference range, px^2.
+/// Returns a coordinate's variance by that model at the reference range, px^2.
 fn reference_px2(focal_px: f64, size_m: f64) -> f64 {
     let half_px = 0.5 * focal_px * size_m / REFERENCE_RANGE_M;
     let square = [[-half_px, -half_px], [half_px, -half_px], [half_px, half_px], [-half_px, half_px]];
@@ -111,21 +111,21 @@ fn reference_px2(focal_px: f64, size_m: f64) -> f64 {
 }
 
 impl WhitenedView {
-    /// Nothing.
+    /// Returns a view without information.
     pub(crate) fn nothing() -> Self {
         Self { basis: [[0.0; WIDTH]; MAX_JOINTS], twists: Twists::zeros() }
     }
 }
 
 impl ViewJacobian {
-    /// `tags`: (index, probability that it is seen).
+    /// Linearizes a view. `tags`: index, and probability that the camera sees it.
     pub(crate) fn new(robot: &Robot, optics: CornerModel, angles: &JointAngles, tags: &[(usize, f64)]) -> Self {
         let poses = robot.chain.link_poses(angles).in_frame(&robot.tag_frame);
         let tags_from_camera = poses.frame(&robot.camera.mount);
         let camera_from_tags = tags_from_camera.inverse();
         let (eye_m, turn) = (tags_from_camera.translation.vector, camera_from_tags.rotation);
         let n_joints = robot.n_seen_joints();
-        // Before a camera that stands still the joints move the tags.
+        // For a fixed camera the joints move the tags.
         let sign = if robot.is_watched() { -1.0 } else { 1.0 };
         let mut twists = Twists::zeros();
         let mut by_joint: Basis = [[0.0; WIDTH]; MAX_JOINTS];
@@ -147,7 +147,7 @@ impl ViewJacobian {
         Self { basis: by_joint, twists, sights: tags.iter().filter_map(sight).collect() }
     }
 
-    /// With the noise made one; `None` where the tags tell nothing of the camera's pose.
+    /// Whitens the view; `None` if the tags give no information on the camera's pose.
     pub(crate) fn telling(&self, robot: &Robot, unknowns: &ParameterPrior) -> Option<WhitenedView> {
         let mut info = Matrix6::zeros();
         for sight in &self.sights {
@@ -164,11 +164,11 @@ impl ViewJacobian {
     }
 }
 
-/// The information left when the tag's own survey error is noise: `(H^-1 + A P A^T)^-1`.
+/// Returns the information left when the tag's own survey error is noise: `(H^-1 + A P A^T)^-1`.
 fn with_own_survey_error(robot: &Robot, sight: &TagInformation) -> Option<Matrix6<f64>> {
     let tag = &robot.tags[sight.tag];
     if !tag.is_known() {
-        // Mapped by the views themselves.
+        // The views themselves map this tag.
         return Some(sight.info);
     }
     let std = |k: usize| OWN_SURVEY_SHARE * if k < 3 { tag.position_std_m } else { tag.rotation_std_rad };

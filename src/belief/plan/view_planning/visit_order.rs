@@ -1,8 +1,8 @@
-//! The order of visits: little time of the arm.
+//! Order of visits with little arm time.
 //!
-//! An open tour from where the arm is, by cheapest insertion, then 2-opt and or-opt (moves of up to three poses) until
-//! neither helps (Croes 1958, Or 1976). Times of edges are those of rest-to-rest motion; paths that have to go around
-//! something take longer.
+//! An open tour from the arm's configuration, by cheapest insertion. Then 2-opt and or-opt (moves of up to three poses)
+//! run until neither helps (Croes 1958, Or 1976). Times of edges are those of rest-to-rest motion; paths around
+//! obstacles take longer.
 
 use crate::plan::constants::view_planning_visit_order::{LEAST_GAIN_S, MAX_SWEEPS};
 use crate::plan::motion::timing::Timing;
@@ -15,7 +15,7 @@ pub(crate) struct Tour<'a> {
 }
 
 impl Tour<'_> {
-    /// Time on the way, s.
+    /// Returns the time on the paths, s.
     pub(crate) fn travel_time_s(&self, order: &[JointAngles]) -> f64 {
         let mut at = &self.start;
         let mut sum_s = 0.0;
@@ -26,7 +26,7 @@ impl Tour<'_> {
         sum_s
     }
 
-    /// Where in `order` a new pose costs least, and how much, s.
+    /// Returns the index in `order` at which a new pose costs least, and its cost, s.
     pub(crate) fn insertion(&self, order: &[JointAngles], new: &JointAngles) -> (usize, f64) {
         let mut before = self.timing.least_duration_s(&self.start, new);
         let mut best = (0, f64::INFINITY);
@@ -47,7 +47,7 @@ impl Tour<'_> {
         (best.0, best.1.max(0.0))
     }
 
-    /// Positions of `poses` in a short order.
+    /// Returns the indices of `poses` in a short order.
     pub(crate) fn order(&self, poses: &[JointAngles]) -> Vec<usize> {
         let mut order: Vec<usize> = Vec::with_capacity(poses.len());
         let mut placed: Vec<JointAngles> = Vec::with_capacity(poses.len());
@@ -68,7 +68,7 @@ impl Tour<'_> {
         if k == 0 { &self.start } else { &poses[order[k - 1]] }
     }
 
-    /// Turns stretches round; places count from 1, 0 is the start.
+    /// Reverses stretches; places count from 1, 0 is the start.
     fn two_opt(&self, order: &mut [usize], poses: &[JointAngles]) -> bool {
         let n = order.len();
         let mut helped = false;
@@ -125,7 +125,7 @@ mod tests {
 
     use super::*;
 
-    /// Beside the best of all orders of six poses.
+    /// Compares tours with the best of all orders of six poses.
     #[test]
     fn tours_are_as_short_as_they_can_be() {
         let robot = crate::plan::view_planning::fixture::titan();

@@ -1,4 +1,4 @@
-//! An arm that goes where its controller is told at once, whose oil warms while it does.
+//! An arm that reaches its set-points at once, while its oil warms.
 
 use crate::model::JointParameters;
 use crate::session::motion::*;
@@ -86,7 +86,7 @@ fn sensors_with_terms_are_used_under_what_was_heard_last() {
     parameters.terms[2] = Terms { drift_rad_per_h: per_h, ..Terms::default() };
     parameters.terms[3].nonlinearity_rad[2] = 5e-3;
     driver.believe(parameters.sensors(&robot));
-    // At the reference only the shape tells.
+    // At the reference conditions only the nonlinearity has an effect.
     let at_rest = driver.believed_angles().expect("readings");
     for joint in [0, 1, 2, 4, 5] {
         assert!((at_rest[joint] - robot.stowed[joint]).abs() < 1e-9);
@@ -94,7 +94,7 @@ fn sensors_with_terms_are_used_under_what_was_heard_last() {
     assert!((at_rest[3] - robot.stowed[3]).abs() > 1e-4);
     assert!(driver.set_point().max_abs_difference(&at_rest) < 1e-9);
 
-    // The same words mean other angles when the oil is warmer, the arm deeper and the time later.
+    // The same readings mean other angles when the oil is warmer, the arm deeper and the time later.
     let ends = Path::at_full_speed(vec![at_rest, at_rest]);
     driver.arm.command(&counts).expect("taken");
     drop(driver);
@@ -108,7 +108,7 @@ fn sensors_with_terms_are_used_under_what_was_heard_last() {
     for (joint, expected) in [15.0 * per_k, 3.0 * per_mpa, hours * per_h, 0.0, 0.0, 0.0].into_iter().enumerate() {
         assert!((warm[joint] - at_rest[joint] - expected).abs() < 1e-9, "{joint}: {}", warm[joint] - at_rest[joint]);
     }
-    // The same angles ask for other words, and the arm believes to be where it was sent.
+    // The same angles require other readings, and the arm believes to be at its set-point.
     assert_eq!(driver.follow(&ends).expect("it moves"), MotionOutcome::Arrived);
     for _ in 0..3 {
         driver.step().expect("it steps");
@@ -119,7 +119,7 @@ fn sensors_with_terms_are_used_under_what_was_heard_last() {
     assert!((turned_rad + 15.0 * per_k).abs() < 1e-6, "{turned_rad}");
     drop(driver);
 
-    // What is recorded of it is the same belief.
+    // The recorded belief is the same.
     recorder.writer.flush().expect("written");
     let recording = read_recording(&file).expect("it reads");
     let states: Vec<_> = recording
@@ -130,7 +130,7 @@ fn sensors_with_terms_are_used_under_what_was_heard_last() {
     assert!(states.last().expect("states").max_abs_difference(&at_rest) < 1e-5);
 }
 
-/// Answers in turn; what it was asked stays.
+/// An operator who answers in turn, and keeps the questions.
 struct Operator {
     answers: Vec<crate::session::Approval>,
     asked: Vec<crate::session::MotionAhead>,
@@ -173,7 +173,7 @@ fn an_operator_is_asked_before_a_motion_and_obeyed() {
     let path = Path::at_full_speed(vec![from, to]);
     let duration_s = Timing::new(&robot).path_duration_s(&path);
     assert_eq!(driver.follow_told(&path, Some(0.07)).expect("it moves"), MotionOutcome::Arrived);
-    // Twice 5 s, then the motion.
+    // Two holds of 5 s, then the motion.
     assert!((driver.elapsed_s() - 0.01 - 10.0 - duration_s).abs() < 0.05, "{}", driver.elapsed_s());
     let back = Path::at_full_speed(vec![to, from]);
     assert!(matches!(driver.follow(&back), Err(SessionError::Interrupted { .. })));
