@@ -93,7 +93,7 @@ fn reflectance(tag: &PlacedTag, cells: &TagCells, x: f64, y: f64) -> Option<bool
     cells.get(row as usize, column as usize)
 }
 
-/// A tag with what every ray needs of it.
+/// Tag with precomputed quantities for its rays.
 struct Printed {
     tag: PlacedTag,
     cells: TagCells,
