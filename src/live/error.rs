@@ -32,7 +32,7 @@ pub enum LiveError {
 }
 
 impl LiveError {
-    /// For errors of the middleware, which are of many types.
+    /// Wraps errors of the middleware, which are of many types.
     pub(crate) fn dds<E: std::fmt::Debug>(what: &str) -> impl FnOnce(E) -> Self {
         move |error| Self::Dds { what: what.to_owned(), problem: format!("{error:?}") }
     }

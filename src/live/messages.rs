@@ -77,7 +77,7 @@ pub(crate) struct Command {
 }
 
 impl Command {
-    /// As one of the types that drivers take.
+    /// Returns the set-point as a message of one of the types that drivers take.
     pub fn message(&self, message_type: CommandType) -> Result<CommandMessage, LiveError> {
         let header = Header::new(self.stamp, "")?;
         let (names, positions) = (self.names.clone(), self.positions.clone());

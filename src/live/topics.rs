@@ -1,4 +1,4 @@
-//! What the topics of a connection carry, and how their messages are read, whatever brought them.
+//! Contents of a connection's topics, and the reading of their messages, for every protocol.
 
 use crate::messages::{BOOL, Bool};
 use crate::{Connection, Heard};
@@ -11,7 +11,7 @@ use armcal_core::time::Stamp;
 const MAX_LISTED: usize = 20;
 const MAX_NAME_CHARS: usize = 40;
 
-/// What a topic carries.
+/// Content of a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Content {
     Joints,

@@ -1,4 +1,4 @@
-//! What a connection to an arm carries, whatever the protocol.
+//! Interface of a connection to an arm, for every protocol.
 
 use std::time::Duration;
 

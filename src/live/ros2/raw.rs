@@ -54,7 +54,7 @@ impl SerializerAdapter<Vec<u8>> for Raw {
         RepresentationIdentifier::CDR_LE
     }
 
-    /// Of bytes with a header of little endian.
+    /// Removes the header (little endian), which the serializer writes itself.
     fn to_bytes(value: &Vec<u8>) -> Result<Bytes, Infallible> {
         Ok(Bytes::copy_from_slice(value.get(HEADER_BYTES..).unwrap_or_default()))
     }

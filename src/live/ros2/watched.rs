@@ -41,7 +41,7 @@ impl Wire for WatchedWire {
 
     fn receive(&mut self, timeout: Duration, heard: &mut Vec<Heard>) -> Result<(), LiveError> {
         if let Err(error) = self.memory.check() {
-            // At once: the program may be ended before the run has finished its files.
+            // Stops at once: the program may be ended before the run has finished its files.
             let is_first = !std::mem::replace(&mut self.is_lost, true);
             if is_first
                 && self.has_sent

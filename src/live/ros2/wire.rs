@@ -61,7 +61,7 @@ impl Ros2Wire {
         })
     }
 
-    /// Whether anything came.
+    /// Appends all waiting messages to `heard`; returns true if there were any.
     fn drain(&mut self, heard: &mut Vec<Heard>) -> bool {
         let before = heard.len();
         for (content, reader) in &self.readers {

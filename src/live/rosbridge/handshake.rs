@@ -86,7 +86,7 @@ fn check_answer(head: &str, key: &str) -> Result<(), String> {
     Ok(())
 }
 
-/// What a server answers to a key.
+/// Returns the server's answer to a key.
 pub(crate) fn accept_key(key: &str) -> String {
     STANDARD.encode(Sha1::digest(format!("{key}{MAGIC}")))
 }

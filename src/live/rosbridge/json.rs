@@ -89,7 +89,7 @@ fn ros2_name(name: &str) -> &str {
     }
 }
 
-/// One of those that base64 stands for, and nothing but a byte.
+/// One byte of decoded base64; it deserializes only as a byte.
 struct Byte(u8);
 
 impl<'de> IntoDeserializer<'de, Error> for Byte {

@@ -173,7 +173,7 @@ struct Line {
 }
 
 impl Line {
-    /// Until the end; the text says why the connection is lost.
+    /// Runs until the link closes; the error says why the connection is lost.
     fn run(&mut self, mut poll: Poll) -> Result<(), String> {
         let mut events = Events::with_capacity(8);
         loop {

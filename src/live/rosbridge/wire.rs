@@ -25,7 +25,7 @@ pub struct RosbridgeWire {
     link: Link,
     start: Instant,
     newest: Stamp,
-    /// Whether the recording was told that the connection is lost.
+    /// True if the recording was told that the connection is lost.
     is_told: bool,
 }
 

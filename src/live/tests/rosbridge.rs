@@ -36,7 +36,7 @@ struct Bridge {
 }
 
 impl Bridge {
-    /// One that does `play` with the stream of its only client.
+    /// Starts a server that runs `play` with the stream of its only client.
     fn raw(play: impl FnOnce(TcpStream, &Log) + Send + 'static) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
         let url = format!("ws://{}", listener.local_addr().expect("an address"));
@@ -46,7 +46,7 @@ impl Bridge {
         Self { url, log, thread: Some(std::thread::spawn(serve)) }
     }
 
-    /// One that speaks WebSocket.
+    /// Starts a server that speaks WebSocket.
     fn new(play: impl FnOnce(&mut WebSocket<TcpStream>, &Log) + Send + 'static) -> Self {
         Self::raw(move |mut stream, log| {
             let (mut head, mut byte) = (Vec::new(), [0]);
@@ -82,7 +82,7 @@ impl Bridge {
         RosbridgeWire::open(&connection, bridge, &titan4()).expect("it connects")
     }
 
-    /// What was said to it with this operation.
+    /// Returns the messages with this operation that the bridge received.
     fn told(&self, op: &str) -> Vec<Value> {
         self.log.lock().expect("whole").iter().filter(|message| message["op"] == op).cloned().collect()
     }
@@ -328,7 +328,7 @@ fn on(topic: &str, message: &Value) -> Value {
     json!({ "op": "publish", "topic": topic, "msg": message })
 }
 
-/// One message of each kind, as a bridge of ROS 1 sends them.
+/// Returns one message of each kind, as a bridge of ROS 1 sends them.
 fn one_of_each() -> Vec<Value> {
     let header = json!({ "seq": 7, "stamp": stamp(1, 0.5), "frame_id": "vehicle" });
     let (nine, vector) = (vec![0.0; 9], json!({ "x": 0.1, "y": 0, "z": -9.81 }));
