@@ -51,7 +51,7 @@ impl TagRegion<'_> {
         samples.truncate(limit);
     }
 
-    /// A pixel's sample; `None` beside the tag and in most of its flat areas.
+    /// Returns the sample of a pixel; `None` outside the tag and in most of its flat areas.
     #[inline]
     fn sample_pixel(&self, x: usize, y: usize, value: f64) -> Option<Sample> {
         let pixel = [x as f64, y as f64];

@@ -129,7 +129,7 @@ fn ray(rendering: &Rendering, tags: &[Printed], bearing: &Vector3<f64>) -> f64 {
 /// Rays along a pixel's side.
 const N: usize = 8;
 
-/// Renders tags, the first in front; pixels beside them are not traced.
+/// Renders tags, the first in front; pixels outside of them are not traced.
 pub(super) fn render(lens: &CameraModel, rendering: &Rendering, tags: &[PlacedTag], rng: &mut ChaCha8Rng) -> Vec<u8> {
     let [width, height] = lens.resolution_px().map(|n| n as usize);
     let mut grey = vec![rendering.around; width * height];

@@ -158,7 +158,7 @@ fn noise_shows_nothing() {
         let detections = detect_in(&lens, DetectorSettings::default(), &data);
         assert!(detections.tags.is_empty(), "{:?}", detections.tags);
     }
-    // Patches of random cells in place of a tag's, as large as one: nothing of the family.
+    // Patches as large as a tag, with random cells instead of a tag's, hold no tag of the family.
     let mut rng = stream_rng(9, "detect/noise");
     for _ in 0..3 {
         let cells: Vec<u8> = (0..128 * 154).map(|_| if rng.random_range(0.0..1.0) < 0.5 { 20 } else { 220 }).collect();

@@ -1,9 +1,9 @@
-//! Why a connection to an arm cannot be made or used.
+//! Errors of making or using a connection to an arm.
 
 use armcal_core::codes::{Code, Coded};
 use armcal_core::robot::RobotError;
 
-/// Why there is no live arm.
+/// Reason for which there is no live arm.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum LiveError {

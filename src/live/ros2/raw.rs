@@ -10,10 +10,10 @@ use rustdds::no_key::{Decode, DefaultDecoder, DeserializerAdapter, SerializerAda
 pub(super) const HEADER_BYTES: usize = 4;
 const ENCODINGS: [RepresentationIdentifier; 2] = [RepresentationIdentifier::CDR_LE, RepresentationIdentifier::CDR_BE];
 
-/// Hands bytes on.
+/// Serializer that passes bytes on.
 pub(crate) struct Raw;
 
-/// Puts the header before the body again.
+/// Decoder that restores the header before the body.
 #[derive(Clone)]
 pub(crate) struct WithHeader;
 

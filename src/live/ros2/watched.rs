@@ -15,9 +15,9 @@ pub struct WatchedWire {
     stop: Stopper,
     has_sent: bool,
     is_lost: bool,
-    /// Sends nothing but that stop.
+    /// Participant that sends only that stop.
     node: Node,
-    /// Last: the domain is left under its eyes.
+    /// Watch of the memory. It is the last field, so that the domain is left under its watch.
     memory: MemoryWatch,
 }
 

@@ -43,7 +43,7 @@ pub(crate) struct Listener {
 }
 
 impl Listener {
-    /// `names` are the driver's, robot's order of joints.
+    /// Builds the reader; `names` are the driver's, in the robot's order of joints.
     pub fn new(connection: &Connection, bridge: &Rosbridge, names: &[String]) -> Self {
         let topics = contents(connection).into_iter().map(|(content, topic)| (content, topic.to_owned()));
         Self { topics: topics.collect(), names: names.to_vec(), ros: bridge.ros }
@@ -85,7 +85,8 @@ impl Listener {
         Said::Heard(*content, if let Heard::Unusable(why) = heard { Heard::Unusable(shown(&why)) } else { heard })
     }
 
-    /// Set-points that are spelled for the wrong ROS would not be understood: that shall be known before they are sent.
+    /// Checks that the bridge's ROS is the configured one before any set-point is sent: the wrong one would not
+    /// understand the spelling.
     fn check_spelling(&self, message: &Value) -> Result<(), String> {
         let (other, key) = if self.ros == 1 { (2, "sec") } else { (1, "secs") };
         if message["header"]["stamp"].get(key).is_some() {
