@@ -107,7 +107,7 @@ fn draw_quads(run: &ReplayScene, stream: &mut EntityLog, entity: &str, mut views
     views.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut drawn: Option<f64> = None;
     for (n, (time_s, view)) in views.iter().enumerate() {
-        // Of two frames with the same time, the later one stays.
+        // If two frames have the same time, the later one stays.
         let next_s = views.get(n + 1).map_or(f64::INFINITY, |(next_s, _)| *next_s);
         let is_last_for_long = next_s.min(run.tracks.duration_s) - time_s > STALE_S;
         // The first view of each time slot is drawn, so that the start of the drawing does not matter.

@@ -22,7 +22,8 @@ use armcal_core::log::Stream;
 const MAX_MESSAGE_BYTES: usize = 32 << 20;
 /// Largest number of bytes that wait to be sent; with more, the other side takes none.
 const MAX_WAITING_BYTES: usize = 1 << 20;
-/// Number of messages of one topic that are kept while nobody listens; `IMAGE_DEPTH` is that of images, which are large.
+/// Number of messages of one topic that are kept while nobody listens; `IMAGE_DEPTH` is that of images, which are
+/// large.
 const DEPTH: usize = 200;
 const IMAGE_DEPTH: usize = 4;
 /// Number of messages that are read between two looks at the outbox.

@@ -52,8 +52,8 @@ table!(
         gyro_noise_rad_s = 5e-4, in 0.0..=1.0;
         /// Noise of the specific force, one sigma per axis.
         accelerometer_noise_m_s2 = 0.02, in 0.0..=10.0;
-        /// Natural frequency of a free vehicle's position and attitude control (assumed: a pilot's aid); 0 for thrusters that
-        /// are off.
+        /// Natural frequency of a free vehicle's position and attitude control (assumed: a pilot's aid); 0 for
+        /// thrusters that are off.
         station_keeping_rad_s = 0.5, in 0.0..=5.0;
         /// Damping ratio of that control.
         station_damping_ratio = 0.9, in 0.0..=5.0;

@@ -324,7 +324,7 @@ fn largest(a: &[Place], b: &[Place]) -> (f64, f64) {
     )
 }
 
-/// The same moves with ever longer steps are compared with a step of a quarter of a millisecond. The differences at
+/// Moves with ever longer steps are compared with those of a step of a quarter of a millisecond. The differences at
 /// rest arise mostly in the rest band, from where the controller's noisy readings let each valve close.
 #[test]
 fn the_step_is_short_enough() {

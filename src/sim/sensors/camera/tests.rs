@@ -166,7 +166,7 @@ fn a_moving_camera_shows_the_mean_over_its_exposure() {
     }
 }
 
-/// The same image, with and without growth of the noise, shows that noise scales by `1 + k blur`.
+/// One image with and without growth of the noise shows that noise scales by `1 + k blur`.
 #[test]
 fn noise_grows_with_the_blur() {
     let noisy = |growth: f64| {
