@@ -4,22 +4,22 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::Color as _;
 
-/// How a series looks.
+/// Marks or lines that draw a series.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Style {
     Line,
     Dots,
-    /// Broken, for what is no measurement.
+    /// Dashed line, for values that are not measurements.
     Dashes,
-    /// Small crosses, for what does not belong.
+    /// Small crosses, for outliers.
     Crosses,
-    /// Each two points are the ends of a stroke.
+    /// Strokes, each between two consecutive points.
     Strokes,
-    /// The points go around an area.
+    /// Area whose outline passes through the points.
     Area,
 }
 
-/// Of a series.
+/// Color of a series.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Color {
     Blue,
@@ -32,10 +32,10 @@ pub enum Color {
 }
 
 impl Color {
-    /// In the order of series that name none.
+    /// All colors, in the order in which series without a color take them.
     pub const ALL: [Self; 7] = [Self::Blue, Self::Red, Self::Green, Self::Violet, Self::Orange, Self::Grey, Self::Cyan];
 
-    /// `#1f77b4`.
+    /// Returns the color in CSS notation: `#1f77b4`.
     #[must_use]
     pub fn css(self) -> String {
         let RGBColor(red, green, blue) = self.rgb();
@@ -50,23 +50,23 @@ impl Color {
 /// Points of one color.
 #[derive(Clone, Debug)]
 pub struct Series {
-    /// In the legend; one without a name is not there.
+    /// Name in the legend; a series with an empty name has no entry.
     pub name: String,
-    /// One after the other where none is named.
+    /// Color of the series; `None`: the next one of [`Color::ALL`].
     pub color: Option<Color>,
     pub style: Style,
     pub points: Vec<[f64; 2]>,
 }
 
-/// How an axis is divided.
+/// Scale and direction of an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axis {
     Linear,
-    /// Points that are not positive are left out.
+    /// Logarithmic axis; points that are not positive are omitted.
     Log,
-    /// Of whole numbers: no other has a label.
+    /// Axis of whole numbers: only these have labels.
     Whole,
-    /// The rows of an image: grows downwards.
+    /// Axis that grows downwards, such as the rows of an image.
     Downward,
 }
 
@@ -76,7 +76,7 @@ pub struct Panel {
     pub title: String,
     pub x: (String, Axis),
     pub y: (String, Axis),
-    /// Whether a unit is as long on both axes.
+    /// True if both axes have the same scale.
     pub is_map: bool,
     pub series: Vec<Series>,
 }
@@ -90,13 +90,13 @@ const COLORS: [RGBColor; 7] = [
     RGBColor(0x55, 0x55, 0x55),
     RGBColor(0x17, 0xbe, 0xcf),
 ];
-/// Of one panel, px.
+/// Width and height of one panel, px.
 const PANEL: (u32, u32) = (480, 360);
 
 /// Draws panels side by side.
 ///
 /// # Errors
-/// What the drawing library says.
+/// The message of the drawing library.
 pub fn svg(panels: &[Panel]) -> Result<String, String> {
     let mut text = String::new();
     {
@@ -111,11 +111,11 @@ pub fn svg(panels: &[Panel]) -> Result<String, String> {
     Ok(text)
 }
 
-/// Draws one panel of `size_px` without a background; black and white in it are those of the page, if its style says so
-/// for `fill` and `stroke`.
+/// Draws one panel of `size_px` without a background. Black and white become the page's colors if its style sets `fill`
+/// and `stroke`.
 ///
 /// # Errors
-/// What the drawing library says.
+/// The message of the drawing library.
 pub fn inlay(panel: &Panel, size_px: (u32, u32)) -> Result<String, String> {
     let mut text = String::new();
     {
@@ -188,12 +188,13 @@ fn draw(area: &Area<'_>, panel: &Panel) -> Result<(), DrawError> {
     Ok(())
 }
 
-/// Decades are all that a logarithmic axis has labels for: a range of much less than two is better off without.
+/// Returns true if the axis is drawn with a logarithmic scale. Such a scale has labels at decades only, so a range of
+/// much less than two decades is drawn linearly.
 fn is_log(axis: Axis, (low, high): Range) -> bool {
     axis == Axis::Log && high >= 50.0 * low
 }
 
-/// Labels of an axis at most; of whole numbers no more than there are.
+/// Returns the largest number of labels of an axis; an axis of whole numbers has at most one per whole number.
 fn most_labels(axis: Axis, (low, high): Range) -> usize {
     const MOST: usize = 8;
     if axis == Axis::Whole { ((high.floor() - low.ceil()) as usize + 1).min(MOST) } else { MOST }
@@ -206,7 +207,7 @@ fn label(axis: Axis, value: f64) -> String {
     }
 }
 
-/// Of the four corners the one about which there are the fewest points.
+/// Returns the corner of the panel with the fewest points near it.
 fn free_corner(series: &[Series], x: Range, y: Range) -> SeriesLabelPosition {
     let share = |value: f64, (low, high): Range| (value - low) / (high - low);
     let n_in = |is_right: bool, is_upper: bool| {
@@ -229,19 +230,19 @@ fn boxed<E: std::error::Error + Send + Sync>(error: DrawingAreaErrorKind<E>) -> 
     error.to_string().into()
 }
 
-/// Short: 0.001, 1e-7, 250.
+/// Returns a short label of a value: 0.001, 1e-7, 250.
 fn number(value: f64) -> String {
     let size = value.abs();
-    // What is left of a subtraction is no figure.
+    // A rounding error of a subtraction is zero.
     if size > 1e-12 && !(1e-3..1e5).contains(&size) {
         format!("{value:.0e}")
     } else {
-        // Not -0.
+        // Avoids -0.
         format!("{}", (value * 1e6).round() / 1e6 + 0.0)
     }
 }
 
-/// Upwards in the chart is where an axis that grows downwards has the lower values.
+/// Mirrors the points about zero on axes that grow downwards.
 fn upright(panel: &Panel, mut series: Series) -> Series {
     let turned = [panel.x.1, panel.y.1].map(|axis| if axis == Axis::Downward { -1.0 } else { 1.0 });
     series.points.iter_mut().for_each(|p| *p = [p[0] * turned[0], p[1] * turned[1]]);
@@ -258,7 +259,7 @@ fn positive(panel: &Panel, series: &Series) -> Series {
 
 type Range = (f64, f64);
 
-/// Of both axes, around all points.
+/// Returns the ranges of both axes, which enclose all points.
 fn ranges(panel: &Panel, series: &[Series], size_px: (u32, u32)) -> (Range, Range) {
     let of = |axis: usize| {
         let values = series.iter().flat_map(|series| &series.points).map(|p| p[axis]);
@@ -268,7 +269,7 @@ fn ranges(panel: &Panel, series: &[Series], size_px: (u32, u32)) -> (Range, Rang
     if !panel.is_map {
         return (widened(x, panel.x.1), widened(y, panel.y.1));
     }
-    // Of the panel, what labels and margins leave.
+    // Labels and margins take 72 px of each side of the panel.
     let aspect = f64::from(size_px.0.max(73) - 72) / f64::from(size_px.1.max(73) - 72);
     let half = (0.5 * (x.1 - x.0)).max(0.5 * (y.1 - y.0) * aspect) * 1.05 + 1e-9;
     let around = |(low, high): Range, half: f64| (0.5 * (low + high) - half, 0.5 * (low + high) + half);
@@ -303,7 +304,7 @@ mod tests {
         assert!(matches!(corner(&rising), SeriesLabelPosition::UpperLeft));
     }
 
-    /// The chart's labels that are numbers.
+    /// Returns the labels of the chart that are numbers.
     fn numbers(svg: &str) -> Vec<f64> {
         let texts = svg.split("<text").skip(1).filter_map(|rest| rest.split_once('>')?.1.split_once("</text>"));
         texts.filter_map(|(text, _)| text.trim().parse().ok()).collect()

@@ -71,7 +71,7 @@ impl<'a> RectifiedView<'a> {
         (rotated.z > MIN_DEPTH).then(|| Vector2::new(rotated.x / rotated.z, rotated.y / rotated.z))
     }
 
-    /// The same with d(plane)/d(pixel).
+    /// Returns the intersection like [`Self::plane`], with its Jacobian d(plane)/d(pixel).
     #[inline]
     pub(super) fn plane_with_jacobian(&self, pixel_px: [f64; 2]) -> Option<(Vector2<f64>, Matrix2<f64>)> {
         const H: f64 = 0.5;

@@ -18,13 +18,13 @@ const SIDE: f32 = 0.107;
 /// Buffers, reused.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ContrastNormalizer {
-    /// Of each column over the rows of the window.
+    /// Sums of each column over the rows of the window.
     columns: Sums,
-    /// Of the window about each pixel of a row.
+    /// Sums of the window about each pixel of a row.
     windows: Sums,
-    /// Columns of the window about each pixel of a row.
+    /// Number of columns in the window about each pixel of a row.
     n_columns: Vec<f32>,
-    /// Smoothed down, and across as well.
+    /// One row smoothed over its neighbours above and below; `smooth` is smoothed across as well.
     down: Vec<f32>,
     smooth: Vec<f32>,
 }
@@ -63,7 +63,7 @@ impl ContrastNormalizer {
         }
     }
 
-    /// One row, by loops that become vector instructions.
+    /// Writes one normalized row, by loops that the compiler vectorizes.
     fn write_row(&self, n_rows: f32, out: &mut [u8]) {
         let Sums { levels, squares } = &self.windows;
         let windows = levels.iter().zip(squares).zip(&self.n_columns);
@@ -102,7 +102,7 @@ impl Sums {
     }
 }
 
-/// Places within reach of one of `n`.
+/// Number of positions within reach of one of `n`.
 fn n_within(at: usize, n: usize) -> usize {
     (at + REACH + 1).min(n) - at.saturating_sub(REACH)
 }
@@ -111,7 +111,7 @@ fn n_within(at: usize, n: usize) -> usize {
 fn across(columns: &[i32], out: &mut [i32]) {
     let n = columns.len();
     let mut sum: i32 = columns.iter().take(REACH).sum();
-    // Up to here no column leaves the window, from there on none enters it.
+    // Below `full` no column leaves the window; from `last` on none enters it.
     let (full, last) = ((REACH + 1).min(n), n.saturating_sub(REACH));
     for (x, out) in out.iter_mut().enumerate().take(full) {
         sum += columns.get(x + REACH).copied().unwrap_or(0);
@@ -150,7 +150,7 @@ fn smoothed([above, row, below]: [&[u8]; 3], down: &mut Vec<f32>, out: &mut Vec<
 mod tests {
     use super::*;
 
-    /// Against the definition, sum by sum.
+    /// Compares the running sums with a direct sum over each window.
     #[test]
     fn normalization_agrees_with_its_definition() {
         // The window is larger than the last two.

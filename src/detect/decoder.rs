@@ -48,13 +48,13 @@ impl QuadDecoder {
         Ok(Self { library, image: blank()?, normalized: blank()?, normalizer: ContrastNormalizer::default() })
     }
 
-    /// Candidates in the image as it is.
+    /// Returns the candidates in the image without contrast normalization.
     pub(crate) fn decode(&mut self, image: &GreyImage, decimation: f32) -> Vec<Candidate> {
         self.load(image);
         decode(&mut self.library, &self.image, decimation)
     }
 
-    /// The same; a second thread normalizes the contrast meanwhile.
+    /// Returns the candidates like [`Self::decode`]; a second thread normalizes the contrast meanwhile.
     pub(crate) fn decode_and_normalize(&mut self, image: &GreyImage, decimation: f32) -> Vec<Candidate> {
         self.load(image);
         let Self { library, image: buffer, normalized, normalizer } = self;
@@ -66,7 +66,7 @@ impl QuadDecoder {
         })
     }
 
-    /// Candidates in the normalized image of the last [`Self::decode_and_normalize`].
+    /// Returns the candidates in the normalized image of the last [`Self::decode_and_normalize`].
     pub(crate) fn decode_normalized(&mut self, decimation: f32) -> Vec<Candidate> {
         decode(&mut self.library, &self.normalized, decimation)
     }
@@ -93,10 +93,10 @@ pub(crate) fn library_family(family: TagFamily) -> Family {
     }
 }
 
-/// How many wrong bits may be corrected. A random quadrilateral passes for a tag with the chance of
-/// `4 * tags * codes within reach / 2^bits`: 0.2 % for 16h5 (25 % with two bits), 0.1 % for 25h9, 0.002 % for 36h11,
-/// 0.2 % for Circle21h7, below 1e-6 for the others. The library's table has an entry of 16 bytes, three times over, for
-/// each code within reach: of the large families some 150 MB with one bit, and gigabytes with two.
+/// Number of wrong code bits that may be corrected. A random quadrilateral passes for a tag with the probability `4 *
+/// tags * codes within reach / 2^bits`: 0.2 % for 16h5 (25 % with two bits), 0.1 % for 25h9, 0.002 % for 36h11, 0.2 %
+/// for Circle21h7, below 1e-6 for the others. For each code within reach, the library's table has three entries of 16
+/// bytes: for the large families about 150 MB with one bit, and gigabytes with two.
 pub(crate) fn corrected_bits(family: TagFamily) -> usize {
     match family {
         TagFamily::Tag16h5 => 0,

@@ -9,15 +9,16 @@ use armcal_core::streams::{DetectionReject, TagDetection};
 pub struct DetectedTag {
     /// Corners as printed: bottom left, bottom right, top right, top left; pixel centres at whole numbers.
     pub detection: TagDetection,
-    /// Of each corner, in the same order, px2. Neighbouring corners share a side and are not independent.
+    /// Covariance of each corner, in the order of `detection`, px2. Errors of neighbouring corners, which share a side,
+    /// are correlated.
     pub covariances_px2: [Matrix2<f64>; 4],
 }
 
 /// Tags and rejected candidates of one image; tags by id, rejects by id and position.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ImageDetections {
-    /// Those that passed all gates; an id once.
+    /// Tags that passed all gates, each id once.
     pub tags: Vec<DetectedTag>,
-    /// Each with the first gate that it failed.
+    /// Rejected candidates, each with the first gate that it failed.
     pub rejects: Vec<DetectionReject>,
 }

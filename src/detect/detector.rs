@@ -115,7 +115,7 @@ impl Refiner {
 const CORRELATION: f64 = 1.5;
 /// Smallest variance of a corner, px2: errors of the pattern model.
 const FLOOR_PX2: f64 = 0.01 * 0.01;
-/// The same for each px2 of motion blur: motion blur is not Gaussian. Measured.
+/// Increase of this variance per px2 of motion blur, because motion blur is not Gaussian. Measured.
 const MOTION_FLOOR: f64 = 7e-4;
 
 /// Corner covariances of the fit, inflated for model errors.

@@ -8,7 +8,7 @@ use armcal_core::streams::{DetectionReject, RejectReason, TagDetection};
 /// A tag, or the reason for its rejection with the corners before the fit.
 pub(crate) type Refined = Result<DetectedTag, (RejectReason, [[f64; 2]; 4])>;
 
-/// Whether a candidate is the same tag as id `id` at `corners_px`.
+/// Returns true if a candidate is the same tag as id `id` at `corners_px`.
 pub(crate) fn is_same_tag(candidate: &Candidate, id: u32, corners_px: &[[f64; 2]; 4]) -> bool {
     id == candidate.id && are_nested(corners_px, &candidate.corners_px)
 }

@@ -2,7 +2,7 @@
 
 use armcal_core::codes::{Code, Coded};
 
-/// Why an image could not be searched for tags.
+/// Reason why an image could not be searched for tags.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum DetectError {

@@ -46,13 +46,13 @@ const MIN_RESIDUAL_STD: f64 = 0.3;
 #[derive(Clone, Debug)]
 pub(super) struct Fit {
     pub corners_px: [[f64; 2]; 4],
-    /// From residuals and normal matrix.
+    /// Covariance of each corner from residuals and normal matrix, px2.
     pub covariances_px2: [Matrix2<f64>; 4],
     /// Difference of the blur's variances along and across its longest direction.
     pub motion_px2: f64,
     /// White minus black, grey levels.
     pub contrast: f64,
-    /// Of the residuals, grey levels.
+    /// Standard deviation of the residuals, grey levels.
     pub residual_std: f64,
     /// Share of the pixels' variance that the pattern explains.
     pub explained: f64,
@@ -68,7 +68,7 @@ pub(super) struct Fitter {
 
 struct Linearized {
     cost: f64,
-    /// Over the pixels: sums of weights, and of weighted squared residuals.
+    /// Sum of the pixels' weights; `squares` is the sum of their weighted squared residuals.
     weight: f64,
     squares: f64,
     matrix: NormalMatrix,

@@ -80,7 +80,7 @@ fn largest_std(covariance: &Matrix2<f64>) -> f64 {
     (half + difference.hypot(covariance[(0, 1)])).sqrt()
 }
 
-/// Whether the center of one quadrilateral lies within the other: two readings of one tag, not two tags.
+/// Returns true if the center of one quadrilateral lies within the other: both are detections of one tag.
 pub(super) fn are_nested(a: &[[f64; 2]; 4], b: &[[f64; 2]; 4]) -> bool {
     contains_center(a, b) || contains_center(b, a)
 }

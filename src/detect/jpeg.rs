@@ -21,8 +21,8 @@ pub struct GreyPicture {
     pub data: Vec<u8>,
 }
 
-/// The brightness in a JPEG of brightness and colours (YCbCr, as cameras write it), or of brightness alone. Its colours
-/// are not looked at: they are coarser, and would blur the edges. A picture beyond `size_px` is not decoded.
+/// Decodes the brightness of a JPEG of brightness and colours (YCbCr, as cameras write it) or of brightness only. It
+/// ignores the colours, which are coarser and would blur the edges. A picture larger than `size_px` is not decoded.
 ///
 /// # Errors
 /// [`DetectError::Jpeg`] where it is damaged, larger, or has no brightness of its own (RGB, CMYK).

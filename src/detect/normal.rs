@@ -1,6 +1,6 @@
 //! Density and integral of the standard normal distribution from a table, accurate to 1e-6.
 
-/// Range of the table in standard deviations; the density beyond is taken as 0.
+/// Range of the table in standard deviations; the density beyond it is 0.
 pub(super) const REACH: f64 = 4.0;
 const STEPS_PER_STD: usize = 256;
 const N_NODES: usize = 2 * 4 * STEPS_PER_STD + 2;

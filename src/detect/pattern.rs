@@ -1,7 +1,7 @@
 //! Reflectance of a blurred tag: its cells convolved with a Gaussian, with derivatives.
 //!
 //! Position (u, v) in cells from the bottom left corner of the border square as printed, u right, v up, 0 .. n. Beyond
-//! what is printed its outermost cells go on, and what is not printed in between is white. The separable part is a
+//! the print, its outermost cells continue; cells within it that are not printed are white. The separable part is a
 //! product of normal integrals. The blur's cross term enters to first order: convolution with a Gaussian obeys the heat
 //! equation, dP/dC_uv = d2P/(du dv).
 
@@ -15,7 +15,7 @@ pub(super) struct Cells {
     /// Cells along a side of the border square, and those printed beyond it on each side.
     extent: Extent,
     rows: [[f64; MAX_CELLS]; MAX_CELLS],
-    /// Where nothing is printed, in the same order; `None` where everything is.
+    /// True for cells without print, in the order of `rows`; `None` if every cell is printed.
     blank: Option<[[bool; MAX_CELLS]; MAX_CELLS]>,
 }
 
@@ -142,14 +142,14 @@ impl Cells {
         out
     }
 
-    /// Whether all cells within a rectangle about a position have one colour.
+    /// Returns true if all cells within a rectangle about a position have one colour.
     pub(super) fn is_flat(&self, position: [f64; 2], reach: [f64; 2]) -> bool {
         let [columns, rows] = self.within(position, reach);
         let first = self.rows[*rows.start()][*columns.start()];
         rows.clone().all(|row| columns.clone().all(|column| self.rows[row][column] == first))
     }
 
-    /// Whether all within a rectangle about a position is printed.
+    /// Returns true if all cells within a rectangle about a position are printed.
     pub(super) fn is_printed(&self, position: [f64; 2], reach: [f64; 2]) -> bool {
         let Some(blank) = &self.blank else { return true };
         let [columns, mut rows] = self.within(position, reach);

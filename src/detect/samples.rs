@@ -11,13 +11,13 @@ use crate::pattern::Cells;
 const TYPICAL_BLUR_PX: f64 = 0.8;
 /// A pixel farther than this from the next cell edge has no information on the edge's position.
 const EDGE_REACH_PX: f64 = 3.0;
-/// One of this many flat pixels is used, for the grey levels of black and white.
+/// Stride of the flat pixels that the fit uses, for the grey levels of black and white.
 const FLAT_STRIDE: u32 = 23;
 
 /// One pixel of a fit.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sample {
-    /// Position in the rectified view, and d(plane)/d(pixel).
+    /// Position in the rectified view; `jacobian` is d(plane)/d(pixel).
     pub plane: Vector2<f64>,
     pub jacobian: Matrix2<f64>,
     pub value: f64,
@@ -38,7 +38,7 @@ impl TagRegion<'_> {
     /// Fills `samples` with at most `limit` pixels in pseudo-random order, so that every prefix is spread over the tag.
     pub(super) fn sample(&self, limit: usize, samples: &mut Vec<Sample>) {
         samples.clear();
-        // Of a square's side; it is more where the camera looks at a slant.
+        // Share of a square's side; it is larger where the camera views the tag obliquely.
         let margin_share = 0.8 * self.cells.margin() / self.cells.half();
         let Some([columns, rows]) = window(self.image, self.corners_px, margin_share) else { return };
         for y in rows {
@@ -51,7 +51,7 @@ impl TagRegion<'_> {
         samples.truncate(limit);
     }
 
-    /// A pixel's sample; `None` beside the tag and in most of its flat areas.
+    /// Returns the sample of a pixel; `None` outside the tag and in most of its flat areas.
     #[inline]
     fn sample_pixel(&self, x: usize, y: usize, value: f64) -> Option<Sample> {
         let pixel = [x as f64, y as f64];

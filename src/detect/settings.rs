@@ -7,7 +7,7 @@ use crate::decoder::corrected_bits;
 /// Search resolution and gates of a detector. `armcal-lab detection` measures the defaults.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DetectorSettings {
-    /// What is printed on the tags.
+    /// Tag family printed on the tags.
     pub family: TagFamily,
     /// Image decimation for the quad search: 1 finds small tags, 2 is faster.
     pub decimation: f32,
@@ -25,7 +25,7 @@ pub struct DetectorSettings {
     pub min_explained: f64,
     /// Largest standard deviation of a corner in any direction, px.
     pub max_corner_std_px: f64,
-    /// Other ids are rejected; `None`: all ids of the family are accepted.
+    /// Accepted ids; `None`: all ids of the family.
     pub known_ids: Option<Vec<u32>>,
 }
 

@@ -93,7 +93,7 @@ fn reflectance(tag: &PlacedTag, cells: &TagCells, x: f64, y: f64) -> Option<bool
     cells.get(row as usize, column as usize)
 }
 
-/// A tag with what every ray needs of it.
+/// Tag with precomputed quantities for its rays.
 struct Printed {
     tag: PlacedTag,
     cells: TagCells,
@@ -129,7 +129,7 @@ fn ray(rendering: &Rendering, tags: &[Printed], bearing: &Vector3<f64>) -> f64 {
 /// Rays along a pixel's side.
 const N: usize = 8;
 
-/// Renders tags, the first in front; pixels beside them are not traced.
+/// Renders tags, the first in front; pixels outside of them are not traced.
 pub(super) fn render(lens: &CameraModel, rendering: &Rendering, tags: &[PlacedTag], rng: &mut ChaCha8Rng) -> Vec<u8> {
     let [width, height] = lens.resolution_px().map(|n| n as usize);
     let mut grey = vec![rendering.around; width * height];

@@ -43,7 +43,7 @@ struct DetectionErrors {
 }
 
 impl DetectionErrors {
-    /// Per coordinate.
+    /// Returns the RMS error per pixel coordinate.
     fn rms_px(&self) -> f64 {
         (self.errors_px.iter().map(|e| e * e).sum::<f64>() / self.errors_px.len() as f64 / 2.0).sqrt()
     }
@@ -109,7 +109,7 @@ fn trials(
     errors
 }
 
-/// Any spin and place: the order of the corners is right, or errors would be as large as a side.
+/// Places tags at any spin and position. A wrong order of the corners would make errors as large as a side.
 #[test]
 fn clean_corners_are_those_of_the_projection() {
     for (ranges, incidences) in [([0.4, 0.8], [0.0, 0.9]), ([0.8, 1.6], [0.0, 0.9]), ([1.6, 2.5], [0.0, 0.6])] {
@@ -126,8 +126,9 @@ fn clean_corners_are_those_of_the_projection() {
     }
 }
 
-/// In white noise the covariances are 1.5 times too large, which snow needs: means of 2/1.5. Those of some 150 squares
-/// have a standard deviation of 0.11; the floor makes the largest contrast's errors smaller than said.
+/// In white noise the covariances are 1.5 times too large, which marine snow requires: the mean of the normalized
+/// squares is 2/1.5. Means of about 150 squares have a standard deviation of 0.11. At the largest contrast, the
+/// variance floor makes the errors smaller than the covariance says.
 #[test]
 fn noisy_corners_err_as_their_covariance_says() {
     for (contrast, blur_px, band) in [(120.0, 1.0, 0.5..=2.2), (40.0, 0.4, 0.9..=2.2), (30.0, 1.0, 0.9..=2.2)] {
@@ -157,7 +158,7 @@ fn noise_shows_nothing() {
         let detections = detect_in(&lens, DetectorSettings::default(), &data);
         assert!(detections.tags.is_empty(), "{:?}", detections.tags);
     }
-    // Patches of random cells in place of a tag's, as large as one: nothing of the family.
+    // Patches as large as a tag, with random cells instead of a tag's, hold no tag of the family.
     let mut rng = stream_rng(9, "detect/noise");
     for _ in 0..3 {
         let cells: Vec<u8> = (0..128 * 154).map(|_| if rng.random_range(0.0..1.0) < 0.5 { 20 } else { 220 }).collect();
@@ -170,10 +171,11 @@ fn noise_shows_nothing() {
 /// Each family's corners are those of 36h11 within its noise, and none of its tags is read as one of another family.
 #[test]
 fn tags_of_each_family_are_found_where_they_are() {
-    // No more of the image than where the tags are.
+    // The images end where the tags end.
     let lens = Fisheye { center_px: [260.0, 160.0], resolution_px: [520, 320], ..fisheye() }.into();
     let of_family = |family| detector(&lens, DetectorSettings::of_family(family));
-    // Tables of large families take seconds to make: those are held against their own tags only, in few images.
+    // Tables of large families take seconds to make, so those families are tested on their own tags only, in few
+    // images.
     let is_small = |family: &TagFamily| family.n_tags() < 5000;
     let mut small: Vec<(TagFamily, TagDetector)> =
         TagFamily::ALL.into_iter().filter(is_small).map(|family| (family, of_family(family))).collect();
@@ -260,7 +262,7 @@ fn doubtful_tags_are_rejected_with_the_reason() {
     // A tag whose border the image does not have where the code says: half of it hidden by a grey bar.
     let sure = DetectorSettings { max_corner_std_px: 1e-4, ..default() };
     assert_eq!(reasons(&detect_in(&lens, sure, &clean)), [(42, RejectReason::PoorEdges)]);
-    // Beyond the field of view that belief has.
+    // The tag is beyond the assumed field of view.
     let narrow = Fisheye { max_view_angle_rad: 0.05, ..fisheye() }.into();
     let detections = detect_in(&narrow, default(), &clean);
     assert_eq!(reasons(&detections), [(42, RejectReason::OutOfView)]);

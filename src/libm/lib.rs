@@ -2,10 +2,10 @@
 //!
 //! `f64::sin` calls `sin` of the platform's C library, and glibc has two of them, one with fused multiply-add and one
 //! without, that differ in the last bit. This crate has these functions under C's names, so that the linker finds them
-//! before the C library's: in our code, in nalgebra, in the sampling of noise, and in the C code that finds tags. They
-//! are those of the crate `libm` (a port of musl's), which adds and multiplies in one stated order.
+//! before the C library's: in our code, in nalgebra, in the sampling of noise, and in the C code that finds tags. The
+//! functions are those of the crate `libm` (a port of musl's), which adds and multiplies in one stated order.
 //!
-//! Who links this crate gets them in the whole program. armcal-core does, and so does everything of ours.
+//! Every program that links this crate uses these functions throughout. armcal-core links it, so all our programs do.
 #![no_std]
 #![allow(unsafe_code, reason = "no_mangle: two functions of one name would be an error of the linker, not of memory")]
 
@@ -43,13 +43,13 @@ of_two_arguments! {
     powf: f32, atan2f: f32, hypotf: f32,
 }
 
-/// What LLVM makes of a sine and a cosine of one angle.
+/// Returns sine and cosine of one angle through pointers: LLVM merges a sine and a cosine of one angle into this call.
 #[unsafe(no_mangle)]
 pub extern "C" fn sincos(x: f64, sine: &mut f64, cosine: &mut f64) {
     (*sine, *cosine) = libm::sincos(x);
 }
 
-/// As [`sincos`], of 32 bits.
+/// Single-precision variant of [`sincos`].
 #[unsafe(no_mangle)]
 pub extern "C" fn sincosf(x: f32, sine: &mut f32, cosine: &mut f32) {
     (*sine, *cosine) = libm::sincosf(x);

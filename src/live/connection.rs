@@ -1,4 +1,4 @@
-//! arm.toml: which topics carry what, and when the guard stops the arm.
+//! The connection map arm.toml: contents of the topics, and limits at which the guard stops the arm.
 
 mod bridge;
 
@@ -23,39 +23,40 @@ use armcal_core::schema::schema_of;
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Connection {
-    /// Of this file's layout: 1.
+    /// Version of this file's layout: 1.
     pub version: u32,
-    /// [`Kind::Arm`].
+    /// Kind of this file: [`Kind::Arm`].
     pub kind: Kind,
-    /// ROS_DOMAIN_ID.
+    /// Number of the ROS domain (ROS_DOMAIN_ID).
     #[schemars(range(min = 0, max = 232))]
     pub domain: u16,
-    /// Addresses of this machine's interfaces that DDS may use; all of them where none are named. The sockets stay
-    /// open to every interface.
+    /// Addresses of this machine's interfaces that DDS may use; all of them if the list is empty. The sockets stay open
+    /// to every interface.
     pub networks: Vec<Ipv4Addr>,
-    /// The bridge that the arm is reached over, in place of DDS.
+    /// Rosbridge through which the arm is reached, instead of DDS.
     pub rosbridge: Option<Rosbridge>,
-    /// `sensor_msgs/msg/JointState` with raw counts in `position`.
+    /// Topic of the joint sensors: `sensor_msgs/msg/JointState` with raw counts in `position`.
     pub joint_sensors: String,
-    /// The driver's names of joints, by those of the robot's file, where they differ.
+    /// The driver's joint names, keyed by the names in the robot's file, where they differ.
     pub names: BTreeMap<String, String>,
-    /// Where set-points go.
+    /// Topic, type and rate of the set-points.
     pub commands: Commands,
-    /// `apriltag_msgs/msg/AprilTagDetectionArray`; empty where there is none, as all below.
+    /// Topic of tag detections: `apriltag_msgs/msg/AprilTagDetectionArray`; empty if there is none.
     pub detections: String,
-    /// `sensor_msgs/msg/CompressedImage`, JPEG; searched for tags where nobody publishes detections.
+    /// Topic of images: `sensor_msgs/msg/CompressedImage`, JPEG; empty if there is none. They are searched for tags if
+    /// `detections` is empty.
     pub images: String,
-    /// `sensor_msgs/msg/Temperature`.
+    /// Topic of the oil temperature: `sensor_msgs/msg/Temperature`; empty if there is none.
     pub oil_temperature: String,
-    /// `sensor_msgs/msg/Temperature`.
+    /// Topic of the water temperature: `sensor_msgs/msg/Temperature`; empty if there is none.
     pub water_temperature: String,
-    /// `sensor_msgs/msg/FluidPressure`.
+    /// Topic of the depth sensor's pressure: `sensor_msgs/msg/FluidPressure`; empty if there is none.
     pub pressure: String,
-    /// `sensor_msgs/msg/Imu`.
+    /// Topic of the vehicle's IMU: `sensor_msgs/msg/Imu`; empty if there is none.
     pub imu: String,
-    /// Topic and service by which the arm is stopped.
+    /// Topic and service that stop the arm.
     pub stop: StopWays,
-    /// `None` where nobody has to hold a switch.
+    /// Dead man's switch; `None` if nobody has to hold one.
     pub deadman: Option<Deadman>,
     /// Limits of the guard.
     pub guard: GuardLimits,
@@ -86,16 +87,16 @@ impl Default for Connection {
     }
 }
 
-/// Where set-points go, raw counts.
+/// Topic of the set-points, which are in raw counts.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Commands {
     /// Name of the topic.
     pub topic: String,
-    /// Type of its messages.
+    /// Type of the messages.
     #[serde(rename = "type")]
     pub message_type: CommandType,
-    /// Set-points a second, by the arm's clock.
+    /// Rate of the set-points by the arm's clock, Hz.
     #[schemars(range(min = 5.0, max = 1000.0))]
     pub rate_hz: f64,
 }
@@ -107,22 +108,22 @@ impl Default for Commands {
     }
 }
 
-/// Messages that drivers take set-points from.
+/// Message types in which drivers take set-points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 pub enum CommandType {
-    /// One point, to be reached one period later.
+    /// Trajectory of one point, which is to be reached one period later.
     #[serde(rename = "trajectory_msgs/msg/JointTrajectory", alias = "trajectory_msgs/JointTrajectory")]
     JointTrajectory,
-    /// `data` alone, in the order of the robot's file.
+    /// Values in `data` without names, in the joint order of the robot's file.
     #[serde(rename = "std_msgs/msg/Float64MultiArray", alias = "std_msgs/Float64MultiArray")]
     Float64MultiArray,
-    /// `position`, as our recordings have it.
+    /// Set-points in `position`, as in our recordings.
     #[serde(rename = "sensor_msgs/msg/JointState", alias = "sensor_msgs/JointState")]
     JointState,
 }
 
 impl CommandType {
-    /// As ROS writes it.
+    /// Returns the type's name as ROS 2 writes it.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -133,15 +134,15 @@ impl CommandType {
     }
 }
 
-/// Topic and service by which the arm is stopped; each that is named is used.
+/// Topic and service that stop the arm; each one that is named is used.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct StopWays {
-    /// `std_msgs/msg/Bool`, true.
+    /// Topic that stops the arm: `std_msgs/msg/Bool`, true; empty if there is none.
     pub topic: String,
-    /// `std_srvs/srv/Trigger`; empty where there is none.
+    /// Service that stops the arm: `std_srvs/srv/Trigger`; empty if there is none.
     pub service: String,
-    /// How the other side's middleware carries services.
+    /// Mapping of services to DDS that the server of `service` uses.
     pub mapping: ServiceMapping,
 }
 
@@ -151,50 +152,50 @@ impl Default for StopWays {
     }
 }
 
-/// How services go over DDS.
+/// Mapping of services to DDS.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ServiceMapping {
-    /// Fast DDS and others.
+    /// Mapping of Fast DDS and others.
     Enhanced,
-    /// Cyclone DDS.
+    /// Mapping of Cyclone DDS.
     Cyclone,
 }
 
-/// A switch that somebody holds as long as the arm may move.
+/// Switch that somebody holds as long as the arm may move.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Deadman {
-    /// `std_msgs/msg/Bool`.
+    /// Topic of the switch: `std_msgs/msg/Bool`.
     pub topic: String,
-    /// The arm stops when the last `true` is older, s.
+    /// Largest age of the last `true`, s; the arm stops when it is older.
     #[schemars(range(min = 0.05, max = 10.0))]
     pub timeout_s: f64,
 }
 
-/// When the guard stops the arm.
+/// Limits at which the guard stops the arm.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct GuardLimits {
-    /// The first readings must come within this time, s.
+    /// Longest wait for the first readings, s.
     #[schemars(range(min = 0.1, max = 600.0))]
     pub connect_s: f64,
-    /// Readings must be sound and the arm at rest for so long before anything moves, s.
+    /// Time for which readings must be sound and the arm at rest before anything moves, s.
     #[schemars(range(min = 0.5, max = 60.0))]
     pub ready_s: f64,
-    /// Readings may be missing for so long, s.
+    /// Longest gap between readings, s.
     #[schemars(range(min = 0.02, max = 5.0))]
     pub stale_s: f64,
-    /// A joint may be so far from its set-point, deg.
+    /// Largest distance of a joint from its set-point, deg.
     #[schemars(range(min = 0.5, max = 180.0))]
     pub tracking_deg: f64,
-    /// It may be so for this time by the arm's clock, s.
+    /// Longest time for which a joint may exceed `tracking_deg`, s by the arm's clock.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub tracking_s: f64,
-    /// All readings may stay the same to the count for so long while set-points move, s.
+    /// Longest time for which all readings may stay the same to the count while set-points move, s.
     #[schemars(range(min = 0.1, max = 10.0))]
     pub frozen_s: f64,
-    /// The arm's clock may leap by so much between two readings, s.
+    /// Largest jump of the arm's clock between two readings, s.
     #[schemars(range(min = 0.05, max = 60.0))]
     pub clock_step_s: f64,
 }
@@ -274,7 +275,7 @@ impl Connection {
         Ok(())
     }
 
-    /// Every topic and service by its key.
+    /// Returns every topic and service with its key.
     fn named(&self) -> Vec<(&'static str, &str)> {
         let mut named = vec![
             ("joint_sensors", self.joint_sensors.as_str()),
@@ -292,19 +293,19 @@ impl Connection {
         named
     }
 
-    /// Whether tags are looked for in the images: there are images, and nobody else does.
+    /// Returns true if the images are searched for tags: the map has a topic of images and none of detections.
     #[must_use]
     pub fn searches_images(&self) -> bool {
         self.detections.is_empty() && !self.images.is_empty()
     }
 
-    /// The driver's name of a joint.
+    /// Returns the driver's name of a joint.
     pub(crate) fn driver_name<'a>(&'a self, joint: &'a str) -> &'a str {
         self.names.get(joint).map_or(joint, String::as_str)
     }
 }
 
-/// Whether a connection map may name this topic or service.
+/// Returns true if a connection map may name this topic or service.
 pub(crate) fn is_name(topic: &str) -> bool {
     let is_allowed = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '/';
     topic.starts_with('/') && topic.len() > 1 && topic.chars().all(is_allowed)

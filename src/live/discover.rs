@@ -1,5 +1,5 @@
-//! A proposed connection map: which of the topics of a domain carry what, with comments on what was chosen, what else
-//! is there and what is left to fill in.
+//! Proposal of a connection map: the contents of a domain's topics. Its comments list the choices, the other candidates
+//! and the keys left to fill in.
 
 use std::cmp::Reverse;
 use std::collections::BTreeSet;
@@ -14,44 +14,44 @@ use armcal_core::robot::{Robot, likely_name};
 use armcal_core::schema::first_line;
 use armcal_core::text::printable;
 
-/// A ROS 2 domain and how it is reached.
+/// ROS 2 domain and the interfaces through which it is reached.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Domain {
-    /// ROS_DOMAIN_ID.
+    /// Number of the domain (ROS_DOMAIN_ID).
     pub number: u16,
-    /// Addresses of this machine's interfaces; all of them where none are named.
+    /// Addresses of this machine's interfaces; all of them if the list is empty.
     pub networks: Vec<Ipv4Addr>,
 }
 
-/// What others have in a domain.
+/// Topics and services of the other participants in a domain.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Seen {
-    /// Where it was seen.
+    /// Domain in which they were seen.
     pub domain: Domain,
-    /// By name.
+    /// Topics, sorted by name.
     pub topics: Vec<SeenTopic>,
-    /// In no order.
+    /// Services, in no order.
     pub services: Vec<SeenService>,
 }
 
 /// A topic that somebody publishes or subscribes to.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SeenTopic {
-    /// As ROS has it.
+    /// Name as ROS writes it.
     pub name: String,
-    /// `package/msg/Type`.
+    /// Type: `package/msg/Type`.
     pub ros_type: String,
-    /// How many publish it now.
+    /// Number of current publishers.
     pub publishers: usize,
-    /// How many subscribe to it now.
+    /// Number of current subscribers.
     pub subscribers: usize,
-    /// Messages that were heard.
+    /// Number of messages that were heard.
     pub messages: u64,
-    /// Joint readings a second, by their stamps.
+    /// Rate of the joint readings by their stamps, Hz.
     pub rate_hz: Option<f64>,
-    /// Names in joint readings.
+    /// Joint names in the readings.
     pub joints: BTreeSet<String>,
-    /// The largest position in joint readings, either way.
+    /// Largest absolute position in the joint readings.
     pub largest: f64,
 }
 
@@ -65,11 +65,11 @@ impl SeenTopic {
 /// A service that somebody offers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SeenService {
-    /// As ROS has it.
+    /// Name as ROS writes it.
     pub name: String,
-    /// `package/srv/Type`.
+    /// Type: `package/srv/Type`.
     pub ros_type: String,
-    /// By the make of the server's middleware.
+    /// Mapping that the vendor of the server's middleware uses.
     pub mapping: ServiceMapping,
 }
 
@@ -108,7 +108,7 @@ impl<'a> Proposal<'a> {
         self.text.push('\n');
     }
 
-    /// A key with its value, or one that is left to fill in.
+    /// Appends a key with its value, or a key that is left to fill in.
     fn needed(&mut self, key: &str, path: &str, topic: Option<&SeenTopic>, lacking: &str) {
         match topic {
             Some(topic) => self.line(&format!("{key} = {}   # {}", quoted(&topic.name), described(topic))),
@@ -144,7 +144,7 @@ impl<'a> Proposal<'a> {
         self.line(&format!("version = 1\nkind = \"arm\"\ndomain = {number}\nnetworks = [{}]\n", networks.join(", ")));
     }
 
-    /// Everything that the arm publishes; readings a second.
+    /// Appends everything that the arm publishes; returns the rate of the joint readings, Hz.
     fn joints(&mut self, robot: Option<&Robot>) -> Option<f64> {
         let wanted = robot.map(Robot::joint_names).unwrap_or_default();
         let matched = |topic: &SeenTopic| wanted.iter().filter(|j| likely_name(j, &topic.joints).is_some()).count();
@@ -167,7 +167,7 @@ impl<'a> Proposal<'a> {
         chosen.and_then(|topic| topic.rate_hz)
     }
 
-    /// What comes beside the joint readings; an empty name where it does not.
+    /// Appends the other streams of the arm; a stream that was not seen gets an empty name.
     fn streams(&mut self) {
         let all: [(&str, Stream, &[&str]); 6] = [
             ("detections", Stream::Detections, &[]),
@@ -221,7 +221,7 @@ impl<'a> Proposal<'a> {
     fn commands(&mut self, rate_hz: Option<f64>) {
         let types = [CommandType::JointTrajectory, CommandType::Float64MultiArray, CommandType::JointState];
         let type_of = |topic: &SeenTopic| types.iter().position(|own| own.name() == topic.ros_type);
-        // Joint readings have subscribers, too; nobody but armcal publishes set-points.
+        // Joint readings have subscribers, too; only armcal publishes set-points.
         let all = self.topics(|topic| topic.subscribers > 0 && topic.publishers == 0 && type_of(topic).is_some());
         let rank = |topic: &&&SeenTopic| {
             let is_called = is_called_after(&topic.name, &["command", "set_point", "setpoint", "trajectory"]);
@@ -279,7 +279,7 @@ impl<'a> Proposal<'a> {
         self.others("other switches that somebody publishes", &all, chosen.copied());
     }
 
-    /// Everything, chosen or not.
+    /// Appends all topics and services, whether chosen or not.
     fn all(&mut self) {
         self.line("\n# Seen in the domain:");
         for topic in &self.seen.topics {
@@ -310,12 +310,12 @@ fn described(topic: &SeenTopic) -> String {
     text
 }
 
-/// As TOML writes a text.
+/// Returns a text as a TOML string.
 fn quoted(text: &str) -> String {
     toml::Value::String(text.to_owned()).to_string()
 }
 
-/// One line without control characters.
+/// Returns a text as one line without control characters.
 fn comment(text: &str) -> String {
     printable(text).replace(['\n', '\t'], " ")
 }

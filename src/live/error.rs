@@ -1,9 +1,9 @@
-//! Why a connection to an arm cannot be made or used.
+//! Errors of making or using a connection to an arm.
 
 use armcal_core::codes::{Code, Coded};
 use armcal_core::robot::RobotError;
 
-/// Why there is no live arm.
+/// Reason for which there is no live arm.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum LiveError {
@@ -32,7 +32,7 @@ pub enum LiveError {
 }
 
 impl LiveError {
-    /// For errors of the middleware, which are of many types.
+    /// Wraps errors of the middleware, which are of many types.
     pub(crate) fn dds<E: std::fmt::Debug>(what: &str) -> impl FnOnce(E) -> Self {
         move |error| Self::Dds { what: what.to_owned(), problem: format!("{error:?}") }
     }

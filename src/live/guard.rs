@@ -1,4 +1,4 @@
-//! When a live arm must stop: pure rules on readings, set-points and clocks.
+//! Rules that stop a live arm, from readings, set-points and clocks only.
 
 use armcal_core::codes::{Code, Coded};
 use std::time::Duration;
@@ -10,19 +10,20 @@ use armcal_core::sensor::ArmSensors;
 use armcal_core::streams::{JointCounts, JointSensorSample};
 use armcal_core::time::Stamp;
 
-/// Angles beyond the sensors' bounds that count as inside of a joint's range, rad.
+/// Allowance beyond the sensors' bounds for angles that count as inside a joint's range, rad.
 const RANGE_SLACK_RAD: f64 = 0.035;
-/// Set-points that moved less ask for nothing that frozen readings would miss, rad.
+/// Smallest motion of a set-point that readings should show, rad.
 const ASKED_RAD: f64 = 0.02;
-/// Of the time for which readings may repeat themselves, so much must have passed since more was asked: an arm whose
-/// sensors have no noise repeats itself at rest, and follows late.
+/// Share of `frozen_s` that must have passed since a set-point moved. An arm whose sensors have no noise repeats its
+/// readings at rest, and follows late.
 const ASKED_SHARE: f64 = 0.5;
-/// A clock that runs so many times as fast as ours is a simulator's; faster, and it has leapt.
+/// Largest rate of a simulator's clock over ours; a clock that runs faster has jumped.
 const MAX_PACE: f64 = 100.0;
-/// One that went less than this times as fast while the arm was heard out is a real arm's, and never goes so fast.
+/// Largest rate of a real arm's clock over ours. A clock that was slower before the first motion is a real arm's and
+/// never runs faster.
 const REAL_PACE: f64 = 2.0;
 
-/// Why the guard stopped the arm.
+/// Reason for which the guard stopped the arm.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum StopReason {
@@ -50,31 +51,31 @@ pub enum StopReason {
     Asked(String),
 }
 
-/// The short way round.
+/// Returns the way from one reading to another, the short way round, rad.
 fn way_rad(wrap_counts: f64, counts_per_rad: f64, from: f64, to: f64) -> f64 {
     let way = (to - from + wrap_counts / 2.0).rem_euclid(wrap_counts) - wrap_counts / 2.0;
     way / counts_per_rad
 }
 
-/// Watches one arm.
+/// Guard of one arm.
 pub(crate) struct Guard {
     limits: GuardLimits,
     deadman_s: Option<f64>,
     joints: Vec<String>,
     nominal: ArmSensors,
     counts_per_rad: Vec<f64>,
-    /// Whether counts rise, 1, or fall, -1, with the angle.
+    /// 1 if counts rise with the angle, -1 if they fall.
     senses: Vec<f64>,
     wrap_counts: Vec<f64>,
-    /// Least and greatest angle that a set-point may mean by the nominal sensor.
+    /// Least and greatest angle of a set-point by the nominal sensor, rad.
     range_rad: Vec<[f64; 2]>,
     last: Option<(JointSensorSample, Duration)>,
-    /// The arm's clock goes no faster than ours times this.
+    /// Largest rate of the arm's clock over ours.
     max_pace: f64,
-    /// Silence counts from here.
+    /// Time by our clock from which silence counts.
     listening_since: Duration,
     held_at: Option<Duration>,
-    /// Since when each joint is too far from its set-point.
+    /// Time from which each joint has been too far from its set-point.
     astray_since: Vec<Option<Stamp>>,
     leaps: Leaps,
     unchanged: Option<Unchanged>,
@@ -84,9 +85,9 @@ pub(crate) struct Guard {
 struct Unchanged {
     counts: JointCounts,
     since: Stamp,
-    /// The set-point then.
+    /// Set-point at the time `since`.
     sent: JointCounts,
-    /// When a set-point first asked for more than they show.
+    /// Time at which a set-point was first far enough from `sent` for the readings to show it.
     asked_since: Option<Stamp>,
 }
 
@@ -122,38 +123,38 @@ impl Guard {
         }
     }
 
-    /// The newest reading.
+    /// Returns the newest reading.
     pub fn latest(&self) -> Option<&JointSensorSample> {
         self.last.as_ref().map(|(sample, _)| sample)
     }
 
-    /// Way from one reading of a joint to another, rad; the short way round.
+    /// Returns the way from one reading of a joint to another, rad; the short way round.
     pub fn way_rad(&self, joint: usize, from: f64, to: f64) -> f64 {
         way_rad(self.wrap_counts[joint], self.counts_per_rad[joint], from, to)
     }
 
-    /// Reading of a joint, so far from another one.
+    /// Returns the reading of a joint that is `way_rad` from another reading.
     pub fn moved(&self, joint: usize, from: f64, way_rad: f64) -> f64 {
         (from + way_rad * self.counts_per_rad[joint]).rem_euclid(self.wrap_counts[joint])
     }
 
-    /// Turn of a joint from one reading to another, rad, by the drawing's sense.
+    /// Returns the turn of a joint from one reading to another, rad, in the sense of the nominal model (URDF).
     pub fn turn_rad(&self, joint: usize, from: f64, to: f64) -> f64 {
         self.senses[joint] * self.way_rad(joint, from, to)
     }
 
-    /// Reading of a joint, turned by so much from another one.
+    /// Returns the reading of a joint that is turned by `turn_rad` from another reading.
     pub fn turned(&self, joint: usize, from: f64, turn_rad: f64) -> f64 {
         self.moved(joint, from, self.senses[joint] * turn_rad)
     }
 
-    /// The sense, 1 or -1, in which a joint turns towards the middle of its range.
+    /// Returns the sense, 1 or -1, in which a joint turns towards the middle of its range.
     pub fn inward(&self, joint: usize, counts: &JointCounts) -> f64 {
         let [low, high] = self.range_rad[joint];
         (0.5 * (low + high) - self.nominal.angles(counts)[joint]).signum()
     }
 
-    /// A set-point before it is sent.
+    /// Checks a set-point before it is sent.
     pub fn check_set_point(&self, counts: &JointCounts) -> Result<(), StopReason> {
         let angles = self.nominal.angles(counts);
         for (joint, (angle, [low, high])) in angles.iter().zip(&self.range_rad).enumerate() {
@@ -164,13 +165,13 @@ impl Guard {
         Ok(())
     }
 
-    /// When the dead man's switch was held, by our clock; `None` when it was let go.
+    /// Takes the time, by our clock, at which the dead man's switch was held; `None` if it was let go.
     pub fn hear_deadman(&mut self, held_at: Option<Duration>) {
         self.held_at = held_at;
     }
 
-    /// A reading that came at `at` by our clock, while `sent` was the last set-point; `false` for one that is older
-    /// than the newest.
+    /// Checks a reading that came at `at` by our clock, while `sent` was the last set-point. Returns false if it is
+    /// older than the newest reading.
     pub fn hear(&mut self, sample: &JointSensorSample, sent: &JointCounts, at: Duration) -> Result<bool, StopReason> {
         if let Some((last, last_at)) = &self.last {
             let (step_s, ours_s) = (sample.stamp.since_s(last.stamp), (at.saturating_sub(*last_at)).as_secs_f64());
@@ -218,17 +219,18 @@ impl Guard {
         Err(StopReason::Leapt { joint, off_deg: off_rad.to_degrees(), for_s, limit_deg })
     }
 
-    /// Nothing was asked yet: what the readings were before counts no more.
+    /// Forgets the leaps of earlier readings. They do not count before the first set-point.
     pub fn forget_leaps(&mut self) {
         self.leaps.forget();
     }
 
-    /// Whether the reading of a joint is in doubt: it leapt, and has not come back.
+    /// Returns true if the reading of a joint is in doubt: it leapt, and has not come back.
     pub fn has_leapt(&self, joint: usize) -> bool {
         self.leaps.has_leapt(joint)
     }
 
-    /// What was asked counts even where it was taken back: a session that sees no joint move may hold it.
+    /// Checks that readings are not frozen. A set-point counts even if it was taken back, because a session that sees
+    /// no joint move may hold it.
     fn check_frozen(&mut self, sample: &JointSensorSample, sent: &JointCounts) -> Result<(), StopReason> {
         let asks = |u: &Unchanged| (0..sent.len()).any(|j| self.way_rad(j, u.sent[j], sent[j]).abs() > ASKED_RAD);
         let is_asked = self.unchanged.as_ref().is_some_and(asks);
@@ -247,7 +249,7 @@ impl Guard {
         Ok(())
     }
 
-    /// What silence says at `now` by our clock.
+    /// Checks the time since the last reading at `now` by our clock, and the dead man's switch.
     pub fn check_silence(&self, now: Duration) -> Result<(), StopReason> {
         let Some((_, heard_at)) = &self.last else { return Ok(()) };
         let silent_s = now.saturating_sub(self.listening_since.max(*heard_at)).as_secs_f64();
@@ -257,19 +259,19 @@ impl Guard {
         self.check_deadman(now)
     }
 
-    /// Whether somebody holds the switch, where there is one.
+    /// Checks that somebody holds the dead man's switch, if there is one.
     pub fn check_deadman(&self, now: Duration) -> Result<(), StopReason> {
         let Some(limit_s) = self.deadman_s else { return Ok(()) };
         let is_held = self.held_at.is_some_and(|at| now.saturating_sub(at).as_secs_f64() <= limit_s);
         if is_held { Ok(()) } else { Err(StopReason::Deadman { limit_s }) }
     }
 
-    /// The arm's clock went on by `arm_s` in `ours_s` of our time.
+    /// Learns the rate of the arm's clock, which advanced by `arm_s` in `ours_s` of our time.
     pub fn learn_pace(&mut self, arm_s: f64, ours_s: f64) {
         self.max_pace = if arm_s < REAL_PACE * ours_s { REAL_PACE } else { MAX_PACE };
     }
 
-    /// Nothing was asked of the arm for a while, and nobody listened: silence begins anew.
+    /// Restarts the time without readings, after a pause without set-points in which nobody listened.
     pub fn resume(&mut self, now: Duration) {
         self.listening_since = now;
         if self.held_at.is_some() {

@@ -1,4 +1,4 @@
-//! Tags in the images of a camera that has no detector node, looked for beside the loop.
+//! Search for tags in the images of a camera without a detector node, in parallel to the loop.
 
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -7,12 +7,12 @@ use std::time::Duration;
 use crate::{Heard, LiveError, Wire};
 use armcal_core::streams::{CameraImage, JointCounts, Message};
 
-/// Looks for tags in an image.
+/// Detector that searches an image for tags.
 pub trait TagFinder {
-    /// Detections of the image's stamp, and rejects where there are any.
+    /// Returns detections with the image's stamp, and rejects if there are any.
     ///
     /// # Errors
-    /// What is wrong with the image, for people.
+    /// The fault of the image, for people.
     fn find(&mut self, image: &CameraImage) -> Result<Vec<Message>, String>;
 }
 

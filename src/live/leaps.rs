@@ -1,17 +1,17 @@
-//! Readings that leap: farther from one to the next than any joint goes, and not back.
+//! Detection of leaps: readings that move farther in one step than any joint can, and do not return.
 
 use armcal_core::robot::Robot;
 use armcal_core::streams::JointSensorSample;
 use armcal_core::time::Stamp;
 
-/// A joint that is pushed or falls goes no faster than the robot's file allows, times this.
+/// Factor on the largest rate of the robot's file, for a joint that is pushed or falls.
 const RATE_SLACK: f64 = 2.0;
 
-/// Which joints' readings are in doubt.
+/// Joints whose readings are in doubt.
 pub(crate) struct Leaps {
     limit_rad: f64,
     max_rate_rad_s: Vec<f64>,
-    /// The last reading before the leap, for each joint.
+    /// Last reading of each joint before its leap.
     before: Vec<Option<(f64, Stamp)>>,
 }
 
@@ -23,24 +23,25 @@ pub(crate) struct Leapt {
 }
 
 impl Leaps {
-    /// `limit_rad`: what counts as a leap, beside the way that a joint can go between two readings.
+    /// Detects leaps: steps longer by `limit_rad` than a joint can go between two readings.
     pub fn new(robot: &Robot, limit_rad: f64) -> Self {
         let max_rate_rad_s = robot.sensors.iter().map(|sensor| RATE_SLACK * sensor.max_rate_rad_s).collect();
         Self { limit_rad, max_rate_rad_s, before: vec![None; robot.sensors.len()] }
     }
 
-    /// Readings are taken as they are from here on: an arm that is heard out may begin anywhere.
+    /// Accepts the next readings as they are: an arm that is only listened to may begin anywhere.
     pub fn forget(&mut self) {
         self.before.fill(None);
     }
 
-    /// Whether the joint's readings leapt, and have not come back.
+    /// Returns true if the joint's readings leapt, and have not come back.
     pub fn has_leapt(&self, joint: usize) -> bool {
         self.before[joint].is_some()
     }
 
-    /// The joint that has stayed away for longest. `way_rad`: of a joint, from one reading to another. Only a second
-    /// leap brings a joint back: one that could have gone to where it reads by now was not there in between.
+    /// Returns the joint that has stayed away longest. `way_rad` returns the way of a joint from one reading to
+    /// another. Only a second leap brings a joint back. A joint that could have moved to its present reading by now was
+    /// not there in between.
     pub fn hear(
         &mut self,
         last: &JointSensorSample,

@@ -1,4 +1,4 @@
-//! A real arm as sessions know arms: paced by its own readings, and stopped by the guard.
+//! Real arm as sessions know arms: paced by its own readings, and stopped by the guard.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -13,22 +13,23 @@ use armcal_core::streams::{
 };
 use armcal_core::time::Stamp;
 
-/// The longest wait for messages before silence is looked at again.
+/// Longest wait for messages before silence is checked again.
 const LISTEN: Duration = Duration::from_millis(5);
-/// A step ends with a reading that is at most so much of a period early.
+/// Share of a period by which the reading that ends a step may be early.
 const EARLY_SHARE: f64 = 0.25;
-/// An arm at rest moves less while it is watched before its first motion, rad.
+/// Largest motion of an arm at rest before its first set-point, rad.
 const REST_RAD: f64 = 0.01;
-/// Fewer readings a second cannot steer an arm.
+/// Smallest rate of readings at which an arm can be controlled, Hz.
 const MIN_RATE_HZ: f64 = 5.0;
-/// Set-points move no joint faster than the robot's file allows, times this: the session plans up to that rate.
+/// Factor on the largest rates of the robot's file, beyond which set-points move no joint: the session plans up to
+/// those rates.
 const RATE_SLACK: f64 = 1.2;
-/// A joint that is told to stay within this of its reading is not moved, rad.
+/// Distance of a set-point from the reading within which a joint is not moved, rad.
 const STAY_RAD: f64 = 0.005;
-/// Times from reading to set-point that are kept, the latest.
+/// Largest number of stored times from reading to set-point; the latest are kept.
 const MAX_LATENCIES: usize = 1 << 16;
 
-/// An arm behind a wire. Set-points pass the guard before they are sent, and readings when they come.
+/// Arm behind a wire. Set-points pass the guard before they are sent, and readings when they arrive.
 pub struct LiveArm<W> {
     wire: W,
     guard: Guard,
@@ -37,19 +38,20 @@ pub struct LiveArm<W> {
     period_s: f64,
     stale: Duration,
     now: Stamp,
-    /// Nothing is recorded under an earlier time: what comes now, was not there when the last call ended.
+    /// Earliest time under which messages are recorded: a message that arrives now was not there when the last call
+    /// ended.
     not_before: Stamp,
-    /// When the present control period ends.
+    /// End of the present control period.
     due: Stamp,
     goal: JointCounts,
     sent: JointCounts,
     sent_at: Stamp,
     has_sent: bool,
-    /// Whether the present period has its set-point.
+    /// True if the present period has its set-point.
     was_commanded: bool,
-    /// When the last call ended, our clock.
+    /// Time at which the last call ended, by our clock.
     left_at: Duration,
-    /// When the newest reading came, our clock.
+    /// Time at which the newest reading arrived, by our clock.
     heard_at: Duration,
     stopped: Option<StopReason>,
     heard: Vec<Heard>,
@@ -58,24 +60,24 @@ pub struct LiveArm<W> {
     n_latencies: usize,
 }
 
-/// What was heard of an arm before anything moved.
+/// Messages of an arm before anything moved.
 #[derive(Clone, Debug)]
 pub struct Survey {
-    /// Time that was listened, s.
+    /// Duration of the survey, s.
     pub seconds: f64,
-    /// Joint readings in it.
+    /// Number of joint readings in it.
     pub readings: usize,
-    /// The last ones.
+    /// Last joint reading.
     pub counts: JointCounts,
-    /// Images with their tags, and tags in all of them.
+    /// Number of images that were searched for tags.
     pub images: usize,
-    /// Tags in all images.
+    /// Number of tags in all images.
     pub tags: usize,
-    /// Messages that could not be used, and what was wrong with the last of them.
+    /// Number of unusable messages, and the fault of the last of them.
     pub unusable: Option<(u64, String)>,
     /// The latest detection of each tag.
     pub detections: BTreeMap<u32, TagDetection>,
-    /// Whether known tags are where they may be; `None` where none is in view.
+    /// Comparison of known tags with the datasheet; `None` if no known tag is in view.
     pub tag_check: Option<TagCheck>,
 }
 
@@ -126,42 +128,43 @@ impl<W: Wire> LiveArm<W> {
         Ok((arm, survey))
     }
 
-    /// Stops the arm for good, in every way that the connection knows: it is told to stay where it reads to be, and no
+    /// Stops the arm for good, in every way that the connection knows. The arm is told to stay at its reading, and no
     /// later set-point is sent.
     pub fn stop(&mut self, why: &str) {
         self.halt(StopReason::Asked(why.to_owned()));
     }
 
-    /// Why the arm was stopped.
+    /// Returns the reason for which the arm was stopped.
     #[must_use]
     pub fn stopped(&self) -> Option<&StopReason> {
         self.stopped.as_ref()
     }
 
-    /// Times from a reading to the set-point that follows from it, s; of the latest set-points, in no order.
+    /// Returns the times from a reading to the set-point that follows from it, s; of the latest set-points, in no
+    /// order.
     #[must_use]
     pub fn latencies_s(&self) -> &[f64] {
         &self.latencies_s
     }
 
-    /// Messages that could not be used so far.
+    /// Returns the number of unusable messages so far.
     #[must_use]
     pub fn unusable(&self) -> u64 {
         self.unusable
     }
 
-    /// The newest reading.
+    /// Returns the newest reading.
     pub(crate) fn reading(&self) -> Option<JointCounts> {
         self.guard.latest().map(|sample| sample.counts)
     }
 
-    /// Name of a joint, by its place from the base.
+    /// Returns the name of a joint, by its index from the base.
     #[must_use]
     pub fn joint_name(&self, joint: usize) -> String {
         self.joint_names[joint].clone()
     }
 
-    /// For the geometry of readings.
+    /// Returns the guard, for the geometry of readings.
     pub(crate) fn guard(&self) -> &Guard {
         &self.guard
     }
@@ -169,11 +172,11 @@ impl<W: Wire> LiveArm<W> {
     fn halt(&mut self, reason: StopReason) -> ArmError {
         if self.stopped.is_none() {
             if let Some(latest) = self.guard.latest() {
-                // Where a reading is in doubt, the joint stays where it was sent last.
+                // A joint whose reading is in doubt stays at its last set-point.
                 let stay = JointCounts::from_fn(self.sent.len(), |joint| {
                     if self.guard.has_leapt(joint) { self.sent[joint] } else { latest.counts[joint] }
                 });
-                // Both are tried, whatever becomes of the other.
+                // Both are tried, even if one fails.
                 let _ = self.wire.send(&stay, self.period_s);
             }
             if let Err(error) = self.wire.stop() {
@@ -193,7 +196,7 @@ impl<W: Wire> LiveArm<W> {
         self.now.max(self.not_before)
     }
 
-    /// Takes what has come, and waits a little where nothing has.
+    /// Takes the messages that have arrived; waits a little if there are none.
     fn listen(&mut self, sink: &mut dyn Sink) -> Result<(), ArmError> {
         let mut heard = std::mem::take(&mut self.heard);
         heard.clear();
@@ -212,7 +215,7 @@ impl<W: Wire> LiveArm<W> {
                     (self.now, self.heard_at) = (sample.stamp, at);
                     sink.record(self.now, &Message::JointSensors(sample)).map_err(ArmError::Sink)
                 }
-                // Older than what is known already.
+                // Older than the newest reading.
                 Ok(false) => Ok(()),
                 Err(reason) => Err(self.halt_saying(reason, sink)),
             },
@@ -228,7 +231,7 @@ impl<W: Wire> LiveArm<W> {
         }
     }
 
-    /// Stops, and leaves the reason in the recording.
+    /// Stops the arm and records the reason.
     fn halt_saying(&mut self, reason: StopReason, sink: &mut dyn Sink) -> ArmError {
         let text = format!("the guard stopped the arm: {reason} [{}]", reason.code());
         let error = self.halt(reason);
@@ -239,7 +242,7 @@ impl<W: Wire> LiveArm<W> {
         }
     }
 
-    /// Sends the set-point that is next on the way to the goal, no faster than the joints may go.
+    /// Sends the next set-point on the way to the goal, no faster than the joints may move.
     fn send(&mut self) -> Result<(), ArmError> {
         let elapsed_s = self.now.since_s(self.sent_at).clamp(0.0, self.period_s);
         let Some(latest) = self.guard.latest() else { return Ok(()) };
@@ -273,7 +276,7 @@ impl<W: Wire> LiveArm<W> {
     }
 }
 
-/// Hears the arm out before anything moves.
+/// Listens to the arm before anything moves.
 fn listen(wire: &mut impl Wire, guard: &mut Guard, connection: &Connection) -> Result<Survey, LiveError> {
     let limits = connection.guard;
     let (start, mut heard) = (wire.elapsed(), Vec::new());
@@ -290,7 +293,7 @@ fn listen(wire: &mut impl Wire, guard: &mut Guard, connection: &Connection) -> R
                     let is_new = guard.hear(&sample, &anchor.counts, now).map_err(not_ready)?;
                     let moved = |j: usize| guard.way_rad(j, anchor.counts[j], sample.counts[j]).abs();
                     if (0..sample.counts.len()).any(|j| moved(j) > REST_RAD) {
-                        // It moves: wait for its rest from here on.
+                        // The arm moves: wait for rest from here on.
                         first = Some((sample.clone(), now));
                         guard.forget_leaps();
                         survey.readings = 0;
@@ -310,7 +313,7 @@ fn listen(wire: &mut impl Wire, guard: &mut Guard, connection: &Connection) -> R
             }
         }
         guard.check_silence(now).or_else(|reason| match reason {
-            // Nothing moves yet: the switch is needed from the first set-point on.
+            // Nothing moves yet: the switch is needed only from the first set-point on.
             StopReason::Deadman { .. } => Ok(()),
             reason => Err(not_ready(reason)),
         })?;
@@ -418,7 +421,7 @@ impl<W: Wire> Arm for LiveArm<W> {
         {
             return Err(self.halt_saying(reason, sink));
         }
-        // A set-point that was not renewed is sent again: it may be on its way still, and drivers want to hear of us.
+        // A set-point that was not renewed is sent again: it may still be on its way, and drivers expect messages.
         if self.has_sent && !std::mem::take(&mut self.was_commanded) {
             self.send()?;
         }

@@ -1,5 +1,5 @@
-//! A bound on the memory that peers can make the program take. The DDS middleware has none: a fragment may claim a
-//! sample of 4 GB, and a heartbeat as many samples as it likes.
+//! Bound on the memory that peers can make the program take. The DDS middleware has none: a fragment may claim a sample
+//! of 4 GB, and a heartbeat any number of samples.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -7,9 +7,9 @@ use std::time::{Duration, Instant};
 
 use crate::LiveError;
 
-/// The program may grow by so much while peers can reach it. A whole run takes 60 MB.
+/// Largest growth of the program while peers can reach it. A whole run takes 60 MB.
 const MAX_GROWTH_BYTES: u64 = 256_000_000;
-/// The program ends at once where it grows by so much more, regardless of what it leaves unfinished.
+/// Further growth at which the program ends at once, regardless of unfinished work.
 const FURTHER_BYTES: u64 = 128_000_000;
 /// Time between two looks at the memory.
 const LOOK: Duration = Duration::from_millis(5);
@@ -21,7 +21,7 @@ pub struct MemoryWatch(Arc<Shared>);
 
 struct Shared {
     limit_bytes: u64,
-    /// Growth that was too much; zero where none was.
+    /// Growth that exceeded the limit; zero if none did.
     grown_bytes: AtomicU64,
     is_over: AtomicBool,
 }

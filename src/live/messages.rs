@@ -65,19 +65,19 @@ pub(crate) enum CommandMessage {
     State(JointState),
 }
 
-/// A set-point in any of the types that carry one.
+/// Set-point in any of the types that carry one.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Command {
     pub stamp: Stamp,
-    /// The driver's; empty where the type has none.
+    /// Joint names of the driver; empty if the type has none.
     pub names: Vec<String>,
     pub positions: Vec<f64>,
-    /// Zero where the type has none.
+    /// Time within which the set-point is to be reached, s; zero if the type has none.
     pub within_s: f64,
 }
 
 impl Command {
-    /// As one of the types that drivers take.
+    /// Returns the set-point as a message of one of the types that drivers take.
     pub fn message(&self, message_type: CommandType) -> Result<CommandMessage, LiveError> {
         let header = Header::new(self.stamp, "")?;
         let (names, positions) = (self.names.clone(), self.positions.clone());
@@ -103,7 +103,7 @@ impl Command {
         encode(&self.message(message_type)?, out).map_err(|error| LiveError::Encode(error.into()))
     }
 
-    /// The last point of a trajectory is where the arm shall be.
+    /// Decodes a set-point; of a trajectory it takes the last point.
     pub fn decode(message_type: CommandType, bytes: &[u8]) -> Result<Self, CdrError> {
         let stamp = |header: &Header| Stamp::try_from(header.stamp).unwrap_or(Stamp { nanos: 0 });
         Ok(match message_type {
@@ -126,7 +126,7 @@ impl Command {
         })
     }
 
-    /// The positions in the order of `names`; `None` where one is missing or is no number.
+    /// Returns the positions in the order of `names`; `None` if one is missing or is no number.
     pub fn in_order(&self, names: &[&str]) -> Option<Vec<f64>> {
         let positions: Vec<f64> = if self.names.is_empty() {
             self.positions.clone()

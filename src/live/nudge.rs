@@ -7,32 +7,32 @@ use crate::{LiveArm, Wire};
 use armcal_core::streams::{Arm, ArmError, JointCounts, Message, Sink, SinkError};
 use armcal_core::time::Stamp;
 
-/// How far a joint is moved, rad.
+/// Displacement of the nudged joint, rad.
 const NUDGE_RAD: f64 = PI / 180.0;
-/// How long the way takes, s.
+/// Duration of the way out, s.
 const WAY_S: f64 = 1.0;
-/// And the rest at each end, s: readings of its last part are averaged.
+/// Duration of the rest at each end, s; readings of its last `MEAN_S` are averaged.
 const REST_S: f64 = 1.5;
 const MEAN_S: f64 = 0.4;
-/// A joint that moves so far the wrong way, or though it was not asked to, stops the arm, rad.
+/// Motion in the wrong direction, or without a command, beyond which the arm stops, rad.
 const ASTRAY_RAD: f64 = 0.5 * PI / 180.0;
-/// A joint follows if it moves by such a share of the way: valves have deadbands.
+/// Smallest and largest share of the commanded displacement with which a joint follows: valves have deadbands.
 const SHARES: [f64; 2] = [0.5, 1.5];
 
-/// What a joint was asked to do and what it read to do.
+/// Commanded and measured displacement of a joint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Nudge {
-    /// Its name.
+    /// Name of the joint.
     pub joint: String,
-    /// The way out, rad.
+    /// Commanded displacement, rad.
     pub asked_rad: f64,
-    /// By its reading, rad.
+    /// Displacement by the joint's reading, rad.
     pub moved_rad: f64,
-    /// From its start, after the way back, rad.
+    /// Distance from the start after the way back, rad.
     pub left_rad: f64,
 }
 
-/// Why an arm must not be moved further.
+/// Reason for which an arm must not be moved further.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum NudgeProblem {
@@ -65,7 +65,7 @@ pub enum NudgeProblem {
     Arm(#[from] ArmError),
 }
 
-/// Nothing of this is recorded.
+/// Sink that discards all messages.
 struct Forget;
 
 impl Sink for Forget {
@@ -75,8 +75,8 @@ impl Sink for Forget {
 }
 
 impl<W: Wire> LiveArm<W> {
-    /// Moves one joint by one degree towards the middle of its range, and back. The arm is stopped for good where a
-    /// joint goes astray, or as soon as `is_over` says so.
+    /// Moves one joint by one degree towards the middle of its range, and back. The arm is stopped for good if a joint
+    /// goes astray, or as soon as `is_over` returns true.
     ///
     /// # Errors
     /// [`NudgeProblem`].
@@ -110,7 +110,7 @@ impl<W: Wire> LiveArm<W> {
         Ok(Nudge { joint, asked_rad: out.to_rad, moved_rad, left_rad })
     }
 
-    /// Leads the joint along a way and lets it rest; how far it then reads to be from the start, rad.
+    /// Leads the joint along a way and lets it rest. Returns its distance from the start by the reading, rad.
     fn go(&mut self, way: &Way, is_over: &dyn Fn() -> bool) -> Result<f64, NudgeProblem> {
         let n = |seconds: f64, period_s: f64| (seconds / period_s).ceil() as u32;
         let period_s = self.period_s();
@@ -130,7 +130,8 @@ impl<W: Wire> LiveArm<W> {
         Ok(sum_rad / f64::from(n_mean))
     }
 
-    /// How far the joint reads to be from the start, rad; it and the others must not go astray.
+    /// Returns the joint's distance from the start by its reading, rad. Refuses a wrong motion of this joint or of
+    /// another.
     fn check(&self, way: &Way) -> Result<f64, NudgeProblem> {
         let reading = self.reading().unwrap_or(way.start);
         let moved_rad = |joint: usize| self.guard().turn_rad(joint, way.start[joint], reading[joint]);
@@ -167,7 +168,7 @@ impl<W: Wire> LiveArm<W> {
     }
 }
 
-/// From one distance of the start to another, of one joint.
+/// Way of one joint from one distance from its start to another.
 #[derive(Clone, Copy)]
 struct Way {
     joint: usize,

@@ -1,4 +1,4 @@
-//! Any arm, such as the simulated one, behind the topics of a connection.
+//! Server of any arm, such as the simulated one, on the topics of a connection.
 
 use std::time::{Duration, Instant};
 
@@ -11,31 +11,31 @@ use armcal_core::robot::Robot;
 use armcal_core::streams::{Arm, ArmError, ImageDemand, JointCounts, Message, Sink, SinkError};
 use armcal_core::time::Stamp;
 
-/// How fast and how long an arm is served.
+/// Speed and duration for which an arm is served.
 #[derive(Clone, Copy, Debug)]
 pub struct Pace {
-    /// Arm's time over ours.
+    /// Rate of the arm's time over ours.
     pub factor: f64,
-    /// Of our time; until told otherwise with `None`, s.
+    /// Duration by our clock, s; `None`: until the caller ends it.
     pub seconds: Option<f64>,
 }
 
-/// What happened meanwhile.
+/// Counts and durations of a served arm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Served {
-    /// Of the arm's time, s.
+    /// Duration by the arm's clock, s.
     pub arm_s: f64,
-    /// Of ours, s.
+    /// Duration by our clock, s.
     pub wall_s: f64,
-    /// Set-points that were carried out.
+    /// Number of set-points that were carried out.
     pub commands: u64,
-    /// Set-points that were of no use.
+    /// Number of unusable set-points.
     pub unusable: u64,
-    /// Whether the arm was told to stop.
+    /// True if the arm was told to stop.
     pub stopped: bool,
 }
 
-/// Serves `arm` until the time is over, or `is_over` says so. A stop holds the arm where it reads to be until the stop
+/// Serves `arm` until the time is over, or `is_over` returns true. A stop holds the arm at its reading until the stop
 /// topic says `false`.
 ///
 /// # Errors
@@ -49,7 +49,7 @@ pub fn serve(
 ) -> Result<Served, ArmError> {
     let mut server = Server::open(robot, connection).map_err(|error| ArmError::Connection(Box::new(error)))?;
     let (start, first) = (Instant::now(), arm.now());
-    // A camera that is always on.
+    // The camera is always on.
     arm.request_images(ImageDemand::All);
     let mut served = Served::default();
     while !is_over() && pace.seconds.is_none_or(|seconds| start.elapsed().as_secs_f64() < seconds) {
@@ -67,7 +67,7 @@ pub fn serve(
 
 struct Server<'a> {
     connection: &'a Connection,
-    /// The driver's names, robot's order.
+    /// The driver's joint names, in the robot's order.
     names: Vec<String>,
     header: RecordingHeader,
     writers: Vec<(Stream, Writer)>,
@@ -108,7 +108,7 @@ impl<'a> Server<'a> {
         })
     }
 
-    /// The newest set-point that came since the last call; where the arm is, when it was told to stop.
+    /// Returns the newest set-point that came since the last call; the arm's reading if it was told to stop.
     fn next_set_point(&mut self, served: &mut Served) -> Option<JointCounts> {
         self.node.warn_of_mismatches();
         let was_stopped = self.is_stopped;
@@ -120,7 +120,7 @@ impl<'a> Server<'a> {
         while let Some(Ok(Some((request, _)))) = self.stop_service.as_ref().map(|server| server.receive_request()) {
             self.is_stopped = true;
             let answer = TriggerResponse { success: true, message: "the arm holds".to_owned() };
-            // Whoever asked may be gone.
+            // The client that asked may have left.
             let _ = self.stop_service.as_ref().map(|server| server.send_response(request, answer));
         }
         served.stopped |= self.is_stopped;

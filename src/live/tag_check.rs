@@ -1,4 +1,4 @@
-//! Whether the tags in view are where the datasheet's sensors may have them, before anything moves.
+//! Check, before anything moves, that the tags in view are where the datasheet's sensors may have them.
 
 use nalgebra::{Point3, Vector2, Vector3};
 
@@ -7,26 +7,26 @@ use armcal_core::robot::{Robot, SurveyedTag};
 use armcal_core::sensor::ArmSensors;
 use armcal_core::streams::{JointAngles, JointCounts, TagDetection};
 
-/// Errors of mount and survey count so many times their standard deviation.
+/// Factor on the standard deviations of mount and survey.
 const SIGMAS: f64 = 4.0;
-/// Allowed beyond all bounds, rad: lens, sag, and a view's own noise.
+/// Allowance beyond all bounds, rad: lens, sag, and noise of one view.
 const SLACK_RAD: f64 = 0.03;
 
-/// How the tags in view compare with the datasheet.
+/// Comparison of the tags in view with the datasheet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TagCheck {
-    /// Known tags in view.
+    /// Number of known tags in view.
     pub tags: usize,
-    /// The largest angle between where one is seen and where the datasheet's angles put it, rad.
+    /// Largest angle between a tag's measured direction and its direction by the datasheet's angles, rad.
     pub largest_rad: f64,
-    /// What the bounds of sensors, mount and survey explain for that tag, rad.
+    /// Bound on this angle from sensors, mount and survey, for that tag, rad.
     pub bound_rad: f64,
 }
 
 /// Compares directions from the camera to known tags; `None` where no known tag is in view.
 ///
 /// # Errors
-/// [`LiveError::NotReady`] where a tag is farther off than the bounds explain.
+/// [`LiveError::NotReady`] if a tag's direction errs by more than the bounds explain.
 pub(crate) fn check_tags(
     robot: &Robot,
     counts: &JointCounts,
@@ -67,13 +67,14 @@ fn bearing(robot: &Robot, detection: &TagDetection) -> Option<Vector3<f64>> {
     Some(sum)
 }
 
-/// The tag's middle, camera frame, m.
+/// Returns the tag's middle, camera frame, m.
 fn towards(robot: &Robot, angles: &JointAngles, tag: &SurveyedTag) -> Vector3<f64> {
     let camera_from_tags = robot.tags_from_camera(angles).inverse();
     (camera_from_tags * Point3::from(tag.base_from_tag.origin().vector())).coords
 }
 
-/// All errors at their bounds, each turning the direction the same way.
+/// Returns the bound on the error of a tag's direction, rad: all errors at their bounds turn the direction the same
+/// way.
 fn bound_rad(robot: &Robot, angles: &JointAngles, tag: &SurveyedTag) -> f64 {
     let nominal = towards(robot, angles, tag);
     let by_joint = robot.sensors.iter().enumerate().map(|(joint, sensor)| {

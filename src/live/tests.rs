@@ -23,10 +23,10 @@ use armcal_core::time::{SIMULATION_EPOCH, Stamp};
 use rand_distr::{Distribution, Uniform};
 
 const PERIOD_S: f64 = 0.02;
-/// A stop is a matter of this beyond the limit that it waits for: one period, and the guard's own turn.
+/// Longest time from the limit of a stop to the stop: one period, and the guard's own turn.
 const REACTION_S: f64 = PERIOD_S + 0.005;
 
-/// What goes wrong, from a moment on.
+/// Fault of the arm or its connection, from a time on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Fault {
     None,
@@ -44,18 +44,18 @@ enum Fault {
     Spike {
         counts: f64,
     },
-    /// Of the first joint, for good.
+    /// Jump of the first joint's reading, which stays.
     Jump {
         counts: f64,
     },
-    /// The first readings of all are zeros.
+    /// Zeros in the first readings of all joints.
     BeginsWithZeros,
     Disobeys,
     LetGo,
     NotHeld,
 }
 
-/// What the arm itself saw.
+/// Commands that the arm itself received.
 #[derive(Default)]
 struct Log {
     /// Time and set-point.
@@ -82,7 +82,7 @@ impl FakeWire {
         self.now_s >= self.fault_s
     }
 
-    /// One period of the arm.
+    /// Simulates one period of the arm.
     fn tick(&mut self) {
         let (is_faulty, at_s) = (self.is_faulty(), self.next_s);
         self.next_s += PERIOD_S;
@@ -115,7 +115,7 @@ impl FakeWire {
             _ => {}
         }
         self.under_way.push_back((at_s + delay_s, Heard::Joints(JointSensorSample { stamp, counts })));
-        // Of the same moment, and a little later on the way.
+        // The temperature has the reading's stamp and arrives a little later.
         let oil = TemperatureSample { stamp, thermometer: Thermometer::Oil, temperature_c: 10.0, variance_c2: 0.0 };
         self.under_way.push_back((at_s + delay_s + 0.001, Heard::Other(Message::Temperature(oil))));
         if self.fault != Fault::NotHeld {
@@ -185,7 +185,7 @@ struct Played {
 /// The fault begins after the arm has been found ready and moves.
 const FAULT_S: f64 = 4.0;
 
-/// Connects, moves the first joint back and forth by 0.3 rad for ten seconds, and says how it ended.
+/// Connects, moves the first joint back and forth by 0.3 rad for ten seconds, and returns the outcome.
 fn play(fault: Fault, goal_step_rad: f64) -> Played {
     let robot = titan4();
     let counts = ArmSensors::nominal(&robot).counts(&robot.stowed);
@@ -211,7 +211,7 @@ fn play(fault: Fault, goal_step_rad: f64) -> Played {
     let mut result = Ok(());
     for k in 0..500 {
         let swing = goal_step_rad * (f64::from(k) * PERIOD_S * 0.8).sin();
-        // As a session that holds a joint where it reads to be.
+        // Holds the first joint at its reading, as a session does.
         let held = arm.reading().filter(|_| matches!(fault, Fault::Jump { .. })).map_or(counts[0], |read| read[0]);
         let goal = JointCounts::from_fn(counts.len(), |j| match j {
             0 => held,
@@ -235,12 +235,12 @@ impl Played {
         self.result.as_ref().err().map_or_else(String::new, ToString::to_string)
     }
 
-    /// When it was stopped, after the fault, s.
+    /// Returns the time of the stop after the fault, s.
     fn stopped_after_s(&self) -> Option<f64> {
         self.log.borrow().stops_s.first().map(|at_s| at_s - FAULT_S)
     }
 
-    /// What the arm itself was told was never unsafe: no leap, and nothing after a stop.
+    /// Asserts that the arm received only safe commands: no leap, and nothing after a stop.
     fn assert_safe(&self, fault: Fault) {
         let log = self.log.borrow();
         let rates = log.set_points.windows(2).map(|pair| {

@@ -1,4 +1,4 @@
-//! What the topics of a connection carry, and how their messages are read, whatever brought them.
+//! Contents of a connection's topics, and the reading of their messages, for every protocol.
 
 use crate::messages::{BOOL, Bool};
 use crate::{Connection, Heard};
@@ -7,11 +7,12 @@ use armcal_core::log::{Stream, decode};
 use armcal_core::streams::{JointCounts, JointSensorSample};
 use armcal_core::time::Stamp;
 
-/// Names that are listed of a message's, and characters of each.
+/// Largest number of names that are listed from a message; `MAX_NAME_CHARS` is the largest number of characters of
+/// each.
 const MAX_LISTED: usize = 20;
 const MAX_NAME_CHARS: usize = 40;
 
-/// What a topic carries.
+/// Content of a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Content {
     Joints,
@@ -29,7 +30,7 @@ impl Content {
     }
 }
 
-/// Everything that is heard of an arm, with its topics.
+/// Returns every content that is heard of an arm, with its topic.
 pub(crate) fn contents(connection: &Connection) -> Vec<(Content, &str)> {
     let mut all = vec![(Content::Joints, connection.joint_sensors.as_str())];
     all.extend(streams(connection).into_iter().map(|(stream, topic)| (Content::Stream(stream), topic)));
@@ -37,7 +38,7 @@ pub(crate) fn contents(connection: &Connection) -> Vec<(Content, &str)> {
     all
 }
 
-/// Streams beside the joints', with their topics.
+/// Returns the streams other than the joint readings, with their topics.
 pub(crate) fn streams(connection: &Connection) -> Vec<(Stream, &str)> {
     let all = [
         (Stream::Detections, connection.detections.as_str()),
@@ -50,7 +51,7 @@ pub(crate) fn streams(connection: &Connection) -> Vec<(Stream, &str)> {
     all.into_iter().filter(|(_, topic)| !topic.is_empty()).collect()
 }
 
-/// Reads and checks a message, as CDR; `names` are the driver's, robot's order of joints.
+/// Reads and checks a message in CDR; `names` are the driver's, in the robot's order of joints.
 pub(crate) fn read(content: Content, bytes: &[u8], names: &[String]) -> Heard {
     match content {
         Content::Joints => joints(bytes, names).map_or_else(Heard::Unusable, Heard::Joints),
@@ -64,7 +65,7 @@ pub(crate) fn read(content: Content, bytes: &[u8], names: &[String]) -> Heard {
     }
 }
 
-/// Readings in the robot's order.
+/// Reads joint readings and returns them in the robot's order.
 fn joints(bytes: &[u8], names: &[String]) -> Result<JointSensorSample, String> {
     let message: JointState = decode(bytes).map_err(|error| format!("joint readings: {error}"))?;
     let stamp = Stamp::try_from(message.header.stamp).map_err(|error| format!("joint readings: {error}"))?;
@@ -79,7 +80,7 @@ fn joints(bytes: &[u8], names: &[String]) -> Result<JointSensorSample, String> {
     Ok(JointSensorSample { stamp, counts })
 }
 
-/// The first names of a message, which may have very many and long ones.
+/// Returns the first names of a message, which may have very many and long ones.
 fn listed(names: &[String]) -> String {
     let shown: Vec<String> =
         names.iter().take(MAX_LISTED).map(|name| name.chars().take(MAX_NAME_CHARS).collect()).collect();
@@ -87,7 +88,7 @@ fn listed(names: &[String]) -> String {
     if further == 0 { format!("{shown:?}") } else { format!("{shown:?} and {further} more") }
 }
 
-/// The latest stamp of joint readings, `before` where there is none later.
+/// Returns the latest stamp of joint readings; `before` if none is later.
 pub(crate) fn newest_stamp(heard: &[Heard], before: Stamp) -> Stamp {
     let stamps = heard.iter().filter_map(|heard| match heard {
         Heard::Joints(sample) => Some(sample.stamp),

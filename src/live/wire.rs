@@ -1,44 +1,45 @@
-//! What a connection to an arm carries, whatever the protocol.
+//! Interface of a connection to an arm, for every protocol.
 
 use std::time::Duration;
 
 use crate::LiveError;
 use armcal_core::streams::{JointCounts, JointSensorSample, Message};
 
-/// Something that came over the wire.
+/// Message that came over the wire.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Heard {
-    /// Readings in the robot's order of joints.
+    /// Joint readings in the robot's order of joints.
     Joints(JointSensorSample),
-    /// Any other stream.
+    /// Message of any other stream.
     Other(Message),
-    /// The dead man's switch is held, or let go.
+    /// State of the dead man's switch: true if it is held.
     Deadman(bool),
-    /// A message that says nothing usable, for people.
+    /// Description of an unusable message, for people.
     Unusable(String),
 }
 
-/// A connection to an arm, with a clock of its own.
+/// Connection to an arm, with its own clock.
 pub trait Wire {
-    /// Time since any fixed moment; never goes back.
+    /// Returns the time since any fixed moment; it never goes back.
     fn elapsed(&self) -> Duration;
 
-    /// Waits for messages, `timeout` at most, and appends all that came to `heard`, in the order of arrival a topic.
+    /// Waits for messages, for at most `timeout`, and appends all that came to `heard`; those of one topic are in the
+    /// order of arrival.
     ///
     /// # Errors
-    /// When the connection is of no use any more.
+    /// [`LiveError`] if the connection is of no use any more.
     fn receive(&mut self, timeout: Duration, heard: &mut Vec<Heard>) -> Result<(), LiveError>;
 
     /// Sends a set-point, raw counts, robot's order of joints, that is to be reached within `within_s`.
     ///
     /// # Errors
-    /// When it cannot be sent.
+    /// [`LiveError`] if it cannot be sent.
     fn send(&mut self, set_point: &JointCounts, within_s: f64) -> Result<(), LiveError>;
 
     /// Tells the arm to stop, in every way that the connection knows.
     ///
     /// # Errors
-    /// When none of them could be sent.
+    /// [`LiveError`] if none of them could be sent.
     fn stop(&mut self) -> Result<(), LiveError>;
 }
 

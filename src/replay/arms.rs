@@ -1,4 +1,4 @@
-//! The true and the believed arm, the camera's view cone, captured views and the tool's path.
+//! True and estimated arm, the camera's view cone, captured views and the tool's path.
 
 use crate::rerun::components::Radius;
 use crate::rerun::{LineStrips3D, Points3D};
@@ -16,70 +16,71 @@ use armcal_core::kinematics::{Attachment, LinkPoses};
 use armcal_core::spatial::{Base, Pose, Tool};
 use armcal_core::streams::{CaptureSet, JointAngles, MarkKind};
 
-/// The tool's path is drawn this far back, s, with so many points a second.
+/// Duration of the tool's path that is drawn, s, and its points per second.
 const TRAIL_S: f64 = 12.0;
 const TRAIL_HZ: f64 = 5.0;
-/// Captured views that are drawn: each draws those before it anew.
+/// Largest number of captured views that are drawn: each of them draws all earlier ones again.
 const MAX_CAPTURES: usize = 2000;
 /// Length of the lines of sight at the image's corners, m.
 const SIGHT_M: f64 = 0.22;
 
-/// Names of the arm by truth, or as believed without any, and of the believed one beside a true one.
+/// Names of the drawn arms. The first is the true arm, or the estimated one if the truth is unknown; the second is the
+/// estimated arm if both are drawn.
 const SHOWN_ARM: &str = "arm";
 const BELIEVED_ARM: &str = "believed_arm";
 
-/// The arm that is drawn as believed.
+/// Returns the name of the estimated arm.
 pub(super) fn believed_arm(run: &ReplayScene) -> &'static str {
     if run.has_true_joints() { BELIEVED_ARM } else { SHOWN_ARM }
 }
 
-/// Entity of an arm's body.
+/// Returns the entity of an arm's body.
 pub(super) fn body_entity(run: &ReplayScene, arm: &str, body: usize) -> String {
     format!("{BASE}/{arm}/{body}_{}", path_part(&run.robot.bodies[body].name))
 }
 
 impl ReplayScene<'_> {
-    /// The best known joint angles: true, else believed.
+    /// Returns the best known joint angles: the true ones, else the estimated ones.
     pub(super) fn shown_angles(&self, time_s: f64) -> Option<JointAngles> {
         let truth = self.truth.as_ref().and_then(|truth| truth.angles(time_s));
         truth.or_else(|| self.tracks.believed.at(time_s).copied())
     }
 
-    /// Tool pose of the belief.
+    /// Returns the estimated tool pose.
     pub(super) fn believed_tool(&self, time_s: f64) -> Option<Pose<Base, Tool>> {
         let angles = self.tracks.believed.at(time_s)?;
         Some(Pose::from_isometry(self.believed_poses(time_s, angles).frame(&self.robot.tool.mount)))
     }
 
-    /// The tool by truth, else as believed.
+    /// Returns the true tool pose, else the estimated one.
     pub(super) fn shown_tool(&self, time_s: f64) -> Option<Pose<Base, Tool>> {
         let truth = self.truth.as_ref().and_then(|truth| truth.base_from_tool(time_s));
         truth.or_else(|| self.believed_tool(time_s))
     }
 
-    /// The gap between the jaws as measured, m.
+    /// Returns the measured gap between the jaws, m.
     fn opening_m(&self, time_s: f64) -> Option<f64> {
         self.tracks.gripper.between(time_s, |a, b, share| a + share * (b - a))
     }
 
-    /// Whether true joint angles are known.
+    /// Returns true if true joint angles are known.
     pub(super) fn has_true_joints(&self) -> bool {
         self.truth.as_ref().is_some_and(|truth| truth.angles(0.0).is_some())
     }
 
-    /// Whether the tool's true pose is known.
+    /// Returns true if the tool's true pose is known.
     pub(super) fn has_true_tool(&self) -> bool {
         self.truth.as_ref().is_some_and(|truth| truth.base_from_tool(0.0).is_some())
     }
 }
 
-/// Draws the arms and what belongs to them.
+/// Draws the arms, the camera and the tool's path.
 pub(super) fn draw(run: &ReplayScene, stream: &mut EntityLog) {
     draw_at_rest(run, stream);
     draw_trail(run, stream);
 }
 
-/// The same without the tool's path: of views alone nobody knows it.
+/// Draws the arms like [`draw`], without the tool's path: views do not determine it.
 pub(super) fn draw_at_rest(run: &ReplayScene, stream: &mut EntityLog) {
     let mut shown = Arm::new(run, stream, SHOWN_ARM, Look::Drawn);
     log_camera(run, stream, &shown);
@@ -110,7 +111,7 @@ impl Arm {
         let mut bodies = Vec::new();
         for (n, body) in run.robot.bodies.iter().enumerate() {
             let entity = body_entity(run, name, n);
-            // The base does not move in itself: one drawing of it is enough.
+            // The base does not move in its own frame: one drawing of it is enough.
             if n > 0 || matches!(look, Look::Drawn) {
                 let shapes = if body.visuals.is_empty() { &body.collisions } else { &body.visuals };
                 log_shapes(stream, &entity, shapes, look);
@@ -141,8 +142,8 @@ impl Arm {
     }
 }
 
-/// Lines from the joint that moves a body to the next one, or to the tool, and to the camera that it carries: for a
-/// body of which no shape is known.
+/// Draws a body without known shapes: lines from the joint that moves it to the next joint or the tool, and to the
+/// camera that it carries.
 fn log_skeleton(run: &ReplayScene, stream: &mut EntityLog, entity: &str, body: usize) {
     let (chain, tool, camera) = (&run.robot.chain, &run.robot.tool.mount, &run.robot.camera.mount);
     let next = chain.joints().get(body).map(|joint| joint.parent_from_joint.translation.vector);
@@ -155,7 +156,7 @@ fn log_skeleton(run: &ReplayScene, stream: &mut EntityLog, entity: &str, body: u
     }
 }
 
-/// The camera's lines of sight towards the corners of its image.
+/// Draws the camera's lines of sight towards the corners of its image.
 fn log_camera(run: &ReplayScene, stream: &mut EntityLog, arm: &Arm) {
     let camera = &run.robot.camera;
     let Some(carrier) = arm.bodies.get(camera.mount.n_joints) else { return };
@@ -173,7 +174,7 @@ fn log_camera(run: &ReplayScene, stream: &mut EntityLog, arm: &Arm) {
     stream.log_static(&format!("{entity}/view"), &cone);
 }
 
-/// The last seconds of the tool's path.
+/// Draws the last seconds of the tool's path.
 fn draw_trail(run: &ReplayScene, stream: &mut EntityLog) {
     let mut points: Vec<[f32; 3]> = Vec::new();
     let kept = (TRAIL_S * TRAIL_HZ) as usize;
@@ -188,7 +189,7 @@ fn draw_trail(run: &ReplayScene, stream: &mut EntityLog) {
         let Some(tool) = run.shown_tool(time_s) else { continue };
         points.push(vector(&tool.origin().vector()));
         let first = points.len().saturating_sub(kept);
-        // To a tenth of a millimetre, a tool at rest has one point.
+        // Positions are rounded to 0.1 mm, so that a tool at rest has one point.
         let mut trail: Vec<[f32; 3]> = points[first..].iter().map(|p| p.map(|v| (v * 1e4).round() / 1e4)).collect();
         trail.dedup();
         if trail != drawn && is_drawn {
@@ -198,11 +199,11 @@ fn draw_trail(run: &ReplayScene, stream: &mut EntityLog) {
     }
 }
 
-/// As large at any distance, so that many of them do not hide a small arm: points of the screen.
+/// Radius of a view's dot, points of the screen: the same at any distance, so that many dots do not hide a small arm.
 const VIEW_DOT_POINTS: f32 = 3.0;
 
-/// Camera position of each captured view, before a camera that stands still that of the tags: one colour for fitted
-/// views, one for held-out ones.
+/// Draws the position of the camera at each captured view; for a fixed camera, that of the tags on the arm. Fitted and
+/// held-out views have different colours.
 fn draw_captures(run: &ReplayScene, stream: &mut EntityLog) {
     let (mut places, mut shades) = (Vec::new(), Vec::new());
     let mut marks: Vec<_> = run.tracks.marks.iter().collect();

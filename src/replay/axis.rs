@@ -1,11 +1,11 @@
 //! Ranges of axes on which the viewer writes at least two numbers.
 
-/// The viewer writes at whole powers of ten alone, and only where no more of them than these fit the axis.
+/// Largest number of powers of ten on an axis: the viewer labels only these, and only if no more of them fit.
 const MOST_STEPS: f64 = 4.0;
-/// Free above and below, as a share of the range: a number at the very edge is cut off.
+/// Free margin above and below, as a share of the range: a number at the very edge is cut off.
 const MARGIN: f64 = 0.04;
 
-/// Around `values`; `None` without any.
+/// Returns a range around `values`; `None` if there are none.
 pub(super) fn labelled_range(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
     let values = values.filter(|value| value.is_finite());
     let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
@@ -29,7 +29,7 @@ pub(super) fn labelled_range(values: impl Iterator<Item = f64>) -> Option<[f64; 
 mod tests {
     use super::*;
 
-    /// How many numbers the viewer writes on an axis.
+    /// Returns the number of labels that the viewer writes on an axis.
     fn n_labels([low, high]: [f64; 2]) -> i32 {
         let n = |step: f64| ((high / step).floor() - (low / step).ceil()) as i32 + 1;
         (-6..6).map(|power| 10_f64.powi(power)).find(|step| (high - low) / step <= 1.2 * MOST_STEPS).map_or(0, n)

@@ -1,5 +1,5 @@
-//! The viewer's layout, written down entry by entry: the SDK's builder cannot set the viewpoint, the axes or the
-//! legends, and names its parts by chance.
+//! Layout of the viewer, written entry by entry: the SDK's builder cannot set the viewpoint, the axes or the legends,
+//! and gives its parts random names.
 
 use std::collections::BTreeSet;
 
@@ -33,16 +33,16 @@ pub(super) struct Entry {
     pub what: Box<dyn AsComponents>,
 }
 
-/// Longer recordings play faster, to be over in about this time, s.
+/// Longest duration of the playback, s: longer recordings play faster.
 const WATCHED_S: f64 = 120.0;
-/// Beside the plots of all errors are plots of small ones: of joints up to this, deg, and of the tool up to this share
-/// of the task's tolerance.
+/// Ranges of the plots of small errors, next to those of all errors: joint errors up to this, deg, and tool errors up
+/// to this share of the task's tolerance.
 const CLOSE_DEG: f64 = 0.3;
 const CLOSE_SHARE: f64 = 0.25;
-/// Plots of a run that goes on show so much of it, s.
+/// Duration that the plots of a run in progress show, s.
 const LATEST_S: f64 = 60.0;
 
-/// A view or container that was written down: its path, for the container around it.
+/// View or container that was written: its path, for the container around it.
 struct Part(String);
 
 #[derive(Default)]
@@ -51,7 +51,7 @@ struct Builder {
     parts: u128,
 }
 
-/// The layout for the data of `run`.
+/// Returns the layout for the data of `run`.
 pub(super) fn build(run: &ReplayScene) -> Vec<Entry> {
     let mut b = Builder::default();
     let scene = scene_view(&mut b, run);
@@ -65,7 +65,7 @@ pub(super) fn build(run: &ReplayScene) -> Vec<Entry> {
         main
     } else {
         let phases = b.lanes("Phases of the run");
-        // Each of these has one lane more.
+        // Each of these views has one more lane.
         let lanes: BTreeSet<&str> =
             run.truth.iter().flat_map(|truth| &truth.faults).map(|fault| fault.of.lane()).collect();
         let share = 1.0 + 0.3 * (usize::from(run.online.is_some()) + lanes.len()) as f32;
@@ -74,7 +74,7 @@ pub(super) fn build(run: &ReplayScene) -> Vec<Entry> {
     b.finish(&root, run)
 }
 
-/// The layout of a plan.
+/// Returns the layout of a plan.
 pub(super) fn build_plan(run: &ReplayScene) -> Vec<Entry> {
     let mut b = Builder::default();
     let scene = titled_scene(&mut b, run, "Plan: solid = estimated arm, amber = arms within the error bounds");
@@ -96,7 +96,7 @@ pub(super) fn build_plan(run: &ReplayScene) -> Vec<Entry> {
     b.finish(&root, run)
 }
 
-/// The layout of a real arm's views.
+/// Returns the layout of a real arm's views.
 pub(super) fn build_views(run: &ReplayScene) -> Vec<Entry> {
     let mut b = Builder::default();
     let scene = titled_scene(&mut b, run, "Scene: calibrated arm; yellow = measured tags");
@@ -164,7 +164,7 @@ fn right_column(b: &mut Builder, run: &ReplayScene) -> Part {
     } else {
         "Estimated joint angles [deg]"
     };
-    // The colours are explained beside the errors, where there are any.
+    // The legend of the errors explains the colours, if errors are shown.
     let colors_here = legend(Corner2D::RightTop).with_visible(!run.has_true_joints());
     rows.push((b.plot(title, JOINT_ANGLE, colors_here, run), 2.2));
     if run.has_true_tool() {
@@ -216,7 +216,7 @@ impl Builder {
         self.entries.push(Entry { path, what: Box::new(what) });
     }
 
-    /// A view of all that lies under `origin`.
+    /// Adds a view of all entities under `origin`.
     fn view(&mut self, class: &str, title: &str, origin: &str) -> Part {
         let path = format!("view/{}", self.next_id());
         self.add(format!("{path}/ViewContents"), ViewContents::new(["$origin/**"]));
@@ -225,7 +225,7 @@ impl Builder {
         Part(path)
     }
 
-    /// The lanes of states that there are.
+    /// Adds the lanes of states that have data.
     fn lanes(&mut self, title: &str) -> Part {
         let path = format!("view/{}", self.next_id());
         let faults = [ARM_FAULT_LANE, TAG_FAULT_LANE, SEA_FAULT_LANE];
@@ -235,8 +235,8 @@ impl Builder {
         Part(path)
     }
 
-    /// A plot over the whole recording, or the latest of a run that goes on; by itself the viewer shows what is near
-    /// the time cursor.
+    /// Adds a plot over the whole recording, or over the latest part of a run in progress. By default the viewer shows
+    /// only the neighbourhood of the time cursor.
     fn plot(&mut self, title: &str, origin: &str, legend: PlotLegend, run: &ReplayScene) -> Part {
         let view = self.view("TimeSeries", title, origin);
         self.property(&view, "PlotLegend", legend);
@@ -249,14 +249,14 @@ impl Builder {
         view
     }
 
-    /// The same between two values: what is small beside the errors before calibration.
+    /// Adds a plot with a fixed range of values, for errors that are small against those before calibration.
     fn plot_within(&mut self, title: &str, origin: &str, range: [f64; 2], run: &ReplayScene) -> Part {
         let view = self.plot(title, origin, legend(Corner2D::RightTop), run);
         self.property(&view, "ScalarAxis", ScalarAxis::new().with_range(Range1D(range)));
         view
     }
 
-    /// Sets a plot's range; that of a run that goes on follows what comes.
+    /// Sets a plot's range of values, unless the run is in progress: then the range follows the data.
     fn show_within(&mut self, plot: &Part, range: Option<[f64; 2]>, run: &ReplayScene) {
         if let Some(range) = range.filter(|_| run.state == RunState::Over) {
             self.property(plot, "ScalarAxis", ScalarAxis::new().with_range(Range1D(range)));
@@ -267,7 +267,7 @@ impl Builder {
         self.add(format!("{}/{name}", view.0), what);
     }
 
-    /// A row or a column of parts, each with its share of the length.
+    /// Adds a row or a column of parts, each with its share of the length.
     fn container(&mut self, kind: ContainerKind, parts: &[(Part, f32)]) -> Part {
         let shares = parts.iter().map(|(_, share)| *share);
         let container = ContainerBlueprint::new(kind).with_contents(parts.iter().map(|(part, _)| part.0.as_str()));
@@ -280,7 +280,7 @@ impl Builder {
         Part(path)
     }
 
-    /// Tabs, the first of them in front.
+    /// Adds tabs, the first of them in front.
     fn tabs(&mut self, parts: &[Part]) -> Part {
         let container = ContainerBlueprint::new(ContainerKind::Tabs).with_contents(parts.iter().map(|p| p.0.as_str()));
         let container = match parts.first() {

@@ -1,4 +1,4 @@
-//! The wrist camera's image plane: detections, rejects, and tags as the belief predicts them.
+//! Image plane of the wrist camera: detections, rejects, and predicted tags.
 
 use crate::rerun::{EncodedImage, Image, LineStrips2D, Radius};
 use nalgebra::{Isometry3, Point3, Vector2, Vector3};
@@ -12,13 +12,13 @@ use armcal_core::optics::CameraModel;
 use armcal_core::robot::SurveyedTag;
 use armcal_core::streams::{DetectionReject, TagDetection};
 
-/// The image is drawn at most this often.
+/// Largest rate at which the image is drawn, Hz.
 const VIEWS_HZ: f64 = 12.5;
-/// Detections disappear after this time without a new image, s.
+/// Time after which detections disappear without a new image, s.
 const STALE_S: f64 = 0.6;
-/// And the image itself.
+/// Time after which the image disappears without a new one, s.
 const STALE_IMAGE_S: f64 = 2.5;
-/// Rerun has a pixel's corner at whole numbers, the lens its centre.
+/// Offset of a pixel's centre: in Rerun, whole numbers are pixel corners; in the lens model, centres.
 const PIXEL_CENTER: f32 = 0.5;
 /// Bearings whose circles are drawn, rad.
 const RINGS_RAD: [f64; 2] = [std::f64::consts::FRAC_PI_6, std::f64::consts::FRAC_PI_3];
@@ -42,7 +42,8 @@ pub(super) fn draw(run: &ReplayScene, stream: &mut EntityLog) {
     draw_rejected(run, stream);
 }
 
-/// The camera's images as they were compressed, each until the next or until there has been none for a while.
+/// Draws the camera's images as they were compressed. Each stays until the next one, or disappears after
+/// [`STALE_IMAGE_S`].
 fn draw_images(run: &ReplayScene, stream: &mut EntityLog) {
     let entity = format!("{CAMERA}/image");
     for (n, (time_s, image)) in run.tracks.images.iter().enumerate() {
@@ -55,7 +56,7 @@ fn draw_images(run: &ReplayScene, stream: &mut EntityLog) {
     }
 }
 
-/// Dark water inside of the field of view, black outside.
+/// Returns an image with dark water in the field of view and black outside.
 fn background(lens: &CameraModel) -> Vec<u8> {
     let [width, height] = lens.resolution_px();
     let mut pixels = Vec::with_capacity(3 * width as usize * height as usize);
@@ -68,7 +69,7 @@ fn background(lens: &CameraModel) -> Vec<u8> {
     pixels
 }
 
-/// The circle of all bearings at an angle from the optical axis.
+/// Returns the circle of all bearings at an angle from the optical axis.
 fn ring(lens: &CameraModel, angle_rad: f64) -> Vec<[f32; 2]> {
     let around = (0..=96).map(|n| f64::from(n) * std::f64::consts::TAU / 96.0);
     let bearings = around.map(|a| Vector3::new(angle_rad.sin() * a.cos(), angle_rad.sin() * a.sin(), angle_rad.cos()));
@@ -79,7 +80,7 @@ fn corner([x, y]: [f64; 2]) -> [f32; 2] {
     [x as f32 + PIXEL_CENTER, y as f32 + PIXEL_CENTER]
 }
 
-/// The tags that were seen, until frames stop coming.
+/// Draws the detected tags, which disappear when images stop.
 fn draw_seen(run: &ReplayScene, stream: &mut EntityLog) {
     let entity = format!("{CAMERA}/seen");
     let style = LineStrips2D::update_fields().with_radii([Radius::new_ui_points(1.5)]).with_colors([colors::SEEN]);
@@ -88,7 +89,7 @@ fn draw_seen(run: &ReplayScene, stream: &mut EntityLog) {
     draw_quads(run, stream, &entity, views.collect());
 }
 
-/// Rejected detections with their reasons.
+/// Draws rejected detections with their reasons.
 fn draw_rejected(run: &ReplayScene, stream: &mut EntityLog) {
     if run.tracks.rejects.is_empty() {
         return;
@@ -101,15 +102,15 @@ fn draw_rejected(run: &ReplayScene, stream: &mut EntityLog) {
     draw_quads(run, stream, &entity, views.collect());
 }
 
-/// Outlines by time, each until the next or until there has been none for a while.
+/// Draws outlines by time. Each stays until the next, or disappears after [`STALE_S`].
 fn draw_quads(run: &ReplayScene, stream: &mut EntityLog, entity: &str, mut views: Vec<(f64, Vec<Quad>)>) {
     views.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut drawn: Option<f64> = None;
     for (n, (time_s, view)) in views.iter().enumerate() {
-        // Two frames of one moment: the later one stands.
+        // If two frames have the same time, the later one stays.
         let next_s = views.get(n + 1).map_or(f64::INFINITY, |(next_s, _)| *next_s);
         let is_last_for_long = next_s.min(run.tracks.duration_s) - time_s > STALE_S;
-        // The first one of each slot, so that it does not matter where drawing began.
+        // The first view of each time slot is drawn, so that the start of the drawing does not matter.
         let slot = (time_s * VIEWS_HZ).floor();
         if drawn == Some(slot) && !is_last_for_long {
             continue;
@@ -142,7 +143,7 @@ fn quads(quads: impl Iterator<Item = Quad>) -> LineStrips2D {
     LineStrips2D::update_fields().with_strips(strips).with_labels(labels)
 }
 
-/// Surveyed tags as the belief predicts them.
+/// Draws surveyed tags where the estimate predicts them.
 fn draw_expected(run: &ReplayScene, stream: &mut EntityLog) {
     let entity = format!("{CAMERA}/expected");
     let style = LineStrips2D::update_fields().with_radii([Radius::new_ui_points(1.0)]).with_colors([colors::BELIEVED]);
@@ -161,7 +162,7 @@ fn draw_expected(run: &ReplayScene, stream: &mut EntityLog) {
     }
 }
 
-/// The outline of a tag in the image, rounded to a tenth of a pixel; `None` if the camera cannot see it.
+/// Returns the outline of a tag in the image, rounded to a tenth of a pixel; `None` if the camera cannot see it.
 fn expected_outline(run: &ReplayScene, tags_from_camera: &Isometry3<f64>, tag: &SurveyedTag) -> Option<Vec<[f32; 2]>> {
     let lens = &run.robot.camera.lens;
     let camera_from_tag = tags_from_camera.inv_mul(tag.base_from_tag.isometry());

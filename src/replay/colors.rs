@@ -1,4 +1,4 @@
-//! The colours, chosen to be told apart on a dark ground and by most colour-blind eyes.
+//! Colours that differ on a dark ground, for most colour-blind eyes too.
 
 /// Red, green, blue, opacity.
 pub(super) type Rgba = [u8; 4];
@@ -6,9 +6,9 @@ pub(super) type Rgba = [u8; 4];
 /// Deep water behind the scene.
 pub(super) const WATER: Rgba = [16, 30, 44, 255];
 pub(super) const SEAFLOOR: Rgba = [92, 84, 66, 255];
-/// The arm as believed, drawn through the true one.
+/// Estimated arm, drawn through the true one.
 pub(super) const GHOST: Rgba = [255, 60, 220, 110];
-/// Where the tool may be, as the arm believes.
+/// Region of the tool by the estimate.
 pub(super) const TOOL_REGION: Rgba = [205, 150, 255, 255];
 pub(super) const BELIEVED: Rgba = [255, 90, 225, 255];
 /// Detections.
@@ -22,7 +22,7 @@ pub(super) const SKELETON: Rgba = [200, 205, 215, 255];
 pub(super) const TARGET: Rgba = [255, 205, 60, 255];
 pub(super) const HIT: Rgba = [60, 220, 90, 255];
 pub(super) const MISS: Rgba = [255, 70, 60, 255];
-/// The first attempts, once later ones are there.
+/// First attempts, once later ones are drawn.
 pub(super) const PAST: Rgba = [150, 110, 105, 255];
 pub(super) const TRAIL: Rgba = [240, 240, 245, 255];
 pub(super) const FIT_VIEW: Rgba = [90, 150, 255, 255];
@@ -38,7 +38,7 @@ pub(super) const PLANNED_PATH: Rgba = [150, 165, 185, 255];
 pub(super) const MARGIN: Rgba = [255, 190, 70, 26];
 pub(super) const MARGIN_TOOL: Rgba = [255, 190, 70, 255];
 
-/// One colour a joint, base first.
+/// Colour of each joint, base first.
 pub(super) const JOINTS: [Rgba; armcal_core::streams::MAX_JOINTS] = [
     [240, 90, 80, 255],
     [255, 175, 60, 255],
@@ -50,7 +50,7 @@ pub(super) const JOINTS: [Rgba; armcal_core::streams::MAX_JOINTS] = [
     [200, 200, 200, 255],
 ];
 
-/// The same hue, darker.
+/// Returns the same hue, darker.
 pub(super) fn dimmed([r, g, b, a]: Rgba) -> Rgba {
     [r / 2, g / 2, b / 2, a]
 }

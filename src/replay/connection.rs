@@ -1,4 +1,4 @@
-//! The connection to a viewer that runs on its own.
+//! Connection to a running viewer.
 
 use std::sync::mpsc::channel;
 use std::time::Duration;
@@ -11,27 +11,27 @@ use crate::error::ReplayError;
 use crate::news::Update;
 use crate::rrd;
 
-/// Where a viewer listens by default: on this machine alone.
+/// Default address of the viewer, on this machine only.
 pub const LOOPBACK_VIEWER: &str = "127.0.0.1:9876";
 
-/// Whether a viewer listens.
+/// State of the connection to a viewer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum State {
-    /// Not yet.
+    /// No viewer has listened so far.
     Away,
     Connected,
-    /// It went away; nothing more can be sent over this connection.
+    /// The viewer has left; nothing more can be sent over this connection.
     Lost,
 }
 
-/// What a viewer took until the end.
+/// Share of the data that a viewer took until the end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Taken {
     Whole,
     InPart,
 }
 
-/// A viewer that listens, or may listen some day.
+/// Viewer that listens, or may listen later.
 pub(super) struct Viewer {
     address: String,
     client: Client,
@@ -40,7 +40,7 @@ pub(super) struct Viewer {
 }
 
 impl Viewer {
-    /// Begins to look for a viewer at `address`, host and port. Each call has its own recording in the viewer.
+    /// Starts to look for a viewer at `address`, host and port. Each call has its own recording in the viewer.
     pub fn at(address: &str) -> Result<Self, ReplayError> {
         Self::connect(address, StoreId::random(StoreKind::Recording, rrd::APPLICATION))
     }
@@ -64,7 +64,7 @@ impl Viewer {
         }
     }
 
-    /// Looks for the viewer anew, after it was lost.
+    /// Looks for the viewer again after it was lost.
     pub fn again(self) -> Result<Self, ReplayError> {
         Self::connect(&self.address, self.recording)
     }
@@ -86,15 +86,15 @@ impl Viewer {
         Ok(())
     }
 
-    /// Ends the connection; what the viewer does not take within `patience` it does not get.
+    /// Ends the connection. Data that the viewer does not take within `patience` are lost.
     pub fn finish(self, patience: Duration) -> Taken {
         if self.state() != State::Connected {
-            // A client that is dropped waits for whoever is not there.
+            // A client that is dropped waits for an absent viewer.
             std::mem::forget(self.client);
             return Taken::InPart;
         }
         let (done, is_done) = channel();
-        // Dropped it waits until all was taken, for ever where nothing is.
+        // A client that is dropped waits until all data were taken, for ever if the viewer takes none.
         let finish = move || {
             drop(self.client);
             let _ = done.send(());

@@ -15,13 +15,13 @@ pub(super) const COUNTS: &str = "/plots/counts";
 pub(super) const CLEARANCE: &str = "/plots/clearance";
 pub(super) const PREDICTED: &str = "/plots/predicted";
 pub(super) const OFFSET_CHANGE: &str = "/plots/offset_change";
-/// How far sightings of a tag are from their mean.
+/// Distance of a tag's observations from their mean.
 pub(super) const SIGHTING: &str = "/plots/sighting";
-/// Lanes of states: the viewer names a lane by its path alone.
+/// Lanes of states: the viewer names a lane by its path only.
 pub(super) const PHASE_LANE: &str = "/phase";
 pub(super) const TARGETS_LANE: &str = "/targets";
 pub(super) const VIEWS_LANE: &str = "/views";
-/// The latest fault of each kind; lanes stand in the order of their names.
+/// Latest fault of each kind; the viewer sorts lanes by name.
 pub(super) const ARM_FAULT_LANE: &str = "/fault_arm";
 pub(super) const TAG_FAULT_LANE: &str = "/fault_tag";
 pub(super) const SEA_FAULT_LANE: &str = "/fault_sea";

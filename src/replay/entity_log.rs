@@ -1,7 +1,7 @@
 //! Rows of entities, and the chunks that an .rrd file holds.
 //!
-//! Rerun's recording stream numbers its rows and chunks by clock and chance and batches them on a thread. Here the
-//! identities of chunks and rows count up from a fixed one, so that the same input gives the same bytes.
+//! Rerun's recording stream numbers its rows and chunks by clock and random numbers, and batches them on a thread. Here
+//! the identities of chunks and rows count up from a fixed one, so that the same input gives the same bytes.
 
 use std::collections::BTreeMap;
 
@@ -20,17 +20,18 @@ use crate::shown::Shown;
 
 /// The one timeline of a recording: seconds since its first log time.
 pub(super) const TIMELINE: &str = "sim_time";
-/// Rows in a chunk; the viewer seeks by chunks.
+/// Number of rows in a chunk; the viewer seeks by chunks.
 const CHUNK_ROWS: usize = 1000;
-/// Identities that each chunk and its rows may use up.
+/// Number of identities reserved for each chunk and its rows.
 const CHUNK_STRIDE: u64 = 1 << 16;
-/// The viewer holds rows of a later time for newer, so that what a user changes in the layout must come after ours.
+/// Time in the identities of rows. The viewer regards rows of a later time as newer, so a user's changes of the layout
+/// must have a later time than ours.
 pub(super) const IDENTITY_NANOS: u64 = 1_000_000_000;
 
 /// One row of an entity: time in nanoseconds, and data.
 type Row = (i64, RowData);
 
-/// What a row holds. Poses are by far the most: they become columns only when a chunk is full.
+/// Data of a row. Most rows are poses: they become columns only when a chunk is full.
 enum RowData {
     Batches(Vec<SerializedComponentBatch>),
     Pose(Isometry3<f64>),
@@ -49,25 +50,25 @@ pub(super) struct EntityLog {
     cell: fn(i64) -> TimeCell,
     fixed: BTreeMap<String, Vec<SerializedComponentBatch>>,
     rows: BTreeMap<String, Rows>,
-    /// Ends of what an entity shows, in chunks of their own: the viewer panics where one chunk of images has both.
+    /// Ends of an entity's data, in separate chunks: the viewer panics if one chunk has images and their end.
     ends: BTreeMap<String, Rows>,
     failure: Option<EncodeError>,
-    /// What a viewer has already: that is not logged again.
+    /// Data that the viewer already has, which are not logged again.
     shown: Option<Shown>,
 }
 
 impl EntityLog {
-    /// Of a recording, over time.
+    /// Starts the log of a recording, over time.
     pub fn of_recording() -> Self {
         Self::on(TIMELINE, TimeCell::from_duration_nanos)
     }
 
-    /// Of a recording that goes on, without what was `shown`.
+    /// Starts the log of a recording in progress, without the rows in `shown`.
     pub fn of_news(shown: Shown) -> Self {
         Self { shown: Some(shown), ..Self::of_recording() }
     }
 
-    /// Of a blueprint.
+    /// Starts the log of a blueprint.
     pub fn of_blueprint() -> Self {
         Self::on("blueprint", TimeCell::from_sequence)
     }
@@ -87,7 +88,7 @@ impl EntityLog {
         self.push(entity, time_s, || RowData::Batches(what.as_serialized_batches()));
     }
 
-    /// The entity has this pose in its parent from `time_s` on.
+    /// Logs the pose of the entity in its parent, from `time_s` on.
     pub fn draw_pose(&mut self, entity: &str, time_s: f64, pose: &Isometry3<f64>) {
         self.push(entity, time_s, || RowData::Pose(*pose));
     }
@@ -109,7 +110,7 @@ impl EntityLog {
         }
     }
 
-    /// The entity shows nothing from `time_s` on.
+    /// Ends what the entity shows at `time_s`.
     pub fn clear(&mut self, entity: &str, time_s: f64) {
         let nanos = (time_s * 1e9).round() as i64;
         if self.is_new(&format!("{entity}, end"), nanos) {
@@ -122,24 +123,24 @@ impl EntityLog {
         self.shown.as_mut().is_none_or(|shown| shown.note_row(row, nanos))
     }
 
-    /// Whether this entity, which never changes and takes long to draw, was shown before.
+    /// Returns true if this entity was shown before; it never changes and takes long to draw.
     pub fn is_shown(&self, entity: &str) -> bool {
         self.shown.as_ref().is_some_and(|shown| shown.has(entity))
     }
 
-    /// Where a moving entity was shown last.
+    /// Returns the last shown pose of a moving entity.
     pub fn shown_pose(&self, entity: &str) -> Option<Isometry3<f64>> {
         self.shown.as_ref()?.pose(entity)
     }
 
-    /// Notes where a moving entity is shown now.
+    /// Stores the shown pose of a moving entity.
     pub fn note_pose(&mut self, entity: &str, pose: &Isometry3<f64>) {
         if let Some(shown) = &mut self.shown {
             shown.note_pose(entity, pose);
         }
     }
 
-    /// What was shown up to the end of this drawing, and the chunks that are new.
+    /// Returns the data shown up to the end of this drawing, and the new chunks.
     pub fn into_news(mut self) -> Result<(Shown, Vec<Chunk>), EncodeError> {
         let mut shown = self.shown.take().unwrap_or_default();
         self.fixed.retain(|entity, batches| shown.note_fixed(entity, batches));
@@ -147,7 +148,8 @@ impl EntityLog {
         Ok((shown, self.into_chunks()?))
     }
 
-    /// Chunks in the order of the entities' names: what has no time, what has one, and the ends.
+    /// Returns the chunks: entities without a time, then those with one, then the ends, each in the order of their
+    /// names.
     pub fn into_chunks(self) -> Result<Vec<Chunk>, EncodeError> {
         if let Some(error) = self.failure {
             return Err(error);
@@ -188,7 +190,7 @@ impl Rows {
     }
 }
 
-/// A chunk's identity until it has its own, and those of its rows.
+/// Returns the provisional identity of a chunk, and the identities of its rows.
 fn identities() -> (ChunkId, impl Iterator<Item = RowId>) {
     let id = Tuid::from_nanos_and_inc(IDENTITY_NANOS, 0);
     (ChunkId::from_tuid(id), (1u64..).map(move |n| RowId::from_tuid(id.incremented_by(n))))
@@ -212,7 +214,7 @@ fn batches_chunk(
     Ok(chunk.build()?)
 }
 
-/// The same chunk of poses alone, column by column: row by row it takes ten times as long.
+/// Returns a chunk that has only poses, written column by column: row by row it takes ten times as long.
 fn poses_chunk(
     entity: EntityPath,
     timeline: &'static str,
@@ -259,7 +261,7 @@ mod tests {
         out
     }
 
-    /// Written column by column, a chunk of poses has the bytes that it has row by row.
+    /// A chunk of poses has the same bytes, whether it is written by columns or by rows.
     #[test]
     fn a_chunk_of_poses_is_the_same_by_columns_as_by_rows() {
         let pose = |n: i64| {

@@ -1,20 +1,20 @@
-//! The truth's faults as sentences; the truth has them as a routine does, kind and values.
+//! Sentences that describe the truth's faults; the truth has them as in a routine, by kind and values.
 
 use toml::{Table, Value};
 
 use crate::entities::{ARM_FAULT_LANE, SEA_FAULT_LANE, TAG_FAULT_LANE};
 
-/// What a fault is of.
+/// Part of the world that a fault affects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum FaultOf {
-    /// A joint, a sensor, the camera on it.
+    /// Fault of a joint, a sensor, or the camera on the arm.
     Arm,
     Tag,
-    /// The water, the vehicle, and what this version does not know.
+    /// Fault of the water or the vehicle, or one unknown to this version.
     Sea,
 }
 
-/// Something that broke.
+/// Fault of the run, with its time.
 #[derive(Clone, Debug)]
 pub(super) struct Fault {
     pub time_s: f64,
@@ -41,8 +41,8 @@ impl FaultOf {
     }
 }
 
-/// `sensor_jump`, `by_rad = 0.03, joint = "wrist_pitch"`: `the sensor of wrist_pitch slipped by 1.72 deg`. A fault that
-/// this version does not know is told as it is written.
+/// Returns the sentence that describes a fault: `sensor_jump`, `by_rad = 0.03, joint = "wrist_pitch"` gives `the sensor
+/// of wrist_pitch slipped by 1.72 deg`. A fault unknown to this version is returned as it is written.
 pub(super) fn sentence(kind: &str, details: &str) -> String {
     let values: Option<Table> = format!("fault = {{ {details} }}").parse().ok();
     let fault = values.and_then(|mut values| match values.remove("fault") {
@@ -54,7 +54,7 @@ pub(super) fn sentence(kind: &str, details: &str) -> String {
     told.unwrap_or_else(|| format!("{}: {details}", kind.replace('_', " ")))
 }
 
-/// Values by their keys.
+/// Values of a fault by their keys.
 struct FaultValues(Table);
 
 impl FaultValues {
@@ -70,13 +70,13 @@ impl FaultValues {
         self.0.get(key)?.as_integer()
     }
 
-    /// Length of a vector; zero where there is none.
+    /// Returns the length of a vector; zero if there is none.
     fn length(&self, key: &str) -> f64 {
         let parts = self.0.get(key).and_then(Value::as_array).map(Vec::as_slice).unwrap_or_default();
         parts.iter().filter_map(number).map(|part| part * part).sum::<f64>().sqrt()
     }
 
-    /// `by 41.2 mm and 5.7 deg`, or what there is of both.
+    /// Returns `by 41.2 mm and 5.7 deg`, or only the part that is not zero.
     fn shift(&self) -> String {
         let (mm, deg) = (1e3 * self.length("by_m"), self.length("by_rad").to_degrees());
         match (mm > 0.0, deg > 0.0) {

@@ -9,13 +9,14 @@ use armcal_core::files;
 use armcal_core::log::MessageHasher;
 use armcal_core::robot::{Robot, Vehicle};
 
-/// Recording id in the viewer: a hash of all data that shape the file. Another version of the program may give another.
+/// Recording id in the viewer: a hash of all data that shape the file. Another version of the program may give another
+/// id.
 pub(super) struct Identity {
     pub recording_id: String,
 }
 
 impl Identity {
-    /// Hashes the recording's messages, the truth file and the rest of what is shown.
+    /// Hashes the recording's messages, the truth file and the rest of the input.
     pub fn of(input: &ReplayInput) -> Result<Self, ReplayError> {
         let mut hasher = blake3::Hasher::new();
         let mut messages = MessageHasher::new(&input.recording.joint_names);
@@ -28,7 +29,7 @@ impl Identity {
             let read = files::open(path).and_then(|file| hasher.update_reader(file).map(|_| ()));
             read.map_err(|source| armcal_core::log::LogError::Read { path: path.to_owned(), source })?;
         }
-        // Where files lie, and how that is spelled, is not part of the identity.
+        // The paths of files, and their spelling, are not part of the identity.
         let robot = Robot { folder: PathBuf::new(), links: BTreeMap::new(), ..input.robot.clone() };
         let vehicle = input.vehicle.map(|vehicle| Vehicle { file: PathBuf::new(), ..vehicle.clone() });
         hasher.update(format!("{robot:?}{vehicle:?}{:?}", input.scene).as_bytes());

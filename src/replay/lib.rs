@@ -1,10 +1,10 @@
-//! Mirrors a run into a file for the Rerun viewer, or into a viewer that is open, from recorded streams alone.
+//! Converts a run to a file for the Rerun viewer, or sends it to an open viewer, from recorded streams only.
 //!
-//! [`write_rrd`] draws belief, detections and, with the simulator's truth file, the truth; [`write_plan_rrd`] draws
-//! the motions of a plan, [`write_views_rrd`] the views of a real arm as its calibration has them; [`open_viewer`]
-//! hands the file to an installed viewer, which is not linked. [`LiveView`] sends a run that goes on to a viewer that
-//! is open, [`show_recording`] a whole one. All entities (`entities`) share one timeline, `sim_time`: seconds since
-//! the recording's first log time. The same input gives the same bytes of a file.
+//! [`write_rrd`] draws estimates, detections and, with the simulator's truth file, the truth. [`write_plan_rrd`] draws
+//! the motions of a plan, [`write_views_rrd`] the calibrated views of a real arm. [`open_viewer`] hands the file to an
+//! installed viewer, which is not linked. [`LiveView`] sends a run in progress to an open viewer, [`show_recording`] a
+//! whole recording. All entities (`entities`) share one timeline, `sim_time`: seconds since the recording's first log
+//! time. The same input gives the same bytes of a file.
 
 mod arms;
 mod axis;

@@ -1,8 +1,8 @@
-//! A run as it happens, in a viewer that is open already.
+//! View of a run in progress, in an open viewer.
 //!
-//! A thread of its own takes the messages from a bounded queue, draws a few times a second what is new (`news`) and
-//! sends it. Whoever speaks never waits for a viewer: where none listens nothing is drawn, where one is too slow
-//! messages are left out and counted. A viewer that comes late, or again, gets layout and scenery first.
+//! A separate thread takes the messages from a bounded queue, draws the new data (`news`) a few times per second and
+//! sends them. The sender of messages never waits for a viewer. Without a viewer nothing is drawn; if the viewer is too
+//! slow, messages are dropped and counted. A viewer that connects late, or again, gets layout and scenery first.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
@@ -19,27 +19,28 @@ use crate::scene::ReplayInput;
 use armcal_core::streams::Message;
 use armcal_core::time::Stamp;
 
-/// Between two updates.
+/// Time between two updates.
 const TURN: Duration = Duration::from_millis(200);
-/// Messages that may wait to be drawn, and their bytes: some seconds of images.
+/// Largest number of messages that may wait to be drawn, and their bytes: several seconds of images.
 const MAX_WAITING: usize = 1 << 14;
 const MAX_WAITING_BYTES: usize = 32 << 20;
-/// Between two tries of somebody who waits.
+/// Time between two attempts of a waiting sender.
 const PAUSE: Duration = Duration::from_millis(2);
-/// The viewer gets so long to take what is left at the end.
+/// Time in which the viewer may take the remaining data at the end.
 const FAREWELL: Duration = Duration::from_secs(2);
-/// A viewer that is to show a whole recording must be there by then, and has so long to take it.
+/// Time in which a viewer must connect to show a whole recording; `WHOLE` is the time in which it may take the
+/// recording.
 const CONNECT: Duration = Duration::from_secs(5);
 const WHOLE: Duration = Duration::from_secs(120);
 
-/// A view of a run that goes on.
+/// View of a run in progress.
 pub struct LiveView {
     queue: SyncSender<(Stamp, Message)>,
     shared: Arc<Shared>,
     over: Receiver<Result<Taken, ReplayError>>,
 }
 
-/// What the thread that draws and those who speak both know.
+/// State that the drawing thread and the senders share.
 #[derive(Default)]
 struct Shared {
     waiting_bytes: AtomicUsize,
@@ -49,7 +50,7 @@ struct Shared {
 }
 
 impl Shared {
-    /// Whether there is room for the message.
+    /// Puts the message into the queue; returns false if there is no room.
     fn offer(&self, queue: &SyncSender<(Stamp, Message)>, log_time: Stamp, message: &Message) -> bool {
         let bytes = bytes_of(message);
         let waiting = self.waiting_bytes.fetch_add(bytes, Ordering::Relaxed);
@@ -61,21 +62,21 @@ impl Shared {
     }
 }
 
-/// How a view ended.
+/// Outcome of a view.
 #[derive(Debug)]
 pub struct LiveViewEnd {
-    /// Whether a viewer ever listened.
+    /// True if a viewer ever listened.
     pub was_seen: bool,
-    /// Whether a viewer was there at the end and took everything in time.
+    /// True if a viewer was connected at the end and took everything in time.
     pub was_taken: bool,
-    /// Messages that were not sent because the viewer was too slow.
+    /// Number of messages that were dropped because the viewer was too slow.
     pub left_out: u64,
-    /// Why the view ended before the run.
+    /// Reason for which the view ended before the run.
     pub failure: Option<ReplayError>,
 }
 
 impl LiveView {
-    /// Begins to look for a viewer at `address`, host and port, and goes on to look.
+    /// Starts to look for a viewer at `address`, host and port, and continues to look.
     ///
     /// # Errors
     /// [`ReplayError::Address`].
@@ -86,7 +87,7 @@ impl LiveView {
         let shared = Arc::<Shared>::default();
         let ours = Arc::clone(&shared);
         let view = move || {
-            // Nobody listens to the end of a view that was left.
+            // Nobody reads the end of a view that was dropped.
             let _ = ended.send(show_news(&messages, News::new(drawings), viewer, &ours));
         };
         let started = std::thread::Builder::new().name("live view".to_owned()).spawn(view);
@@ -94,8 +95,8 @@ impl LiveView {
         Ok(Self { queue, shared, over })
     }
 
-    /// Something that takes messages for this view. It waits `patience` in all for a viewer that is too slow, and then
-    /// leaves messages out.
+    /// Returns a function that takes messages for this view. For a viewer that is too slow it waits `patience` in
+    /// total, and then drops messages.
     pub fn listener(&self, mut patience: Duration) -> impl FnMut(Stamp, &Message) + Send + use<> {
         let (queue, shared) = (self.queue.clone(), Arc::clone(&self.shared));
         move |log_time, message| {
@@ -111,7 +112,7 @@ impl LiveView {
         }
     }
 
-    /// Lets the viewer have what is left, for two and a half seconds at most.
+    /// Lets the viewer take the remaining data, for at most 2.4 s.
     #[must_use]
     pub fn end(self) -> LiveViewEnd {
         self.shared.is_over.store(true, Ordering::Relaxed);
@@ -129,7 +130,7 @@ impl LiveView {
 /// Shows a whole recording in the viewer that listens at `address`.
 ///
 /// # Errors
-/// [`ReplayError::NoViewer`], or as for a file.
+/// [`ReplayError::NoViewer`], or the errors of writing a file.
 pub fn show_recording(input: &ReplayInput, address: &str) -> Result<(), ReplayError> {
     let gone = || ReplayError::NoViewer { address: address.to_owned() };
     let mut viewer = Viewer::at(address)?;
@@ -149,7 +150,7 @@ pub fn show_recording(input: &ReplayInput, address: &str) -> Result<(), ReplayEr
     }
 }
 
-/// Until the run is over.
+/// Shows news until the run is over.
 fn show_news(
     messages: &Receiver<(Stamp, Message)>,
     mut news: News,
@@ -179,7 +180,7 @@ fn show_news(
     }
 }
 
-/// Hears messages for one turn; whether that was the last one.
+/// Takes messages for one turn; returns true if it was the last turn.
 fn hear_for_a_turn(messages: &Receiver<(Stamp, Message)>, news: &mut News, shared: &Shared) -> bool {
     let end = Instant::now() + TURN;
     loop {

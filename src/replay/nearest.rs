@@ -1,7 +1,7 @@
-//! A line between the arm and what is nearest to it, coloured by how near that is.
+//! Line between the arm and the part nearest to it, coloured by the distance.
 //!
-//! Which parts these are, and how far apart, is the truth's or, without any, what planning measures at the believed
-//! angles; the points are found between the shapes of the two as they are drawn.
+//! The parts and their distance are those of the truth or, without truth, those of planning at the estimated angles.
+//! The points are found between the collision shapes of the two parts.
 
 use crate::rerun::LineStrips3D;
 use nalgebra::{Isometry3, Vector3};
@@ -19,21 +19,22 @@ use armcal_belief::plan::ClearanceModel;
 use armcal_core::kinematics::LinkPoses;
 use armcal_core::robot::{PlacedShape, Shape, parry_pose};
 
-/// Parts farther apart than this are not shown: m, where nobody says what is kept clear, else so many times as much.
+/// Distance beyond which parts are not shown, m; `FAR_TIMES` is its multiple of the required clearance, used if that is
+/// known.
 const FAR_M: f64 = 0.15;
 const FAR_TIMES: f64 = 3.0;
-/// How far the points that belong to a distance are looked for, m: planning's may be less by how the vehicle sways.
+/// Largest distance at which the points are searched, m: planning's distance may be less, because the vehicle sways.
 const SEARCHED_M: f64 = 1.0;
-/// Steps where planning measures.
+/// Rate at which planning's distances are drawn, Hz.
 const RATE_HZ: f64 = 5.0;
-/// Within so many times the clearance that is kept, what is nearest is amber.
+/// Multiple of the required clearance within which the line is amber.
 const AMBER_TIMES: f64 = 2.0;
-/// Ends that moved less are not drawn again, m.
+/// Motion of the ends below which the line is not drawn again, m.
 const SAME_M: f64 = 1e-3;
 /// Side of the seafloor, m: wider than any arm's reach.
 const SEAFLOOR_SIDE_M: f64 = 40.0;
 
-/// What carries a shape.
+/// Body that carries a shape.
 #[derive(Clone, Copy)]
 enum Carrier {
     Link(usize),
@@ -49,7 +50,7 @@ struct Solid<'a> {
     shape: SharedShape,
 }
 
-/// Draws the line, and its end where nothing is near.
+/// Draws the line; ends it when nothing is near.
 pub(super) fn draw(run: &ReplayScene, input: &ReplayInput, stream: &mut EntityLog) {
     let found = found(run, input);
     if found.is_empty() {
@@ -77,13 +78,14 @@ pub(super) fn draw(run: &ReplayScene, input: &ReplayInput, stream: &mut EntityLo
         }
         drawn = Some((points_m, color));
         let line = LineStrips3D::update_fields().with_strips([points_m.map(|point_m| vector(&point_m))]);
-        // As the plots have it: to the distance between two links planning adds what less is kept between them.
+        // Same value as in the plots: planning reduces the required clearance between two links, and adds the
+        // difference to their distance.
         let label = format!("{:.0} mm", 1e3 * clearance.distance_m.max(0.0));
         stream.draw(&entity, clearance.time_s, &line.with_colors([color]).with_labels([label]));
     }
 }
 
-/// Green, amber or red; white where nobody says what is kept clear.
+/// Returns green, amber or red; white if the required clearance is unknown.
 fn color(distance_m: f64, clearance_m: Option<f64>) -> Rgba {
     match clearance_m {
         None => colors::TRAIL,
@@ -93,7 +95,7 @@ fn color(distance_m: f64, clearance_m: Option<f64>) -> Rgba {
     }
 }
 
-/// By truth; without any as planned, where a clearance is kept.
+/// Returns the clearances by truth. Without truth they are those of planning, if a clearance is required.
 fn found(run: &ReplayScene, input: &ReplayInput) -> Vec<Clearance> {
     if let Some(truth) = run.truth.as_ref() {
         return truth.clearances.clone();
@@ -139,7 +141,7 @@ fn solids<'a>(run: &'a ReplayScene<'_>) -> Vec<Solid<'a>> {
     solids
 }
 
-/// The nearest points of two parts in the base frame, m; `None` where a part has no shape.
+/// Returns the nearest points of two parts in the base frame, m; `None` if a part has no shape.
 fn points(run: &ReplayScene, solids: &[Solid<'_>], clearance: &Clearance) -> Option<[Vector3<f64>; 2]> {
     let poses = run.robot.chain.link_poses(&run.shown_angles(clearance.time_s)?);
     let vehicle_from_base = run.vehicle.map_or_else(Isometry3::identity, |v| *v.vehicle_from_base.isometry());

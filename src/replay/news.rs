@@ -1,4 +1,4 @@
-//! What is new of a run that goes on: the messages so far that drawing needs, and the rows that nobody was shown yet.
+//! New data of a run in progress: the messages so far that drawing needs, and the rows that were not shown yet.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -18,43 +18,43 @@ use armcal_core::routine::Scene;
 use armcal_core::streams::Message;
 use armcal_core::time::Stamp;
 
-/// All messages are kept so long, s: the tool's path looks back so far.
+/// Time for which all messages are kept, s: the length of the tool's path.
 const RECENT_S: f64 = 15.0;
-/// Images are kept so long, s: beyond the time for which one is shown.
+/// Time for which images are kept, s: longer than one is shown.
 const IMAGES_S: f64 = 3.0;
-/// Older readings, beliefs and temperatures are kept so far apart, s, for viewers that come late.
+/// Spacing of older readings, estimates and temperatures, s; they are kept for viewers that connect late.
 const KEPT_S: f64 = 0.25;
-/// What moves is drawn up to so long ago, s: messages of one moment come one after the other.
+/// Delay of moving entities, s: messages of one time arrive one after the other.
 const LAG_S: f64 = 0.1;
-/// Moments of what moved before a viewer came, at most.
+/// Largest number of drawn times before a viewer connected.
 const MAX_TICKS_BEFORE: f64 = 6000.0;
 const SUMMARY: &str = "# Live\n\nAs it happens, by the arm's own belief: nothing here knows the truth.\n";
 
-/// The drawings that a run is shown with.
+/// Robot, vehicle and scene with which a run is shown.
 #[derive(Clone, Debug)]
 pub struct LiveDrawings {
-    /// With the tags of its vehicle.
+    /// Robot with the tags of its vehicle.
     pub robot: Robot,
-    /// What carries the arm.
+    /// Vehicle that carries the arm.
     pub vehicle: Option<Vehicle>,
-    /// The site.
+    /// Site of the run.
     pub scene: Option<Scene>,
 }
 
-/// A run that goes on.
+/// Run in progress.
 pub(super) struct News {
     drawings: LiveDrawings,
     recording: Recording,
-    /// Up to here all that moves was shown, s since the first message.
+    /// Time up to which all moving entities were shown, s since the first message.
     until_s: Option<f64>,
     shown: Shown,
     /// Paths of the layout's parts.
     layout: Vec<String>,
 }
 
-/// What a viewer is to be told.
+/// Update for a viewer.
 pub(super) struct Update {
-    /// The layout, where it changed.
+    /// New layout; `None` if it is unchanged.
     pub layout: Option<Vec<Entry>>,
     pub chunks: Vec<Chunk>,
 }
@@ -71,20 +71,20 @@ impl News {
         messages.push((log_time, message));
     }
 
-    /// The next viewer has seen nothing yet.
+    /// Forgets the shown data, because the next viewer has none.
     pub fn forget_shown(&mut self) {
         self.until_s = None;
         self.shown = Shown::default();
         self.layout.clear();
     }
 
-    /// What was not shown yet; from here on it counts as shown. `None` while there is nothing at all.
+    /// Returns data that were not shown yet, and marks them as shown; `None` before the first message.
     pub fn take(&mut self) -> Result<Option<Update>, ReplayError> {
         let Some(duration_s) = self.duration_s() else { return Ok(None) };
         self.take_until(duration_s - LAG_S).map(Some)
     }
 
-    /// The same at the end: nothing more will come.
+    /// Returns all remaining data, at the end of the run.
     pub fn take_rest(&mut self) -> Result<Option<Update>, ReplayError> {
         let Some(duration_s) = self.duration_s() else { return Ok(None) };
         self.take_until(duration_s).map(Some)
@@ -119,7 +119,7 @@ impl News {
             Some(after_s) => Window { after_s, until_s: until_s.max(after_s), ..Window::default() },
             None => Window { until_s, max_ticks: MAX_TICKS_BEFORE, ..Window::default() },
         };
-        // Before the first tick there is nothing that others would miss.
+        // A window that ends before the first tick has shown nothing.
         self.until_s = (tracks.window.until_s >= 0.0).then_some(tracks.window.until_s);
         let run = ReplayScene {
             tracks,
@@ -138,12 +138,12 @@ impl News {
         let paths: Vec<String> = layout.iter().map(|entry| entry.path.clone()).collect();
         let layout = (paths != self.layout).then_some(layout);
         self.layout = paths;
-        // Identities by the clock: to the viewer later chunks are newer.
+        // Identities follow the clock, so that later chunks are newer to the viewer.
         let chunks = chunks.into_iter().map(|chunk| chunk.clone_as(ChunkId::new(), RowId::new())).collect();
         Ok(Update { layout, chunks })
     }
 
-    /// Drops what no later drawing needs.
+    /// Drops messages that no later drawing needs.
     pub fn trim(&mut self) {
         let messages = &mut self.recording.messages;
         let (Some((first, _)), Some((last, _))) = (messages.first(), messages.last()) else { return };
@@ -153,7 +153,7 @@ impl News {
         let mut latest = BTreeMap::<Stream, Stamp>::new();
         let mut is_first = true;
         messages.retain(|(at, message)| {
-            // The first one says when time begins.
+            // The first message defines the start of time.
             if std::mem::take(&mut is_first) {
                 return true;
             }

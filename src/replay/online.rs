@@ -1,4 +1,4 @@
-//! What was believed online: the error expected of the tool, how far each sensor's offset has come, and what happened.
+//! Online estimates: the expected tool error, the change of each sensor's offset, and the events.
 
 use crate::rerun::{Scalars, SeriesLines, StateChange, StateConfiguration};
 
@@ -9,10 +9,10 @@ use crate::scene::ReplayScene;
 use armcal_belief::calib::online::{BeliefLog, BeliefRow, OnlineEvent};
 use armcal_core::time::Stamp;
 
-/// A span of an event is shown at least this long, in parts of the recording.
+/// Shortest drawn span of an event, as a share of the recording.
 const LEAST_SHARE: f64 = 0.01;
 
-/// Draws plots and lane; nothing without a belief.
+/// Draws plots and lane; nothing without an online estimate.
 pub(super) fn draw(run: &ReplayScene, stream: &mut EntityLog) {
     let Some(log) = run.online else { return };
     draw_expected_error(run, log, stream);
@@ -40,11 +40,12 @@ fn draw_expected_error(run: &ReplayScene, log: &BeliefLog, stream: &mut EntityLo
     }
 }
 
-/// Of each joint the change of its offset since the first belief, bright, between one sigma on either side, dark.
+/// Draws the change of each joint's offset since the first estimate, bright, between bounds of one standard deviation,
+/// dark.
 fn draw_offsets(run: &ReplayScene, log: &BeliefLog, stream: &mut EntityLog) {
     let Some(first) = log.beliefs().next() else { return };
     let names = run.robot.joint_names();
-    // Beyond the camera nothing is learnt.
+    // Offsets distal to the camera are unobservable.
     let joints = 0..run.robot.camera.mount.n_joints.min(first.offset_rad.len());
     for (part, sigmas) in [("believed", 0.0), ("above", 1.0), ("below", -1.0)] {
         let entity = format!("{OFFSET_CHANGE}/{part}");
@@ -70,7 +71,7 @@ fn draw_offsets(run: &ReplayScene, log: &BeliefLog, stream: &mut EntityLog) {
     }
 }
 
-/// A lane with a span from what first showed an event to its verdict.
+/// Draws a lane with a span for each event, from its first sign to its verdict.
 fn draw_events(run: &ReplayScene, log: &BeliefLog, stream: &mut EntityLog) {
     let events: Vec<&OnlineEvent> = log.events().collect();
     if events.is_empty() {

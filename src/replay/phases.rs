@@ -53,7 +53,7 @@ fn draw_phases(run: &ReplayScene, stream: &mut EntityLog) {
 
 /// State of a lane for one mark.
 struct State {
-    /// Unique in the lane.
+    /// Name, unique in the lane.
     name: String,
     /// Short text on the span.
     label: String,
@@ -86,7 +86,7 @@ fn reach_state(run: &ReplayScene, mark: &Span) -> Option<State> {
     Some(State { name, label: n.to_string(), color: colors::dimmed(color) })
 }
 
-/// The truth's latest fault of each kind, from when it happened: by itself a lane does not say how long a fault lasts.
+/// Draws the truth's latest fault of each kind from its time on; a lane cannot show the duration of a fault.
 fn draw_faults(run: &ReplayScene, stream: &mut EntityLog) {
     let faults = || run.truth.iter().flat_map(|truth| &truth.faults);
     let mut names: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
@@ -102,7 +102,7 @@ fn draw_faults(run: &ReplayScene, stream: &mut EntityLog) {
     }
 }
 
-/// A lane with a state for each mark that `state` knows, and gaps between them.
+/// Draws a lane with a state for each mark that `state` knows, and gaps between them.
 fn draw_lane(run: &ReplayScene, stream: &mut EntityLog, lane: &str, state: fn(&ReplayScene, &Span) -> Option<State>) {
     let spans: Vec<_> =
         run.tracks.marks.iter().filter_map(|mark| Some((mark.start_s, mark.end_s, state(run, mark)?))).collect();
@@ -123,7 +123,7 @@ fn draw_lane(run: &ReplayScene, stream: &mut EntityLog, lane: &str, state: fn(&R
     }
 }
 
-/// The log's lines by their senders, and a line for each arrival.
+/// Draws the log's lines by their senders, and a line for each arrival.
 fn draw_log(run: &ReplayScene, stream: &mut EntityLog) {
     let mut lines: Vec<(f64, String, TextLog)> = Vec::new();
     for (time_s, line) in &run.tracks.log {

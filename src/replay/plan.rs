@@ -28,26 +28,27 @@ use armcal_core::streams::{
 };
 use armcal_core::time::{SIMULATION_EPOCH, Stamp};
 
-/// Steps of what moves.
+/// Rate of moving entities, Hz.
 const FRAME_HZ: f64 = 12.5;
-/// The arms that are drawn for all within the errors: every joint off to the same side, and every other one.
+/// Corners of the error box whose arms are drawn: all joints off to the same side, and alternate joints off to opposite
+/// sides.
 const CORNERS: [u32; 4] = [0b0000_0000, 0b1111_1111, 0b0101_0101, 0b1010_1010];
 
-/// A plan, and the robot, vehicle, scene and task that it was made for.
+/// Plan, and the robot, vehicle, scene and task for which it was made.
 pub struct PlanInput<'a> {
     pub plan: &'a PlanFile,
     pub robot: &'a Robot,
     pub vehicle: &'a Vehicle,
     pub scene: &'a Scene,
     pub task: &'a TaskSettings,
-    /// Shown as it is.
+    /// Text that is shown unchanged.
     pub markdown: &'a str,
 }
 
 /// Writes `out`, an .rrd file with its blueprint, replacing one of that name.
 ///
 /// # Errors
-/// [`ReplayError`] when it cannot be written, or the plan is another arm's.
+/// [`ReplayError`] if it cannot be written, or the plan belongs to another arm.
 pub fn write_plan_rrd(input: &PlanInput<'_>, out: &Path) -> Result<(), ReplayError> {
     let messages = plan_recording(input);
     let shown = ReplayInput {
@@ -83,7 +84,7 @@ pub fn write_plan_rrd(input: &PlanInput<'_>, out: &Path) -> Result<(), ReplayErr
     rrd::write(out, &Identity::of(&shown)?, &blueprint::build_plan(&run), stream)
 }
 
-/// The plan's motions as messages.
+/// Messages of the plan's motions.
 struct PlanMessages<'a> {
     input: &'a PlanInput<'a>,
     messages: Vec<(Stamp, Message)>,
@@ -188,7 +189,7 @@ fn pose_text(pose: &PoseTable) -> String {
     )
 }
 
-/// The whole path of the tool.
+/// Draws the whole path of the tool.
 fn draw_tool_path(run: &ReplayScene, stream: &mut EntityLog) {
     let tool = |angles: &JointAngles| run.robot.chain.link_poses(angles).frame(&run.robot.tool.mount);
     let way: Vec<[f32; 3]> =
@@ -197,7 +198,7 @@ fn draw_tool_path(run: &ReplayScene, stream: &mut EntityLog) {
     stream.log_static(&format!("{BASE}/planned_way"), &strip);
 }
 
-/// Transparent arms at corners of the error box, and the tool positions of all corners.
+/// Draws transparent arms at corners of the error box, and the tool positions of all corners.
 fn draw_margins(input: &PlanInput<'_>, run: &ReplayScene, stream: &mut EntityLog) {
     let robot = input.robot;
     let mut ghosts: Vec<Vec<Mover>> = Vec::new();
@@ -234,7 +235,7 @@ fn draw_margins(input: &PlanInput<'_>, run: &ReplayScene, stream: &mut EntityLog
     }
 }
 
-/// The error bounds between those of the poses before and after.
+/// Returns the error bounds, interpolated between those of the poses before and after.
 fn error_at(plan: &PlanFile, time_s: f64) -> JointAngles {
     let after = plan.pose.partition_point(|pose| pose.arm_time_s < time_s).min(plan.pose.len().saturating_sub(1));
     let (Some(next), Some(last)) = (plan.pose.get(after), plan.pose.get(after.saturating_sub(1))) else {
@@ -246,7 +247,7 @@ fn error_at(plan: &PlanFile, time_s: f64) -> JointAngles {
     JointAngles::from_fn(plan.joints.len(), |j| a[j] + share * (b[j] - a[j]))
 }
 
-/// Frames around the tags expected at the next pose, coloured by the probability of detection.
+/// Draws frames around the tags expected at the next pose, coloured by the probability of detection.
 fn draw_expected_tags(input: &PlanInput<'_>, stream: &mut EntityLog) {
     let entity = format!("{BASE}/sights");
     let mut since_s = 0.0;
@@ -268,7 +269,7 @@ fn draw_expected_tags(input: &PlanInput<'_>, stream: &mut EntityLog) {
     }
 }
 
-/// Red: never, green: always.
+/// Returns a colour between red (probability 0) and green (1).
 fn chance_color(probability: f64) -> Rgba {
     let [from, to] = [colors::MISS, colors::SEEN];
     std::array::from_fn(|k| {

@@ -10,7 +10,7 @@ use crate::scene::ReplayScene;
 use crate::tracks::{GAP_S, HOLD_S};
 use armcal_core::streams::{JointAngles, ReachAttempt};
 
-/// Samples of what moves, and of what does not, a second.
+/// Sample rates of moving quantities, and of slow ones, Hz.
 const FAST_HZ: f64 = 12.5;
 const SLOW_HZ: f64 = 2.0;
 
@@ -36,15 +36,15 @@ fn style(stream: &mut EntityLog, entity: &str, names: &[String], shades: &[Rgba]
     stream.log_static(entity, &lines.with_widths(names.iter().map(|_| width)));
 }
 
-/// Ends the lines where nothing was recorded.
+/// Ends the lines at gaps of the recording.
 fn interrupt(run: &ReplayScene, stream: &mut EntityLog, entity: &str) {
     for gap_s in run.tracks.gaps() {
         stream.draw(entity, gap_s, &Scalars::new([] as [f64; 0]));
     }
 }
 
-/// Believed angles at the moments that are drawn, s; none where lines end, because for long nothing was believed: what
-/// happens in a wait is no ramp.
+/// Returns the estimated angles at the drawn times, s. `None` ends the lines after a long time without an estimate,
+/// which would otherwise appear as a ramp.
 pub(super) fn believed<'a>(run: &'a ReplayScene<'_>) -> Vec<(f64, Option<&'a JointAngles>)> {
     let step_s = 0.9 / run.tracks.affordable_hz(FAST_HZ);
     let (mut next_s, mut last_s) = (0.0, f64::INFINITY);
@@ -62,7 +62,7 @@ pub(super) fn believed<'a>(run: &'a ReplayScene<'_>) -> Vec<(f64, Option<&'a Joi
     drawn
 }
 
-/// What is believed as bright lines, what is true as dark ones of the same colours.
+/// Draws estimated angles as bright lines, true ones as dark lines of the same colours.
 fn draw_angles(run: &ReplayScene, stream: &mut EntityLog) {
     let names = run.robot.joint_names();
     let (believed, truth) = (format!("{JOINT_ANGLE}/believed"), format!("{JOINT_ANGLE}/true"));
@@ -83,13 +83,13 @@ fn draw_angles(run: &ReplayScene, stream: &mut EntityLog) {
     }
 }
 
-/// Degrees; millimetres of slides.
+/// Returns the angles in degrees; slides in millimetres.
 fn shown(run: &ReplayScene, angles: &JointAngles) -> Scalars {
     Scalars::new(angles.iter().zip(&run.robot.sensors).map(|(angle_rad, spec)| angle_rad * spec.unit().scale()))
 }
 
-/// Believed - true, by the shorter way round, at the moments of the belief so that motion adds nothing; nothing where
-/// lines end.
+/// Returns the joint errors, estimated minus true, the shorter way round. They are taken at the times of the estimates,
+/// so that motion adds nothing. Empty where the lines end.
 pub(super) fn joint_errors_deg(run: &ReplayScene) -> Vec<(f64, Vec<f64>)> {
     let Some(truth) = run.truth.as_ref().filter(|_| run.has_true_joints()) else { return Vec::new() };
     let errors = |(time_s, believed): (f64, Option<&JointAngles>)| {
@@ -112,7 +112,7 @@ fn draw_joint_error(run: &ReplayScene, stream: &mut EntityLog) {
     }
 }
 
-/// How far the believed tool is from the true one, mm; nothing where the line ends.
+/// Returns the distance between estimated and true tool, mm; `None` where the line ends.
 pub(super) fn tool_errors_mm(run: &ReplayScene) -> Vec<(f64, Option<f64>)> {
     let Some(truth) = run.truth.as_ref() else { return Vec::new() };
     let error = |(time_s, angles): (f64, Option<&JointAngles>)| {
@@ -124,7 +124,7 @@ pub(super) fn tool_errors_mm(run: &ReplayScene) -> Vec<(f64, Option<f64>)> {
     believed(run).into_iter().filter_map(error).collect()
 }
 
-/// How far the believed tool is from the true one, and what each arrival missed its target by, mm.
+/// Draws the distance between estimated and true tool, and the miss of each arrival, mm.
 fn draw_tool_error(run: &ReplayScene, stream: &mut EntityLog) {
     if !run.has_true_tool() {
         return;
@@ -158,7 +158,7 @@ fn draw_tool_error(run: &ReplayScene, stream: &mut EntityLog) {
     }
 }
 
-/// All that is drawn of them, C.
+/// Returns all temperatures that are drawn, C.
 pub(super) fn temperatures_c(run: &ReplayScene) -> Vec<f64> {
     let both = [&run.tracks.oil_c, &run.tracks.water_c];
     both.iter().flat_map(|track| run.tracks.ticks(SLOW_HZ).filter_map(|time_s| track.at(time_s).copied())).collect()

@@ -3,7 +3,7 @@
 use crate::rerun::Transform3D;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
-/// Single precision, as Rerun has it.
+/// Returns a vector in single precision, as Rerun has it.
 pub(super) fn vector(v: &Vector3<f64>) -> [f32; 3] {
     [v.x as f32, v.y as f32, v.z as f32]
 }

@@ -1,4 +1,4 @@
-//! The messages of a recording that a replay shows, within a budget of memory.
+//! Messages of a recording that a replay shows, within a budget of memory.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -7,17 +7,18 @@ use armcal_core::log::{LogError, Recording, Stream, TopicMap, scan_recording};
 use armcal_core::streams::Message;
 use armcal_core::time::Stamp;
 
-/// Messages that are kept in all, bytes.
+/// Largest memory of all kept messages, bytes.
 const MAX_BYTES: usize = 160 << 20;
-/// Each time so many bytes are kept, the rate of what is measured again and again halves: first after 20 minutes.
+/// Memory after which the rate of repeated measurements halves each time, bytes: first after 20 minutes.
 const HALVING_BYTES: usize = 24 << 20;
-/// Distance of messages of one stream after the first halving, s.
+/// Spacing of one stream's messages after the first halving, s.
 const SPACING_S: f64 = 0.019;
 
-/// Reads what a replay shows; of long recordings, a share. `left_in_file` of the result counts the rest, images too.
+/// Reads the messages that a replay shows; of long recordings, a share. `left_in_file` of the result counts the rest,
+/// including images.
 ///
 /// # Errors
-/// As [`armcal_core::log::read_recording`].
+/// Errors of [`armcal_core::log::read_recording`].
 pub fn read_for_replay(path: &Path) -> Result<Recording, LogError> {
     let mut thinning = Thinning::default();
     let (recording, _) =
@@ -51,7 +52,7 @@ impl Thinning {
     }
 }
 
-/// Memory of a message with what it points to.
+/// Returns the memory of a message and of the data that it points to.
 pub(super) fn bytes_of(message: &Message) -> usize {
     let pointed = match message {
         Message::Detections(detections) => size_of_val(&detections.tags[..]),
@@ -65,7 +66,7 @@ pub(super) fn bytes_of(message: &Message) -> usize {
     size_of::<(Stamp, Message)>() + pointed
 }
 
-/// Whether the next message of the stream tells the same anew.
+/// Returns true if the stream is a series of measurements, which may be thinned.
 fn is_series(message: &Message) -> bool {
     !matches!(message, Message::Task(_) | Message::Survey(_) | Message::Touch(_) | Message::Mark(_) | Message::Log(_))
 }
@@ -86,7 +87,7 @@ mod tests {
             kept_by_hour[n as usize / 360_000] += u32::from(thinning.keep(stamp, &Message::JointSensors(sample)));
         }
         assert!(kept_by_hour[0] > 200_000 && kept_by_hour[0] < 360_000, "{kept_by_hour:?}");
-        // One more or less at the ends of an hour.
+        // The hours may differ by one message at their ends.
         assert!(kept_by_hour.is_sorted_by(|a, b| a + 1 >= *b) && kept_by_hour[23] > 10_000, "{kept_by_hour:?}");
         assert!(thinning.bytes < MAX_BYTES);
         let text = "x".repeat(1 << 20);

@@ -25,7 +25,7 @@ pub fn write_rrd(input: &ReplayInput, out: &Path) -> Result<(), ReplayError> {
     rrd::write(out, &identity, &blueprint::build(&run), stream)
 }
 
-/// The recording as the drawing modules share it.
+/// Returns the recording as the drawing modules share it.
 pub(super) fn scene<'a>(input: &ReplayInput<'a>) -> Result<ReplayScene<'a>, ReplayError> {
     let mut tracks = Tracks::new(input.recording, input.robot)?;
     // A recording that was never in a file has no images.
@@ -43,12 +43,12 @@ pub(super) fn scene<'a>(input: &ReplayInput<'a>) -> Result<ReplayScene<'a>, Repl
     Ok(ReplayScene { tracks, truth, robot, vehicle, scene, believed_chains, online, state: RunState::Over })
 }
 
-/// All entities of a recording, measured or planned.
+/// Draws all entities of a recording, measured or planned.
 pub(super) fn draw(run: &ReplayScene<'_>, input: &ReplayInput<'_>) -> EntityLog {
     draw_into(EntityLog::of_recording(), run, input)
 }
 
-/// The same without what was shown already.
+/// Draws all entities except those that were already shown.
 pub(super) fn draw_news(run: &ReplayScene<'_>, input: &ReplayInput<'_>, shown: Shown) -> EntityLog {
     draw_into(EntityLog::of_news(shown), run, input)
 }

@@ -1,5 +1,5 @@
-//! What of Rerun's SDK is used, by the names of its crate `rerun`. That crate, and `re_sdk` below it, bring a client of
-//! its servers, a store of recordings, readers of other formats and telemetry: 93 crates more.
+//! The parts of Rerun's SDK that are used, under the names of its crate `rerun`. That crate and `re_sdk` bring 93
+//! further crates: a client of its servers, a store of recordings, readers of other formats and telemetry.
 
 pub(crate) use re_build_info::CrateVersion;
 pub(crate) use re_log_types::{EntityPath, StoreId, StoreKind};

@@ -1,4 +1,5 @@
-//! The tags' names, and what a calibration left of each tag: a frame about it, green where it fits, and else a figure.
+//! Names of the tags, and the residuals of each tag after a calibration: a frame about it, green if it fits, else with
+//! a figure.
 
 use std::collections::BTreeMap;
 
@@ -15,27 +16,27 @@ use armcal_belief::tagmap::files::{FIRST_NAMED_ID, spoken_name};
 use armcal_core::robot::SurveyedTag;
 use armcal_core::time::Stamp;
 
-/// A tag fits where it is not off by more than the first of these times the median tag, nor by the first of the figures
-/// below; beyond the second it does not.
+/// Multiples of the median tag's residual. A tag fits if its residual is at most the first multiple or the first of
+/// `FINE_PX`, the larger of the two. It does not fit if it exceeds the larger of the second values.
 const TIMES_MEDIAN: [f64; 2] = [1.5, 3.0];
-/// Root mean square of corners, px, that is nothing to look at; those of tags without corners have none, m.
+/// Root mean squares of corner residuals that are acceptable in any case, px; tags without corners have no such limit.
 const FINE_PX: [f64; 2] = [0.5, 1.0];
 const NAME_COLOR: Rgba = [225, 225, 225, 255];
-/// Side of a frame, in sides of its tag: about the plate.
+/// Side of a frame over the side of its tag: about the plate.
 const FRAME_SIDE: f64 = 1.5;
 
-/// What is left of one tag.
+/// Residual of one tag.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Left {
-    /// Of its corners, root mean square, px.
+    /// Root mean square of its corner residuals, px.
     Corners(f64),
-    /// Of its place, root mean square, m: the recording has no corners of it.
+    /// Root mean square of its position residuals, m: the recording has no corners of it.
     Place(f64),
-    /// The fit rejected all that was seen of it.
+    /// No residual, because the fit rejected all observations of the tag.
     Rejected,
 }
 
-/// Draws the names, and from each calibration on what it left.
+/// Draws the names and, from each calibration on, the residuals.
 pub(super) fn draw(run: &ReplayScene, residuals: &[(Stamp, &[ViewResidual])], stream: &mut EntityLog) {
     let tags = &run.robot.tags;
     if tags.is_empty() {
@@ -43,7 +44,7 @@ pub(super) fn draw(run: &ReplayScene, residuals: &[(Stamp, &[ViewResidual])], st
     }
     let names = |left: &BTreeMap<u32, (Left, Rgba)>| {
         let label = |tag: &SurveyedTag| match left.get(&tag.id) {
-            // Names alone where all is well: many figures hide the scene.
+            // Only the name of a tag that fits: many figures hide the scene.
             None | Some((_, colors::HIT)) => name(run, tag),
             Some((left, _)) => format!("{}: {}", name(run, tag), left.in_words()),
         };
@@ -83,7 +84,7 @@ impl Left {
     }
 }
 
-/// Of each tag, over all views.
+/// Returns the residual of each tag over all views.
 fn left_of(views: &[ViewResidual]) -> BTreeMap<u32, Left> {
     let mut seen: BTreeMap<u32, Vec<&ObservedTag>> = BTreeMap::new();
     for tag in views.iter().flat_map(|view| &view.tags) {
@@ -102,7 +103,7 @@ fn left_of(views: &[ViewResidual]) -> BTreeMap<u32, Left> {
     seen.into_iter().map(|(id, tags)| (id, left(&tags))).collect()
 }
 
-/// With a colour each: green, amber or red.
+/// Adds a colour to each residual: green, amber or red.
 fn judged(left: &BTreeMap<u32, Left>) -> BTreeMap<u32, (Left, Rgba)> {
     let median = |of: fn(&Left) -> Option<f64>| {
         let mut all: Vec<f64> = left.values().filter_map(of).collect();

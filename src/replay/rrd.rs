@@ -28,7 +28,7 @@ fn encode(file: impl Write, identity: &Identity, entries: &[Entry], drawn: Entit
     let recording = StoreId::new(StoreKind::Recording, APPLICATION, identity.recording_id.clone());
     let version = crate::rerun::CrateVersion::LOCAL;
     let mut encoder = Encoder::new_eager(version, EncodingOptions::PROTOBUF_COMPRESSED, file)?;
-    // A footer is an index that viewers do without, and the encoder orders it by chance.
+    // The footer is an optional index, and the encoder orders it randomly.
     encoder.do_not_emit_footer();
     encoder.append(&store_info(&recording))?;
     for message in layout(&recording, &format!("layout-{}", identity.recording_id), entries)? {
@@ -41,7 +41,7 @@ fn encode(file: impl Write, identity: &Identity, entries: &[Entry], drawn: Entit
     encoder.flush_blocking()
 }
 
-/// A layout for the application of `recording`, and the word to use it.
+/// Returns the messages of a layout for the application of `recording`, and the command to use it.
 pub(super) fn layout(recording: &StoreId, id: &str, entries: &[Entry]) -> Result<Vec<LogMsg>, EncodeError> {
     let blueprint = StoreId::new(StoreKind::Blueprint, recording.application_id().clone(), id);
     let mut log = EntityLog::of_blueprint();

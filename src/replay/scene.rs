@@ -22,17 +22,18 @@ pub struct ReplayInput<'a> {
     pub robot: &'a Robot,
     pub vehicle: Option<&'a Vehicle>,
     pub scene: Option<&'a Scene>,
-    /// Since when the arm was believed to be other than drawn, and how; in the order of time.
+    /// Link corrections of the estimate, each with the time from which they apply, in the order of time.
     pub believed_links: &'a [(Stamp, LinkCorrections)],
-    /// Since when it was believed how surely where the tool is, in the order of time; `None` where nobody said.
+    /// Estimates of the tool's uncertainty, each with the time from which they apply, in the order of time; `None` if
+    /// unknown.
     pub tool_beliefs: &'a [(Stamp, Option<ToolBelief>)],
-    /// What each calibration left of the tags that it saw, since its time.
+    /// Residuals of the tags in each calibration, with its time.
     pub residuals: &'a [(Stamp, &'a [ViewResidual])],
-    /// What planning keeps clear around the arm, m; `None` where nobody says.
+    /// Clearance that planning requires around the arm, m; `None` if unknown.
     pub clearance_m: Option<f64>,
-    /// What was believed online.
+    /// Online estimates.
     pub online: Option<&'a BeliefLog>,
-    /// Shown as it is, in place of a short description of the recording.
+    /// Text that is shown unchanged, instead of a short description of the recording.
     pub summary_markdown: Option<&'a str>,
 }
 
@@ -43,15 +44,16 @@ pub(crate) struct ReplayScene<'a> {
     pub robot: &'a Robot,
     pub vehicle: Option<&'a Vehicle>,
     pub scene: Option<&'a Scene>,
-    /// Arms that were believed in since a time, s, before which there was the drawing.
+    /// Estimated kinematic chains, each with the time from which it applies, s; before the first one, the nominal model
+    /// (URDF) applies.
     pub believed_chains: Vec<(f64, Chain)>,
-    /// What was believed online.
+    /// Online estimates.
     pub online: Option<&'a BeliefLog>,
-    /// Whether more will come.
+    /// State of the run: over or in progress.
     pub state: RunState,
 }
 
-/// How far a run is while it is shown.
+/// State of a run while it is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum RunState {
     Over,
@@ -59,7 +61,7 @@ pub(crate) enum RunState {
 }
 
 impl ReplayScene<'_> {
-    /// Poses of the links of the arm that was believed in, at believed angles.
+    /// Returns the link poses of the estimated arm at the estimated angles.
     pub(crate) fn believed_poses(&self, time_s: f64, angles: &JointAngles) -> LinkPoses {
         let since = self.believed_chains.partition_point(|(since_s, _)| *since_s <= time_s);
         let chain = since.checked_sub(1).map_or(&self.robot.chain, |at| &self.believed_chains[at].1);

@@ -13,14 +13,14 @@ use armcal_core::spatial::{Pose, Vehicle, World};
 
 /// Half of the seafloor that is drawn, m.
 const SEAFLOOR_HALF_M: f64 = 8.0;
-/// Side of a board whose size nobody says, m.
+/// Side of a board of unknown size, m.
 pub(super) const LANDMARK_M: f64 = 0.1;
-/// Movements below these are not drawn again.
+/// Motions below which nothing is drawn again.
 const SAME_M: f64 = 2e-5;
 const SAME_RAD: f64 = 2e-5;
 
 impl ReplayScene<'_> {
-    /// Pose of the vehicle: by truth, else by its attitude sensor, else at rest.
+    /// Returns the pose of the vehicle: by truth, else by its attitude sensor, else at rest.
     pub(super) fn world_from_vehicle(&self, time_s: f64) -> Pose<World, Vehicle> {
         let measured = || {
             let turn = self.tracks.attitude.at(time_s)?;
@@ -31,7 +31,7 @@ impl ReplayScene<'_> {
     }
 }
 
-/// An entity that moves; it is drawn again only after a motion.
+/// Moving entity, which is drawn again only after a motion.
 pub(super) struct Mover {
     entity: String,
     last: Option<Isometry3<f64>>,
@@ -89,7 +89,7 @@ fn draw_site(run: &ReplayScene, stream: &mut EntityLog) {
     log_shapes(stream, &format!("{WORLD}/obstacles"), obstacles, Look::Drawn);
 }
 
-/// Each tag as a white plate with a black square and a white middle; the base tag's plate is blue.
+/// Draws each tag as a white plate with a black square and a white middle; the base tag's plate is blue.
 fn draw_tags(run: &ReplayScene, stream: &mut EntityLog) {
     let tags = &run.robot.tags;
     if tags.is_empty() {

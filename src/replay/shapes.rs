@@ -8,16 +8,16 @@ use crate::entity_log::EntityLog;
 use crate::poses::{quaternion, vector};
 use armcal_core::robot::{Hull, PlacedShape, Shape};
 
-/// How a body looks.
+/// Style of a body.
 #[derive(Clone, Copy)]
 pub(super) enum Look {
-    /// In the colours of its drawing.
+    /// Colours of its nominal model.
     Drawn,
-    /// See-through, in one colour.
+    /// Transparent, in one colour.
     Ghost(Rgba),
 }
 
-/// One batch of shapes of a kind.
+/// Batch of shapes of one kind.
 #[derive(Default)]
 struct Batch {
     sizes: Vec<[f32; 3]>,
@@ -76,7 +76,7 @@ pub(super) fn log_shapes<'a>(
             Shape::Box { size_m } => boxes.push(size_m.map(|v| 0.5 * v), place, color),
             Shape::Cylinder { radius_m, length_m } => cylinders.push([radius_m, radius_m, length_m], place, color),
             Shape::Capsule { radius_m, length_m } => {
-                // Rerun's capsule begins at its origin, ours has its centre there.
+                // Rerun's capsule begins at its origin; ours is centred there.
                 let begin = place * Translation3::new(0.0, 0.0, -0.5 * length_m);
                 capsules.push([radius_m, radius_m, length_m], begin, color);
             }
@@ -108,7 +108,7 @@ pub(super) fn log_shapes<'a>(
     }
 }
 
-/// A hull as a mesh in its owner's frame. Each triangle has corners of its own: a body with edges, not a soft one.
+/// Returns a hull as a mesh in its owner's frame. Each triangle has its own corners, so that edges are sharp.
 fn mesh(hull: &Hull, place: &Isometry3<f64>, color: Rgba) -> Mesh3D {
     let (mut corners, mut normals) = (Vec::new(), Vec::new());
     for triangle in hull.triangles() {
@@ -124,7 +124,7 @@ fn mesh(hull: &Hull, place: &Isometry3<f64>, color: Rgba) -> Mesh3D {
     Mesh3D::new(corners).with_vertex_normals(normals).with_triangle_indices(triangles).with_albedo_factor(color)
 }
 
-/// A name as one part of an entity's path.
+/// Returns a name as one part of an entity's path.
 pub(super) fn path_part(name: &str) -> String {
     name.chars().map(|c| if c.is_ascii_alphanumeric() || c == '_' || c == '-' { c } else { '_' }).collect()
 }

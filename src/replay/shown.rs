@@ -1,14 +1,14 @@
-//! What a viewer has of a run that goes on, so that each row is sent once.
+//! Data that a viewer has of a run in progress, so that each row is sent once.
 
 use std::collections::BTreeMap;
 
 use crate::rerun::SerializedComponentBatch;
 use nalgebra::Isometry3;
 
-/// Rows are drawn at most this long after their time, s: a mark is recorded when its span is over.
+/// Largest delay of a drawn row, s: a mark is recorded when its span is over.
 const LATE_S: f64 = 60.0;
 
-/// What was sent to a viewer.
+/// Data that were sent to a viewer.
 #[derive(Default)]
 pub(super) struct Shown {
     rows: BTreeMap<String, BTreeMap<i64, Rows>>,
@@ -19,16 +19,16 @@ pub(super) struct Shown {
     newest_nanos: i64,
 }
 
-/// Rows of one entity and time.
+/// Counts of the rows of one entity and time.
 #[derive(Clone, Copy, Default)]
 struct Rows {
     sent: usize,
-    /// In the present drawing.
+    /// Rows in the present drawing.
     drawn: usize,
 }
 
 impl Shown {
-    /// Counts a row of the present drawing; whether it is to be sent.
+    /// Counts a row of the present drawing; returns true if it must be sent.
     pub fn note_row(&mut self, entity: &str, nanos: i64) -> bool {
         if self.since_nanos.is_some_and(|since| nanos < since) {
             return false;
@@ -45,7 +45,7 @@ impl Shown {
         is_new
     }
 
-    /// Notes data without a time; whether it is to be sent, because it is new or other than before.
+    /// Stores data without a time; returns true if they must be sent, because they are new or have changed.
     pub fn note_fixed(&mut self, entity: &str, batches: &[SerializedComponentBatch]) -> bool {
         let is_new = self.fixed.get(entity).is_none_or(|sent| !is_same(sent, batches));
         if is_new {
@@ -66,7 +66,7 @@ impl Shown {
         self.poses.insert(entity.to_owned(), *pose);
     }
 
-    /// All rows of the present drawing are noted: what is too old to be drawn again is forgotten.
+    /// Ends the present drawing, and forgets rows that are too old to be drawn again.
     pub fn end_drawing(&mut self) {
         let since = self.newest_nanos - (1e9 * LATE_S) as i64;
         self.since_nanos = Some(since);

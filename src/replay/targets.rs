@@ -11,10 +11,10 @@ use crate::scene::ReplayScene;
 use crate::tracks::Span;
 use armcal_core::streams::{MarkKind, ReachAttempt, ReachTask};
 
-/// Small tolerances are drawn larger than they are, to be seen at all, m.
+/// Smallest radius of a drawn target, m: small tolerances are drawn larger to be visible.
 const SMALLEST_M: f64 = 0.02;
 
-/// One arrival at a target, judged by truth.
+/// Arrival at a target, judged by truth.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Arrival {
     pub time_s: f64,
@@ -27,14 +27,14 @@ pub(super) struct Arrival {
 }
 
 impl ReplayScene<'_> {
-    /// The arrivals in the order of time; none without truth.
+    /// Returns the arrivals in the order of time; none without truth.
     pub(super) fn arrivals(&self) -> Vec<Arrival> {
         let mut arrivals: Vec<Arrival> = self.tracks.marks.iter().filter_map(|mark| self.arrival(mark)).collect();
         arrivals.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
         arrivals
     }
 
-    /// The arrival of a reach mark.
+    /// Returns the arrival of a reach mark.
     pub(super) fn arrival(&self, mark: &Span) -> Option<Arrival> {
         let MarkKind::Reach { attempt, target_idx } = mark.kind else { return None };
         let (_, task) = self.tracks.task?;
@@ -81,7 +81,7 @@ impl<'a> TargetMarkers<'a> {
     fn draw_targets(&self, stream: &mut EntityLog, time_s: f64) {
         let positions = self.task.targets_m.iter().map(|target| target.map(|v| v as f32));
         let shades = self.latest.iter().map(|latest| latest.map_or(colors::TARGET, verdict_color));
-        // All figures at once would hide one another and the tags: those of earlier arrivals are in the log.
+        // Figures of earlier arrivals are only in the log: all figures at once would hide one another and the tags.
         let last = self.all.last().map(|arrival| arrival.target_idx);
         let labels = self.latest.iter().enumerate().map(|(at, latest)| match latest.filter(|_| last == Some(at)) {
             None => (at + 1).to_string(),
@@ -97,14 +97,14 @@ impl<'a> TargetMarkers<'a> {
         stream.draw(&format!("{BASE}/task/targets"), time_s, &balls);
     }
 
-    /// Miss of the same target before calibration, for an `arrival` after it.
+    /// Returns the miss of the same target before calibration, for an `arrival` after it.
     fn missed_before_m(&self, arrival: &Arrival) -> Option<f64> {
         let earlier = |a: &&Arrival| a.target_idx == arrival.target_idx && a.attempt == ReachAttempt::Before;
         let before = self.all.iter().rev().find(earlier)?;
         (arrival.attempt == ReachAttempt::After).then_some(before.miss_m)
     }
 
-    /// Lines from the targets to where the tool came to rest, with a ball there.
+    /// Draws lines from the targets to the tool's rest positions, with a ball there.
     fn draw_rests(&self, stream: &mut EntityLog, time_s: f64, attempt: ReachAttempt) {
         let shown: Vec<&Arrival> = self.all.iter().filter(|arrival| arrival.attempt == attempt).collect();
         if shown.is_empty() {

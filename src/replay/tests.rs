@@ -1,4 +1,4 @@
-//! A small made-up run, shown.
+//! Replay of a small made-up run.
 
 mod beside_the_arm;
 mod live_view;
@@ -28,7 +28,7 @@ fn robots() -> PathBuf {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots")
 }
 
-/// One leg: to `goal` as believed, then a rest in which something is marked.
+/// Leg of the run: to `goal` by the estimate, then a rest in which something is marked.
 struct Leg {
     goal: JointAngles,
     move_s: f64,
@@ -153,7 +153,7 @@ fn ros_pose(pose: &Isometry3<f64>) -> ros::Pose {
     ros::Pose { position: [t.x, t.y, t.z].into(), orientation }
 }
 
-/// Joint angles that bring the believed tool to a target.
+/// Returns joint angles that bring the estimated tool to a target.
 fn reaching(robot: &Robot, target_m: [f64; 3]) -> JointAngles {
     let limits = robot
         .chain
@@ -170,7 +170,7 @@ fn reaching(robot: &Robot, target_m: [f64; 3]) -> JointAngles {
     solve_position(&robot.chain, &robot.tool.mount, &goal, &robot.stowed, &settings).unwrap_or(robot.stowed)
 }
 
-/// Files of a run with `n_views` views, in `dir`: reach, look about, calibrate, reach again.
+/// Writes the files of a run with `n_views` views in `dir`: reach, look about, calibrate, reach again.
 fn fabricate(dir: &Path, n_views: u32) -> (PathBuf, PathBuf) {
     let robot = armcal_core::robot::load(&robots().join("titan4")).unwrap();
     let (run_path, truth_path) = (dir.join("run.mcap"), dir.join("truth.mcap"));
@@ -244,7 +244,7 @@ fn input<'a>(recording: &'a Recording, robot: &'a Robot) -> ReplayInput<'a> {
     }
 }
 
-/// Chunks of the recording in a file, as Rerun's own decoder reads it.
+/// Returns the chunks of the recording in a file, as Rerun's own decoder reads it.
 fn chunks(rrd: &Path) -> Vec<crate::rerun::log::Chunk> {
     use re_log_encoding::DecoderApp;
     let file = std::io::BufReader::new(std::fs::File::open(rrd).unwrap());
@@ -259,7 +259,7 @@ fn chunks(rrd: &Path) -> Vec<crate::rerun::log::Chunk> {
     chunks
 }
 
-/// Entities of the recording in a file with their rows.
+/// Returns the entities of the recording in a file with their number of rows.
 fn entities(rrd: &Path) -> std::collections::BTreeMap<String, usize> {
     let mut entities = std::collections::BTreeMap::new();
     for chunk in chunks(rrd) {
@@ -268,14 +268,14 @@ fn entities(rrd: &Path) -> std::collections::BTreeMap<String, usize> {
     entities
 }
 
-/// Images as they are in the recording, under what was seen and what was not believed.
+/// Recorded images are shown, below detections and rejects.
 #[test]
 fn images_and_rejects_are_shown_where_there_are_any() {
     let dir = tempfile::tempdir().unwrap();
     let (run, out) = (dir.path().join("run.mcap"), dir.path().join("run.rrd"));
     let robot = armcal_core::robot::load(&robots().join("titan4")).unwrap();
     let mut writer = RecordingWriter::create(&run, RecordingHeader::new(robot.joint_names())).unwrap();
-    // No more than its mark at both ends: nobody decodes it on the way.
+    // Only the markers at both ends of a JPEG: nobody decodes it on the way.
     let jpeg = [&[0xff, 0xd8][..], b"not decoded by anybody", &[0xff, 0xd9]].concat();
     let reject = DetectionReject { id: 7, corners_px: [[9.0; 2]; 4], reason: RejectReason::LowContrast };
     for n in 0..40 {
@@ -295,7 +295,7 @@ fn images_and_rejects_are_shown_where_there_are_any() {
     assert_eq!(entities.get("/camera/image"), Some(&11), "{entities:?}");
     assert_eq!(entities.get("/camera/rejected"), Some(&12), "{entities:?}");
     assert!(!entities.contains_key("/camera/background"));
-    // The viewer panics where one chunk holds images and their end.
+    // The viewer panics if one chunk holds images and their end.
     let of_image = chunks(&out).into_iter().filter(|chunk| chunk.entity_path().to_string() == "/camera/image");
     let has = |chunk: &crate::rerun::log::Chunk, archetype: &str| {
         chunk.component_descriptors().any(|c| c.archetype.is_some_and(|name| name.short_name() == archetype))
@@ -329,7 +329,7 @@ fn a_run_becomes_a_file_that_rerun_reads() {
     assert!(entities["/plots/joint_error"] > 100);
 }
 
-/// The believed arm is the drawing's until links were estimated, and theirs from then on.
+/// The estimated arm has the nominal links until links are estimated, and the estimated links from then on.
 #[test]
 fn the_believed_arm_is_that_of_its_time() {
     let (_dir, recording, _, robot) = small();
@@ -369,7 +369,7 @@ fn jaws_move_while_the_arm_rests() {
     assert!(left > link + 20 && right == left, "{link} {left} {right}");
 }
 
-/// Each touch is there from its time on, with those before it.
+/// Each touch is shown from its time on, with those before it.
 #[test]
 fn surfaces_that_were_touched_are_shown() {
     let (dir, mut recording, _, robot) = small();
@@ -449,7 +449,7 @@ fn a_jump_of_log_time_is_a_gap() {
     assert!(run.tracks.frames().is_sorted());
 }
 
-/// Nothing is believed for a minute: a sensor that slipped meanwhile is drawn as no drift.
+/// Without estimates for a minute, a sensor that slips meanwhile is not drawn as drift.
 #[test]
 fn a_wait_without_a_belief_ends_the_lines() {
     let (_dir, mut recording, _, robot) = small();

@@ -1,4 +1,4 @@
-//! Where the tool touched surveyed surfaces: the point, the surface's normal and its name.
+//! Touches of surveyed surfaces by the tool: the point, the surface's normal and its name.
 
 use crate::rerun::{Arrows3D, Points3D};
 

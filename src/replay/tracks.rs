@@ -14,27 +14,28 @@ use armcal_core::streams::{
 };
 use armcal_core::time::Stamp;
 
-/// A message's own stamp places it if it is this near to its log time; else its clock is not the recorder's.
+/// Largest difference of a message's own stamp and its log time. With a larger one, its clock is not the recorder's.
 const CLOCKS_AGREE_S: f64 = 1.0;
-/// Samples nearer in time than this are dropped: nothing is drawn that fast.
+/// Smallest spacing of samples; nearer ones are dropped, because nothing is drawn that fast.
 const MIN_SPACING_S: f64 = 0.0095;
-/// The same for images, which take most of the file.
+/// Smallest spacing of images, which take most of the file.
 const MIN_IMAGE_SPACING_S: f64 = 0.095;
-/// Images that are kept, bytes; each time a quarter is reached, their rate halves.
+/// Largest memory of kept images, bytes; their rate halves at each quarter.
 const MAX_IMAGE_BYTES: usize = 96 << 20;
-/// Marks that are drawn, and lines of the log.
+/// Largest number of drawn marks, and of lines of the log.
 const MAX_MARKS: usize = 20_000;
-/// Touches that are drawn, each with those before it.
+/// Largest number of drawn touches, each of which draws the earlier ones again.
 const MAX_TOUCHES: usize = 200;
 /// Longest recording. Beyond it a wrong log time is likely.
 const LONGEST_S: f64 = 7.0 * 24.0 * 3600.0;
-/// Steps of everything that moves.
+/// Rate of moving entities, Hz.
 const FRAME_HZ: f64 = 25.0;
-/// Without any message for longer than this nothing is drawn, s: a clock that was set, or a recorder that was off.
+/// Time without any message beyond which nothing is drawn, s: a clock was set, or the recorder was off.
 pub(super) const GAP_S: f64 = 30.0;
-/// What was last shown is drawn this far into a gap, s.
+/// Time for which the last data are drawn into a gap, s.
 pub(super) const HOLD_S: f64 = 2.0;
-/// Moments at which one thing is drawn, at most; longer recordings are drawn at lower rates. One hour of frames.
+/// Largest number of times at which one entity is drawn: one hour of frames. Longer recordings are drawn at lower
+/// rates.
 const MAX_TICKS: f64 = 90_000.0;
 
 /// Values over time, s, ascending.
@@ -65,13 +66,13 @@ impl<T> TimeSeries<T> {
         self.samples.iter()
     }
 
-    /// The latest value at `time_s`; the first one before it.
+    /// Returns the latest value at `time_s`; the first one before it.
     pub fn at(&self, time_s: f64) -> Option<&T> {
         let after = self.samples.partition_point(|(t, _)| *t <= time_s);
         self.samples.get(after.saturating_sub(1)).map(|(_, value)| value)
     }
 
-    /// The value at `time_s` between its two neighbours, by `blend(before, after, share)`.
+    /// Returns the value at `time_s` between its two neighbours, by `blend(before, after, share)`.
     pub fn between(&self, time_s: f64, blend: impl Fn(&T, &T, f64) -> T) -> Option<T> {
         let after = self.samples.partition_point(|(t, _)| *t <= time_s);
         let (t0, before) = self.samples.get(after.saturating_sub(1))?;
@@ -81,12 +82,12 @@ impl<T> TimeSeries<T> {
     }
 }
 
-/// Linear between two sets of joint angles.
+/// Returns the linear interpolation between two sets of joint angles.
 pub(super) fn blend_angles(a: &JointAngles, b: &JointAngles, share: f64) -> JointAngles {
     JointAngles::from_fn(a.len(), |j| a[j] + share * (b[j] - a[j]))
 }
 
-/// A straight line and the shorter turn between two poses.
+/// Returns the interpolation between two poses: a straight line and the shorter turn.
 pub(super) fn blend_poses(a: &Isometry3<f64>, b: &Isometry3<f64>, share: f64) -> Isometry3<f64> {
     a.try_lerp_slerp(b, share, 1e-9).unwrap_or(*a)
 }
@@ -99,12 +100,12 @@ pub(super) struct Span {
     pub kind: MarkKind,
 }
 
-/// The moments at which moving things are drawn: after one time, up to another.
+/// Interval of times at which moving entities are drawn.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Window {
     pub after_s: f64,
     pub until_s: f64,
-    /// Moments at which one thing is drawn, at most.
+    /// Largest number of times at which one entity is drawn.
     pub max_ticks: f64,
 }
 
@@ -114,7 +115,7 @@ impl Default for Window {
     }
 }
 
-/// One moment at which something that moves is drawn.
+/// Time at which a moving entity is drawn.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tick {
     pub time_s: f64,
@@ -126,7 +127,7 @@ pub(super) struct Tick {
 pub(super) struct Tracks<'a> {
     start: Stamp,
     pub duration_s: f64,
-    /// All of the recording, unless the run goes on.
+    /// Drawn part: the whole recording, or part of a run in progress.
     pub window: Window,
     /// Spans with messages, s, ascending, with gaps between them.
     covered: Vec<(f64, f64)>,
@@ -135,7 +136,7 @@ pub(super) struct Tracks<'a> {
     pub attitude: TimeSeries<UnitQuaternion<f64>>,
     pub oil_c: TimeSeries<f64>,
     pub water_c: TimeSeries<f64>,
-    /// Between the jaws, m.
+    /// Gap between the jaws, m.
     pub gripper: TimeSeries<f64>,
     pub views: Vec<(f64, &'a TagDetections)>,
     /// Rejected detections.
@@ -222,7 +223,8 @@ impl<'a> Tracks<'a> {
         }
     }
 
-    /// Takes the images, which a recording in memory leaves in its file, unless they follow each other too closely.
+    /// Takes the images from the file, where a recording in memory leaves them, unless they follow each other too
+    /// closely.
     pub fn take_images(&mut self, file: &Path) -> Result<(), LogError> {
         let (mut images, mut bytes, mut latest_s) = (Vec::<(f64, CameraImage)>::new(), 0, f64::NEG_INFINITY);
         for_each_image(file, |log_time, image| {
@@ -255,36 +257,37 @@ impl<'a> Tracks<'a> {
         }
     }
 
-    /// A mark is logged when its span is over.
+    /// Returns the span of a mark, which is logged at the end of its span.
     fn span(&self, log_time: Stamp, mark: &Mark) -> Span {
         let end_s = self.place_s(log_time, mark.end);
         let start_s = (end_s - mark.end.since_s(mark.start)).max(0.0);
         Span { start_s, end_s, kind: mark.kind }
     }
 
-    /// Time of a message: its own stamp if that clock agrees with the recorder's, else its log time.
+    /// Returns the time of a message: its own stamp if that clock agrees with the recorder's, else its log time.
     pub fn place_s(&self, log_time: Stamp, stamp: Stamp) -> f64 {
         let (logged_s, stamped_s) = (log_time.since_s(self.start), stamp.since_s(self.start));
         let placed_s = if (stamped_s - logged_s).abs() <= CLOCKS_AGREE_S { stamped_s } else { logged_s };
         placed_s.clamp(0.0, self.duration_s)
     }
 
-    /// Log time at a moment of the timeline.
+    /// Returns the log time at a time of the timeline.
     pub fn stamp_at(&self, time_s: f64) -> Stamp {
         self.start.plus_s(time_s)
     }
 
-    /// The moments at which moving things are drawn, s.
+    /// Returns the times at which moving entities are drawn, s.
     pub fn frames(&self) -> impl Iterator<Item = f64> {
         self.ticks(FRAME_HZ)
     }
 
-    /// Moments at `rate_hz` from the start to the end, s, without those in gaps.
+    /// Returns times at `rate_hz` from the start to the end, s, without those in gaps.
     pub fn ticks(&self, rate_hz: f64) -> impl Iterator<Item = f64> {
         self.ticks_with_lead(rate_hz, 0).map(|tick| tick.time_s)
     }
 
-    /// The same with so many ticks before them that were drawn already: for what depends on the moments before.
+    /// Returns the ticks at `rate_hz`, preceded by up to `lead` ticks that were already drawn: some drawings depend on
+    /// earlier times.
     pub fn ticks_with_lead(&self, rate_hz: f64, lead: u64) -> impl Iterator<Item = Tick> {
         let rate_hz = self.affordable_hz(rate_hz);
         let Window { after_s, until_s, .. } = self.window;
@@ -298,7 +301,7 @@ impl<'a> Tracks<'a> {
         })
     }
 
-    /// `rate_hz`, or the share of it that a long recording can be drawn at.
+    /// Returns `rate_hz`, or the largest share of it at which a long recording can be drawn.
     pub fn affordable_hz(&self, rate_hz: f64) -> f64 {
         let Window { after_s, until_s, max_ticks } = self.window;
         let in_window = |(from_s, to_s): &(f64, f64)| (to_s.min(until_s) - from_s.max(after_s)).max(0.0);
@@ -306,13 +309,13 @@ impl<'a> Tracks<'a> {
         rate_hz / (covered_s * rate_hz / max_ticks).ceil().max(1.0)
     }
 
-    /// Starts of the gaps without messages, s.
+    /// Returns the starts of the gaps without messages, s.
     pub fn gaps(&self) -> impl Iterator<Item = f64> {
         self.covered.iter().rev().skip(1).rev().map(|(_, to_s)| *to_s)
     }
 }
 
-/// Spans with messages no farther apart than [`GAP_S`], s since `start`.
+/// Returns the spans with messages at most [`GAP_S`] apart, s since `start`.
 fn covered(recording: &Recording, start: Stamp, duration_s: f64) -> Vec<(f64, f64)> {
     let mut spans = vec![(0.0, 0.0)];
     for (log_time, _) in &recording.messages {

@@ -1,4 +1,4 @@
-//! Reads the simulator's truth file, as far as it can be drawn.
+//! Reader of the parts of the simulator's truth file that can be drawn.
 
 use std::path::Path;
 
@@ -26,19 +26,19 @@ pub(super) struct Truth {
     joints: TimeSeries<JointAngles>,
     world_from_vehicle: TimeSeries<Isometry3<f64>>,
     base_from_tool: TimeSeries<Isometry3<f64>>,
-    /// What was nearest to the arm, in the order of time.
+    /// Nearest parts over time.
     pub clearances: Vec<Clearance>,
     /// Faults with their times, s, as sentences.
     pub faults: Vec<Fault>,
 }
 
-/// The nearest two parts at a moment.
+/// Two nearest parts at one time.
 #[derive(Clone)]
 pub(super) struct Clearance {
     pub time_s: f64,
-    /// Not above 0 where they touch.
+    /// Distance between the parts; at most 0 if they touch.
     pub distance_m: f64,
-    /// Names of a link and of what it is near to.
+    /// Names of a link and of the part nearest to it.
     pub parts: [String; 2],
 }
 
@@ -84,7 +84,7 @@ impl Truth {
         self.world_from_vehicle.between(time_s, blend_poses).map(Pose::from_isometry)
     }
 
-    /// True pose of the tool.
+    /// Returns the true pose of the tool.
     pub fn base_from_tool(&self, time_s: f64) -> Option<Pose<Base, Tool>> {
         self.base_from_tool.between(time_s, blend_poses).map(Pose::from_isometry)
     }
@@ -95,12 +95,12 @@ struct Reader<'a> {
     robot: &'a Robot,
     tracks: &'a Tracks<'a>,
     truth: Truth,
-    /// Messages on topics under /truth/.
+    /// Number of messages on topics under /truth/.
     topics: u64,
 }
 
 impl Reader<'_> {
-    /// A least clearance is noted after its time.
+    /// Sorts the series, because a least clearance is recorded after its time.
     fn sorted(mut self) -> Truth {
         self.truth.clearances.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
         self.truth
@@ -151,7 +151,7 @@ impl Reader<'_> {
         self.tracks.place_s(log_time, Stamp::try_from(time).unwrap_or(log_time))
     }
 
-    /// The angles in the order of the robot's joints.
+    /// Returns the angles in the order of the robot's joints.
     fn angles(&self, message: &RawMessage<'_>, joints: &ros::JointState) -> Result<JointAngles, ReplayError> {
         let expected = self.robot.joint_names();
         let find = |name: &String| {

@@ -1,7 +1,8 @@
-//! The ellipsoid about the believed tool in which the tool is with 95 %, as sure as the arm is of its sensors.
+//! Ellipsoid about the estimated tool position that contains the true position with 95 % probability, by the estimate's
+//! covariance.
 //!
-//! It is a part of the arm's link in the viewer and moves with it; its size follows in coarser steps. One that is too
-//! small to be seen is drawn larger, as its entity's name and its label say.
+//! In the viewer it belongs to the arm's link and moves with it; its size changes in coarser steps. An ellipsoid too
+//! small to be visible is drawn larger, as its entity's name and its label say.
 
 use std::collections::BTreeSet;
 
@@ -18,41 +19,42 @@ use armcal_belief::calib::ConditionHistory;
 use armcal_core::stats::chi_square_quantile;
 use armcal_core::streams::JointAngles;
 
-/// Names of the entities, in the frame of the link that carries the tool.
+/// Names of the entities, in the frame of the link that carries the tool: drawn to scale, and enlarged.
 pub(super) const AS_LARGE: &str = "tool_95_percent";
 pub(super) const LARGER: &str = "tool_95_percent_drawn_20_times_as_large";
-/// What the second of them is drawn larger by.
+/// Factor by which the second one is enlarged.
 pub(super) const FACTOR: f64 = 20.0;
-/// Share of the errors inside of the ellipsoid.
+/// Probability that the ellipsoid contains the error.
 const PROBABILITY: f64 = 0.95;
-/// Steps of its size, and how many there are at most: longer recordings have them farther apart.
+/// Rate at which its size is drawn, Hz; `MOST_STEPS` is the largest number of drawn sizes, which lowers the rate of
+/// long recordings.
 const RATE_HZ: f64 = 5.0;
 const MOST_STEPS: f64 = 4000.0;
-/// Where the longest half axis is never above this, m, it is drawn larger.
+/// Longest half axis below which the ellipsoid is enlarged, m.
 const SMALL_M: f64 = 0.015;
-/// The label's height above it, m.
+/// Height of the label above the ellipsoid, m.
 const LABEL_M: f64 = 0.22;
-/// Beyond this, m, nothing is known of the tool.
+/// Half axis from which on the tool position is regarded as unknown, m.
 const UNKNOWN_M: f64 = 1.5;
-/// Changes of the covariance below this share of it are not drawn again.
+/// Relative change of the covariance below which the ellipsoid is not drawn again.
 const SAME_SHARE: f64 = 0.02;
-/// Moves of the centre below this are not drawn again, m.
+/// Motion of the centre below which the ellipsoid is not drawn again, m.
 const SAME_M: f64 = 2e-5;
 
-/// An ellipsoid at a moment, in the frame of the link.
+/// Ellipsoid at one time, in the frame of the link.
 #[derive(Clone, Copy)]
 struct Region {
     time_s: f64,
     center_m: Vector3<f64>,
-    /// Of the errors, scaled so that its ellipsoid holds the probability, m^2.
+    /// Covariance of the errors, scaled so that its ellipsoid holds the probability, m^2.
     covariance_m2: Matrix3<f64>,
     half_axes_m: Vector3<f64>,
     turn: UnitQuaternion<f64>,
-    /// The base's upward direction.
+    /// Upward direction of the base.
     up: Vector3<f64>,
 }
 
-/// Draws it for each span of a belief that says how sure it is.
+/// Draws the ellipsoid for each span of an estimate with a covariance.
 pub(super) fn draw(run: &ReplayScene, input: &ReplayInput, stream: &mut EntityLog) {
     let beliefs = input.tool_beliefs;
     if beliefs.is_empty() {
@@ -102,7 +104,8 @@ fn draw_spans(run: &ReplayScene, since_s: &[f64], spans: &[Vec<Region>], stream:
     }
 }
 
-/// By the largest of a span, so that its factor does not change within a belief; `None` without any.
+/// Returns the entity's name by the largest ellipsoid of a span, so that the factor is constant within an estimate;
+/// `None` if the span is empty.
 fn name_of(span: &[Region]) -> Option<&'static str> {
     let largest_m = span.iter().map(|region| region.half_axes_m.max()).fold(0.0, f64::max);
     (!span.is_empty()).then_some(if largest_m > SMALL_M { AS_LARGE } else { LARGER })
@@ -143,14 +146,14 @@ impl Region {
             .with_centers([vector(&self.center_m)])
             .with_quaternions([quaternion(&self.turn)]);
         stream.draw(entity, self.time_s, &ellipsoid);
-        // Above the ellipsoid, not to hide it: the viewer writes below the point.
+        // The label is above the ellipsoid, not to hide it: the viewer writes below the point.
         let above_m = self.center_m + (factor * longest_m + LABEL_M) * self.up;
         let label = Points3D::update_fields().with_positions([vector(&above_m)]).with_labels([label]);
         stream.draw(&format!("{entity}/size"), self.time_s, &label);
     }
 }
 
-/// Where the link that carries the tool is drawn.
+/// Returns the pose at which the link that carries the tool is drawn.
 fn base_from_carrier(run: &ReplayScene, time_s: f64, angles: &JointAngles) -> Isometry3<f64> {
     let poses =
         if run.has_true_joints() { run.believed_poses(time_s, angles) } else { run.robot.chain.link_poses(angles) };

@@ -35,7 +35,7 @@ fn open_with(program: &str, rrd: &Path) -> Result<Child, ViewerError> {
     if !rrd.is_file() {
         return Err(ViewerError::NoFile { path: rrd.to_owned() });
     }
-    // By default the viewer listens to the whole network.
+    // Binds to the loopback: by default the viewer listens to the whole network.
     let started =
         Command::new(program).arg(rrd).args(["--bind", "127.0.0.1"]).stdin(Stdio::null()).stdout(Stdio::null()).spawn();
     started.map_err(|source| match source.kind() {

@@ -9,9 +9,9 @@ use crate::scene::ReplayScene;
 /// wide).
 const HALF_UP: f64 = 0.52;
 const HALF_ACROSS: f64 = 1.7 * HALF_UP;
-/// Share of the picture that the scene takes.
+/// Share of the picture that the scene fills.
 const FILL: f64 = 0.82;
-/// Samples of the arm's configuration over the run.
+/// Number of sampled configurations of the arm over the run.
 const SAMPLES: u32 = 200;
 /// Direction to the viewpoint in the base frame, rad: about z from x, and above the horizon.
 const AZIMUTH_RAD: f64 = -0.95;
@@ -34,12 +34,12 @@ pub(super) fn frame(run: &ReplayScene) -> Viewpoint {
             points.push(poses.frame(&run.robot.tool.mount).translation.vector);
         }
     }
-    // Tags that the arm carries are where its links are.
+    // Tags that the arm carries move with its links.
     let beside = run.robot.tags.iter().filter(|_| !run.robot.is_watched());
     points.extend(beside.map(|tag| tag.base_from_tag.origin().vector()));
     points.extend(run.tracks.task.iter().flat_map(|(_, task)| task.targets_m.iter().map(|t| Vector3::from(*t))));
     points.push(Vector3::zeros());
-    // The axes of the picture: towards the viewer, to its right and up.
+    // Axes of the picture: towards the viewer, to its right and up.
     let around = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), AZIMUTH_RAD);
     let towards = around * Vector3::new(ELEVATION_RAD.cos(), 0.0, ELEVATION_RAD.sin());
     let right = Vector3::z().cross(&towards).normalize();

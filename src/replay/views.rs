@@ -1,4 +1,4 @@
-//! The views of a real arm's recording as its calibration has them: the arm at each rest, and where it saw its tags.
+//! Views of a real arm's recording after calibration: the arm at each rest, and the tags that it observed.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -21,14 +21,14 @@ use armcal_core::log::Recording;
 use armcal_core::robot::Robot;
 use armcal_core::streams::{CaptureSet, JointStateBelief, Mark, MarkKind, Message};
 
-/// What is shown of a calibration.
+/// Views and robots of a calibration that are shown.
 pub struct ViewsInput<'a> {
     pub views: &'a [View],
-    /// By drawing and datasheet, with the tags that were around the arm.
+    /// Robot by nominal model and datasheet, with the tags that were around the arm.
     pub drawn: &'a Robot,
-    /// The same with the camera's mount and the links as calibrated.
+    /// Robot with the calibrated camera mount and links.
     pub calibrated: &'a Robot,
-    /// What each view's reading means as calibrated, rad; one for each view.
+    /// Calibrated joint angles of each view, rad.
     pub angles: &'a [JointAngles],
     pub summary_markdown: &'a str,
 }
@@ -74,7 +74,7 @@ const LEGEND: &str = "### How to read the picture\n\n\
       camera to the mean of its sightings\n\
     - upper plot: how far a view's sightings are from their mean, by the datasheet and as calibrated\n";
 
-/// The angles of each view, and a mark.
+/// Returns a recording with the angles of each view, and a mark.
 fn recording(input: &ViewsInput<'_>) -> Recording {
     let messages = input.views.iter().zip(input.angles).flat_map(|(view, angles)| {
         let stamp = view.end;
@@ -97,7 +97,7 @@ fn by_datasheet(robot: &Robot, view: &View) -> JointAngles {
     JointAngles::from_fn(robot.n_joints(), |joint| robot.sensors[joint].center_rad + view.travel_rad[joint])
 }
 
-/// A tag seen in a view: number of the view, tag, place in the frame of the tags, m.
+/// Observation of a tag in a view: number of the view, index of the tag, position in the frame of the tags, m.
 type Sighting = (usize, usize, Point3<f64>);
 
 fn sightings(views: &[View], robot: &Robot, angles: &[JointAngles]) -> Vec<Sighting> {
@@ -110,7 +110,7 @@ fn sightings(views: &[View], robot: &Robot, angles: &[JointAngles]) -> Vec<Sight
     views.iter().enumerate().flat_map(of_view).collect()
 }
 
-/// Mean place of each tag.
+/// Returns the mean position of each tag.
 fn means(sightings: &[Sighting]) -> BTreeMap<usize, Point3<f64>> {
     let mut sums: BTreeMap<usize, (nalgebra::Vector3<f64>, f64)> = BTreeMap::new();
     for (_, tag, place) in sightings {
@@ -121,7 +121,7 @@ fn means(sightings: &[Sighting]) -> BTreeMap<usize, Point3<f64>> {
     sums.into_iter().map(|(tag, (sum, n))| (tag, Point3::from(sum / n))).collect()
 }
 
-/// Where the camera at hand saw each tag, from the mean of that tag's sightings, and how far apart the two are.
+/// Draws the RMS distance of each view's tags from the mean positions of the tags: by datasheet, and as calibrated.
 fn draw_sightings(input: &ViewsInput<'_>, times_s: &[f64], stream: &mut EntityLog) {
     let by_datasheet: Vec<JointAngles> = input.views.iter().map(|view| by_datasheet(input.drawn, view)).collect();
     let drawn = sightings(input.views, input.drawn, &by_datasheet);

@@ -1,4 +1,4 @@
-//! Where a rosbridge listens, and which ROS is behind it.
+//! Address of a rosbridge, and the ROS version behind it.
 
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -7,9 +7,9 @@ use serde::Deserialize;
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Rosbridge {
-    /// `ws://HOST:PORT`.
+    /// Address of the bridge: `ws://HOST:PORT`.
     pub url: String,
-    /// 1 or 2: how times and types are spelled.
+    /// ROS version, 1 or 2, which decides the spelling of times and types.
     #[schemars(range(min = 1, max = 2))]
     pub ros: u32,
 }
@@ -21,7 +21,7 @@ impl Default for Rosbridge {
 }
 
 impl Rosbridge {
-    /// Host and port.
+    /// Returns host and port.
     pub(crate) fn address(&self) -> Result<(&str, u16), String> {
         let problem = || format!("{:?} is not ws://HOST:PORT, such as \"ws://127.0.0.1:9090\"", self.url);
         let (host, port) = self.url.strip_prefix("ws://").and_then(|rest| rest.rsplit_once(':')).ok_or_else(problem)?;
@@ -36,7 +36,7 @@ impl Rosbridge {
         Ok((inner.unwrap_or(host), port))
     }
 
-    /// A type as this ROS writes it.
+    /// Returns a type's name as this ROS writes it.
     pub(crate) fn type_name(&self, ros2_name: &str) -> String {
         if self.ros == 1 { ros2_name.replacen("/msg/", "/", 1) } else { ros2_name.to_owned() }
     }

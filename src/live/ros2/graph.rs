@@ -1,4 +1,4 @@
-//! What others in a ROS 2 domain publish, subscribe and serve.
+//! Topics and services of the other participants in a ROS 2 domain.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -12,18 +12,19 @@ use armcal_core::log::ros::JointState;
 use armcal_core::log::{Stream, decode};
 use armcal_core::time::Stamp;
 
-/// The longest time between two looks at the domain.
+/// Longest time between two looks at the domain.
 const LISTEN: Duration = Duration::from_millis(20);
-/// A look that takes longer than that is followed by a pause of so many times its length.
+/// Pause after a longer look, as a multiple of its duration.
 const PAUSES_PER_LOOK: u32 = 4;
-/// Topics and services, and names of one topic's joints, that are kept.
+/// Largest number of stored topics, services, and joint names of one topic.
 const MAX_NAMES: usize = 2000;
-/// Topics whose messages are heard: the middleware loses those who would listen to a thousand at once.
+/// Largest number of topics whose messages are heard: the middleware loses participants that listen to a thousand at
+/// once.
 const MAX_LISTENED: usize = 200;
-/// As Cyclone DDS announces itself.
+/// Vendor id that Cyclone DDS announces.
 const CYCLONE_VENDOR: [u8; 2] = [1, 16];
 
-/// A reader or writer of somebody else.
+/// Reader or writer of another participant.
 struct Endpoint {
     dds_topic: String,
     dds_type: String,
@@ -31,7 +32,7 @@ struct Endpoint {
     is_writer: bool,
 }
 
-/// One topic's messages.
+/// Reader of one topic's messages.
 struct Listening {
     reader: Reader,
     first: Option<Stamp>,
@@ -64,7 +65,7 @@ pub fn look_around(domain: &Domain, seconds: f64, is_over: &dyn Fn() -> bool) ->
             }
             let is_new = heard.len() < MAX_LISTENED && !heard.contains_key(&key);
             if is_new && endpoint.is_writer && is_of_a_stream(&key.1) {
-                // A name that two types share can be listened to once: the rest of the domain counts all the same.
+                // Only one type of a name can be listened to; the rest of the domain counts all the same.
                 let reader = node.reader(&key.0, &key.1).ok();
                 let listening = reader.map(|reader| Listening { reader, first: None, last: Stamp { nanos: 0 } });
                 heard.insert(key.clone(), listening);
@@ -80,7 +81,7 @@ pub fn look_around(domain: &Domain, seconds: f64, is_over: &dyn Fn() -> bool) ->
     Ok(Seen { domain: domain.clone(), topics: topics.into_values().collect(), services })
 }
 
-/// Participants that were announced since the last call.
+/// Returns participants that were announced since the last call.
 fn new_cyclones(node: &Node) -> Vec<GUID> {
     let events = std::iter::from_fn(|| node.status.try_recv_status());
     let cyclone = |event| match event {
@@ -106,13 +107,13 @@ fn endpoints(node: &Node) -> Vec<Endpoint> {
     writers.chain(readers).filter(|endpoint| endpoint.guid.prefix != own).collect()
 }
 
-/// Name and type as ROS has them; `None` for what is no topic of ROS.
+/// Returns name and type as ROS writes them; `None` if it is no topic of ROS.
 fn topic_of(endpoint: &Endpoint) -> Option<(String, String)> {
     let name = endpoint.dds_topic.strip_prefix("rt").filter(|name| name.starts_with('/'))?;
     Some((name.to_owned(), ros_type(&endpoint.dds_type)?))
 }
 
-/// A service by what its server reads.
+/// Returns a service by the topic that its server reads.
 fn service(endpoint: &Endpoint, cyclones: &[GUID]) -> Option<SeenService> {
     let name = endpoint.dds_topic.strip_prefix("rq").and_then(|name| name.strip_suffix("Request"))?;
     let ros_type = ros_type(endpoint.dds_type.replace("_Request_", "_").as_str())?;
@@ -121,7 +122,7 @@ fn service(endpoint: &Endpoint, cyclones: &[GUID]) -> Option<SeenService> {
     (!endpoint.is_writer).then(|| SeenService { name: name.to_owned(), ros_type, mapping })
 }
 
-/// `package::msg::dds_::Type_` as ROS has it.
+/// Returns the type `package::msg::dds_::Type_` as ROS writes it.
 fn ros_type(dds_type: &str) -> Option<String> {
     let mut parts = dds_type.split("::");
     let (package, kind, infix) = (parts.next()?, parts.next()?, parts.next()?);

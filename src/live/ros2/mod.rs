@@ -16,5 +16,5 @@ pub(crate) use trigger::{TriggerRequest, TriggerResponse, service_mapping};
 pub use watched::WatchedWire;
 pub use wire::Ros2Wire;
 
-/// Messages of one topic that are taken at once; more wait for the next turn.
+/// Largest number of messages of one topic that are taken at once; more wait for the next turn.
 const MAX_TAKEN: usize = 1000;

@@ -1,4 +1,4 @@
-//! A participant of a ROS 2 domain, with readers and writers of raw messages.
+//! Participant of a ROS 2 domain, with readers and writers of raw messages.
 
 use std::net::Ipv4Addr;
 use std::sync::mpsc::channel;
@@ -15,20 +15,21 @@ use super::raw::Raw;
 use crate::LiveError;
 use armcal_core::log::Stream;
 
-/// Messages that a reader keeps while nobody listens, and images: the middleware also keeps those that were taken.
+/// Number of messages that a reader keeps while nobody listens; `IMAGE_DEPTH` is that of images. The middleware also
+/// keeps messages that were taken.
 const DEPTH: i32 = 200;
 const IMAGE_DEPTH: i32 = 4;
-/// The middleware may take so long to leave the domain: a flood of participants keeps it busy for minutes.
+/// Longest time for which the middleware may leave the domain: a flood of participants keeps it busy for minutes.
 const LEAVE_LIMIT: Duration = Duration::from_secs(2);
 
-/// Our place in the domain.
+/// Our participant of the domain.
 pub(crate) struct Node {
     pub ros: ros2_client::Node,
     publisher: rustdds::Publisher,
     subscriber: rustdds::Subscriber,
     pub(super) status: DomainParticipantStatusListener,
     pub(super) participant: DomainParticipant,
-    /// Last: everything else of the node is gone before.
+    /// Last field, so that everything else of the node is dropped before.
     _leaving: Leaving,
 }
 
@@ -78,7 +79,7 @@ impl Node {
         Ok(Self { _leaving: Leaving(Some(participant.clone())), participant, publisher, subscriber, status, ros })
     }
 
-    /// Everything of ours has this prefix.
+    /// Returns our participant's id, whose prefix all our endpoints have.
     pub fn guid(&self) -> GUID {
         self.participant.guid()
     }
@@ -101,7 +102,7 @@ impl Node {
         created.map_err(LiveError::dds(topic))
     }
 
-    /// Says what the other side offers in vain.
+    /// Warns of endpoints of the other side that do not match ours.
     pub fn warn_of_mismatches(&self) {
         while let Some(event) = self.status.try_recv_status() {
             if let DomainParticipantStatusEvent::RemoteReaderQosIncompatible { requested_qos, .. } = event {
@@ -114,7 +115,7 @@ impl Node {
 }
 
 impl Reader {
-    /// The oldest message that was not taken; `None` when there is none, the text when it could not be read.
+    /// Returns the oldest message that was not taken; `None` if there is none, the text if it could not be read.
     pub fn take(&self) -> Option<Result<Vec<u8>, String>> {
         self.0.drain_read_notifications();
         match self.0.try_take_one() {
@@ -134,21 +135,21 @@ impl Writer {
     }
 }
 
-/// Matches every writer.
+/// Returns settings that match every writer.
 fn best_effort(depth: i32) -> QosPolicies {
     let limits = ResourceLimits { max_samples: depth, max_instances: depth, max_samples_per_instance: depth };
     let builder = QosPolicyBuilder::new().reliability(Reliability::BestEffort).resource_limits(limits);
     builder.history(History::KeepLast { depth }).build()
 }
 
-/// Matches every reader.
+/// Returns settings that match every reader.
 fn reliable() -> QosPolicies {
     let max_blocking_time = rustdds::Duration::from_millis(10);
     let builder = QosPolicyBuilder::new().reliability(Reliability::Reliable { max_blocking_time });
     builder.history(History::KeepLast { depth: 10 }).build()
 }
 
-/// `package/msg/Type` as DDS has it.
+/// Returns the type `package/msg/Type` as DDS writes it.
 fn dds_type(ros_type: &str) -> String {
     let mut parts = ros_type.split('/');
     let (package, kind, name) = (parts.next(), parts.next(), parts.next());

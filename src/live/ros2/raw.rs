@@ -10,10 +10,10 @@ use rustdds::no_key::{Decode, DefaultDecoder, DeserializerAdapter, SerializerAda
 pub(super) const HEADER_BYTES: usize = 4;
 const ENCODINGS: [RepresentationIdentifier; 2] = [RepresentationIdentifier::CDR_LE, RepresentationIdentifier::CDR_BE];
 
-/// Hands bytes on.
+/// Serializer that passes bytes on.
 pub(crate) struct Raw;
 
-/// Puts the header before the body again.
+/// Decoder that restores the header before the body.
 #[derive(Clone)]
 pub(crate) struct WithHeader;
 
@@ -54,7 +54,7 @@ impl SerializerAdapter<Vec<u8>> for Raw {
         RepresentationIdentifier::CDR_LE
     }
 
-    /// Of bytes with a header of little endian.
+    /// Removes the header (little endian), which the serializer writes itself.
     fn to_bytes(value: &Vec<u8>) -> Result<Bytes, Infallible> {
         Ok(Bytes::copy_from_slice(value.get(HEADER_BYTES..).unwrap_or_default()))
     }

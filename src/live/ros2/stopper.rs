@@ -1,4 +1,4 @@
-//! Every way to stop an arm over DDS.
+//! All ways to stop an arm over DDS.
 
 use super::{Node, TriggerRequest, TriggerResponse, Writer, service_mapping};
 use crate::messages::{BOOL, Bool};

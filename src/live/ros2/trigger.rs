@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::ServiceMapping;
 
-/// std_srvs/srv/Trigger, asked; an empty request is one byte.
+/// Request of std_srvs/srv/Trigger; an empty request is one byte.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct TriggerRequest {
     pub structure_needs_at_least_one_member: u8,
@@ -12,7 +12,7 @@ pub(crate) struct TriggerRequest {
 
 impl ros2_client::Message for TriggerRequest {}
 
-/// std_srvs/srv/Trigger, answered.
+/// Response of std_srvs/srv/Trigger.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct TriggerResponse {
     pub success: bool,
@@ -21,7 +21,7 @@ pub(crate) struct TriggerResponse {
 
 impl ros2_client::Message for TriggerResponse {}
 
-/// The middleware's name of a mapping.
+/// Returns the middleware's name of a mapping.
 pub(crate) fn service_mapping(mapping: ServiceMapping) -> ros2_client::ServiceMapping {
     match mapping {
         ServiceMapping::Enhanced => ros2_client::ServiceMapping::Enhanced,

@@ -15,9 +15,9 @@ pub struct WatchedWire {
     stop: Stopper,
     has_sent: bool,
     is_lost: bool,
-    /// Sends nothing but that stop.
+    /// Participant that sends only that stop.
     node: Node,
-    /// Last: the domain is left under its eyes.
+    /// Watch of the memory. It is the last field, so that the domain is left under its watch.
     memory: MemoryWatch,
 }
 
@@ -41,7 +41,7 @@ impl Wire for WatchedWire {
 
     fn receive(&mut self, timeout: Duration, heard: &mut Vec<Heard>) -> Result<(), LiveError> {
         if let Err(error) = self.memory.check() {
-            // At once: the program may be ended before the run has finished its files.
+            // Stops at once: the program may be ended before the run has finished its files.
             let is_first = !std::mem::replace(&mut self.is_lost, true);
             if is_first
                 && self.has_sent

@@ -16,7 +16,7 @@ use armcal_core::time::Stamp;
 /// A connection over DDS.
 pub struct Ros2Wire {
     connection: Connection,
-    /// The driver's names, robot's order of joints.
+    /// The driver's joint names, in the robot's order of joints.
     names: Vec<String>,
     readers: Vec<(Content, Reader)>,
     commands: Writer,
@@ -25,7 +25,7 @@ pub struct Ros2Wire {
     events: Events,
     start: Instant,
     newest: Stamp,
-    /// Last: readers and writers leave the domain before it does.
+    /// Participant of the domain. It is the last field, so that readers and writers leave the domain before it does.
     node: Node,
 }
 
@@ -61,7 +61,7 @@ impl Ros2Wire {
         })
     }
 
-    /// Whether anything came.
+    /// Appends all waiting messages to `heard`; returns true if there were any.
     fn drain(&mut self, heard: &mut Vec<Heard>) -> bool {
         let before = heard.len();
         for (content, reader) in &self.readers {

@@ -8,12 +8,12 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use sha1::{Digest, Sha1};
 
-/// Every server appends this to the key.
+/// Text that every server appends to the key.
 const MAGIC: &str = "258EAFA5-E914-47DA-95CA-C5AB0DC85B11";
-/// The longest answer that is read.
+/// Longest answer that is read.
 const MAX_ANSWER_BYTES: usize = 16 << 10;
 
-/// A connection that speaks WebSocket from here on, and what came of it already.
+/// Connection that speaks WebSocket from here on, and the bytes that it has already received.
 pub(super) struct Opened {
     pub stream: TcpStream,
     pub rest: Vec<u8>,
@@ -33,7 +33,7 @@ pub(super) fn open(host: &str, port: u16, limit: Duration) -> Result<Opened, Str
     Err(problem)
 }
 
-/// Time until then; never zero, which would be no limit.
+/// Returns the time left until `until`; never zero, which would be no limit.
 fn left(until: Instant) -> Duration {
     until.saturating_duration_since(Instant::now()).max(Duration::from_millis(1))
 }
@@ -86,12 +86,12 @@ fn check_answer(head: &str, key: &str) -> Result<(), String> {
     Ok(())
 }
 
-/// What a server answers to a key.
+/// Returns the server's answer to a key.
 pub(crate) fn accept_key(key: &str) -> String {
     STANDARD.encode(Sha1::digest(format!("{key}{MAGIC}")))
 }
 
-/// Another one for each connection; it is no secret.
+/// Returns a new key for each connection; it is no secret.
 fn key() -> String {
     let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
     let hash = Sha1::digest(format!("{} {}", now.as_nanos(), std::process::id()));

@@ -8,7 +8,7 @@ use serde::de::{Error as _, IntoDeserializer, Visitor};
 use serde::{Deserialize, Deserializer, forward_to_deserialize_any};
 use serde_json::{Value, json};
 
-/// A message of the types of recordings.
+/// Reads a message of the types of recordings.
 pub(super) fn from_json<'de, T: Deserialize<'de>>(json: &'de Value) -> Result<T, String> {
     T::deserialize(Json(json)).map_err(|error| error.to_string())
 }
@@ -31,7 +31,7 @@ pub(super) fn spell_as_ros1(json: &mut Value) {
     }
 }
 
-/// A value, read as any type that it may stand for.
+/// Value that is read as any type that it may represent.
 struct Json<'a>(&'a Value);
 
 impl<'de> IntoDeserializer<'de, Error> for Json<'de> {
@@ -80,7 +80,7 @@ impl<'de> Deserializer<'de> for Json<'de> {
     }
 }
 
-/// A field's name of ROS 1 as ROS 2 has it.
+/// Returns the ROS 2 name of a field of ROS 1.
 fn ros2_name(name: &str) -> &str {
     match name {
         "secs" => "sec",
@@ -89,7 +89,7 @@ fn ros2_name(name: &str) -> &str {
     }
 }
 
-/// One of those that base64 stands for, and nothing but a byte.
+/// One byte of decoded base64; it deserializes only as a byte.
 struct Byte(u8);
 
 impl<'de> IntoDeserializer<'de, Error> for Byte {

@@ -1,5 +1,5 @@
-//! A WebSocket on a thread of its own, which always listens: pings are answered and old readings forgotten while a
-//! session plans, and neither a slow line nor a stuck one holds up the loop.
+//! WebSocket on its own thread, which always listens. It answers pings and drops old readings while a session plans,
+//! and neither a slow line nor a stuck one delays the loop.
 
 use std::collections::VecDeque;
 use std::io::ErrorKind;
@@ -18,25 +18,26 @@ use crate::topics::Content;
 use crate::{Heard, LiveError};
 use armcal_core::log::Stream;
 
-/// The largest message that is read.
+/// Largest size of a message that is read.
 const MAX_MESSAGE_BYTES: usize = 32 << 20;
-/// Bytes that wait to be sent; the other side takes none where there are more.
+/// Largest number of bytes that wait to be sent; with more, the other side takes none.
 const MAX_WAITING_BYTES: usize = 1 << 20;
-/// Messages of one topic that are kept while nobody listens, and images: they are large.
+/// Number of messages of one topic that are kept while nobody listens; `IMAGE_DEPTH` is that of images, which are
+/// large.
 const DEPTH: usize = 200;
 const IMAGE_DEPTH: usize = 4;
-/// Messages that are read between two looks at what is to be sent.
+/// Number of messages that are read between two looks at the outbox.
 const BURST: usize = 64;
-/// The other side may take nothing for so long.
+/// Longest time for which the other side may take nothing.
 const WRITE_LIMIT: Duration = Duration::from_millis(250);
-/// The longest sleep of the thread, and while something waits to be sent.
+/// Longest sleep of the thread; `SLEEP_WRITING` applies while a text waits to be sent.
 const SLEEP: Duration = Duration::from_millis(100);
 const SLEEP_WRITING: Duration = Duration::from_millis(5);
 
 const SOCKET: Token = Token(0);
 const WAKER: Token = Token(1);
 
-/// Our end of the thread.
+/// End of the link outside its thread.
 pub(super) struct Link {
     shared: Arc<Shared>,
     waker: Waker,
@@ -53,9 +54,9 @@ struct Shared {
 struct State {
     inbox: VecDeque<(Option<Content>, Heard)>,
     outbox: Vec<String>,
-    /// Something was taken from the outbox that may not be on its way yet.
+    /// True if a text was taken from the outbox that may not be on its way yet.
     is_writing: bool,
-    /// Why there is no connection any more.
+    /// Reason for which the connection is lost.
     lost: Option<String>,
     is_over: bool,
 }
@@ -65,7 +66,7 @@ impl Shared {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits as long as `is_waiting` says, `timeout` at most.
+    /// Waits while `is_waiting` returns true, for at most `timeout`.
     fn wait(&self, timeout: Duration, is_waiting: impl Fn(&State) -> bool) -> MutexGuard<'_, State> {
         let waited = self.changed.wait_timeout_while(self.lock(), timeout, |state| is_waiting(state));
         waited.unwrap_or_else(PoisonError::into_inner).0
@@ -78,7 +79,7 @@ impl Shared {
 }
 
 impl State {
-    /// Keeps the newest of each topic.
+    /// Keeps the newest messages of each topic.
     fn keep(&mut self, content: Option<Content>, heard: Heard) {
         let depth = if content == Some(Content::Stream(Stream::Images)) { IMAGE_DEPTH } else { DEPTH };
         let is_same = |(own, _): &(Option<Content>, Heard)| *own == content;
@@ -116,8 +117,8 @@ impl Link {
         Ok(Self { shared, waker, thread: Some(thread) })
     }
 
-    /// Waits for messages, `timeout` at most, and appends all that came; the text when the connection is lost and
-    /// nothing is left of it.
+    /// Waits for messages, for at most `timeout`, and appends all that came. Returns the reason if the connection is
+    /// lost and no message is left.
     pub fn take(&self, timeout: Duration, heard: &mut Vec<Heard>) -> Result<(), String> {
         let mut state = self.shared.wait(timeout, |state| state.inbox.is_empty() && state.lost.is_none());
         if let (true, Some(why)) = (state.inbox.is_empty(), &state.lost) {
@@ -138,7 +139,7 @@ impl Link {
         self.waker.wake().map_err(|error| error.to_string())
     }
 
-    /// Waits until all that was sent is on its way, `timeout` at most.
+    /// Waits until all texts are on their way, for at most `timeout`.
     pub fn flush(&self, timeout: Duration) -> Result<(), String> {
         let is_waiting = |state: &State| (state.is_writing || !state.outbox.is_empty()) && state.lost.is_none();
         let state = self.shared.wait(timeout, is_waiting);
@@ -153,7 +154,7 @@ impl Link {
 impl Drop for Link {
     fn drop(&mut self) {
         self.shared.lock().is_over = true;
-        // The thread looks by itself, if later.
+        // Without the waker the thread looks later.
         let _ = self.waker.wake();
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
@@ -161,19 +162,19 @@ impl Drop for Link {
     }
 }
 
-/// The thread's end.
+/// End of the link on its thread.
 struct Line {
     socket: WebSocket<TcpStream>,
     shared: Arc<Shared>,
     listener: Listener,
-    /// The last complaint: one that is repeated is told once.
+    /// Last complaint: a repeated one is reported once.
     complained: String,
-    /// Since when something waits to be sent.
+    /// Time from which a text has waited to be sent.
     blocked_since: Option<Instant>,
 }
 
 impl Line {
-    /// Until the end; the text says why the connection is lost.
+    /// Runs until the link closes; the error says why the connection is lost.
     fn run(&mut self, mut poll: Poll) -> Result<(), String> {
         let mut events = Events::with_capacity(8);
         loop {
@@ -209,7 +210,7 @@ impl Line {
         }
     }
 
-    /// Sends what waits, as far as the other side takes it; whether it is the end.
+    /// Sends the waiting texts, as far as the other side takes them; returns true at the end.
     fn write(&mut self) -> Result<bool, String> {
         let (texts, is_over) = {
             let mut state = self.shared.lock();
@@ -231,7 +232,7 @@ impl Line {
         Ok(is_over)
     }
 
-    /// Reads what has come; whether there may be more.
+    /// Reads the messages that have come; returns true if there may be more.
     fn read(&mut self) -> Result<bool, String> {
         for _ in 0..BURST {
             let said = match unless_blocked(self.socket.read())? {
@@ -267,7 +268,7 @@ impl Line {
     }
 }
 
-/// `None` where it has to wait; the text where the connection is of no use any more.
+/// Returns the value; `None` if the call would block, and the reason if the connection is of no use any more.
 fn unless_blocked<T>(done: Result<T, Error>) -> Result<Option<T>, String> {
     match done {
         Ok(value) => Ok(Some(value)),

@@ -1,4 +1,4 @@
-//! What is said over a rosbridge: one JSON object a message, with its operation in `op`.
+//! Messages of a rosbridge: one JSON object each, with its operation in `op`.
 
 use serde_json::{Value, json};
 
@@ -12,30 +12,30 @@ use armcal_core::log::ros::{AprilTagDetectionArray, CompressedImage, FluidPressu
 use armcal_core::log::{RosMessage, Stream};
 use armcal_core::text::printable;
 
-/// Most values of one message: each takes many bytes of memory for two of text.
+/// Largest number of values in one message: each takes many bytes of memory for two of text.
 const MAX_VALUES: usize = 4 << 20;
-/// Most keys of one message: each takes ten times as much as a value.
+/// Largest number of keys in one message: each takes ten times as much memory as a value.
 const MAX_KEYS: usize = 200_000;
-/// Of what the other side says, so many characters are repeated.
+/// Largest number of characters that are repeated from a text of the other side.
 const MAX_SHOWN: usize = 200;
 
-/// Messages of a topic that the bridge keeps for us where the line is slow; older ones are dropped.
+/// Number of messages of a topic that the bridge keeps for us while the line is slow; older ones are dropped.
 const QUEUE_LENGTH: usize = 10;
-/// Marks our own call among the answers.
+/// Id that marks our own call among the answers.
 const STOP_ID: &str = "armcal_stop";
 
-/// Something that the bridge said.
+/// Message of the bridge.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Said {
-    /// On a topic.
+    /// Message on a topic.
     Heard(Content, Heard),
-    /// Of itself: an error or a warning, for people.
+    /// Error or warning of the bridge itself, for people.
     Complaint(String),
-    /// All else that is as it should be.
+    /// Any other valid message.
     Nothing,
 }
 
-/// Understands what a bridge says.
+/// Reader of the bridge's messages.
 pub(crate) struct Listener {
     topics: Vec<(Content, String)>,
     names: Vec<String>,
@@ -43,13 +43,13 @@ pub(crate) struct Listener {
 }
 
 impl Listener {
-    /// `names` are the driver's, robot's order of joints.
+    /// Builds the reader; `names` are the driver's, in the robot's order of joints.
     pub fn new(connection: &Connection, bridge: &Rosbridge, names: &[String]) -> Self {
         let topics = contents(connection).into_iter().map(|(content, topic)| (content, topic.to_owned()));
         Self { topics: topics.collect(), names: names.to_vec(), ros: bridge.ros }
     }
 
-    /// One message of the bridge, whatever it is.
+    /// Reads one message of the bridge, of any operation.
     pub fn read(&self, text: &str) -> Said {
         let n_bytes = |wanted: u8| text.bytes().filter(|byte| *byte == wanted).count();
         if n_bytes(b',') >= MAX_VALUES {
@@ -85,7 +85,8 @@ impl Listener {
         Said::Heard(*content, if let Heard::Unusable(why) = heard { Heard::Unusable(shown(&why)) } else { heard })
     }
 
-    /// Set-points that are spelled for the wrong ROS would not be understood: that shall be known before they are sent.
+    /// Checks that the bridge's ROS is the configured one before any set-point is sent: the wrong one would not
+    /// understand the spelling.
     fn check_spelling(&self, message: &Value) -> Result<(), String> {
         let (other, key) = if self.ros == 1 { (2, "sec") } else { (1, "secs") };
         if message["header"]["stamp"].get(key).is_some() {
@@ -95,7 +96,7 @@ impl Listener {
     }
 }
 
-/// A message as the bytes that DDS would have brought.
+/// Returns a message as the bytes that DDS would have brought.
 fn recoded(content: Content, json: &Value) -> Result<Vec<u8>, String> {
     match content {
         Content::Joints => recode::<JointState>(json),
@@ -132,7 +133,7 @@ fn status(message: &Value) -> Said {
     }
 }
 
-/// To the call of the stop service.
+/// Reads the answer to the call of the stop service.
 fn answer(message: &Value) -> Said {
     let values = &message["values"];
     if message["result"] == true && values["success"] != false {
@@ -142,13 +143,13 @@ fn answer(message: &Value) -> Said {
     Said::Complaint(format!("the service {service} failed: {}", shown(&values.to_string())))
 }
 
-/// The beginning of a text of the other side, in one line.
+/// Returns the beginning of a text of the other side, as one line.
 pub(super) fn shown(text: &str) -> String {
     let line: String = text.chars().take(MAX_SHOWN).map(|c| if c.is_control() { ' ' } else { c }).collect();
     printable(&line).into_owned()
 }
 
-/// What is said first: everything that is heard of the arm, and everything that it will be told.
+/// Returns the first messages to the bridge: subscriptions to the arm's topics, and announcements of our own.
 pub(super) fn greeting(connection: &Connection, bridge: &Rosbridge) -> Vec<String> {
     let subscribe = |(content, topic): (Content, &str)| {
         let type_name = bridge.type_name(content.ros_type());
@@ -165,7 +166,7 @@ pub(super) fn greeting(connection: &Connection, bridge: &Rosbridge) -> Vec<Strin
     all
 }
 
-/// A set-point.
+/// Returns the message of a set-point.
 pub(super) fn set_point(connection: &Connection, bridge: &Rosbridge, command: &Command) -> Result<String, LiveError> {
     let message = command.message(connection.commands.message_type)?;
     let mut json =
@@ -176,7 +177,8 @@ pub(super) fn set_point(connection: &Connection, bridge: &Rosbridge, command: &C
     Ok(publish(&connection.commands.topic, &json))
 }
 
-/// Every way to stop the arm. A bridge may wait for the service before it does anything else: the topic comes first.
+/// Returns the messages that stop the arm. The topic comes first, because a bridge may wait for the service before it
+/// does anything else.
 pub(super) fn stop(connection: &Connection) -> Vec<String> {
     let stop = &connection.stop;
     let topic = (!stop.topic.is_empty()).then(|| publish(&stop.topic, &json!({ "data": true })));

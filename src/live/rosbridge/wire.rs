@@ -13,19 +13,19 @@ use armcal_core::robot::Robot;
 use armcal_core::streams::{JointCounts, LogLevel, LogLine, Message};
 use armcal_core::time::Stamp;
 
-/// A stop is waited for so long until it is on its way.
+/// Longest wait until a stop is on its way.
 const STOP_LIMIT: Duration = Duration::from_millis(100);
 
 /// A connection over a rosbridge. Once lost, it stays lost: nothing comes in its place, and the recording says why.
 pub struct RosbridgeWire {
     connection: Connection,
     bridge: Rosbridge,
-    /// The driver's names, robot's order of joints.
+    /// The driver's joint names, in the robot's order of joints.
     names: Vec<String>,
     link: Link,
     start: Instant,
     newest: Stamp,
-    /// Whether the recording was told that the connection is lost.
+    /// True if the recording was told that the connection is lost.
     is_told: bool,
 }
 
@@ -74,7 +74,7 @@ impl Wire for RosbridgeWire {
         if std::mem::replace(&mut self.is_told, true) {
             return Err(error);
         }
-        // First into the recording.
+        // The recording gets the line first.
         let line = LogLine {
             stamp: self.newest,
             level: LogLevel::Error,
@@ -89,7 +89,7 @@ impl Wire for RosbridgeWire {
         let command = Command { stamp: self.newest, names: self.names.clone(), positions: counts.to_vec(), within_s };
         let text = set_point(&self.connection, &self.bridge, &command)?;
         match self.link.send([text]) {
-            // The next `receive` says so, to the recording first.
+            // The next `receive` reports it, to the recording first.
             Err(_) if !self.is_told => Ok(()),
             sent => sent.map_err(|why| self.lost(&why)),
         }

@@ -12,7 +12,7 @@ fn topic(name: &str, ros_type: &str, publishers: usize, subscribers: usize) -> S
     topic
 }
 
-/// A driver with names of its own, beside much else.
+/// Driver with its own names, among many other topics.
 fn seen() -> Seen {
     let mut raw = topic("/titan/raw", "sensor_msgs/msg/JointState", 1, 2);
     raw.joints = titan4().joint_names().iter().map(|name| format!("titan_{name}")).collect();

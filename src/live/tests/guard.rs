@@ -9,7 +9,8 @@ use armcal_core::sensor::ArmSensors;
 use armcal_core::streams::{JointCounts, JointSensorSample};
 use armcal_core::time::SIMULATION_EPOCH;
 
-/// Readings and set-points, turns of joint 1 from where it stands in deg, heard one a period: when the guard stops.
+/// Returns the time of the guard's stop. Readings and set-points are turns of joint 1 from its start, deg, one per
+/// period.
 fn heard(n: u32, reading_deg: impl Fn(f64) -> f64, sent_deg: impl Fn(f64) -> f64) -> Option<(f64, StopReason)> {
     let robot = titan4();
     let stowed = ArmSensors::nominal(&robot).counts(&robot.stowed);
@@ -26,7 +27,7 @@ fn heard(n: u32, reading_deg: impl Fn(f64) -> f64, sent_deg: impl Fn(f64) -> f64
     })
 }
 
-/// They repeat themselves all the time; the set-point goes 2 deg away in 0.2 s, and is taken back 0.3 s later.
+/// Readings repeat all the time; the set-point moves by 2 deg in 0.2 s, and is taken back 0.3 s later.
 #[test]
 fn frozen_readings_stop_an_arm_that_is_held_meanwhile() {
     let sent = |at_s: f64| if at_s < 2.5 { ((at_s - 2.0) / 0.1).clamp(0.0, 2.0) } else { 0.0 };
@@ -37,14 +38,14 @@ fn frozen_readings_stop_an_arm_that_is_held_meanwhile() {
     assert!((0.0..=2.0 * PERIOD_S).contains(&late_s), "{late_s} s");
 }
 
-/// Sensors without noise repeat themselves at rest: only what is asked counts, not how long the arm has rested.
+/// Sensors without noise repeat their readings at rest: only commands count, not the duration of the rest.
 #[test]
 fn an_arm_without_noise_may_rest_and_then_move_late() {
     let sent = |at_s: f64| (2.0 * (at_s - 8.0)).clamp(0.0, 10.0);
     assert_eq!(heard(1000, |at_s| sent(at_s - 0.4), sent), None);
 }
 
-/// Set-points that follow the reading at once hide nothing.
+/// Set-points that follow the reading at once hide no fault.
 #[test]
 fn a_reading_that_leaps_and_stays_stops_the_arm() {
     let read = |at_s: f64| if at_s < 1.99 { 0.0 } else { 30.0 };
@@ -62,7 +63,7 @@ fn readings_that_come_back_or_go_as_joints_go_do_not_stop_it() {
     assert_eq!(heard(500, two_places, |_| 0.0), None);
     let moves = |at_s: f64| (20.0 * (at_s - 2.0)).clamp(0.0, 60.0);
     assert_eq!(heard(500, moves, moves), None);
-    // A slip that calibration is for.
+    // Slip that calibration corrects.
     let slips = |at_s: f64| if at_s < 2.0 { 0.0 } else { 8.0 };
     assert_eq!(heard(500, slips, |_| 0.0), None);
 }

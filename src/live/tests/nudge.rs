@@ -1,4 +1,4 @@
-//! One joint by one degree out and back, on arms whose set-points mean something else than they should.
+//! Nudges of one joint by one degree out and back, on arms that misinterpret set-points.
 
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
@@ -13,20 +13,20 @@ use armcal_core::sensor::ArmSensors;
 use armcal_core::stats::stream_rng;
 use armcal_core::streams::JointCounts;
 
-/// How an arm takes its set-points.
+/// Interpretation of set-points by an arm's driver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Driver {
     Sound,
-    /// A joint goes so many times as far as it is told.
+    /// The displacement of a joint is multiplied by a factor.
     Scaled {
         joint: usize,
         by: f64,
     },
-    /// Readings of a joint rise where set-points fall, about half a turn.
+    /// Readings of a joint rise where set-points fall, mirrored about half a turn.
     Mirrored {
         joint: usize,
     },
-    /// The names of two joints are mixed up.
+    /// The names of two joints are exchanged.
     Swapped {
         a: usize,
         b: usize,
@@ -86,13 +86,13 @@ impl Wire for SkewedWire {
 
 struct Nudged {
     problem: Option<NudgeProblem>,
-    /// Share of the way that each joint moved.
+    /// Share of the way that each joint moves.
     shares: Vec<f64>,
     log: Rc<RefCell<Log>>,
     start: JointCounts,
 }
 
-/// Nudges one joint after the other until one is wrong.
+/// Nudges one joint after the other until one fails.
 fn nudge_all(robot: &Robot, driver: Driver) -> Nudged {
     let start = ArmSensors::nominal(robot).counts(&robot.stowed);
     let log = Rc::new(RefCell::new(Log::default()));
@@ -113,7 +113,7 @@ fn nudge_all(robot: &Robot, driver: Driver) -> Nudged {
 }
 
 impl Nudged {
-    /// The farthest that a joint was ever told to be from its start, deg.
+    /// Returns the largest commanded distance of any joint from its start, deg.
     fn farthest_deg(&self, robot: &Robot) -> f64 {
         let log = self.log.borrow();
         let way =
@@ -135,7 +135,7 @@ fn a_sound_arm_passes_and_is_where_it_was() {
     assert!((0.99..1.06).contains(&farthest_deg), "{farthest_deg}");
     let log = nudged.log.borrow();
     let (_, last) = log.set_points.last().expect("set-points");
-    // Each nudge begins where the arm reads to be, which is within a count of where it is.
+    // Each nudge begins at the arm's reading, which is within a count of its true angle.
     let most = robot.n_joints() as f64;
     assert!((0..last.len()).all(|j| (last[j] - nudged.start[j]).abs() <= most), "{last:?}");
     assert!(log.stops_s.is_empty());
@@ -163,7 +163,7 @@ fn a_joint_that_moves_otherwise_than_told_stops_the_arm() {
     insta::assert_snapshot!("nudges", told);
 }
 
-/// However far a driver would go, the arm is stopped within a few degrees.
+/// The arm is stopped within a few degrees, however far the driver would move it.
 #[test]
 fn an_arm_that_goes_astray_does_not_go_far() {
     let robot = titan4();

@@ -28,7 +28,7 @@ type Log = Arc<Mutex<Vec<Value>>>;
 /// Reading a robot takes longer than a period.
 static NAMES: LazyLock<Vec<String>> = LazyLock::new(|| titan4().joint_names());
 
-/// A server on the loopback, with what it was told.
+/// Server on the loopback, with the messages that it received.
 struct Bridge {
     url: String,
     log: Log,
@@ -36,7 +36,7 @@ struct Bridge {
 }
 
 impl Bridge {
-    /// One that does `play` with the stream of its only client.
+    /// Starts a server that runs `play` with the stream of its only client.
     fn raw(play: impl FnOnce(TcpStream, &Log) + Send + 'static) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
         let url = format!("ws://{}", listener.local_addr().expect("an address"));
@@ -46,7 +46,7 @@ impl Bridge {
         Self { url, log, thread: Some(std::thread::spawn(serve)) }
     }
 
-    /// One that speaks WebSocket.
+    /// Starts a server that speaks WebSocket.
     fn new(play: impl FnOnce(&mut WebSocket<TcpStream>, &Log) + Send + 'static) -> Self {
         Self::raw(move |mut stream, log| {
             let (mut head, mut byte) = (Vec::new(), [0]);
@@ -82,7 +82,7 @@ impl Bridge {
         RosbridgeWire::open(&connection, bridge, &titan4()).expect("it connects")
     }
 
-    /// What was said to it with this operation.
+    /// Returns the messages with this operation that the bridge received.
     fn told(&self, op: &str) -> Vec<Value> {
         self.log.lock().expect("whole").iter().filter(|message| message["op"] == op).cloned().collect()
     }
@@ -113,7 +113,7 @@ fn stowed() -> Vec<f64> {
     ArmSensors::nominal(&robot).counts(&robot.stowed).to_vec()
 }
 
-/// An arm that goes where it is told, until its client goes or `hangs_up_s` is over.
+/// Arm that follows its set-points, until its client leaves or `hangs_up_s` is over.
 fn play_arm(ros: u32, hangs_up_s: f64) -> impl FnOnce(&mut WebSocket<TcpStream>, &Log) + Send + 'static {
     move |socket, log| {
         let (start, mut counts, mut n) = (Instant::now(), stowed(), 0_u32);
@@ -218,7 +218,7 @@ fn a_lost_connection_ends_a_run_at_once_and_the_recording_says_so() {
     assert!(wire.send(&survey.counts, 0.02).is_err() && wire.stop().is_err());
 }
 
-/// Goes after the client's greeting: a socket that is closed before makes the client's connect fail.
+/// Leaves after the client's greeting: a socket that is closed before makes the client's connect fail.
 fn bridge_that_is_gone() -> RosbridgeWire {
     Bridge::new(|socket, _| drop(socket.read())).wire()
 }
@@ -328,7 +328,7 @@ fn on(topic: &str, message: &Value) -> Value {
     json!({ "op": "publish", "topic": topic, "msg": message })
 }
 
-/// One message of each kind, as a bridge of ROS 1 sends them.
+/// Returns one message of each kind, as a bridge of ROS 1 sends them.
 fn one_of_each() -> Vec<Value> {
     let header = json!({ "seq": 7, "stamp": stamp(1, 0.5), "frame_id": "vehicle" });
     let (nine, vector) = (vec![0.0; 9], json!({ "x": 0.1, "y": 0, "z": -9.81 }));
@@ -419,7 +419,7 @@ fn what_says_nothing_usable_is_told() {
     }
 }
 
-/// Bytes exchanged, removed, doubled and moved: nothing panics, and no count is accepted that is no number.
+/// Bytes exchanged, removed, doubled and moved cause no panic, and no count is accepted that is no number.
 #[test]
 fn mutated_messages_are_read_or_refused() {
     let (listener, stowed, mut rng) = (listener(1), stowed(), stream_rng(11, "mutations"));
@@ -453,7 +453,7 @@ fn mutated_messages_are_read_or_refused() {
     assert!(accepted > 300 && refused > 10_000, "{accepted} accepted, {refused} refused");
 }
 
-/// A megabyte of JPEG, which comes beside the readings.
+/// A megabyte of JPEG, which comes between the readings.
 #[test]
 fn a_large_image_is_read_soon() {
     let jpeg: Vec<u8> = (0..1_000_000_u32).map(|k| (k.wrapping_mul(k) >> 5) as u8).collect();

@@ -1,4 +1,4 @@
-//! Images over a wire in memory, searched beside the loop.
+//! Images over a wire in memory, searched in parallel to the loop.
 
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
@@ -7,7 +7,7 @@ use crate::{Heard, ImageSearch, LiveError, TagFinder, Wire};
 use armcal_core::streams::{CameraImage, JointCounts, Message, TagDetection, TagDetections};
 use armcal_core::time::{SIMULATION_EPOCH, Stamp};
 
-/// Hands over what the test has put in.
+/// Wire that returns the messages of the test.
 struct Pipe(Receiver<Heard>);
 
 impl Wire for Pipe {
@@ -60,7 +60,7 @@ fn search() -> (Sender<Heard>, Sender<()>, ImageSearch<Pipe>) {
     (say, go, ImageSearch::new(Pipe(said), move || finder).expect("a thread"))
 }
 
-/// Receives until `wanted` says so; what came.
+/// Receives until `wanted` returns true; returns the messages.
 fn receive_until(wire: &mut impl Wire, wanted: impl Fn(&[Heard]) -> bool) -> Vec<Heard> {
     let (mut heard, began) = (Vec::new(), Instant::now());
     while !wanted(&heard) {
@@ -91,7 +91,7 @@ fn images_are_passed_on_and_their_tags_follow_with_the_images_stamp() {
     }
 }
 
-/// The loop is never kept waiting, and after a long search the newest image is next.
+/// The loop never waits, and after a long search the newest image is next.
 #[test]
 fn a_slow_search_skips_images_and_holds_nobody_up() {
     let (say, go, mut wire) = search();

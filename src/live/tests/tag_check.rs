@@ -16,7 +16,7 @@ fn with_tags() -> Robot {
     titan4().mounted_on(&vehicle).expect("it fits")
 }
 
-/// What the camera sees at these true angles.
+/// Returns the camera's detections at these true angles.
 fn seen(robot: &Robot, angles: &JointAngles) -> Vec<TagDetection> {
     let camera_from_tags = robot.tags_from_camera(angles).inverse();
     let of = |tag: &armcal_core::robot::SurveyedTag| {

@@ -1,4 +1,4 @@
-//! What is drawn about the arm: how sure it is of its tool, how well tags fit, what is near.
+//! Drawings about the arm: the uncertainty of its tool, the residuals of the tags, and the nearest part.
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ use armcal_core::sensor::{ArmSensors, Conditions};
 use armcal_core::streams::JointAngles;
 use armcal_core::time::SIMULATION_EPOCH;
 
-/// Rows of one component of an entity: times, s, and what it has.
+/// Returns the rows of one component of an entity: times, s, and values.
 fn rows<C: Component>(rrd: &Path, entity: &str, component: &ComponentDescriptor) -> Vec<(f64, Vec<C>)> {
     let mut rows = Vec::new();
     for chunk in chunks(rrd).iter().filter(|chunk| chunk.entity_path().to_string() == entity && !chunk.is_static()) {
@@ -31,7 +31,8 @@ fn rows<C: Component>(rrd: &Path, entity: &str, component: &ComponentDescriptor)
     rows
 }
 
-/// With sensors by the datasheet, then ones a hundred times as good, then nobody knows which.
+/// The ellipsoid has the size of the estimate's covariance: sensors by the datasheet, then a hundred times as accurate,
+/// then unknown.
 #[test]
 fn the_ellipsoid_is_about_the_believed_tool_and_as_large_as_the_belief_says() {
     let (dir, recording, truth, robot) = small();
@@ -77,7 +78,7 @@ fn the_ellipsoid_is_about_the_believed_tool_and_as_large_as_the_belief_says() {
     }
 }
 
-/// Without truth there is one arm, and without a belief no ellipsoid.
+/// Without truth there is one arm, and without an estimate no ellipsoid.
 #[test]
 fn the_ellipsoid_belongs_to_the_one_arm_that_is_shown() {
     let (dir, recording, _, robot) = small();
@@ -90,7 +91,8 @@ fn the_ellipsoid_belongs_to_the_one_arm_that_is_shown() {
     assert!(found(&out).is_empty());
 }
 
-/// Corners of one view: each tag's are off by so many px; a negative figure is rejected.
+/// Returns the residuals of one view: each tag's corners are off by the given number of px; a negative number is
+/// rejected.
 fn seen(offs: &[(u32, f64)]) -> ViewResidual {
     let tag = |&(id, off_px): &(u32, f64)| {
         let corner = CornerResidual { seen_px: [9.0; 2], off_px: [off_px, 0.0], is_used: true };
@@ -106,7 +108,7 @@ fn seen(offs: &[(u32, f64)]) -> ViewResidual {
     }
 }
 
-/// Frames about the tags that were seen, from the calibration on.
+/// Frames about the observed tags appear from the calibration on.
 #[test]
 fn tags_are_coloured_by_what_the_calibration_left_of_them() {
     let (dir, recording, _, robot) = small();
@@ -142,7 +144,7 @@ fn tags_are_coloured_by_what_the_calibration_left_of_them() {
     assert_eq!(after[6..], before[6..], "not seen");
 }
 
-/// The nearest two parts as truth.mcap has them, at times, s.
+/// Writes the nearest two parts at given times, s, as truth.mcap has them.
 fn write_clearances(truth: &Path, robot: &Robot, clearances: &[(f64, f64)]) {
     #[derive(serde::Serialize)]
     struct Clearance {
@@ -163,7 +165,8 @@ fn write_clearances(truth: &Path, robot: &Robot, clearances: &[(f64, f64)]) {
     writer.finish().unwrap();
 }
 
-/// From the last link to a rock below the tool, by the truth's figures; not beyond three times what is kept clear.
+/// The line leads from the last link to a rock below the tool, by the truth's distances. Beyond three times the
+/// required clearance there is none.
 #[test]
 fn a_line_shows_how_near_the_nearest_part_is() {
     let (dir, recording, _, robot) = small();

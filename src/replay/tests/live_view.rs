@@ -1,4 +1,4 @@
-//! A run that goes on, shown to viewers that are there, slow, or absent.
+//! Run in progress, shown to viewers that are connected, slow, or absent.
 
 use std::collections::BTreeMap;
 use std::net::TcpListener;
@@ -13,14 +13,14 @@ use armcal_core::log::Recording;
 use armcal_core::robot::Robot;
 use armcal_core::streams::{CameraImage, Message};
 
-/// By then every stream has been heard.
+/// Time by which every stream has been heard, ns.
 const FIRST_HEARD_NANOS: i64 = 2_000_000_000;
 
 fn drawings(robot: &Robot) -> LiveDrawings {
     LiveDrawings { robot: robot.clone(), vehicle: None, scene: None }
 }
 
-/// Rows by entity, time and content, with how many there are of each; `fixed` ones have no time.
+/// Number of rows by entity, time and content; `fixed` rows have no time.
 #[derive(Default)]
 struct Drawn {
     rows: BTreeMap<(String, i64, String), usize>,
@@ -55,7 +55,7 @@ impl Drawn {
     }
 }
 
-/// The rows of a recording with images, told bit by bit.
+/// Returns the rows of a recording with images that is sent in parts; `every` says after which messages.
 fn told(recording: &Recording, robot: &Robot, mut every: impl FnMut(usize) -> bool) -> (Drawn, usize) {
     let (mut news, mut drawn, mut n_layouts) = (News::new(drawings(robot)), Drawn::default(), 0);
     let mut take = |update: Option<crate::news::Update>| {
@@ -74,7 +74,7 @@ fn told(recording: &Recording, robot: &Robot, mut every: impl FnMut(usize) -> bo
     (drawn, n_layouts)
 }
 
-/// The made-up run with an image of so many bytes five times a second for its first half.
+/// Returns the made-up run with images of the given size, five per second in its first half.
 fn with_images(bytes: usize) -> (tempfile::TempDir, Recording, Robot) {
     let (dir, mut recording, _, robot) = small();
     let n = recording.messages.len();
@@ -91,7 +91,7 @@ fn with_images(bytes: usize) -> (tempfile::TempDir, Recording, Robot) {
     (dir, recording, robot)
 }
 
-/// Each row once, whenever the updates come, and none that the drawing of the whole run would not have.
+/// Each row is sent once, at any times of the updates, and the drawing of the whole run has it too.
 #[test]
 fn updates_together_are_the_drawing_at_once() {
     let (_dir, recording, robot) = with_images(20_000);
@@ -110,7 +110,7 @@ fn updates_together_are_the_drawing_at_once() {
         for (row, n) in &bit_by_bit.rows {
             assert_eq!(at_once.rows.get(row), Some(n), "sent too often or wrongly, every {every} messages: {row:?}");
         }
-        // Whoever sees the whole run draws the first temperature before it was measured, too.
+        // The drawing of the whole run also has the first temperature before it was measured.
         for (row, n) in at_once.rows.iter().filter(|((_, nanos, _), _)| *nanos >= FIRST_HEARD_NANOS) {
             assert_eq!(bit_by_bit.rows.get(row), Some(n), "not sent, every {every} messages: {row:?}");
         }
@@ -121,7 +121,7 @@ fn updates_together_are_the_drawing_at_once() {
     }
 }
 
-/// A viewer that comes late gets what moved before, at a lower rate, and everything that happened once.
+/// A late viewer receives earlier motion at a lower rate, and all single events.
 #[test]
 fn a_late_viewer_is_told_what_happened() {
     let (_dir, recording, robot) = with_images(20_000);
@@ -146,7 +146,8 @@ fn a_late_viewer_is_told_what_happened() {
     assert!(next.layout.is_some() && next.chunks.iter().any(|chunk| chunk.is_static()));
 }
 
-/// Tells a view all of the recording, and again; how long the slowest message took, and how the view ended.
+/// Sends a view the whole recording several times. Returns the time of the slowest message, and the outcome of the
+/// view.
 fn speak(recording: &Recording, robot: &Robot, address: &str, times: usize) -> (Duration, LiveViewEnd) {
     let view = LiveView::open(drawings(robot), address).unwrap();
     let mut listener = view.listener(Duration::ZERO);
@@ -179,7 +180,7 @@ fn nobody_waits_for_a_viewer_that_is_not_there() {
     insta::assert_snapshot!("no_viewer", error.replace(&port.to_string(), "PORT"));
 }
 
-/// It takes the connection and reads nothing.
+/// The viewer accepts the connection and reads nothing.
 #[test]
 fn nobody_waits_for_a_viewer_that_is_too_slow() {
     let (_dir, recording, robot) = with_images(100_000);

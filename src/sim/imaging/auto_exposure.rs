@@ -1,4 +1,4 @@
-//! Automatic exposure: exposure time and gain by the brightness of the image.
+//! Automatic exposure: exposure time and gain from the brightness of the image.
 
 use crate::imaging::math::max;
 use crate::imaging::rays::Rays;
@@ -6,7 +6,7 @@ use crate::spec::ImageSpec;
 
 /// Share of the pixels in the field of view that are at or above the set level.
 const BRIGHT_SHARE: f64 = 0.002;
-/// The level of these pixels, of full scale.
+/// Target level of these pixels, as a share of full scale.
 const BRIGHT_LEVEL: f32 = 0.85;
 /// Sampling distance of the histogram across and down, px.
 const LOOK_PX: usize = 3;
@@ -21,7 +21,7 @@ pub(super) struct Exposure {
     pub gain: f32,
 }
 
-/// Histogram of the brightness, reused.
+/// Histogram of the brightness; its buffer is reused.
 #[derive(Clone, Debug)]
 pub(super) struct AutoExposure {
     buckets: Vec<u32>,
@@ -32,7 +32,7 @@ impl AutoExposure {
         Self { buckets: vec![0; BUCKETS] }
     }
 
-    /// The exposure by the image's brightness, or the spec's fixed gain.
+    /// Returns the exposure for the image's brightness, or the spec's fixed gain.
     pub(super) fn choose(&mut self, spec: &ImageSpec, planes: &[Vec<f32>; 3], rays: &Rays) -> Exposure {
         if spec.gain > 0.0 {
             return Exposure { share: 1.0, gain: spec.gain as f32 };
@@ -45,7 +45,7 @@ impl AutoExposure {
         Exposure { share: 1.0, gain: (wanted / electrons.max(1e-3)).min(spec.gain_max as f32) }
     }
 
-    /// The level that the bright pixels reach, cd/m2, to a part in 64.
+    /// Returns the level that the bright pixels reach, cd/m2, to a part in 64.
     fn bright(&mut self, planes: &[Vec<f32>; 3], rays: &Rays) -> f32 {
         self.buckets.fill(0);
         let mut n_seen = 0_u32;

@@ -10,11 +10,11 @@ use crate::imaging::tracer::{Candidates, Tracer};
 /// Face, range and radiance (cd/m2) of each pixel.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Canvas {
-    /// Object and face of the ray through each pixel's centre.
+    /// Object and face that the ray through each pixel's centre meets.
     faces: Vec<u16>,
     /// Range, m; infinite in open water.
     pub ranges: Vec<f32>,
-    /// 1 where samples are needed although no neighbour differs.
+    /// 1 where samples are needed although all neighbours are alike.
     swept: Vec<u8>,
     spare: Vec<u8>,
     pub planes: [Vec<f32>; 3],

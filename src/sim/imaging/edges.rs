@@ -10,7 +10,7 @@ use crate::imaging::tracer::object_of;
 /// Largest sweep of a moving edge that is searched, px.
 const FARTHEST_SWEEP_PX: usize = 48;
 
-/// Sweep of the edges in the image, px; 0 if nothing moves.
+/// Returns the sweep of the edges in the image, px; 0 if nothing moves.
 pub(super) fn sweep_px(objects: &[Object], faces: &[u16]) -> usize {
     if objects.iter().all(|object| object.moving.is_none()) {
         return 0;
@@ -19,7 +19,7 @@ pub(super) fn sweep_px(objects: &[Object], faces: &[u16]) -> usize {
     faces.iter().filter_map(|face| object_of(*face)).for_each(|n| is_seen[n] = true);
     let seen = objects.iter().zip(&is_seen).filter(|(_, is_seen)| **is_seen);
     let farthest = seen.map(|(object, _)| object.motion_px).fold(0.0, max);
-    // Halfway is the middle of the sweep.
+    // The image halfway through the exposure is in the middle of the sweep.
     ((0.5 * farthest).ceil() as usize).min(FARTHEST_SWEEP_PX)
 }
 
@@ -41,7 +41,7 @@ pub(super) fn mark_swept(rays: &Rays, faces: &[u16], reach: usize, swept: &mut [
     });
 }
 
-/// Whether a pixel's neighbourhood shows more than one face.
+/// Returns true if a pixel's neighbourhood shows more than one face.
 #[inline]
 pub(super) fn has_other_face(faces: &[u16], width: usize, height: usize, column: usize, row: usize) -> bool {
     let own = faces[row * width + column];
@@ -50,9 +50,9 @@ pub(super) fn has_other_face(faces: &[u16], width: usize, height: usize, column:
         .any(|y| faces[y * width + left..=y * width + right].iter().any(|face| *face != own))
 }
 
-/// 1 within `reach` of where `is_set`.
+/// Sets `out` to 1 within `reach` of each index for which `is_set` is true, else to 0.
 fn spread(n: usize, reach: usize, is_set: impl Fn(usize) -> bool, out: &mut [u8]) {
-    // The last one set up to k + reach.
+    // Last set index up to k + reach.
     let mut last: Option<usize> = None;
     let mut next = 0;
     for (k, out) in out.iter_mut().enumerate().take(n) {

@@ -1,18 +1,18 @@
 //! A finished image.
 
-/// 8 bits a channel, rows from the top, red, green, blue.
+/// Image of 8 bits per channel, rows from the top; red, green, blue.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Frame {
-    /// Columns.
+    /// Number of columns.
     pub width: usize,
-    /// Rows.
+    /// Number of rows.
     pub height: usize,
-    /// Three bytes a pixel.
+    /// Pixel values, three bytes per pixel.
     pub rgb: Vec<u8>,
 }
 
 impl Frame {
-    /// Brightness by the weights of ITU-R BT.601, into `out`, which is resized.
+    /// Writes the brightness, by the weights of ITU-R BT.601, into `out`, which is resized.
     pub fn grey(&self, out: &mut Vec<u8>) {
         out.clear();
         out.extend(self.rgb.as_chunks::<3>().0.iter().map(|&[red, green, blue]| {

@@ -22,57 +22,58 @@ use armcal_core::optics::{CameraModel, TagFamily};
 use armcal_core::robot::Shape;
 use armcal_core::stats::stream_rng;
 
-/// A printed tag: its frame has x right and y up as printed, z out of the print.
+/// Printed tag; its frame has x right and y up as printed, z out of the print.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TagPlane {
-    /// What is printed on it.
+    /// Family of the printed tag.
     pub family: TagFamily,
-    /// Number in the family.
+    /// Number of the tag in the family.
     pub id: u32,
     /// Side of its border square, as [`TagFamily`] has it.
     pub size_m: f64,
-    /// When the shutter opens, halfway, and when it closes.
+    /// Poses when the shutter opens, halfway through the exposure, and when it closes.
     pub base_from_tag: [Isometry3<f64>; 3],
 }
 
 impl TagPlane {
-    /// A tag of family 36h11 at rest relative to the base.
+    /// Returns a tag of family 36h11 at rest relative to the base.
     #[must_use]
     pub fn fixed(id: u32, size_m: f64, base_from_tag: Isometry3<f64>) -> Self {
         Self { family: TagFamily::Tag36h11, id, size_m, base_from_tag: [base_from_tag; 3] }
     }
 }
 
-/// A solid thing, wherever it is.
+/// Solid shape of the scene, without its pose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SolidShape {
-    /// About its own centre; its pose is in [`Shot::solids`].
+    /// Shape about its own centre; its pose is in [`Shot::solids`].
     pub shape: Shape,
-    /// As a screen shows it.
+    /// Colour on a screen: red, green, blue.
     pub color_rgb: [u8; 3],
-    /// Whether it has the seafloor's texture in place of its colour.
+    /// True if it has the seafloor's texture instead of its colour.
     pub is_ground: bool,
 }
 
 /// Camera and scene of one image.
 #[derive(Clone, Copy, Debug)]
 pub struct Shot<'a> {
-    /// When the shutter opens, halfway, and when it closes; the camera's frame has x right, y down, z along its axis.
+    /// Poses when the shutter opens, halfway through the exposure, and when it closes. The camera's frame has x right,
+    /// y down, z along its axis.
     pub base_from_camera: [Isometry3<f64>; 3],
     /// Printed tags of the scene.
     pub tags: &'a [TagPlane],
-    /// `base_from_shape` of each of the imager's solids, or of none, at the same instants.
+    /// Pose `base_from_shape` of each of the imager's solids, or empty, at the same instants.
     pub solids: &'a [[Isometry3<f64>; 3]],
-    /// Towards the surface of the sea, base frame.
+    /// Direction to the surface of the sea, base frame.
     pub up: Unit<Vector3<f64>>,
-    /// Stirred up sediment hides everything.
+    /// True if stirred up sediment hides everything.
     pub is_silty: bool,
-    /// Number of the image: its noise and snow are drawn for it.
+    /// Number of the image, from which its noise and snow are drawn.
     pub number: u64,
 }
 
 impl<'a> Shot<'a> {
-    /// Tags alone, before a camera that stands still, up along z of the base.
+    /// Returns a scene of tags only, in front of a camera at rest, up along z of the base.
     #[must_use]
     pub fn of_tags(base_from_camera: Isometry3<f64>, tags: &'a [TagPlane], number: u64) -> Self {
         let base_from_camera = [base_from_camera; 3];
@@ -80,7 +81,7 @@ impl<'a> Shot<'a> {
     }
 }
 
-/// Renders images with one lens in one water.
+/// Renderer of images with one lens in one water.
 #[derive(Clone, Debug)]
 pub struct Imager {
     lens: CameraModel,
@@ -101,7 +102,7 @@ pub struct Imager {
 const SILT_CD_M2: [f32; 3] = [9.0, 8.0, 6.0];
 
 impl Imager {
-    /// Noise and snow are drawn for `seed`.
+    /// Builds the imager; noise and snow are drawn for `seed`.
     #[must_use]
     pub fn new(lens: &CameraModel, spec: &ImageSpec, lights: &[Light], seed: u64) -> Self {
         use rand::Rng;
@@ -133,7 +134,7 @@ impl Imager {
         self.solids = solids.iter().map(|solid| (Form::of_shape(&solid.shape), look(solid))).collect();
     }
 
-    /// Takes an image.
+    /// Renders an image.
     pub fn take_image(&mut self, shot: &Shot) -> &Frame {
         let camera_from_base = shot.base_from_camera[1].inverse();
         let shader = Shader::new(&self.spec, &self.lights, &camera_from_base, &shot.up, &self.rays);
@@ -176,7 +177,7 @@ impl Imager {
         }
     }
 
-    /// The lens that it renders with.
+    /// Returns the lens with which it renders.
     #[must_use]
     pub fn lens(&self) -> &CameraModel {
         &self.lens

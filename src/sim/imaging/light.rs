@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
 use crate::imaging::math::{Lanes, Rgb, Vec3, exp, exp2, max};
 
-/// A white lamp in the base frame.
+/// White lamp in the base frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Light {
     /// Position of the source.
@@ -13,18 +13,18 @@ pub struct Light {
     pub direction: Unit<Vector3<f64>>,
     /// Luminous flux.
     pub flux_lm: f64,
-    /// From the beam's axis to where it has half its intensity, rad.
+    /// Angle from the beam's axis to half of the intensity, rad.
     pub half_angle_rad: f64,
 }
 
-/// A lamp in the camera's frame. At angle `a` from its axis it has `I0 2^(-(1 - cos a)/(1 - cos half))` cd (assumed);
-/// `I0` follows from the flux over the whole sphere.
+/// Lamp in the camera's frame. At angle `a` from its axis its intensity is `I0 2^(-(1 - cos a)/(1 - cos half))` cd
+/// (assumed); `I0` follows from the flux over the whole sphere.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lamp {
     position: Vec3,
     direction: Vec3,
     intensity_cd: f32,
-    /// 1 / (1 - cos(half)).
+    /// Beam coefficient `1 / (1 - cos(half))`.
     narrowness: f32,
 }
 
@@ -41,11 +41,11 @@ impl Lamp {
         }
     }
 
-    /// Light through a unit area across the rays at `points`, lx, without the water's losses; the ways' lengths; the
-    /// unit vectors towards the lamp.
+    /// Returns the light through a unit area across the rays at `points`, lx, without the water's losses. The other
+    /// results are the lengths of the paths, m, and the unit vectors towards the lamp.
     #[inline]
     fn arriving<const N: usize>(&self, points: &Lanes<N>) -> ([f32; N], [f32; N], Lanes<N>) {
-        /// Nearer than this a lamp is no point.
+        /// Square of the distance within which a lamp is not a point source, m2.
         const SIZE_M2: f32 = 0.0025;
         let (mut lux, mut way_m, mut towards) = ([0.0; N], [0.0; N], [[0.0; N]; 3]);
         let [ax, ay, az]: [f32; 3] = self.direction.into();
@@ -61,7 +61,7 @@ impl Lamp {
         (lux, way_m, towards)
     }
 
-    /// Illuminance of surfaces of unit normals `normals` at `points`, lx, added to `sum`, colour by colour.
+    /// Adds the illuminance of surfaces of unit normals `normals` at `points`, lx, to `sum`, colour by colour.
     #[inline]
     pub(super) fn light_up<const N: usize>(
         &self,
@@ -78,7 +78,7 @@ impl Lamp {
         add_attenuated(&lux, &way_m, per_m, sum);
     }
 
-    /// Illuminance of particles at `points`, lx, added to `sum`, colour by colour.
+    /// Adds the illuminance of particles at `points`, lx, to `sum`, colour by colour.
     #[inline]
     pub(super) fn light_up_all_sides<const N: usize>(&self, points: &Lanes<N>, per_m: &Rgb, sum: &mut Lanes<N>) {
         let (lux, way_m, _) = self.arriving(points);
@@ -86,7 +86,7 @@ impl Lamp {
     }
 }
 
-/// Adds what the water leaves of `lux` after `way_m`.
+/// Adds `lux` after its attenuation by the water over `way_m`.
 #[inline]
 fn add_attenuated<const N: usize>(lux: &[f32; N], way_m: &[f32; N], per_m: &Rgb, sum: &mut Lanes<N>) {
     for (sum, per_m) in sum.iter_mut().zip(per_m) {

@@ -1,8 +1,8 @@
-//! Marine snow: particles in the water before the camera, anew in each image, drawn as soft discs over what lies behind
-//! them.
+//! Marine snow: particles in the water in front of the camera, redrawn for each image as soft discs over the
+//! background.
 //!
-//! A particle of radius a at range r, white by half (assumed), sends as much light as a disc of its size: `E / pi` from
-//! `pi (f a / r)^2` px, spread as a Gaussian.
+//! A particle of radius a at range r with an albedo of one half (assumed) sends as much light as a disc of its size.
+//! The disc has the radiance `E / pi` and `pi (f a / r)^2` px, spread as a Gaussian.
 
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
@@ -12,25 +12,25 @@ use crate::imaging::shader::Shader;
 use crate::spec::ImageSpec;
 use armcal_core::optics::CameraModel;
 
-/// Particles farther away are too faint to tell, m.
+/// Largest range of visible particles, m.
 const FAR_M: f32 = 2.0;
 const NEAR_M: f32 = 0.04;
 const ALBEDO: f32 = 0.5;
-/// No disc is larger, px.
+/// Largest standard deviation of a disc, px.
 const LARGEST_PX: f32 = 20.0;
 
-/// A disc in the image.
+/// Disc in the image.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Flake {
     column: f32,
     row: f32,
     sigma_px: f32,
     range_m: f32,
-    /// At the middle, cd/m2.
+    /// Radiance in the middle, cd/m2.
     peak: [f32; 3],
 }
 
-/// The particles of one image into `out`; `key` selects their random numbers.
+/// Draws the particles of one image into `out`; `key` selects their random numbers.
 pub(super) fn fall(spec: &ImageSpec, lens: &CameraModel, shader: &Shader, key: u64, out: &mut Vec<Flake>) {
     out.clear();
     let cos_least = lens.max_view_angle_rad().cos() as f32;
@@ -46,7 +46,7 @@ pub(super) fn fall(spec: &ImageSpec, lens: &CameraModel, shader: &Shader, key: u
         let (sin, azimuth) = ((1.0 - cos * cos).max(0.0).sqrt(), TAU * draw(2));
         let point = Vec3::new(sin * azimuth.cos(), sin * azimuth.sin(), cos) * range_m;
         let Some(pixel) = lens.project(&point.cast()) else { continue };
-        // Sizes: exponential, so that few are large.
+        // The sizes are exponential, so that few are large.
         let radius_m = spec.snow_radius_m as f32 * -(1.0 - draw(3)).ln();
         let focal_px = lens.focal_px()[0] as f32;
         let radius_px = focal_px * radius_m / range_m;
@@ -62,7 +62,7 @@ pub(super) fn fall(spec: &ImageSpec, lens: &CameraModel, shader: &Shader, key: u
     }
 }
 
-/// Adds what falls on the rows from `top` on.
+/// Adds the particles on the rows from `top` on.
 pub(super) fn draw(flakes: &[Flake], rays: &Rays, ranges: &[f32], top: usize, planes: &mut [&mut [f32]; 3]) {
     let width = rays.width;
     let rows = planes[0].len() / width;

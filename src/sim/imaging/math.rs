@@ -2,29 +2,29 @@
 
 use armcal_core::numeric::NO_FRACTION;
 
-/// A vector in the camera's frame or an object's, single precision.
+/// Vector in the camera's frame or an object's, single precision.
 pub(super) type Vec3 = nalgebra::Vector3<f32>;
 /// Red, green, blue.
 pub(super) type Rgb = [f32; 3];
 /// Several vectors, or colours, component by component: loops over them become vector instructions.
 pub(super) type Lanes<const N: usize> = [[f32; N]; 3];
 
-/// Vectors as lanes.
+/// Converts vectors to lanes.
 #[inline]
 pub(super) fn lanes<const N: usize>(vectors: &[Vec3; N]) -> Lanes<N> {
     std::array::from_fn(|axis| std::array::from_fn(|k| vectors[k][axis]))
 }
 
-/// `exp(x)` for x <= 0 to a relative error of 1e-6 and of the bits of x; 0 below -87.
+/// Returns `exp(x)` for x <= 0, to a relative error of 1e-6 and of the bits of x; 0 below -87.
 #[inline]
 pub(super) fn exp(x: f32) -> f32 {
     exp2(x * std::f32::consts::LOG2_E)
 }
 
-/// `2^x` for x <= 0: the whole part goes into the exponent, the rest through its Taylor polynomial of degree 6.
+/// Returns `2^x` for x <= 0: the whole part goes into the exponent, the rest through its Taylor polynomial of degree 6.
 #[inline]
 pub(super) fn exp2(x: f32) -> f32 {
-    // Without a branch, so that a loop of these can become vector instructions.
+    // No branch, so that a loop of these can become vector instructions.
     let is_some = x >= -126.0;
     let x = if is_some { x } else { 0.0 };
     let below = x - 0.5;
@@ -40,7 +40,7 @@ pub(super) fn exp2(x: f32) -> f32 {
     if is_some { value } else { 0.0 }
 }
 
-/// The smaller one, without a care for NaN: one instruction.
+/// Returns the smaller value without handling NaN: one instruction.
 #[inline]
 pub(super) fn min(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
@@ -51,7 +51,7 @@ pub(super) fn max(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// A hash of 64 bits: the finalizer of SplitMix64 (Steele et al. 2014).
+/// Returns a hash of 64 bits: the finalizer of SplitMix64 (Steele et al. 2014).
 #[inline]
 pub(super) fn hash(x: u64) -> u64 {
     let x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
@@ -60,13 +60,13 @@ pub(super) fn hash(x: u64) -> u64 {
     x ^ (x >> 31)
 }
 
-/// Uniform in 0..1 from the upper bits of a hash.
+/// Returns a uniform number in 0..1 from the upper bits of a hash.
 #[inline]
 pub(super) fn unit(hash: u64) -> f32 {
     (hash >> 40) as f32 * (1.0 / 16_777_216.0)
 }
 
-/// Selects the random numbers of image `number`.
+/// Returns the key that selects the random numbers of image `number`.
 pub(super) fn image_key(seed: u64, number: u64) -> u64 {
     hash(seed ^ hash(number))
 }

@@ -14,7 +14,7 @@ pub(super) struct Rays {
     pub x: Vec<f32>,
     pub y: Vec<f32>,
     pub z: Vec<f32>,
-    /// Of each row: the pixels that see, from the first to behind the last.
+    /// Range of pixels in each row that are in the field of view: the first, and one after the last.
     pub spans: Vec<[usize; 2]>,
     pub focal_px: f32,
     pub center_px: [f32; 2],
@@ -55,7 +55,7 @@ impl Rays {
         Vec3::new(self.x[i], self.y[i], self.z[i])
     }
 
-    /// Those of pixels in a row, from the `i`th pixel on.
+    /// Returns the rays of consecutive pixels in a row, from the `i`th pixel on.
     #[inline]
     pub(super) fn several<const N: usize>(&self, i: usize) -> Lanes<N> {
         [first_of(&self.x[i..]), first_of(&self.y[i..]), first_of(&self.z[i..])]
@@ -66,8 +66,8 @@ impl Rays {
         (self.spans[row][0]..self.spans[row][1]).contains(&column)
     }
 
-    /// The direction at a pixel and how it changes by one pixel across and down. Beside the image or the field of view
-    /// the difference to the other side stands in.
+    /// Returns the direction at a pixel and its change by one pixel across and down. At the edge of the image or the
+    /// field of view, the change is that to the opposite side.
     pub(super) fn with_slopes(&self, column: usize, row: usize) -> (Vec3, Vec3, Vec3) {
         let here = self.at(column, row);
         let slope = |before: Option<Vec3>, after: Option<Vec3>| match (before, after) {
@@ -85,7 +85,7 @@ impl Rays {
     }
 }
 
-/// The first few values; zero where there are no more.
+/// Returns the first few values; zero where there are no more.
 #[inline(always)]
 pub(super) fn first_of<const N: usize>(values: &[f32]) -> [f32; N] {
     if let Some(whole) = values.first_chunk() {

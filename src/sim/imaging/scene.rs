@@ -7,13 +7,13 @@ use crate::imaging::rays::Rays;
 use crate::imaging::shape::{Form, Place};
 use armcal_core::spatial::{exp, log};
 
-/// Samples of place and time on a pixel that an edge crosses.
+/// Number of samples of position and time on a pixel that an edge crosses.
 pub(super) const SAMPLES: usize = 32;
 /// Side of a tile, px.
 pub(super) const TILE_PX: usize = 32;
 /// Smallest image motion during the exposure that counts as motion, px.
 const STILL_PX: f32 = 0.01;
-/// Cells that are narrower than this in the image are sampled everywhere, px.
+/// Width of cells in the image below which they are sampled everywhere, px.
 const FINE_CELL_PX: f32 = 2.5;
 
 /// Appearance of a surface.
@@ -21,32 +21,33 @@ const FINE_CELL_PX: f32 = 2.5;
 pub(super) enum Appearance {
     Tag,
     Plain(Rgb),
-    /// The seafloor's texture.
+    /// Texture of the seafloor.
     Ground,
 }
 
-/// One object before the camera.
+/// Object in front of the camera.
 #[derive(Clone, Debug)]
 pub(super) struct Object<'a> {
     pub form: &'a Form,
     pub look: Appearance,
-    /// Halfway through the exposure.
+    /// Pose halfway through the exposure.
     pub place: Place,
-    /// At each sample's time, where it moves against the camera.
+    /// Poses at each sample's time, if it moves against the camera.
     pub moving: Option<Box<[Place; SAMPLES]>>,
-    /// The farthest that any of it may move in the image while the shutter is open.
+    /// Largest motion of its points in the image while the shutter is open, px.
     pub motion_px: f32,
-    /// Its pattern is too small in the image for pixels to be told by their neighbours.
+    /// True if its pattern is too small in the image to find edges by comparing neighbouring pixels.
     pub is_fine: bool,
-    /// Spheres that hold it together, camera frame.
+    /// Spheres that together contain it, camera frame.
     bounds: Vec<Bound>,
 }
 
-/// The three instants of an exposure.
+/// Poses at the three instants of an exposure.
 pub(super) type Instants = [Isometry3<f64>; 3];
 
 impl<'a> Object<'a> {
-    /// `base_from_object` and `base_from_camera` when the shutter opens, halfway and when it closes.
+    /// Builds the object from `base_from_object` and `base_from_camera` when the shutter opens, halfway and when it
+    /// closes.
     pub(super) fn new(
         form: &'a Form,
         look: Appearance,
@@ -68,7 +69,7 @@ impl<'a> Object<'a> {
         let range_m = bounds.iter().map(|(c, r)| c.norm() - r).fold(f32::INFINITY, f32::min).max(0.1);
         let motion_px = 2.0 * focal_px * (way_m / range_m + turn_rad);
         let moving = (motion_px > STILL_PX).then(|| {
-            // The parabola through the three poses, in the tangent space at the middle one.
+            // Parabola through the three poses, in the tangent space at the middle one.
             Box::new(std::array::from_fn(|sample| {
                 let t = 2.0 * f64::from(offset(sample)[2]);
                 Place::new(&(relative[1] * exp(&(first * (0.5 * t * (t - 1.0)) + last * (0.5 * t * (t + 1.0))))))
@@ -84,25 +85,26 @@ impl<'a> Object<'a> {
         Self { form, look, place: Place::new(&relative[1]), moving, motion_px, is_fine, bounds }
     }
 
-    /// At the time of a sample.
+    /// Returns the pose at the time of a sample.
     #[inline]
     pub(super) fn place_at(&self, sample: usize) -> &Place {
         self.moving.as_ref().map_or(&self.place, |places| &places[sample])
     }
 }
 
-/// Where a sample lies on its pixel, px from the centre, and when in the exposure; each in -0.5..0.5 and of mean 0. A
-/// rank-1 lattice (1, 7, 5)/32: its planes are 0.18 apart in place, and each coordinate takes 32 even steps.
+/// Returns a sample's position on its pixel, px from the centre, and its time in the exposure. Each is in -0.5..0.5
+/// with mean 0. The samples are a rank-1 lattice (1, 7, 5)/32: its planes are 0.18 apart, and each coordinate takes 32
+/// even steps.
 pub(super) fn offset(sample: usize) -> [f32; 3] {
     [1, 7, 5].map(|step| (((sample * step) % SAMPLES) as f32 + 0.5) / SAMPLES as f32 - 0.5)
 }
 
-/// A sphere around part of an object, as a cone from the eye sees it.
+/// Sphere around part of an object, as a cone seen from the eye.
 #[derive(Clone, Copy, Debug)]
 struct Bound {
     towards: Vec3,
     nearest_m: f32,
-    /// Of the angle that it takes up to either side; a sphere that holds the eye takes up everything.
+    /// Cosine of the cone's half angle; a sphere that contains the eye fills all directions.
     cos: f32,
     sin: f32,
 }
@@ -122,14 +124,14 @@ impl Bound {
     }
 }
 
-/// The cone around a tile's rays.
+/// Cone around a tile's rays.
 struct Cone {
     axis: Vec3,
     cos: f32,
     sin: f32,
 }
 
-/// Objects that a tile's rays may meet, the nearest first, each with a bound that no ray beats.
+/// Returns the objects that a tile's rays may meet, the nearest first, each with a lower bound of its range.
 pub(super) fn candidates(objects: &[Object], rays: &Rays, column: usize, row: usize) -> Vec<(f32, u16)> {
     let Some(cone) = Cone::new(rays, column, row) else { return Vec::new() };
     let nearest = |object: &Object| {
@@ -146,8 +148,8 @@ pub(super) fn candidates(objects: &[Object], rays: &Rays, column: usize, row: us
     found
 }
 
-/// Those of a tile's candidates that the rays of a small block of it may meet, in the same order. The block is left,
-/// top, right, bottom; the last two are behind it.
+/// Selects the candidates of a tile that the rays of a small block in it may meet, in the same order. The block is
+/// left, top, right, bottom; the last two are exclusive.
 pub(super) fn narrow(
     objects: &[Object],
     rays: &Rays,
@@ -167,9 +169,9 @@ pub(super) fn narrow(
 }
 
 impl Cone {
-    /// `None` where a corner sees nothing.
+    /// Returns the cone of a block; `None` if a corner is outside the field of view.
     fn of_block(rays: &Rays, [left, top, right, bottom]: [usize; 4]) -> Option<Self> {
-        /// Rounding, and rays between the corners that are farther from the axis.
+        /// Margin for rounding, and for rays between the corners that are farther from the axis.
         const MARGIN_PX: f32 = 2.0;
         let corners = [(left, top), (right - 1, top), (left, bottom - 1), (right - 1, bottom - 1)];
         if !corners.iter().all(|&(x, y)| rays.sees(x, y)) {
@@ -184,9 +186,9 @@ impl Cone {
         Some(Self { axis, cos: cos * margin_cos - sin * margin_sin, sin: sin * margin_cos + cos * margin_sin })
     }
 
-    /// `None` for a tile that sees nothing.
+    /// Returns the cone of a tile; `None` if it is outside the field of view.
     fn new(rays: &Rays, column: usize, row: usize) -> Option<Self> {
-        /// Rays on the rim that are looked at.
+        /// Spacing of the rays on the rim that are used.
         const EVERY_PX: usize = 8;
         let (right, bottom) = ((column + TILE_PX).min(rays.width) - 1, (row + TILE_PX).min(rays.height) - 1);
         let steps = |from: usize, to: usize| (from..to).step_by(EVERY_PX).chain([to]);
@@ -199,7 +201,7 @@ impl Cone {
         };
         let axis = rim().sum::<Vec3>().try_normalize(1e-6)?;
         let cos = rim().map(|ray| ray.dot(&axis)).fold(1.0, f32::min);
-        // Some pixels more, for samples beside the centres, rays between those of the rim, and the edge of the field of
+        // The margin is for samples off the pixel centres, rays between those of the rim, and the edge of the field of
         // view.
         let half_rad = cos.clamp(-1.0, 1.0).acos() + 10.0 / rays.focal_px;
         Some(Self { axis, cos: half_rad.cos(), sin: half_rad.sin() })
@@ -207,14 +209,14 @@ impl Cone {
 
     #[inline]
     fn touches(&self, bound: &Bound) -> bool {
-        // The angle between the axes against the sum of the halves, by their cosines.
+        // Compares the angle between the axes with the sum of the half angles, by their cosines.
         let together_cos = self.cos * bound.cos - self.sin * bound.sin;
         bound.cos <= -self.cos || bound.towards.dot(&self.axis) >= together_cos
     }
 }
 
 impl Form {
-    /// Spheres that hold the form together, own frame: several in a row where it is long.
+    /// Returns spheres that contain the form, own frame: several in a row if it is long.
     fn bounds(&self) -> Vec<(nalgebra::Vector3<f64>, f32)> {
         let half = match self {
             Self::Tag(board) => [board.half_m, board.half_m, 0.0],
@@ -239,13 +241,13 @@ impl Form {
     }
 }
 
-/// The largest of several ranges.
+/// Returns the largest of several ranges.
 #[inline]
 pub(super) fn farthest<const N: usize>(range: &[f32; N]) -> f32 {
     range.iter().fold(f32::NEG_INFINITY, |most, range| max(most, *range))
 }
 
-/// The nearest object on each of several rays at one time: range and number plus one.
+/// Returns the nearest object on each of several rays at one time: range, and number plus one.
 #[inline]
 pub(super) fn first_met<const N: usize>(
     objects: &[Object],
@@ -277,7 +279,7 @@ mod tests {
     use nalgebra::Vector3;
     use rand::RngExt;
 
-    /// Every pixel of every block meets what it meets where all objects are tried, at the same range.
+    /// Every pixel of every block meets the same object, at the same range, as with all objects as candidates.
     #[test]
     fn narrowed_candidates_lack_nothing_that_a_ray_meets() {
         let shapes = [

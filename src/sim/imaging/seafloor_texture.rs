@@ -1,11 +1,11 @@
-//! The seafloor's texture: smooth noise on all scales, periodic, with ever coarser copies for the distance. Assumed.
+//! Texture of the seafloor: smooth noise on all scales, periodic, with ever coarser copies for the distance. Assumed.
 
 use crate::imaging::math::{Rgb, hash, unit};
 
 /// Side of the finest level, texels.
 const SIDE: usize = 512;
 const TEXEL_M: f32 = 0.01;
-/// Of sand.
+/// Reflectance of sand.
 const SAND: Rgb = [0.34, 0.30, 0.23];
 
 #[derive(Clone, Debug)]
@@ -17,7 +17,7 @@ pub(super) struct Texture {
 impl Texture {
     pub(super) fn new() -> Self {
         let mut finest = vec![0.0_f32; SIDE * SIDE];
-        // From 2.56 m down to 2 cm; the share falls with the scale's root.
+        // Scales from 2.56 m to 2 cm; the share falls with the root of the scale.
         for octave in 0..8 {
             let cells = 2_usize << octave;
             let share = 0.28 * 0.76_f32.powi(octave);
@@ -34,19 +34,19 @@ impl Texture {
         Self { levels }
     }
 
-    /// The copy to take where a pixel covers `footprint_m`.
+    /// Returns the copy for a pixel that covers `footprint_m`.
     pub(super) fn level(&self, footprint_m: f32) -> usize {
         let halvings = (footprint_m / TEXEL_M).log2().round();
         halvings.clamp(0.0, (self.levels.len() - 1) as f32) as usize
     }
 
-    /// Reflectance at a place, m.
+    /// Returns the reflectance at a position, m.
     #[inline]
     pub(super) fn albedo(&self, x_m: f32, y_m: f32, level: usize) -> Rgb {
         let texels = &self.levels[level];
         let side = SIDE >> level;
         let scale = 1.0 / (TEXEL_M * (1 << level) as f32);
-        // Whole periods more, so that the cast rounds down.
+        // Adds whole periods, so that the cast rounds down.
         let away = (side << 12) as f32;
         let (x, y) = (x_m * scale + away, y_m * scale + away);
         let (i, j) = (x as i32 as usize, y as i32 as usize);
@@ -60,7 +60,7 @@ impl Texture {
     }
 }
 
-/// Noise in -1..1 that is smooth between the nodes of a periodic grid of `cells` squared.
+/// Returns noise in -1..1 that is smooth between the nodes of a periodic grid of `cells` squared.
 fn smooth_noise(x: usize, y: usize, cells: usize, octave: u64) -> f32 {
     let at =
         |i: usize, j: usize| 2.0 * unit(hash((octave << 40) ^ ((i % cells) as u64) << 20 ^ (j % cells) as u64)) - 1.0;

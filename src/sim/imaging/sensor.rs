@@ -12,13 +12,13 @@ use crate::imaging::rays::{Rays, first_of};
 use crate::spec::ImageSpec;
 use armcal_core::numeric::whole_part;
 
-/// Rows that one thread works on.
+/// Number of rows that one thread processes.
 pub(super) const BAND_ROWS: usize = 32;
 const NORMALS: usize = 4096;
-/// Pixels that are read out together.
+/// Number of pixels that are read out together.
 const LANES: usize = 8;
 
-/// The sensor and what it needs for every image.
+/// Image sensor with its precomputed tables.
 #[derive(Clone, Debug)]
 pub(super) struct Sensor {
     /// Half of a symmetric kernel, its middle first; empty without blur.
@@ -34,7 +34,7 @@ impl Sensor {
         Self { kernel: gaussian(spec.blur_px), normals: normals(), spare: Vec::new(), seed }
     }
 
-    /// The lens's blur.
+    /// Applies the lens's blur.
     pub(super) fn blur(&mut self, planes: &mut [Vec<f32>; 3], width: usize) {
         let Some((middle, sides)) = self.kernel.split_first() else { return };
         let height = planes[0].len() / width;
@@ -57,7 +57,7 @@ impl Sensor {
         }
     }
 
-    /// The readout of image `number`.
+    /// Returns the readout of image `number`.
     pub(super) fn readout(&self, spec: &ImageSpec, exposure: Exposure, rays: &Rays, number: u64) -> Readout<'_> {
         Readout::new(spec, exposure, rays, image_key(self.seed, number), &self.normals)
     }
@@ -93,7 +93,7 @@ impl<'a> Readout<'a> {
         }
     }
 
-    /// The bytes of an image.
+    /// Writes the bytes of an image.
     pub(super) fn write(&self, planes: &[Vec<f32>; 3], width: usize, rgb: &mut [u8]) {
         rgb.par_chunks_mut(3 * width * BAND_ROWS).enumerate().for_each(|(band, out)| {
             for (k, line) in out.chunks_mut(3 * width).enumerate() {
@@ -107,7 +107,7 @@ impl<'a> Readout<'a> {
     fn line(&self, row: usize, planes: [&[f32]; 3], out: &mut [u8]) {
         for (n, out) in out.chunks_mut(3 * LANES).enumerate() {
             let (first, n_pixels) = (n * LANES, out.len() / 3);
-            // At a row's end zeros fill up; what becomes of them is not kept.
+            // Zeros fill up the end of a row; their results are dropped.
             let of = first..first + n_pixels;
             let [red, green, blue] = planes;
             let radiance = [first_of(&red[of.clone()]), first_of(&green[of.clone()]), first_of(&blue[of])];
@@ -118,7 +118,7 @@ impl<'a> Readout<'a> {
         }
     }
 
-    /// Some pixels in a row from column `first` on.
+    /// Returns the bytes of several pixels in a row, from column `first` on.
     #[inline]
     fn pixels(&self, row: usize, first: usize, radiance: &Lanes<LANES>) -> [[u8; LANES]; 3] {
         let dy = row as f32 - self.center_px[1];
@@ -157,7 +157,7 @@ impl<'a> Readout<'a> {
     }
 }
 
-/// A row blurred; beyond its ends the last pixels go on.
+/// Blurs a row; the last pixels continue beyond its ends.
 fn across(line: &[f32], middle: f32, sides: &[f32], out: &mut [f32]) {
     let (n, reach) = (line.len(), sides.len());
     let slow = |i: usize| {
@@ -181,7 +181,7 @@ fn across(line: &[f32], middle: f32, sides: &[f32], out: &mut [f32]) {
     }
 }
 
-/// Half of a Gaussian kernel of unit sum, out to 3 sigma and half a pixel.
+/// Returns half of a Gaussian kernel of unit sum, out to 3 sigma and half a pixel.
 fn gaussian(sigma_px: f64) -> Vec<f32> {
     if sigma_px <= 0.0 {
         return Vec::new();
@@ -192,8 +192,8 @@ fn gaussian(sigma_px: f64) -> Vec<f32> {
     (0..=reach).map(|k| (weight(k) / sum) as f32).collect()
 }
 
-/// The normal distribution's quantiles at the middles of even shares, by bisection of its distribution function (the
-/// series of Marsaglia 2004), scaled to a variance of one.
+/// Returns the normal distribution's quantiles at the middles of even shares, scaled to a variance of one. They are
+/// found by bisection of its distribution function (the series of Marsaglia 2004).
 fn normals() -> Box<[f32; NORMALS]> {
     let below = |x: f64| {
         let (mut sum, mut term, mut n) = (x, x, 1.0);

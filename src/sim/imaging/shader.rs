@@ -1,8 +1,9 @@
 //! Radiance of a surface: `albedo * factor + veil`.
 //!
-//! Lambert: `factor = E / pi exp(-bD z)` with the illuminance E of lamps and sun. The veil far away is what the water
-//! itself sends back, lit by the lamps: `Binf = integral of b p E(s) exp(-bD s) ds` along the ray (single scattering),
-//! on a coarse grid of rays; and the sun's, `E b / (4 pi bB)` (assumed: even in all directions). Lamps cast no shadows.
+//! Lambert: `factor = E / pi exp(-bD z)` with the illuminance E of lamps and sun. The veil at infinity is the light
+//! that the water itself sends back. Lit by the lamps it is `Binf = integral of b p E(s) exp(-bD s) ds` along the ray
+//! (single scattering), on a coarse grid of rays. Lit by the sun it is `E b / (4 pi bB)` (assumed: even in all
+//! directions). Lamps cast no shadows.
 
 use std::f32::consts::{FRAC_1_PI, PI};
 
@@ -14,9 +15,9 @@ use crate::imaging::rays::Rays;
 use crate::imaging::water::Water;
 use crate::spec::ImageSpec;
 
-/// Distance of the veil's nodes, px.
+/// Spacing of the veil's nodes, px.
 const NODE_PX: usize = 16;
-/// Ranges at which the veil's integral is sampled: even steps of the root, so that near ones are close.
+/// Number of ranges at which the veil's integral is sampled: even steps of the root, so that near ones are close.
 const STEPS: usize = 16;
 
 /// Lights and water of one image.
@@ -25,21 +26,21 @@ pub(super) struct Shader {
     pub water: Water,
     pub lamps: Vec<Lamp>,
     ambient_lux: f32,
-    /// Towards the surface of the sea, camera frame.
+    /// Direction to the surface of the sea, camera frame.
     up: Vec3,
     veil: Veil,
-    /// Without lamps and with no water there is no up and down either: light from all sides.
+    /// True without lamps and water: then light comes evenly from all sides, and there is no up and down.
     is_even: bool,
 }
 
-/// `Binf` on a grid over the image, linear in between.
+/// Veil `Binf` on a grid over the image, linear in between.
 #[derive(Clone, Debug, Default)]
 struct Veil {
     columns: usize,
     nodes: Vec<Rgb>,
 }
 
-/// `radiance = albedo * factor + veil`, cd/m2.
+/// Coefficients of the radiance: `radiance = albedo * factor + veil`, cd/m2.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Shade {
     pub factor: Rgb,
@@ -85,7 +86,7 @@ impl Shader {
                 ((n % columns * NODE_PX).min(rays.width - 1), (n / columns * NODE_PX).min(rays.height - 1));
             let mut veil = sunny;
             if has_lamps {
-                // Beside the field of view the nearest ray that sees stands in.
+                // Outside the field of view, the nearest ray in it is used.
                 let [first, behind] = rays.spans[row];
                 if first < behind {
                     self.scattered_back(&path, &rays.at(column.clamp(first, behind - 1), row), &mut veil);
@@ -96,7 +97,7 @@ impl Shader {
         Veil { columns, nodes: (0..columns * rows).into_par_iter().map(node).collect() }
     }
 
-    /// Adds the light of the lamps that the water on a ray sends back.
+    /// Adds the lamps' light that the water on a ray sends back.
     fn scattered_back(&self, path: &BackPath, ray: &Vec3, sum: &mut Rgb) {
         let points: Lanes<STEPS> = std::array::from_fn(|axis| path.middle_m.map(|m| ray[axis] * m));
         let mut lux = [[0.0; STEPS]; 3];
@@ -111,7 +112,7 @@ impl Shader {
         }
     }
 
-    /// The veil far away at a pixel.
+    /// Returns the veil at infinity at a pixel.
     #[inline]
     pub(super) fn veil_at(&self, column: usize, row: usize) -> Rgb {
         let Veil { columns, nodes } = &self.veil;
@@ -123,13 +124,14 @@ impl Shader {
         std::array::from_fn(|k| (1.0 - v) * (a[k] + u * (b[k] - a[k])) + v * (c[k] + u * (d[k] - c[k])))
     }
 
-    /// Open water.
+    /// Returns the shade of open water.
     #[inline]
     pub(super) fn open(&self, column: usize, row: usize) -> Shade {
         Shade { factor: [0.0; 3], veil: self.veil_at(column, row) }
     }
 
-    /// Surfaces at `points` (camera frame) with unit normals `normals`, seen at pixels (column, row).
+    /// Returns the shades of surfaces at `points` (camera frame) with unit normals `normals`, seen at pixels (column,
+    /// row).
     #[inline]
     pub(super) fn shade<const N: usize>(
         &self,
@@ -165,11 +167,11 @@ impl Shader {
     }
 }
 
-/// The steps of the veil's integral, the same for all rays of an image.
+/// Steps of the veil's integral, the same for all rays of an image.
 struct BackPath {
     middle_m: [f32; STEPS],
     length_m: [f32; STEPS],
-    /// What the water leaves of light on its way back, by colour.
+    /// Transmission of the water on the way back, by colour.
     left: Lanes<STEPS>,
 }
 

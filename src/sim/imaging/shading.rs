@@ -30,11 +30,11 @@ pub(super) struct Intersection {
     pub ray: Vec3,
     pub range_m: f32,
     pub face: u16,
-    /// In the camera's frame.
+    /// Outer normal, camera frame.
     pub normal: Vec3,
 }
 
-/// Shades of flat faces that a smallest block has already seen: a few pixels make no difference to them.
+/// Shades of flat faces that a smallest block has already computed: they are the same within a few pixels.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ShadeCache {
     shades: [(u16, Shade); 4],
@@ -59,7 +59,7 @@ impl ShadeCache {
 }
 
 impl Tracer<'_> {
-    /// The shades of a face that is known to lie on the rays of some pixels at `range_m`, and where it is met.
+    /// Returns the shades of a face on the rays of some pixels at `range_m`, and the intersections.
     fn surface<const N: usize>(
         &self,
         face: u16,
@@ -92,14 +92,14 @@ impl Tracer<'_> {
         }
     }
 
-    /// The copy of the texture that a pixel takes.
+    /// Returns the copy of the texture for a pixel.
     fn ground_level(&self, ray: &Vec3, range_m: f32, normal: &Vec3) -> usize {
         self.texture.level(range_m / (self.rays.focal_px * ray.dot(normal).abs().max(0.05)))
     }
 }
 
 impl Band<'_> {
-    /// `tiles` has the candidates of each.
+    /// Shades the band; `tiles` has the candidates of each tile.
     pub(super) fn shade(&mut self, tiles: &[Candidates]) {
         let width = self.tracer.rays.width;
         let rows = self.planes[0].len() / width;
@@ -114,7 +114,7 @@ impl Band<'_> {
         }
     }
 
-    /// Left, top, right, bottom; the last two are behind it. Rows count within the band.
+    /// Shades a block of left, top, right, bottom; the last two are exclusive. Rows count within the band.
     fn shade_block(&mut self, block: [usize; 4], level: usize, found: &[(f32, u16)]) {
         let [left, top, right, bottom] = block;
         if self.is_uniform(block) {
@@ -169,7 +169,7 @@ impl Band<'_> {
         shade.radiance(&albedo)
     }
 
-    /// The objects that a pixel and its neighbours see, as candidates.
+    /// Finds the objects that a pixel and its neighbours see, as candidates; returns their number.
     fn neighbours(&self, x: usize, row: usize, near: &mut [(f32, u16); 9]) -> usize {
         let Tracer { rays, .. } = self.tracer;
         let mut n = 0;
@@ -185,7 +185,7 @@ impl Band<'_> {
         n
     }
 
-    /// Whether a block and the pixels around it show one face, in full view.
+    /// Returns true if a block and the pixels around it show one face, in full view.
     fn is_uniform(&self, [left, top, right, bottom]: [usize; 4]) -> bool {
         let Tracer { rays, .. } = self.tracer;
         let (x0, x1) = (left.saturating_sub(1), (right + 1).min(rays.width));
@@ -196,7 +196,7 @@ impl Band<'_> {
             let [first, behind] = rays.spans[y];
             x0 >= first
                 && x1 <= behind
-                // Without a branch a pixel.
+                // No branch per pixel.
                 && self.faces[line.clone()].iter().fold(0, |other, face| other | (face ^ own)) == 0
                 && self.swept.is_none_or(|swept| swept[line].iter().fold(0, |any, mark| any | mark) == 0)
         })
@@ -229,7 +229,7 @@ impl Band<'_> {
         }
     }
 
-    /// Light is linear in a block, the texture is not. `first` is the pixel at the top left.
+    /// Shades a block of the seafloor: its light is linear, the texture is not. `first` is the pixel at the top left.
     fn fill_ground(
         &mut self,
         [left, top, right, bottom]: [usize; 4],
@@ -261,7 +261,8 @@ impl Band<'_> {
     }
 }
 
-/// The values of one row between four corners (top left, top right, bottom left, bottom right): the first and the step.
+/// Interpolates one row between four corners (top left, top right, bottom left, bottom right): returns the first value
+/// and the step.
 #[inline]
 fn line(corner: &[f32; 4], row: usize, rows: usize, columns: usize) -> (f32, f32) {
     let down = row as f32 / (rows.max(2) - 1) as f32;

@@ -4,7 +4,7 @@ use crate::imaging::math::{Lanes, Vec3, lanes, max, min};
 use crate::imaging::tag_board::{self, Board};
 use armcal_core::robot::Shape;
 
-/// A face of an object takes its lowest bits, the object's number plus one the others; 0 is open water.
+/// Number of low bits that hold the face; the others hold the object's number plus one, and 0 is open water.
 pub(super) const FACE_BITS: u32 = 3;
 
 /// Form of an object in its own frame; lengths in m.
@@ -14,7 +14,7 @@ pub(super) enum Form {
     Box {
         half: [f32; 3],
     },
-    /// Along z.
+    /// Cylinder along z.
     Cylinder {
         radius: f32,
         half: f32,
@@ -26,7 +26,7 @@ pub(super) enum Form {
     Sphere {
         radius: f32,
     },
-    /// Outer normals and distances from the origin.
+    /// Hull by its outer normals and their distances from the origin.
     Hull {
         planes: Vec<[f32; 4]>,
         radius: f32,
@@ -38,7 +38,7 @@ pub(super) enum Form {
 pub(super) struct Place {
     /// Rows of `object_from_camera`'s rotation.
     rows: [[f32; 3]; 3],
-    /// The eye in the object's frame, m.
+    /// Position of the eye in the object's frame, m.
     eye: [f32; 3],
 }
 
@@ -59,7 +59,7 @@ impl Place {
         })
     }
 
-    /// Points on rays, object frame.
+    /// Returns the points on rays, object frame.
     #[inline]
     pub(super) fn points<const N: usize>(&self, rays: &Lanes<N>, range_m: &[f32; N]) -> Lanes<N> {
         let mut points = self.turn(rays);
@@ -71,7 +71,7 @@ impl Place {
         points
     }
 
-    /// Intersection of a ray with the plane z = 0, x and y in the object's frame, m.
+    /// Returns the intersection of a ray with the plane z = 0, x and y in the object's frame, m.
     #[inline]
     pub(super) fn on_plane(&self, ray: [f32; 3]) -> [f32; 2] {
         let d = self.turn(&ray.map(|v| [v]));
@@ -79,7 +79,7 @@ impl Place {
         [self.eye[0] + range * d[0][0], self.eye[1] + range * d[1][0]]
     }
 
-    /// From object to camera axes.
+    /// Turns a vector from object to camera axes.
     #[inline]
     pub(super) fn back(&self, v: &Vec3) -> Vec3 {
         Vec3::from_fn(|j, _| (0..3).map(|i| self.rows[i][j] * v[i]).sum())
@@ -108,7 +108,8 @@ impl Form {
         }
     }
 
-    /// Ranges at which rays enter, m, infinite for those that miss. A tag's counts as nearer by what it is glued on.
+    /// Returns the ranges at which rays enter, m; infinite for rays that miss. A tag's range is reduced, because it is
+    /// glued to a surface.
     #[inline]
     pub(super) fn enter<const N: usize>(&self, place: &Place, rays: &Lanes<N>) -> [f32; N] {
         let d = place.turn(rays);
@@ -123,7 +124,7 @@ impl Form {
         }
     }
 
-    /// Faces and true ranges of what rays meet that enter at `range_m`: a tag's counts as nearer.
+    /// Returns the faces and true ranges at the intersections; the `range_m` of a tag is reduced.
     #[inline]
     pub(super) fn faces<const N: usize>(
         &self,
@@ -146,13 +147,13 @@ impl Form {
         (faces, true_m)
     }
 
-    /// Whether each face has one normal.
+    /// Returns true if each face has one normal.
     #[inline]
     pub(super) fn is_flat(&self) -> bool {
         matches!(self, Self::Tag(_) | Self::Box { .. })
     }
 
-    /// Surface where a ray enters at `range_m`: true range, face and outer normal (camera frame).
+    /// Returns the surface where a ray enters at `range_m`: true range, face and outer normal (camera frame).
     pub(super) fn meet(&self, place: &Place, ray: &Vec3, range_m: f32) -> (f32, u16, Vec3) {
         let rays = lanes(&[*ray]);
         if matches!(self, Self::Tag(_)) {
@@ -166,7 +167,7 @@ impl Form {
         (range_m, face_of(part), place.back(&normal))
     }
 
-    /// The part of the surface that points of it lie on: a box's axis, a cylinder's side (0) or ends (1), a hull's
+    /// Returns the part of the surface on which points are: a box's axis, a cylinder's side (0) or ends (1), a hull's
     /// plane.
     #[inline]
     fn parts<const N: usize>(&self, p: &Lanes<N>) -> [u16; N] {
@@ -200,7 +201,7 @@ impl Form {
         parts
     }
 
-    /// Outer normal of a part at a point of it, own frame.
+    /// Returns the outer normal of a part at one of its points, own frame.
     fn normal(&self, part: u16, p: &Vec3) -> Vec3 {
         match self {
             Self::Tag(_) => Vec3::z(),
@@ -225,7 +226,7 @@ impl Form {
     }
 }
 
-/// Few bits: neighbours seldom share them.
+/// Returns a part's face: with few bits, neighbours seldom share one.
 #[inline]
 fn face_of(part: u16) -> u16 {
     part % (1 << FACE_BITS)

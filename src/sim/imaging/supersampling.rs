@@ -9,17 +9,17 @@ use crate::imaging::shape::Form;
 use crate::imaging::tag_board;
 use crate::imaging::tracer::Tracer;
 
-/// The rays of one pixel's samples, and what they meet.
+/// Rays of one pixel's samples, and the objects that they meet.
 struct Samples {
-    /// Column and row.
+    /// Column and row of the pixel.
     pixel: [usize; 2],
     lanes: Lanes<SAMPLES>,
     range: [f32; SAMPLES],
-    /// Object plus one; 0 is open water.
+    /// Number of the object plus one; 0 is open water.
     number: [u16; SAMPLES],
 }
 
-/// Bits of the samples that are left after `bits` has lost its lowest.
+/// Returns the positions of the bits that are set.
 fn ones(mut bits: u32) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let k = bits.trailing_zeros() as usize;
@@ -53,7 +53,7 @@ impl Samples {
 }
 
 impl Tracer<'_> {
-    /// The mean over a pixel and the exposure.
+    /// Returns the mean radiance over a pixel and the exposure.
     pub(super) fn sampled(&self, found: &[(f32, u16)], column: usize, row: usize, known: &mut ShadeCache) -> Rgb {
         let samples = Samples::new(self, found, column, row);
         let mut sum = [0.0; 3];
@@ -72,9 +72,9 @@ impl Tracer<'_> {
         sum
     }
 
-    /// The mean over the samples in `mine`, which all meet object `n`.
+    /// Returns the mean over the samples in `mine`, which all meet object `n`.
     fn sampled_object(&self, n: u16, mine: u32, samples: &Samples, known: &mut ShadeCache) -> Rgb {
-        /// Shading is smooth but for creases: so many samples stand for all.
+        /// Number of samples that are shaded for all: shading is smooth except at creases.
         const SHADED: u32 = 4;
         let [column, row] = samples.pixel;
         let object = &self.objects[usize::from(n)];
@@ -85,7 +85,7 @@ impl Tracer<'_> {
         for k in ones(mine).step_by(every as usize) {
             let ray = samples.ray(k);
             let (range_m, face, normal) = object.form.meet(object.place_at(k), &ray, samples.range[k]);
-            // All of a tag's front is one plane.
+            // The front of a tag is one plane.
             let key = (n + 1) << FACE_BITS | if is_tag { 0 } else { face };
             let shade = known.shade(key, object, || {
                 let [shade] = self.shader.shade(&[ray * range_m], &[normal], &[[column, row]]);
@@ -103,7 +103,7 @@ impl Tracer<'_> {
     }
 }
 
-/// The mean over the samples in `mine` of a tag whose shade is `shade`.
+/// Returns the mean over the samples in `mine` of a tag whose shade is `shade`.
 fn printed(object: &Object, mine: u32, samples: &Samples, shade: &Shade, face: u16) -> Rgb {
     let Form::Tag(board) = object.form else { return shade.radiance(&tag_board::albedo(face)) };
     if face == tag_board::FACE_BACK {
@@ -118,7 +118,7 @@ fn printed(object: &Object, mine: u32, samples: &Samples, shade: &Shade, face: u
     shade.radiance(&[tag_board::WHITE + share * (tag_board::BLACK - tag_board::WHITE); 3])
 }
 
-/// As `first_met`, each sample at its own time.
+/// Returns the first intersections like `first_met`, with each sample at its own time.
 fn met_in_motion(
     objects: &[Object],
     candidates: &[(f32, u16)],

@@ -1,4 +1,4 @@
-//! Rendered images against projection and closed forms.
+//! Rendered images compared with projection and closed forms.
 
 use std::f64::consts::{PI, TAU};
 
@@ -13,14 +13,14 @@ use armcal_core::robot::{Hull, Shape, parry_pose};
 use armcal_core::stats::stream_rng;
 use armcal_detect::{DetectorSettings, GreyImage, TagDetector};
 
-/// An id that the family does not have: a blank white board.
+/// Id that the family does not have: a blank white board.
 const BLANK: u32 = 9999;
 const WHITE: f64 = 0.85;
 const BLACK: f64 = 0.05;
 const COUNTS_PER_CD_M2: f64 = 255.0 * PI / 1000.0;
 
-/// A tag `range_m` ahead of the camera in a direction by pixel, turned by `tilt` (rad, its own axes) from facing the
-/// camera.
+/// Returns a tag `range_m` ahead of the camera in a direction by pixel. It is turned by `tilt` (rad, its own axes) from
+/// facing the camera.
 fn ahead(pixel: [f64; 2], range_m: f64, tilt: [f64; 3]) -> Isometry3<f64> {
     let ray = lens().unproject(&Vector2::from(pixel)).expect("in view");
     let facing = UnitQuaternion::rotation_between(&Vector3::z(), &-ray.into_inner())
@@ -46,7 +46,7 @@ fn at(frame: &Frame, pixel: [f64; 2]) -> [f64; 3] {
     std::array::from_fn(|k| f64::from(frame.rgb[i + k]))
 }
 
-/// Between pixels.
+/// Interpolates between pixels.
 fn between(image: &[f64], pixel: &Vector2<f64>) -> f64 {
     let width = lens().resolution_px()[0] as usize;
     let (x, y) = (pixel.x.floor(), pixel.y.floor());
@@ -55,8 +55,8 @@ fn between(image: &[f64], pixel: &Vector2<f64>) -> f64 {
     (1.0 - v) * row(i) + v * row(i + width)
 }
 
-/// The sides of the black border where the projection puts them: across each the brightness falls from white to black,
-/// and the area under the profile tells where, whatever the pixels' blur.
+/// The sides of the black border are at their projections. Across each side the brightness falls from white to black,
+/// and the area under the profile gives its position, for any blur of the pixels.
 #[test]
 fn edges_lie_where_the_projection_puts_them() {
     const REACH_PX: f64 = 2.5;
@@ -103,7 +103,7 @@ fn edges_lie_where_the_projection_puts_them() {
     assert!(mean.abs() < 0.01 && rms < 0.03, "mean {mean}, rms {rms}");
 }
 
-/// Each family as the imager draws it, read back by the detector: id, and corners where the projection puts them.
+/// The detector reads each family from rendered images: the ids, and the corners at their projections.
 #[test]
 fn tags_of_each_family_are_read_where_they_were_drawn() {
     for family in TagFamily::ALL {
@@ -128,7 +128,7 @@ fn tags_of_each_family_are_read_where_they_were_drawn() {
     }
 }
 
-/// I = J exp(-bD z) + Binf (1 - exp(-bB z)) for each channel, on white and black.
+/// Each channel follows I = J exp(-bD z) + Binf (1 - exp(-bB z)), on white and black.
 #[test]
 fn water_takes_and_gives_light_by_its_closed_form() {
     let (direct, back, veil) = ([0.9, 0.3, 0.15], [1.4, 0.5, 0.3], [20.0, 60.0, 80.0]);
@@ -144,7 +144,7 @@ fn water_takes_and_gives_light_by_its_closed_form() {
         for (albedo, pixel) in [(WHITE, center()), (WHITE, [300.0, 400.0])] {
             let frame = shot(&spec, &[], &[TagPlane::fixed(BLANK, 0.3, ahead(pixel, range_m, [0.0; 3]))]);
             let found = at(&frame, pixel);
-            // The board's normal lies nearly across the vertical: half of the sky.
+            // The board's normal is nearly horizontal: half of the sky lights it.
             let normal = ahead(pixel, range_m, [0.0; 3]).rotation * Vector3::z();
             for k in 0..3 {
                 let lux = 2000.0 * (0.5 + 0.5 * normal.z);
@@ -159,7 +159,7 @@ fn water_takes_and_gives_light_by_its_closed_form() {
             }
         }
     }
-    // Of a printed tag the black border, seen through the same water.
+    // The black border of a printed tag, seen through the same water.
     let pose = ahead(center(), 0.5, [0.0; 3]);
     let frame = shot(&spec, &[], &[TagPlane::fixed(0, 0.3, pose)]);
     let border = lens().project(&(pose * Point3::new(0.131, 0.0, 0.0)).coords).expect("in view");
@@ -177,7 +177,7 @@ fn lamps_fall_off_with_the_square_and_keep_their_flux() {
         flux_lm: 100.0,
         half_angle_rad,
     };
-    // Peak intensity of the beam, in closed form of its definition.
+    // Peak intensity of the beam, by the closed form of its definition.
     let narrow = 1.0 / (1.0 - 0.5_f64.cos());
     let peak_cd = 100.0 * narrow * 2.0_f64.ln() / (TAU * (1.0 - (-2.0 * narrow).exp2()));
     let spec = ImageSpec { ambient_lux: 0.0, ..ImageSpec::clean() };
@@ -189,7 +189,7 @@ fn lamps_fall_off_with_the_square_and_keep_their_flux() {
     }
     for half_angle_rad in [0.2, 0.7, 1.4] {
         let lamp = Lamp::new(&light(half_angle_rad), &Isometry3::identity());
-        // Over a sphere of 1 m, in even steps of the cosine.
+        // Integral over a sphere of 1 m, in even steps of the cosine.
         let flux: f64 = (0..2000)
             .map(|i| {
                 let cos = -1.0 + (f64::from(i) + 0.5) / 1000.0;
@@ -202,7 +202,7 @@ fn lamps_fall_off_with_the_square_and_keep_their_flux() {
     }
 }
 
-/// An even field: its mean falls as the vignette says, its variance is that of read and shot noise and of rounding.
+/// In an even field, the mean falls with the vignette. The variance is that of read noise, shot noise and rounding.
 #[test]
 fn the_sensor_has_the_vignette_and_the_noise_that_it_says() {
     let spec = ImageSpec { vignetting: 0.4, electrons_per_cd_m2: 400.0, gain: 2.0, ..ImageSpec::clean() };
@@ -227,7 +227,7 @@ fn the_sensor_has_the_vignette_and_the_noise_that_it_says() {
     let expected = scale * scale * (900.0 + 8.0 * 400.0) + 1.0 / 12.0;
     assert!((mean - level).abs() < 0.02, "{mean} for {level}");
     assert!((variance / expected - 1.0).abs() < 0.01, "{variance} for {expected}");
-    // Neighbours, channels and images have nothing to do with each other.
+    // Neighbours, channels and images are independent.
     let red: Vec<f64> = frame.rgb.as_chunks::<3>().0.iter().map(|rgb| f64::from(rgb[0]) - level * 9.0 / 8.0).collect();
     let other: Vec<f64> = grey(&silty(&noisy, 1));
     let correlation =
@@ -236,7 +236,7 @@ fn the_sensor_has_the_vignette_and_the_noise_that_it_says() {
     assert!(found.iter().all(|c| c.abs() < 0.006), "{found:?}");
 }
 
-/// A turn that speeds up: the blurred board's centre of brightness is the mean over instants between.
+/// In a turn that accelerates, the blurred board's centre of brightness is the mean over instants between.
 #[test]
 fn motion_blur_is_the_mean_over_the_exposure() {
     let board = [TagPlane::fixed(BLANK, 0.1, ahead([520.0, 430.0], 0.7, [0.3, 0.2, 0.1]))];
@@ -273,7 +273,7 @@ fn motion_blur_is_the_mean_over_the_exposure() {
     assert!((light / mean_light - 1.0).abs() < 0.005, "{light} for {mean_light}");
 }
 
-/// A scene with everything in it.
+/// Returns a scene with every kind of object.
 fn busy() -> (Imager, Vec<TagPlane>, Vec<[Isometry3<f64>; 3]>) {
     let light = Light {
         position_m: Point3::new(0.4, -0.5, 0.0),
@@ -324,7 +324,7 @@ fn what_is_nearer_hides_what_is_behind_it() {
     let plate = Shape::Box { size_m: [0.3, 0.3, 0.01] };
     imager.set_solids(&[SolidShape { shape: plate, color_rgb: [128, 128, 128], is_ground: false }]);
     let mut level = |along_m: f64| {
-        // In the tag's frame: its own plate's front face lies `along_m` before the print.
+        // In the tag's frame, the front of its plate is `along_m` before the print.
         let plate = [pose * Isometry3::translation(0.0, 0.0, along_m - 0.005); 3];
         let frame = imager.take_image(&Shot { solids: &[plate], ..Shot::of_tags(Isometry3::identity(), &tag, 0) });
         at(frame, center())[1]
@@ -334,7 +334,7 @@ fn what_is_nearer_hides_what_is_behind_it() {
     for (along_m, expected) in [(-0.0015, white), (-0.3, white), (0.004, white), (0.02, grey), (0.5, grey)] {
         assert!((level(along_m) - expected).abs() < 1.5, "{along_m}: {} for {expected}", level(along_m));
     }
-    // From behind, nothing is printed.
+    // The back of a tag is not printed.
     let back = [TagPlane::fixed(0, 0.15, ahead(center(), 0.5, [PI, 0.0, 0.0]))];
     let frame = shot(&ImageSpec::clean(), &[], &back);
     for k in 0..100 {
@@ -344,7 +344,7 @@ fn what_is_nearer_hides_what_is_behind_it() {
     }
 }
 
-/// Rays from outside against parry's.
+/// Rays from outside meet shapes where parry's do.
 #[test]
 fn rays_meet_shapes_where_parry_says() {
     use parry3d::math::Vec3 as P;
@@ -380,7 +380,7 @@ fn rays_meet_shapes_where_parry_says() {
                 continue;
             };
             if found.is_infinite() {
-                // A graze.
+                // Ray that grazes the shape.
                 assert!(
                     expected.normal.dot(parry_ray.dir).abs() < 0.05,
                     "{shape:?}: missed at {}",
@@ -395,7 +395,7 @@ fn rays_meet_shapes_where_parry_says() {
             assert!(off_m < limit_m || !is_flat_on, "{shape:?}: {found}, off by {off_m}");
             let n = expected.normal;
             let apart = (normal.cast::<f64>() - Vector3::new(n.x, n.y, n.z)).norm();
-            // At a crease either normal is right.
+            // At a crease either normal is correct.
             assert!(
                 apart < 5e-3 || is_near_crease(shape, &base_from_shape, &(eye + ray * f64::from(found))),
                 "{shape:?}: {apart}"
@@ -405,7 +405,7 @@ fn rays_meet_shapes_where_parry_says() {
     }
 }
 
-/// Smallest distance of a ray from a shape, m.
+/// Returns the smallest distance of a ray from a shape, m.
 fn nearest(solid: &dyn parry3d::shape::Shape, pose: &parry3d::math::Pose3, ray: &parry3d::query::Ray) -> f64 {
     let at = |k: i32| solid.distance_to_point(pose, ray.origin + ray.dir * (0.005 * f64::from(k)), true);
     (0..600).map(at).fold(f64::INFINITY, f64::min)

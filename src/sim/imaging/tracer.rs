@@ -7,7 +7,7 @@ use crate::imaging::seafloor_texture::Texture;
 use crate::imaging::shader::Shader;
 use crate::imaging::shape::FACE_BITS;
 
-/// Rays traced together.
+/// Number of rays traced together.
 const LANES: usize = 8;
 
 /// Rays, objects and shading of one image.
@@ -22,7 +22,7 @@ pub(super) struct Tracer<'a> {
 /// Objects that the rays of one tile may meet.
 pub(super) type Candidates = Vec<(f32, u16)>;
 
-/// The object that a face belongs to.
+/// Returns the object of a face.
 #[inline]
 pub(super) fn object_of(face: u16) -> Option<usize> {
     (face >> FACE_BITS).checked_sub(1).map(usize::from)
@@ -52,11 +52,11 @@ impl Tracer<'_> {
         (0..rays.width).step_by(TILE_PX).map(tile).collect()
     }
 
-    /// A few pixels from the `i`th on.
+    /// Traces a few pixels from the `i`th on.
     fn meet(&self, found: &[(f32, u16)], i: usize, faces: &mut [u16], ranges: &mut [f32]) {
         let lanes: Lanes<LANES> = self.rays.several(i);
         let (range_m, number) = first_met(self.objects, found, &lanes);
-        // A ray beyond the field of view is zero and meets nothing that counts.
+        // A ray outside the field of view is zero, and its result is ignored.
         let sees = |k: usize| lanes.iter().any(|axis| axis[k] != 0.0);
         if number[0] > 0 && number == [number[0]; LANES] && (0..LANES).all(sees) {
             return self.mark(number[0], &Met { rays: lanes, range_m, first: i }, (faces, ranges));
@@ -71,7 +71,7 @@ impl Tracer<'_> {
         }
     }
 
-    /// Faces and ranges of rays that all meet object `number` less one.
+    /// Writes faces and ranges of rays that all meet object `number` less one.
     #[inline]
     fn mark<const N: usize>(&self, number: u16, met: &Met<N>, (faces, ranges): (&mut [u16], &mut [f32])) {
         let object = &self.objects[usize::from(number - 1)];
@@ -88,8 +88,8 @@ impl Tracer<'_> {
 /// Rays of pixels in a row that meet one object.
 struct Met<const N: usize> {
     rays: Lanes<N>,
-    /// As [`first_met`] has it.
+    /// Ranges as returned by [`first_met`].
     range_m: [f32; N],
-    /// The first pixel.
+    /// Index of the first pixel.
     first: usize,
 }

@@ -1,9 +1,9 @@
 //! Attenuation and veiling light of water: `I = J exp(-bD z) + Binf (1 - exp(-bB z))` for each channel (Akkaynak and
 //! Treibitz 2018).
 //!
-//! Of absorption a and scattering b after Jerlov (1976): `bD = a + b`, what is left of a narrow beam. The veil closes
-//! in by `bB = 2 a + b` (assumed): its light has a way out, too, on which it is absorbed, while scattering is mostly
-//! forward. `Binf` is what lamps and sun send back from far away (`shade`).
+//! Absorption a and scattering b are those of Jerlov (1976). `bD = a + b` attenuates a narrow beam. The veil grows with
+//! `bB = 2 a + b` (assumed): its light is absorbed on the way out, too, while scattering is mostly forward. `Binf` is
+//! the light of lamps and sun that the water sends back from far away (`shader`).
 
 use crate::imaging::math::Rgb;
 use crate::spec::{ImageSpec, WaterKind};
@@ -13,7 +13,7 @@ use crate::spec::{ImageSpec, WaterKind};
 pub(super) struct Water {
     pub direct_per_m: Rgb,
     pub backscatter_per_m: Rgb,
-    /// Share of light scattered back for each metre and steradian.
+    /// Share of light scattered back per metre and steradian.
     pub in_scatter_per_m_sr: Rgb,
     pub scatter_per_m: Rgb,
 }
@@ -34,7 +34,7 @@ impl Water {
     }
 }
 
-/// Absorption and scattering, 1/m, for red, green and blue.
+/// Returns absorption and scattering, 1/m, for red, green and blue.
 fn jerlov(kind: WaterKind) -> ([f64; 3], [f64; 3]) {
     match kind {
         WaterKind::Clear => ([0.460, 0.062, 0.018], [0.001, 0.002, 0.004]),

@@ -1,4 +1,4 @@
-//! State of arm and vehicle, moved step by step by the engine that the world names.
+//! State of arm and vehicle, advanced by the engine that the world names.
 
 use nalgebra::{Isometry3, Vector3};
 
@@ -13,14 +13,14 @@ use crate::vehicle::BaseState;
 use armcal_core::spatial::{Base, Pose, Vehicle};
 use armcal_core::streams::JointAngles;
 
-/// The arm, the vehicle if it is free, and what they may collide with.
+/// Arm, the vehicle if it is free, and the solids with which they may collide.
 pub(crate) struct ArmPhysics {
     engine: Box<dyn Engine>,
     push: Option<Push>,
     step_s: f64,
 }
 
-/// A force on a link for some time.
+/// Force on a link for some time.
 #[derive(Clone, Copy, Debug)]
 struct Push {
     body: usize,
@@ -30,6 +30,8 @@ struct Push {
 }
 
 impl ArmPhysics {
+    /// Builds the arm's physics.
+    ///
     /// # Errors
     /// [`SimError`] for what the engine cannot do.
     pub(crate) fn new(input: PhysicsInput) -> Result<Self, SimError> {
@@ -41,38 +43,38 @@ impl ArmPhysics {
         Ok(Self { engine, push: None, step_s })
     }
 
-    /// Puts the first joint where the mount has brought it.
+    /// Moves the first joint to its pose on the mount.
     pub(crate) fn set_first_place(&mut self, base_from_joint: &Isometry3<f64>) {
         self.engine.set_first_place(base_from_joint);
     }
 
-    /// True joint angles, rad.
+    /// Returns the true joint angles, rad.
     pub(crate) fn angles(&self) -> JointAngles {
         self.engine.angles()
     }
 
-    /// True joint rates, rad/s.
+    /// Returns the true joint rates, rad/s.
     pub(crate) fn rates(&self) -> JointAngles {
         self.engine.rates()
     }
 
-    /// Poses of all links, base frame.
+    /// Returns the poses of all links, base frame.
     pub(crate) fn poses(&self) -> BodyPoses {
         self.engine.poses()
     }
 
-    /// A free base's motion; `None` where it moves as prescribed.
+    /// Returns a free base's motion; `None` if its motion is prescribed.
     pub(crate) fn base_state(&self, vehicle_from_base: &Pose<Vehicle, Base>) -> Option<BaseState> {
         self.engine.base_state(vehicle_from_base)
     }
 
-    /// Something pushes a link at a point of its own frame for a while, with a force in base axes.
+    /// Pushes a link for some time at a point of its own frame, with a force in base axes.
     pub(crate) fn push(&mut self, body: usize, point_m: &Vector3<f64>, force_n: &Vector3<f64>, duration_s: f64) {
         let steps = (duration_s / self.step_s).round().max(1.0) as u64;
         self.push = Some(Push { body, point_m: *point_m, force_n: *force_n, steps });
     }
 
-    /// One step.
+    /// Advances by one step.
     pub(crate) fn step(&mut self, drive: &Drive) {
         let Some(push) = &mut self.push else { return self.engine.step(drive) };
         let mut wrenches = *drive.wrenches;

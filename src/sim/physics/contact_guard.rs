@@ -1,24 +1,25 @@
 //! Lower bounds of clearances: while they are positive, the engine does not search for contacts.
 //!
-//! The distances of all watched pairs are measured now and then. Between two measurements the joints' and the ground's
-//! paths bound what a pair can have lost, so that a step in which nothing can touch is known without looking. The
-//! motion is the same to rounding: the engine adds up a link's inertia in another way when its shapes are switched off.
+//! The distances of all watched pairs are measured at intervals. In between, the paths of the joints and the ground
+//! bound the approach of a pair, so that steps without possible contact need no measurement. The motion is the same
+//! except for rounding: the engine sums a link's inertia in another order when its shapes are switched off.
 
 use crate::body_poses::BodyPoses;
 use crate::pair_motion::{ArmPlace, PairGroup, PairMotion};
 use crate::solids::{Carrier, Solids};
 use armcal_core::kinematics::Chain;
 
-/// The engine makes contacts of pairs nearer than 20 mm, its prediction distance, m.
+/// Distance below which contacts are possible, m: the engine makes them of pairs nearer than 20 mm, its prediction
+/// distance.
 const CONTACT_M: f64 = 0.022;
-/// A pair nearer than this is left to the engine: it would have to be measured in every other step, m.
+/// Distance below which a pair is left to the engine, m: it would have to be measured in every other step.
 const NEAR_M: f64 = 0.03;
 /// Largest distance that is measured, m.
 const FAR_M: f64 = 0.5;
-/// Steps between measurements of a pair that is left to the engine.
+/// Number of steps between measurements of a pair that is left to the engine.
 const NEAR_STEPS: u64 = 10;
 
-/// Watches when contacts become possible.
+/// Guard that finds the steps in which contacts are possible.
 pub(super) struct ContactGuard {
     solids: Solids,
     groups: Vec<Group>,
@@ -28,7 +29,7 @@ pub(super) struct ContactGuard {
 
 struct Group {
     pairs: PairGroup,
-    /// The least distance at the last measurement, and the path until then.
+    /// Least distance at the last measurement; `path_m` is the path until then.
     distance_m: f64,
     path_m: f64,
     measured_at: u64,
@@ -45,7 +46,7 @@ impl ContactGuard {
         Self { solids: solids.clone(), groups: groups.into_iter().map(unmeasured).collect(), motion, step: 0 }
     }
 
-    /// Takes the state at the start of a step; gives whether any pair may be near enough for a contact in it.
+    /// Takes the state at the start of a step; returns true if any pair may be near enough for a contact in it.
     pub(super) fn contact_is_possible(&mut self, place: &ArmPlace, links: impl FnOnce() -> BodyPoses) -> bool {
         self.motion.follow(place);
         self.step += 1;
@@ -89,11 +90,11 @@ mod tests {
     use armcal_core::stats::stream_rng;
     use armcal_core::streams::JointAngles;
 
-    /// The engine's prediction distance.
+    /// Prediction distance of the engine, m.
     const PREDICTED_M: f64 = 0.02;
 
-    /// Arms that wander about, into things too, over a seafloor that heaves: whenever contact is excluded, every
-    /// watched pair is farther apart than the engine would make a contact for.
+    /// Arms move at random, into obstacles too, over a seafloor that heaves. If contact is excluded, every watched pair
+    /// is farther apart than the engine's prediction distance.
     #[test]
     fn what_it_excludes_is_far_apart() {
         let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots");
@@ -118,7 +119,7 @@ mod tests {
                     heave_m += rng.random_range(-1e-3..1e-3);
                     let tilt = nalgebra::Vector3::new(0.02 * heave_m, 0.3 * heave_m, 0.0);
                     let ground = Isometry3::new(nalgebra::Vector3::new(0.0, 0.0, heave_m), tilt);
-                    // A mount that gives.
+                    // A mount that yields.
                     mount.translation.z += rng.random_range(-3e-4..3e-4);
                     let mut chain = robot.chain.clone();
                     chain.set_first_place(&mount);

@@ -1,11 +1,11 @@
-//! Which pairs of shapes rapier makes contacts of.
+//! Filter of the pairs of shapes for which rapier makes contacts.
 
 use rapier3d::pipeline::{PairFilterContext, PhysicsHooks};
 use rapier3d::prelude::SolverFlags;
 
 use crate::solids::{PairTable, Solids};
 
-/// Lets watched pairs of parts through; a collider's user data is its part.
+/// Filter that passes watched pairs of parts; a collider's user data is its part.
 pub(super) struct PairFilter {
     pairs: PairTable,
 }

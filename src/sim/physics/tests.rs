@@ -1,4 +1,4 @@
-//! The moving base against equations of motion that were set up by hand.
+//! Moving base compared with equations of motion that were derived by hand.
 
 use nalgebra::{Isometry3, Matrix3, Unit, Vector3};
 
@@ -35,7 +35,7 @@ fn titan() -> Robot {
     load(std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/titan4"))).expect("the robot reads")
 }
 
-/// An arm that collides with nothing.
+/// Returns an arm without collisions.
 fn physics(chain: &Chain, bodies: &[LinkBody], step_s: f64, angles: JointAngles) -> ArmPhysics {
     physics_by(EngineKind::Featherstone, chain, bodies, step_s, angles)
 }
@@ -48,7 +48,7 @@ fn physics_by(engine: EngineKind, chain: &Chain, bodies: &[LinkBody], step_s: f6
         .expect("an arm")
 }
 
-/// One step without anything about the joints, the base moving from one state to the other.
+/// Advances by one step without loads about the joints, while the base moves from one state to the other.
 fn swing(physics: &mut ArmPhysics, from: &BaseState, to: &BaseState) {
     physics.step(&drive([from, to], &[JointLoad::default(); MAX_JOINTS]));
 }
@@ -56,7 +56,7 @@ fn swing(physics: &mut ArmPhysics, from: &BaseState, to: &BaseState) {
 const NO_WRENCHES: [Force; MAX_JOINTS + 1] =
     [Force { moment: Vector3::new(0.0, 0.0, 0.0), force: Vector3::new(0.0, 0.0, 0.0) }; MAX_JOINTS + 1];
 
-/// What acts in still water.
+/// Returns the inputs of a step in still water.
 fn drive<'a>(base: [&'a BaseState; 2], loads: &'a [JointLoad; MAX_JOINTS]) -> Drive<'a> {
     let still = WaterMotion { velocity: Vector3::zeros(), acceleration: Vector3::zeros() };
     Drive { base, water: [still; 2], wrenches: &NO_WRENCHES, loads }
@@ -77,12 +77,13 @@ fn still(gravity: Vector3<f64>) -> BaseState {
     }
 }
 
-/// A bar of 5 kg with its centre 0.5 m from the joint.
+/// Mass of a bar, kg, with its centre 0.5 m from the joint.
 const MASS: f64 = 5.0;
 const LENGTH: f64 = 0.5;
 const INERTIA: f64 = 0.1;
 
-/// One joint at `origin` about `axis`, the bar along `along`; by an engine with a step (s), from an angle (rad).
+/// Returns one joint at `origin` about `axis`, the bar along `along`; by an engine with a step (s), from an angle
+/// (rad).
 fn pendulum(
     origin: Vector3<f64>,
     axis: Unit<Vector3<f64>>,
@@ -111,7 +112,7 @@ fn pendulum(
     physics_by(engine, &Chain::new(vec![joint]), &bodies, step_s, JointAngles::from_slice(&[angle]))
 }
 
-/// `angle'' = f(t, angle)` by classic Runge-Kutta.
+/// Integrates `angle'' = f(t, angle)` by classic Runge-Kutta.
 fn runge_kutta(f: impl Fn(f64, f64) -> f64, start: f64, end_s: f64) -> f64 {
     let (n, mut q, mut v) = (200_000, start, 0.0);
     let h = end_s / f64::from(n);
@@ -129,7 +130,7 @@ fn runge_kutta(f: impl Fn(f64, f64) -> f64, start: f64, end_s: f64) -> f64 {
 
 const SWING_S: f64 = 6.0;
 
-/// A pendulum that hangs from a base shaken by 0.3 m at 0.5 Hz along x.
+/// Simulates a pendulum that hangs from a base shaken by 0.3 m at 0.5 Hz along x.
 fn shaken(engine: EngineKind, step_s: f64) -> f64 {
     let mut physics = pendulum(Vector3::zeros(), Vector3::y_axis(), -Vector3::z(), (engine, step_s, 0.5));
     let base = |t_s: f64| {
@@ -149,11 +150,10 @@ fn shake(t_s: f64) -> f64 {
     -0.3 * w * w * (w * t_s).sin()
 }
 
-/// A base that moves kinematically gives a multibody no inertial force at all: the pendulum would not notice the
-/// shaking.
+/// A base that moves kinematically exerts no inertial force on a multibody: the pendulum would not notice the shaking.
 #[test]
 fn a_shaken_base_swings_the_pendulum() {
-    // The bar's centre is at LENGTH (-sin q, -cos q) in x and z for a turn q about y.
+    // For a turn q about y, the bar's centre is at LENGTH (-sin q, -cos q) in x and z.
     let total = INERTIA + MASS * LENGTH * LENGTH;
     let exact = runge_kutta(|t, q| MASS * LENGTH * (shake(t) * q.cos() - 9.81 * q.sin()) / total, 0.5, SWING_S);
     let unshaken = runge_kutta(|_, q| -MASS * LENGTH * 9.81 * q.sin() / total, 0.5, SWING_S);
@@ -164,13 +164,13 @@ fn a_shaken_base_swings_the_pendulum() {
     }
     assert!((exact - unshaken).abs() > 0.3, "the shaking must matter");
     assert!(errors[1].abs() < 1e-3, "{errors:?}");
-    // Of second order: half the step leaves a quarter of the error.
+    // The error is of second order: half the step leaves a quarter of it.
     for pair in errors.windows(2) {
         assert!((3.5..4.5).contains(&(pair[0] / pair[1])), "{errors:?}");
     }
 }
 
-/// On a turntable the bar swings about the outward direction: centrifugal force, and Coriolis' through the joint alone.
+/// On a turntable the bar swings about the outward direction: centrifugal force, and Coriolis' through the joint only.
 #[test]
 fn a_turning_base_pulls_the_bar_outwards() {
     let (radius, w) = (1.5, 2.0);
@@ -191,7 +191,7 @@ fn a_turning_base_pulls_the_bar_outwards() {
     assert!((3.5..4.5).contains(&(coarse / fine)), "of second order: {}", coarse / fine);
 }
 
-/// Without torque about its axis a bar keeps its direction in the world however the base turns about that axis.
+/// Without torque about its axis, a bar keeps its direction in the world, however the base turns about that axis.
 #[test]
 fn a_base_that_speeds_up_leaves_a_free_bar_behind() {
     let mut physics =
@@ -215,7 +215,7 @@ fn a_base_that_speeds_up_leaves_a_free_bar_behind() {
 #[test]
 fn no_torque_is_missing_on_a_moving_base() {
     const STEP_S: f64 = 1e-4;
-    /// Of torques of several 100 N m: a first-order step of 0.1 ms, and second differences.
+    /// Limit for torques of several 100 N m: a first-order step of 0.1 ms, and second differences.
     const LIMIT_N_M: f64 = 1.0;
     let robot = titan();
     let spec = VehicleMotionSpec {
@@ -272,7 +272,7 @@ fn no_torque_is_missing_on_a_moving_base() {
     assert!(missing.iter().all(|torque| torque.abs() < LIMIT_N_M), "{missing:?}");
 }
 
-/// Our own engine takes no memory in a step. Rapier's factors a matrix that it allocates.
+/// Our own engine allocates no memory in a step. Rapier's factors a matrix that it allocates.
 #[test]
 fn a_step_of_our_own_equations_does_not_allocate() {
     const STEPS: u64 = 50;

@@ -11,7 +11,7 @@ use crate::recorded_motion::spline::{Spline, Value};
 use crate::recorded_motion::table::{self, Header, Sample};
 use armcal_core::robot::{FileIssue, read_table};
 
-/// A recorded motion, checked and ready to be followed.
+/// Recorded motion, checked and ready to be followed.
 ///
 /// The file is a CSV with the columns `time_s, x_m, y_m, z_m` and then either `roll_rad, pitch_rad, yaw_rad`
 /// (`R = Rz(yaw) Ry(pitch) Rx(roll)`) or `qw, qx, qy, qz` (Hamilton); a line that begins with `#` is a comment.
@@ -23,16 +23,16 @@ pub struct RecordedMotion {
     text: String,
 }
 
-/// The longest time between two samples, s: a longer one is a gap, and what happened there is anyone's guess.
+/// Largest time between two samples, s: a longer one is a gap in which the motion is unknown.
 const MAX_GAP_S: f64 = 1.0;
-/// The most that a vehicle turns between two samples, rad: beyond, the shorter way round need not be the one that it
-/// took.
+/// Largest turn of a vehicle between two samples, rad: beyond it, the shorter way round need not be the actual one.
 const MAX_TURN_RAD: f64 = 1.0;
-/// m/s2. No vehicle with an arm does that; a jump in the recording does.
+/// Largest acceleration, m/s2: a jump in the recording exceeds it, but no vehicle with an arm does.
 const MAX_ACCELERATION_M_S2: f64 = 50.0;
-/// rad/s2, for the same reason.
+/// Largest angular acceleration, rad/s2, for the same reason.
 const MAX_ANGULAR_ACCELERATION_RAD_S2: f64 = 50.0;
-/// The last part of the recording that plays slower, s; half of a recording shorter than twice that.
+/// Duration of the last part of the recording, which plays slower, s; half of a recording that is shorter than twice
+/// this.
 const EASED_S: f64 = 2.0;
 
 impl PartialEq for RecordedMotion {
@@ -50,10 +50,10 @@ impl RecordedMotion {
         Self::parse(path, read_table(path)?)
     }
 
-    /// The motion in `text`; `file` is for error messages.
+    /// Reads and checks the motion in `text`; `file` is for error messages.
     ///
     /// # Errors
-    /// As [`Self::read`].
+    /// Errors as in [`Self::read`].
     pub fn parse(file: &Path, text: String) -> Result<Self, SimError> {
         let (header, samples) = table::parse(file, &text)?;
         check_times(file, &samples)?;
@@ -65,31 +65,31 @@ impl RecordedMotion {
         Ok(motion)
     }
 
-    /// The file's text, for a recording of a run to be complete.
+    /// Returns the file's text, which makes the recording of a run complete.
     #[must_use]
     pub fn text(&self) -> &str {
         &self.text
     }
 
-    /// BLAKE3 of the file's text, hexadecimal.
+    /// Returns the BLAKE3 hash of the file's text, hexadecimal.
     #[must_use]
     pub fn hash(&self) -> String {
         blake3::hash(self.text.as_bytes()).to_hex().to_string()
     }
 
-    /// From the first sample to the last, s.
+    /// Returns the time from the first sample to the last, s.
     #[must_use]
     pub fn duration_s(&self) -> f64 {
         self.spline.end_s()
     }
 
-    /// The state `t_s` seconds after the first sample. Before it the vehicle is where the first sample has it.
+    /// Returns the state `t_s` seconds after the first sample; before it, that of the first sample at rest.
     #[must_use]
     pub fn at(&self, t_s: f64) -> VehicleKinematics {
         self.jet(&self.played(t_s))
     }
 
-    /// Place in the recording (s) at run time `t_s`, with its first and second derivative.
+    /// Returns the time in the recording (s) at run time `t_s`, with its first and second derivative.
     ///
     /// `1 - 3 s2 + 2 s3` of the last [`EASED_S`] stretched to twice their length: the recording's rate falls from one
     /// to zero, and its derivative is zero at both ends, so that the whole stays twice differentiable.
@@ -137,11 +137,11 @@ impl RecordedMotion {
         }
     }
 
-    /// A jump shows as an acceleration that no vehicle has; the largest names the line.
+    /// Checks accelerations: a jump shows as one that no vehicle has, and the largest names the line.
     fn check_accelerations(&self, file: &Path, header: &Header, samples: &[Sample]) -> Result<(), FileIssue> {
         let jets: Vec<_> = self.spline.times_s().iter().map(|&t| self.jet(&[t, 1.0, 0.0])).collect();
         let check = |sizes: &mut dyn Iterator<Item = f64>, limit: f64, unit: &str, columns: String| {
-            // Samples too near to each other for their figures give NaN.
+            // Samples that are too close for their number of decimals give NaN.
             let size = |value: f64| if value.is_nan() { f64::INFINITY } else { value };
             match sizes.map(size).enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, worst)| *worst > limit) {
                 None => Ok(()),
@@ -163,7 +163,7 @@ impl RecordedMotion {
     }
 }
 
-/// Times rise, without gaps.
+/// Checks that times rise, without gaps.
 fn check_times(file: &Path, samples: &[Sample]) -> Result<(), FileIssue> {
     for pair in samples.windows(2) {
         let step_s = pair[1].time_s - pair[0].time_s;
@@ -189,7 +189,7 @@ fn check_times(file: &Path, samples: &[Sample]) -> Result<(), FileIssue> {
     Ok(())
 }
 
-/// Values for the spline: of the two quaternions of each attitude the one nearer to the sample before.
+/// Returns values for the spline: of the two quaternions of each attitude, the one nearer to the sample before.
 fn continuous(file: &Path, header: &Header, samples: &[Sample]) -> Result<Vec<Value>, FileIssue> {
     let mut values: Vec<Value> = Vec::with_capacity(samples.len());
     let mut before = samples[0].rotation.into_inner();

@@ -1,4 +1,4 @@
-//! A natural cubic spline through samples at any distances: twice continuously differentiable.
+//! Natural cubic spline through samples at any spacing: twice continuously differentiable.
 
 /// Position and quaternion of one sample.
 pub(super) type Value = [f64; 7];
@@ -12,7 +12,7 @@ pub(super) struct Spline {
 }
 
 impl Spline {
-    /// Needs two samples or more, at rising times.
+    /// Builds the spline from two samples or more, at rising times.
     pub(super) fn natural(times_s: Vec<f64>, values: Vec<Value>) -> Self {
         let bends = bends(&times_s, &values);
         Self { times_s, values, bends }
@@ -26,7 +26,7 @@ impl Spline {
         self.times_s[self.times_s.len() - 1]
     }
 
-    /// Value, first and second derivative at `t_s`, which lies between the first sample and the last.
+    /// Returns value, first and second derivative at `t_s`, which is between the first sample and the last.
     pub(super) fn at(&self, t_s: f64) -> [Value; 3] {
         let next = self.times_s.partition_point(|&time| time <= t_s).clamp(1, self.times_s.len() - 1);
         let (i, j) = (next - 1, next);
@@ -48,8 +48,8 @@ impl Spline {
     }
 }
 
-/// Solves the tridiagonal system of continuous first derivatives,
-/// `h- m- + 2 (h- + h+) m + h+ m+ = 6 (slope+ - slope-)`, by elimination from the first sample on.
+/// Solves the tridiagonal system of continuous first derivatives, `h- m- + 2 (h- + h+) m + h+ m+ = 6 (slope+ -
+/// slope-)`, by elimination from the first sample on.
 fn bends(times_s: &[f64], values: &[Value]) -> Vec<Value> {
     let n = times_s.len();
     let mut bends = vec![[0.0; 7]; n];

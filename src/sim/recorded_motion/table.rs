@@ -1,4 +1,4 @@
-//! The CSV of a recorded motion: columns and figures, each checked by itself.
+//! CSV of a recorded motion: columns and values, each checked separately.
 
 use armcal_core::codes::Code;
 use std::ops::RangeInclusive;
@@ -8,7 +8,7 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use armcal_core::robot::FileIssue;
 
-/// One line of the file.
+/// Sample of one line of the file.
 pub(super) struct Sample {
     pub line: u64,
     pub time_s: f64,
@@ -16,7 +16,7 @@ pub(super) struct Sample {
     pub rotation: UnitQuaternion<f64>,
 }
 
-/// The columns of a file.
+/// Columns of a file.
 pub(super) struct Header {
     names: &'static [&'static str],
 }
@@ -24,17 +24,17 @@ pub(super) struct Header {
 const BY_ANGLES: [&str; 7] = ["time_s", "x_m", "y_m", "z_m", "roll_rad", "pitch_rad", "yaw_rad"];
 const BY_QUATERNION: [&str; 8] = ["time_s", "x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"];
 const N_POSITION_COLUMNS: usize = 4;
-/// Bytes of a line: the reader of CSV keeps the places of all its cells.
+/// Largest number of bytes in a line: the CSV reader stores the positions of all its cells.
 const MAX_LINE_BYTES: usize = 4096;
-/// A cubic through fewer says nothing about accelerations.
+/// Smallest number of samples: a cubic through fewer determines no accelerations.
 const MIN_ROWS: usize = 4;
 
 const TIME_S: RangeInclusive<f64> = -1e12..=1e12;
 const POSITION_M: RangeInclusive<f64> = -1e4..=1e4;
-/// Yaw may be unwrapped over some turns.
+/// Range of angles, rad: yaw may be unwrapped over several turns.
 const ANGLE_RAD: RangeInclusive<f64> = -1e3..=1e3;
 const QUATERNION_PART: RangeInclusive<f64> = -1.01..=1.01;
-/// Four decimals leave 1e-4; what is further from one is no quaternion of an attitude.
+/// Range of a quaternion's norm: four decimals leave 1e-4, and a larger error is no quaternion of an attitude.
 const QUATERNION_NORM: RangeInclusive<f64> = 0.99..=1.01;
 
 impl Header {
@@ -69,7 +69,7 @@ impl Header {
     }
 }
 
-/// Columns and samples of `text`.
+/// Returns columns and samples of `text`.
 pub(super) fn parse(file: &Path, text: &str) -> Result<(Header, Vec<Sample>), FileIssue> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     if let Some(at) = text.lines().position(|line| line.len() > MAX_LINE_BYTES) {

@@ -15,14 +15,14 @@ fn problem(text: &str) -> String {
     RecordedMotion::parse(Path::new("dive.csv"), text.to_owned()).expect_err("refused").to_string()
 }
 
-/// One axis of the motion below and its first two derivatives.
+/// Returns one axis of the motion below and its first two derivatives.
 fn wave(k: usize, t: f64) -> [f64; 3] {
     let (amplitude, rate, phase) = (0.1 + 0.03 * k as f64, 0.8 + 0.1 * k as f64, 0.7 * k as f64);
     let (sin, cos) = (rate * t + phase).sin_cos();
     [amplitude * sin, amplitude * rate * cos, -amplitude * rate * rate * sin]
 }
 
-/// Six sinusoids, rolled upright by `pitch0_rad` and turned on by `yaw_rate_rad_s`.
+/// Returns a table of six sinusoids, pitched by `pitch0_rad` and yawing at `yaw_rate_rad_s`.
 fn table(step_s: f64, duration_s: f64, pitch0_rad: f64, yaw_rate_rad_s: f64) -> String {
     let mut text = HEADER.to_owned();
     for i in 0..=(duration_s / step_s).round() as u32 {
@@ -34,14 +34,14 @@ fn table(step_s: f64, duration_s: f64, pitch0_rad: f64, yaw_rate_rad_s: f64) -> 
     text
 }
 
-/// The largest component.
+/// Returns the largest component.
 fn worst(differences: &[Vector3<f64>]) -> f64 {
     assert!(differences.iter().all(|v| v.norm().is_finite()), "{differences:?}");
     differences.iter().map(Vector3::amax).fold(0.0, f64::max)
 }
 
-/// Largest differences of velocity, acceleration, rate and angular acceleration from central differences of the pose at
-/// `t`.
+/// Returns the largest differences of velocity, acceleration, rate and angular acceleration from central differences of
+/// the pose at `t`.
 fn off_central_differences(motion: &RecordedMotion, t: f64) -> f64 {
     // Within a cubic piece the third derivative is constant: 1e-4 s leaves 1e-8 of truncation, and 1e-16/h2 = 1e-8 of
     // rounding.
@@ -62,9 +62,9 @@ fn off_central_differences(motion: &RecordedMotion, t: f64) -> f64 {
 
 #[test]
 fn derivatives_are_those_of_what_it_returns() {
-    /// m/s2 or rad/s2.
+    /// Tolerance, m/s2 or rad/s2.
     const TOLERANCE: f64 = 1e-6;
-    // Level, and with the nose straight up while it turns round and round.
+    // Level, and with the nose straight up while it turns continuously.
     for (pitch0_rad, yaw_rate_rad_s) in [(0.0, 0.0), (std::f64::consts::FRAC_PI_2, 0.4)] {
         let motion = parse(&table(0.2, 30.0, pitch0_rad, yaw_rate_rad_s));
         // Inside pieces; the last three while the recording plays slower, and at rest after it.
@@ -75,8 +75,7 @@ fn derivatives_are_those_of_what_it_returns() {
     }
 }
 
-/// The poses of a known motion, sampled, give back its velocities and accelerations, better with the square of the
-/// step.
+/// Samples of a known motion reproduce its velocities and accelerations, with an error of second order in the step.
 #[test]
 fn a_sampled_motion_comes_back_with_its_accelerations() {
     let worst = |step_s: f64| {
@@ -102,7 +101,7 @@ fn a_sampled_motion_comes_back_with_its_accelerations() {
     }
 }
 
-/// Angular velocity of `R = Rz(yaw) Ry(pitch) Rx(roll)` in body axes.
+/// Returns the angular velocity of `R = Rz(yaw) Ry(pitch) Rx(roll)` in body axes.
 fn body_rate(w: &[[f64; 3]; 6]) -> Vector3<f64> {
     let ([roll, droll, _], [pitch, dpitch, _], dyaw) = (w[3], w[4], w[5][1]);
     let ((sr, cr), (sp, cp)) = (roll.sin_cos(), pitch.sin_cos());
@@ -122,7 +121,7 @@ fn largest_difference(a: &VehicleKinematics, b: &VehicleKinematics) -> f64 {
 
 #[test]
 fn nothing_jumps_at_samples_nor_where_it_slows_down_nor_where_it_stops() {
-    // The third derivative times twice this is left over.
+    // The remaining error is the third derivative times twice this.
     let h = 1e-9;
     let motion = parse(&table(0.25, 10.0, 0.2, 0.3));
     for t in [0.25, 1.0, 5.5, 8.0, 9.75, 10.0, 12.0] {
@@ -147,7 +146,7 @@ fn it_begins_with_the_first_sample_and_holds_the_last() {
     let first = motion.at(0.0);
     assert!((first.position - Vector3::from_fn(|k, _| wave(k, 0.0)[0])).amax() < 1e-12);
     assert!((first.velocity - Vector3::from_fn(|k, _| wave(k, 0.0)[1])).amax() < 5e-3, "already moving");
-    // Two seconds later than the last sample, for the last two seconds took four.
+    // The end is two seconds after the last sample, because the last two seconds took four.
     let last = Vector3::from_fn(|k, _| wave(k, 20.0)[0]);
     assert!((motion.at(21.5).position - last).amax() > 1e-6, "not there yet");
     for t in [22.0, 23.0, 1e6] {
@@ -176,7 +175,7 @@ fn angles_and_quaternions_are_the_same_motion_whatever_the_quaternions_sign() {
     }
 }
 
-/// Five good lines, the line of `number` (the header is line 1) replaced.
+/// Returns five good lines, with the line of `number` (the header is line 1) replaced.
 fn with_line(number: usize, line: &str) -> String {
     let text = table(0.5, 2.0, 0.0, 0.0);
     text.lines().enumerate().fold(String::new(), |all, (i, l)| all + if i + 1 == number { line } else { l } + "\n")
@@ -184,7 +183,7 @@ fn with_line(number: usize, line: &str) -> String {
 
 #[test]
 fn bad_files_are_refused_with_line_column_and_range() {
-    // 0.5 rad to and fro within a tenth of a second: each turn is allowed, the acceleration is not.
+    // Turns of 0.5 rad to and fro within a tenth of a second: each turn is allowed, the acceleration is not.
     let shaken = "0,0,0,0,0,0,0\n0.05,0,0,0,0,0,0.5\n0.1,0,0,0,0,0,0\n0.15,0,0,0,0,0,0.5\n0.2,0,0,0,0,0,0\n";
     let close = "0,0,0,0,0,0,0\n1e-300,0,0,0,0,0,0\n2e-300,5,0,0,0,0,0\n0.2,0,0,0,0,0,0\n";
     let texts = [
@@ -210,7 +209,7 @@ fn bad_files_are_refused_with_line_column_and_range() {
     assert!(missing.contains("no/such.csv"), "{missing}");
 }
 
-/// The sample of routines/motion is what its maker says.
+/// The sample of routines/motion has the motion that its generator states.
 #[test]
 fn the_hover_is_as_rough_as_it_says() {
     let file = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("routines/motion/hover.csv");

@@ -1,7 +1,7 @@
 //! The vehicle's attitude sensor: orientation, rates and specific force.
 //!
-//! In the sensor's own axes, which are turned against the vehicle's by a constant misalignment: the orientation with
-//! noise, the rates with a bias that walks and noise, the specific force with a bias and noise.
+//! All values are in the sensor's own axes, which have a constant misalignment against the vehicle's. The orientation
+//! has noise, the rates have a random-walk bias and noise, the specific force has a bias and noise.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use rand_chacha::ChaCha8Rng;
@@ -23,7 +23,7 @@ pub(crate) struct AttitudeSensor {
     vehicle_from_sensor: UnitQuaternion<f64>,
     gyro_bias: Vector3<f64>,
     accelerometer_bias: Vector3<f64>,
-    /// Of the last sample.
+    /// Time of the last sample.
     last: Option<Stamp>,
     rng: ChaCha8Rng,
     drift: ChaCha8Rng,
@@ -116,7 +116,7 @@ mod tests {
         assert!((axis - state.world_from_vehicle.rotation() * Vector3::y()).norm() < 1e-12);
     }
 
-    /// A quarter of an hour: half of the hourly figure, at 20 Hz or in one stride.
+    /// In a quarter of an hour, the walk reaches half of the hourly figure, at 20 Hz or in one stride.
     #[test]
     fn the_gyros_bias_walks_with_the_root_of_time() {
         let spec = VehicleMotionSpec { gyro_drift_rad_s_per_sqrt_h: 2e-4, ..silent() };
@@ -132,7 +132,7 @@ mod tests {
                 }
                 squares += (Vector3::from(rate) - state.vehicle_rate).norm_squared();
             }
-            // 3000 axes know the variance to 2.6 %.
+            // 3000 axes determine the variance to 2.6 %.
             let ratio = squares / 3000.0 / 1e-8;
             assert!((ratio - 1.0).abs() < 0.1, "{ratio}");
         }

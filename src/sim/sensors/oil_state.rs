@@ -1,9 +1,9 @@
-//! State of the joint sensors' surroundings: their own temperature, and the pressure as they feel it.
+//! State of the joint sensors' surroundings: their own temperature, and the pressure with its hysteresis.
 //!
-//! The sensors follow the oil with a first-order lag. Their housings give way to pressure with a hysteresis that does
-//! not depend on the rate, a play operator (Krasnosel'skii and Pokrovskii, Systems with Hysteresis, 1989; the element
-//! of Prandtl and Ishlinskii's sums): `felt = p + w (play(p) - p)`, the play `hysteresis / w` wide. After a dive half
-//! the hysteresis stays behind at the surface.
+//! The sensors follow the oil with a first-order lag. Their housings yield to pressure with a hysteresis independent of
+//! the rate, a play operator. (Krasnosel'skii and Pokrovskii, Systems with Hysteresis, 1989; the element of Prandtl and
+//! Ishlinskii's sums.) `felt = p + w (play(p) - p)`, with a play `hysteresis / w` wide. After a dive, half of the
+//! hysteresis remains at the surface.
 
 use crate::sensors::lag::Lag;
 use crate::spec::JointSensorsSpec;
@@ -12,16 +12,16 @@ use crate::spec::JointSensorsSpec;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct OilState {
     pub oil_c: f64,
-    /// Above the surface's.
+    /// Pressure above that of the surface, Pa.
     pub pressure_pa: f64,
 }
 
-/// What the joint sensors feel of the oil about them.
+/// Temperature and pressure at the joint sensors, with lag and hysteresis.
 #[derive(Clone, Debug)]
 pub(crate) struct SensorSurroundings {
     temperature: Lag,
     lag_s: f64,
-    /// The middle of the play, Pa.
+    /// Middle of the play, Pa.
     lagging_pa: Option<f64>,
     half_play_pa: f64,
     share: f64,
@@ -39,7 +39,8 @@ impl SensorSurroundings {
         }
     }
 
-    /// The sensors' state `elapsed_s` after the last one, in oil as it is now. The first time they have settled.
+    /// Returns the sensors' state `elapsed_s` after the last one, in oil of the present state. At the first call they
+    /// have settled.
     pub(crate) fn follow(&mut self, oil: OilState, elapsed_s: f64) -> OilState {
         let OilState { oil_c, pressure_pa } = oil;
         let half_play = self.half_play_pa;
@@ -71,13 +72,13 @@ mod tests {
         turns_mpa.iter().map(way).collect()
     }
 
-    /// A dive to 40 MPa and back with a hysteresis of 2 MPa: half of it behind on either way, and inside a loop the
-    /// share that does not lag.
+    /// In a dive to 40 MPa and back with a hysteresis of 2 MPa, half of it lags on either way. Inside a loop, only the
+    /// share without lag changes.
     #[test]
     fn pressure_is_felt_as_by_the_play_operator() {
         let spec = JointSensorsSpec { pressure_hysteresis_mpa: 2.0, ..JointSensorsSpec::default() };
         let felt = felt_mpa(&spec, &[1.0, 40.0, 39.0, 36.0, 20.0, 0.0]);
-        // From rest the play of 4 MPa is 2 MPa to either side.
+        // From rest, the play of 4 MPa is 2 MPa to either side.
         for (felt, expected) in felt.iter().zip([0.5, 39.0, 38.5, 37.0, 21.0, 1.0]) {
             assert!((felt - expected).abs() < 1e-12, "{felt} against {expected}");
         }
@@ -85,8 +86,8 @@ mod tests {
         assert!(felt_mpa(&none, &[0.3, 40.0, 17.1]).iter().zip([0.3, 40.0, 17.1]).all(|(a, b)| (a - b).abs() < 1e-12));
     }
 
-    /// Oil that cools evenly: the sensors are behind by rate times lag once they have settled, and get there as a
-    /// first-order lag does.
+    /// In oil that cools linearly, settled sensors are behind by rate times lag. They approach this as a first-order
+    /// lag does.
     #[test]
     fn sensors_lag_behind_the_oil() {
         let spec = JointSensorsSpec { sensor_lag_s: 400.0, ..JointSensorsSpec::default() };

@@ -20,7 +20,8 @@ impl Sink for Tape {
     }
 }
 
-/// Ten seconds of an arm that swings or stands, in the world of a text; the kinds of its first sensors.
+/// Simulates ten seconds of an arm that swings or stands, in the world of a text; `kinds` are those of its first
+/// sensors.
 fn run(world: &str, kinds: &[SensorKind], swing_rad: f64) -> Vec<Message> {
     let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots");
     let vehicle = load_vehicle(&root.join("vehicles/work-class-front.toml")).expect("it reads");
@@ -104,7 +105,7 @@ fn a_world_with_every_effect_runs_and_repeats() {
     assert_eq!(messages, run(RICH, &kinds, 0.1));
 }
 
-/// The work of the drives reaches the oil: a swinging arm's is warmer than a standing one's, which cools to the water.
+/// The drives' work warms the oil: a swinging arm's is warmer than a standing one's, which cools to the water.
 #[test]
 fn oil_warms_with_the_arms_work() {
     let oil_c = |swing_rad: f64| {
@@ -118,7 +119,7 @@ fn oil_warms_with_the_arms_work() {
     };
     let (standing, swinging) = (oil_c(0.0), oil_c(0.3));
     eprintln!("oil after 10 s: {standing:.4} C standing, {swinging:.4} C swinging");
-    // From 10 C towards water of 4 C with 300 s; the oil columns of an arm that stands hardly move.
+    // The oil cools from 10 C towards water of 4 C with 300 s; the oil columns of a standing arm hardly move.
     let cooled = 4.0 + 6.0 * (-10.0_f64 / 300.0).exp();
     assert!((standing - cooled).abs() < 2e-3, "{standing} against {cooled}");
     assert!(swinging > standing + 1e-3, "{swinging}");

@@ -1,7 +1,7 @@
 //! Thermometers in oil and water, and the depth gauge, at 1 Hz.
 //!
-//! A thermometer follows with a first-order lag (exact for temperatures that change evenly between its samples), and
-//! adds its bias and noise; its converter has a step. `gauge = (1 + scale error) pressure + bias + noise`.
+//! A thermometer follows with a first-order lag (exact for temperatures that change linearly between its samples), and
+//! adds its bias and noise. Its converter has a step. `gauge = (1 + scale error) pressure + bias + noise`.
 
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -14,10 +14,10 @@ use armcal_core::stats::stream_rng;
 use armcal_core::streams::{PressureSample, TemperatureSample, Thermometer};
 use armcal_core::time::{SIMULATION_EPOCH, Stamp};
 
-/// Of the air at the surface.
+/// Pressure of the air at the surface, Pa.
 const ATMOSPHERE_PA: f64 = 101_325.0;
 
-/// The slow sensors.
+/// Sensors with a low rate.
 #[derive(Clone, Debug)]
 pub(crate) struct SlowSensors {
     spec: TemperatureSpec,
@@ -28,7 +28,7 @@ pub(crate) struct SlowSensors {
     gauge: ChaCha8Rng,
 }
 
-/// A thermometer's own temperature.
+/// Thermometer's own temperature.
 #[derive(Clone, Debug)]
 struct Probe {
     rng: ChaCha8Rng,
@@ -66,7 +66,7 @@ impl SlowSensors {
         }
     }
 
-    /// Pressure at the vehicle, `heave_m` above its station.
+    /// Returns the pressure at the vehicle, `heave_m` above its station.
     pub(crate) fn pressure(&mut self, heave_m: f64, stamp: Stamp) -> PressureSample {
         let noise: f64 = StandardNormal.sample(&mut self.gauge);
         let depth_m = self.water.station_depth_m(stamp.since_s(SIMULATION_EPOCH)) - heave_m;
@@ -85,7 +85,7 @@ impl Probe {
     }
 }
 
-/// Of the water at a depth, above the surface's, Pa.
+/// Returns the water's pressure at a depth, above that of the surface, Pa.
 pub(crate) fn gauge_pressure_pa(water: &WaterSpec, depth_m: f64) -> f64 {
     water.density_kg_m3 * GRAVITY_M_S2 * depth_m
 }
@@ -100,7 +100,7 @@ mod tests {
         SlowSensors::new(&silent, &water, built, 1)
     }
 
-    /// A step, then an even rise: closed forms of a first-order lag, at 1 Hz and at uneven times.
+    /// A step, then a linear rise, agree with the closed forms of a first-order lag, at 1 Hz and at uneven times.
     #[test]
     fn a_thermometer_lags_as_its_closed_form() {
         let spec = TemperatureSpec { thermometer_lag_s: 20.0, ..TemperatureSpec::default() };
@@ -111,7 +111,7 @@ mod tests {
                     slow.temperature(Thermometer::Oil, true_c, SIMULATION_EPOCH.plus_s(t_s)).temperature_c
                 };
                 assert_eq!(read(10.0, 0.0), 10.0);
-                // The step lies just after the first sample.
+                // The step is just after the first sample.
                 let mut t_s = 1e-6;
                 let mut shown = read(10.0 + jump_k, t_s);
                 for elapsed_s in &seconds {

@@ -10,27 +10,27 @@ use crate::spec::image::CameraMode;
 use crate::spec::table::{CheckedTable, DEG, table};
 use armcal_core::robot::FileIssue;
 
-/// The window between lens and water.
+/// Window between lens and water.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PortKind {
-    /// Rays go straight, as through a dome about the lens's pupil.
+    /// No window: rays are straight, as through a dome centred on the lens's pupil.
     #[default]
     None,
-    /// A sphere whose centre may lie beside the pupil.
+    /// Sphere whose centre may be off the pupil.
     Dome,
-    /// A plane across the lens's axis.
+    /// Plane across the lens's axis.
     Flat,
 }
 
-/// What the geometric camera draws corners and misses from.
+/// Noise and misses of the geometric camera.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CornerNoiseKind {
-    /// `corner_noise_px`, `miss_probability` and the limits of range, incidence and side.
+    /// Noise by `corner_noise_px`, misses by `miss_probability`, and the limits of range, incidence and side.
     #[default]
     Standard,
-    /// `optics::CornerNoise` as fitted to rendered images in the world's kind of water, in place of those.
+    /// Model `optics::CornerNoise` fitted to rendered images in the world's kind of water, which replaces those values.
     Fitted,
 }
 
@@ -41,14 +41,14 @@ impl CornerNoiseKind {
 }
 
 table!(
-    /// The camera's clock against the joint sensors'.
+    /// Clock of the camera compared with that of the joint sensors.
     #[derive(Copy)]
     ClockSpec {
-        /// Its stamps are late by this, on average.
+        /// Mean delay of its stamps.
         camera_latency_s = 0.020, in 0.0..=1.0;
-        /// Standard deviation of the lateness.
+        /// Standard deviation of the delay.
         camera_jitter_s = 0.005, in 0.0..=0.2;
-        /// Its clock gains this on the joint sensors' from the start on. Quartz: 1 to 100 ppm.
+        /// Rate at which its clock gains on the joint sensors', from the start on. Quartz: 1 to 100 ppm.
         camera_clock_drift_ppm = 0.0, in -1000.0..=1000.0;
     }
 );
@@ -63,21 +63,21 @@ table!(
         miss_probability = 0.02, in 0.0..=1.0;
         /// Standard deviation per axis of the mount's error.
         mount_std_rad = 0.2 * DEG, in 0.0..=0.5;
-        /// The same of its position.
+        /// Standard deviation per axis of the mount's position error.
         mount_std_m = 0.002, in 0.0..=0.2;
-        /// Images a second.
+        /// Rate of images.
         rate_hz = 5.0, in 0.1..=100.0;
         /// Largest distance at which the detector still finds a tag.
         max_range_m = 2.5, in 0.1..=50.0;
-        /// Angle between the tag's normal and the line of sight.
+        /// Largest angle between the tag's normal and the line of sight.
         max_incidence_rad = 70.0 * DEG, in 0.1..=1.55;
         /// Shortest side in the image that the detector still decodes.
         min_side_px = 16.0, in 1.0..=1000.0;
-        /// How long the shutter is open before an image's instant; corners are means over it.
+        /// Time for which the shutter is open before an image's instant; corners are means over it.
         exposure_s = 0.0, in 0.0..=0.5;
-        /// Relative growth of the corner noise per px that a corner moves meanwhile. Assumed.
+        /// Relative growth of the corner noise per px of corner motion during the exposure. Assumed.
         blur_noise_per_px = 0.0, in 0.0..=10.0;
-        /// Share of detections that come with the id of another tag of the map. Assumed.
+        /// Share of detections with the id of another tag of the map. Assumed.
         wrong_id_probability = 0.0, in 0.0..=1.0;
         /// Standard deviation of the focal length's relative error, common to both axes. Assumed.
         focal_std = 0.0, in 0.0..=0.1;
@@ -89,14 +89,14 @@ table!(
         dome_radius_m = 0.05, in 0.01..=0.5;
         /// Standard deviation per axis of the dome's centre about the lens's pupil. Assumed.
         dome_decentre_std_m = 0.0, in 0.0..=0.02;
-        /// From the lens's pupil to a flat port. Assumed.
+        /// Distance from the lens's pupil to a flat port. Assumed.
         port_distance_m = 0.02, in 0.0..=0.5;
-        /// Of a dome or a flat port. Assumed.
+        /// Thickness of a dome or a flat port. Assumed.
         port_thickness_m = 0.01, in 0.0..=0.1;
     } and {
-        /// What the camera looks through.
+        /// Port in front of the lens.
         port: PortKind = PortKind::None;
-        /// Where detections come from; also a routine's `[camera] mode`.
+        /// Source of detections; also a routine's `[camera] mode`.
         #[serde(skip_serializing_if = "CameraMode::is_geometric")]
         mode: CameraMode = CameraMode::Geometric;
         /// Noise of the geometric camera's corners.
@@ -106,7 +106,7 @@ table!(
 );
 
 table!(
-    /// How well the tags were surveyed.
+    /// Errors of the tag survey.
     #[derive(Copy)]
     TagsSpec {
         /// Standard deviation per axis of a tag's position error.
@@ -114,20 +114,22 @@ table!(
         /// Standard deviation per axis of a tag's rotation error.
         survey_std_rad = 0.2 * DEG, in 0.0..=0.5;
     } and {
-        /// Of the base tag alone, where it is machined or measured better than the others.
+        /// Standard deviation per axis of the base tag's position error, if it is machined or measured better than the
+        /// others.
         #[serde(skip_serializing_if = "Option::is_none")]
         #[schemars(range(min = 0.0, max = 0.2))]
         base_std_m: Option<f64> = None;
-        /// The same of its rotation.
+        /// Standard deviation per axis of the base tag's rotation error.
         #[serde(skip_serializing_if = "Option::is_none")]
         #[schemars(range(min = 0.0, max = 0.5))]
         base_std_rad: Option<f64> = None;
-        /// Of the tag on the gripper, against its drawing; 0.3 mm and 0.1 deg where left out. Assumed: a measuring arm
-        /// on the bench.
+        /// Standard deviation per axis of the gripper tag's position error against the nominal model; 0.3 mm if left
+        /// out. Assumed: a measuring arm on the bench.
         #[serde(skip_serializing_if = "Option::is_none")]
         #[schemars(range(min = 0.0, max = 0.2))]
         gripper_std_m: Option<f64> = None;
-        /// The same of its rotation.
+        /// Standard deviation per axis of the gripper tag's rotation error against the nominal model; 0.1 deg if left
+        /// out. Assumed.
         #[serde(skip_serializing_if = "Option::is_none")]
         #[schemars(range(min = 0.0, max = 0.5))]
         gripper_std_rad: Option<f64> = None;
@@ -135,17 +137,17 @@ table!(
 );
 
 impl TagsSpec {
-    /// Standard deviations of a surveyed tag's pose, (m, rad) per axis.
+    /// Returns the standard deviations of a surveyed tag's pose, (m, rad) per axis.
     pub(crate) fn survey_std(&self) -> (f64, f64) {
         (self.survey_std_m, self.survey_std_rad)
     }
 
-    /// Those of the base tag.
+    /// Returns the standard deviations of the base tag's pose, (m, rad) per axis.
     pub(crate) fn base_tag_std(&self) -> (f64, f64) {
         (self.base_std_m.unwrap_or(self.survey_std_m), self.base_std_rad.unwrap_or(self.survey_std_rad))
     }
 
-    /// Those of the tag on the gripper.
+    /// Returns the standard deviations of the gripper tag's pose, (m, rad) per axis.
     pub(crate) fn gripper_std(&self) -> (f64, f64) {
         (self.gripper_std_m.unwrap_or(0.0003), self.gripper_std_rad.unwrap_or(0.1 * DEG))
     }

@@ -12,7 +12,8 @@ table!(
     /// Errors of the arm's geometry against its nominal model.
     #[derive(Copy)]
     GeometrySpec {
-        /// Standard deviation of each drawn error over its sigma in `[geometry]` of robot.toml; 0: as in the URDF.
+        /// Standard deviation of each error over its standard deviation in `[geometry]` of robot.toml; 0: as in the
+        /// URDF.
         error_ratio = 0.0, in 0.0..=20.0;
     }
 );

@@ -1,11 +1,11 @@
-//! `[[world.obstacle]]`: obstacles that the scene does not have.
+//! Obstacles `[[world.obstacle]]`, which the scene does not have.
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use armcal_core::robot::PartFile;
 
-/// What stands in the water and is in no drawing: shapes in the world frame.
+/// Unmodelled obstacles in the water: shapes in the world frame that planning does not know.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
 #[serde(transparent)]
 pub struct UnmodelledObstacles(pub(super) Vec<PartFile>);

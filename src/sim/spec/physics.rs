@@ -13,7 +13,7 @@ use armcal_core::robot::FileIssue;
 pub(crate) const CONTROL_PERIOD_S: f64 = 0.01;
 
 table!(
-    /// The integrator and the rate of the truth's record.
+    /// Engine, integrator and rates of the truth's record.
     #[derive(Copy)]
     PhysicsSpec {
         /// Step of the rigid-body integration; a control period (10 ms) must be a whole number of steps.
@@ -22,8 +22,8 @@ table!(
         truth_rate_hz = 50.0, in 5.0..=100.0;
         /// Rate at which the clearance is measured.
         clearance_rate_hz = 5.0, in 0.1..=100.0;
-        /// Of two parts that touch (assumed: structure and hoses give, not steel alone), shared by their points of
-        /// contact.
+        /// Stiffness of two parts in contact (assumed: structure and hoses yield, not only steel), shared by their
+        /// points of contact.
         contact_stiffness_n_m = 5e5, in 1e3..=1e9;
         /// Damping of a contact over its stiffness (assumed: it hardly rebounds).
         contact_damping_s = 0.01, in 0.0..=1.0;
@@ -31,7 +31,7 @@ table!(
         contact_friction = 0.3, in 0.0..=2.0;
     }
     and {
-        /// What moves the arm; not named: `WorldSpec::engine`.
+        /// Engine that moves the arm; without it, that of `WorldSpec::engine`.
         #[serde(skip_serializing_if = "Option::is_none")]
         engine: Option<EngineKind> = None;
     }
@@ -41,14 +41,14 @@ table!(
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum EngineKind {
-    /// Equations of motion of our own, of second order in the step.
+    /// Our own equations of motion, of second order in the step.
     Featherstone,
     /// Rapier's multibody, of first order; on a prescribed vehicle only.
     Rapier,
 }
 
 impl EngineKind {
-    /// As in routines.
+    /// Returns the name as routines write it.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {

@@ -1,4 +1,4 @@
-//! Short lists of figures, and the lines through them.
+//! Short lists of numbers, and the lines through them.
 
 use armcal_core::codes::Code;
 use std::ops::RangeInclusive;
@@ -9,10 +9,10 @@ use serde::{Deserialize, Serialize};
 
 use armcal_core::robot::FileIssue;
 
-/// The longest list.
+/// Largest number of values in a list.
 const MAX_POINTS: usize = 16;
 
-/// A few figures, written as a list.
+/// Short list of numbers, written as a list.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "Vec<f64>", into = "Vec<f64>")]
 pub struct Points {
@@ -21,10 +21,10 @@ pub struct Points {
 }
 
 impl Points {
-    /// An empty list.
+    /// Empty list.
     pub const NONE: Self = Self { n: 0, values: [0.0; MAX_POINTS] };
 
-    /// The figures of the list.
+    /// Returns the values of the list.
     #[must_use]
     pub fn as_slice(&self) -> &[f64] {
         &self.values[..self.n]
@@ -59,7 +59,7 @@ impl From<Points> for Vec<f64> {
     }
 }
 
-/// Figures over places in ascending order.
+/// Values over positions in ascending order.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Polyline<'a> {
     pub at: &'a Points,
@@ -67,6 +67,8 @@ pub(super) struct Polyline<'a> {
 }
 
 impl Polyline<'_> {
+    /// Checks the values and their positions.
+    ///
     /// # Errors
     /// [`FileIssue`] naming the key of the places or that of the values, and what is allowed.
     pub(super) fn check(
@@ -95,7 +97,8 @@ impl Polyline<'_> {
         Ok(())
     }
 
-    /// Linear between the places and constant beyond; `None` where there are none.
+    /// Returns the value at a position, linear between the given positions and constant beyond; `None` if there are
+    /// none.
     pub(super) fn value_at(&self, place: f64) -> Option<f64> {
         let (at, values) = (self.at.as_slice(), self.values.as_slice());
         let last = *values.last()?;

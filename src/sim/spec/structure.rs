@@ -10,20 +10,20 @@ use serde::{Deserialize, Serialize};
 use crate::spec::table::CheckedTable;
 use armcal_core::robot::FileIssue;
 
-/// What gives and pulls about the arm. Nothing does in the standard world.
+/// Compliance, payload and hose of the arm, none of which the standard world has.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct StructureSpec {
-    /// By joint: how far the link turns behind its sensor under a torque. 0 for joints that are not named.
+    /// Compliance by joint: turn of the link behind its sensor per torque; 0 for joints that are not named.
     #[schemars(extend("additionalProperties" = { "type": "number", "minimum": 0.0, "maximum": 1e-2 }))]
     pub joint_compliance_rad_per_nm: BTreeMap<String, f64>,
-    /// By joint, of those that give: full width of the play between sensor and link.
+    /// Full width of the backlash between sensor and link, by joint, for joints with a compliance.
     #[schemars(extend("additionalProperties" = { "type": "number", "minimum": 0.0, "maximum": 0.1 }))]
     pub bearing_play_rad: BTreeMap<String, f64>,
-    /// How far the base turns on the vehicle under a moment about each of its axes.
+    /// Turn of the base on the vehicle per moment, about each of its axes.
     #[schemars(inner(range(min = 0.0, max = 1e-2)))]
     pub mount_compliance_rad_per_nm: [f64; 3],
-    /// How far it moves under a force along each of its axes.
+    /// Motion of the base on the vehicle per force, along each of its axes.
     #[schemars(inner(range(min = 0.0, max = 1e-2)))]
     pub mount_compliance_m_per_n: [f64; 3],
     /// Damping of the mount over its stiffness; assumed.
@@ -32,23 +32,23 @@ pub struct StructureSpec {
     /// Mass of a ball in the gripper; 0 for none.
     #[schemars(range(min = 0.0, max = 1e4))]
     pub payload_kg: f64,
-    /// Steel by default.
+    /// Density of the payload; steel by default.
     #[schemars(range(min = 100.0, max = 2e4))]
     pub payload_density_kg_m3: f64,
-    /// Its centre from the tool point, axes of the tool's link.
+    /// Centre of the payload from the tool point, axes of the tool's link.
     #[schemars(inner(range(min = -10.0, max = 10.0)))]
     pub payload_offset_m: [f64; 3],
-    /// A hose to a link; none without a stiffness.
+    /// Link to which a hose is tied; there is no hose without a stiffness.
     pub hose_link: String,
-    /// Where it is tied to the link, in the link's frame.
+    /// Point at which the hose is tied, in the link's frame.
     #[schemars(inner(range(min = -10.0, max = 10.0)))]
     pub hose_point_m: [f64; 3],
-    /// Where it comes from, base frame.
+    /// Point from which the hose comes, base frame.
     pub hose_anchor_m: [f64; 3],
-    /// It pulls when its ends are farther apart than this.
+    /// Length of the hose, which pulls when its ends are farther apart.
     #[schemars(range(min = 0.0, max = 100.0))]
     pub hose_length_m: f64,
-    /// Of its pull; 0 for no hose.
+    /// Stiffness of the hose's pull; 0 for no hose.
     #[schemars(range(min = 0.0, max = 1e4))]
     pub hose_stiffness_n_m: f64,
 }
@@ -78,17 +78,17 @@ impl StructureSpec {
         *self == Self::default()
     }
 
-    /// Of a joint that is not named: 0.
+    /// Returns the compliance of a joint, rad/(N m); 0 for a joint that is not named.
     pub(crate) fn joint_compliance(&self, joint: &str) -> f64 {
         self.joint_compliance_rad_per_nm.get(joint).copied().unwrap_or(0.0)
     }
 
-    /// Of a joint that is not named: 0.
+    /// Returns the backlash of a joint's bearing, rad; 0 for a joint that is not named.
     pub(crate) fn bearing_play(&self, joint: &str) -> f64 {
         self.bearing_play_rad.get(joint).copied().unwrap_or(0.0)
     }
 
-    /// Whether the base gives on the vehicle.
+    /// Returns true if the base yields on the vehicle.
     pub(crate) fn mount_gives(&self) -> bool {
         self.mount_compliance_rad_per_nm != [0.0; 3] || self.mount_compliance_m_per_n != [0.0; 3]
     }

@@ -40,7 +40,7 @@ macro_rules! table {
         }
 
         impl $name {
-            /// Keys of this table with their defaults and allowed ranges.
+            /// Returns the keys of this table with their defaults and allowed ranges.
             pub(super) fn figures(table: &str) -> Vec<$crate::spec::table::Figure> {
                 let usual = Self::default();
                 vec![$($crate::spec::table::Figure {
@@ -54,14 +54,14 @@ macro_rules! table {
 }
 pub(super) use table;
 
-/// A key of `[world]` that holds a number.
+/// Key of `[world]` that holds a number.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Figure {
-    /// As in `--set`.
+    /// Key as in `--set`.
     pub key: String,
-    /// Of the standard world.
+    /// Value in the standard world.
     pub usual: f64,
-    /// What is allowed.
+    /// Allowed range.
     pub range: RangeInclusive<f64>,
 }
 

@@ -10,27 +10,28 @@ use crate::spec::table::{CheckedTable, table};
 use armcal_core::robot::FileIssue;
 
 table!(
-    /// Oil and water. The oil warms as `start + rise * (1 - exp(-t / time constant))`, or by the arm's work.
+    /// Temperatures of oil and water. The oil warms as `start + rise * (1 - exp(-t / time constant))`, or by the arm's
+    /// work.
     #[derive(Copy)]
     TemperatureSpec {
-        /// Water temperature at the start, where it is the same at all depths.
+        /// Water temperature at the start, if it is the same at all depths.
         water_c = 4.0, in -3.0..=40.0;
         /// Oil temperature at the start.
         oil_start_c = 10.0, in -3.0..=80.0;
-        /// Rise of the oil in the long run.
+        /// Rise of the oil after a long time.
         oil_rise_k = 8.0, in 0.0..=60.0;
-        /// 300 s: 6.9 K of the 8 K within 10 minutes.
+        /// Time constant of the oil; with 300 s it rises by 6.9 K of the 8 K within 10 minutes.
         oil_time_constant_s = 300.0, in 1.0..=1e5;
         /// Noise of both thermometers.
         thermometer_noise_k = 0.05, in 0.0..=5.0;
-        /// The water changes by this much in the long run (a dive into colder water); the oil follows with its own time
+        /// Change of the water after a long time (a dive into colder water); the oil follows with its own time
         /// constant.
         water_change_k = 0.0, in -60.0..=60.0;
-        /// Time constant of that change.
+        /// Time constant of the water's change.
         water_time_constant_s = 1800.0, in 1.0..=1e6;
-        /// Heat capacity of the oil and what it warms. Above 0 the oil warms by the power that the hydraulics lose and
-        /// cools towards the water with its time constant, and `oil_rise_k` does not count. Assumed: 20 L of oil hold
-        /// 3.3e4 J/K.
+        /// Heat capacity of the oil and of the parts that it warms. If it is positive, the oil warms by the power that
+        /// the hydraulics lose. It cools towards the water with its time constant, and `oil_rise_k` does not count.
+        /// Assumed: 20 L of oil hold 3.3e4 J/K.
         oil_heat_capacity_j_per_k = 0.0, in 0.0..=1e9;
         /// Standard deviation of each thermometer's constant error. Assumed.
         thermometer_bias_std_k = 0.0, in 0.0..=5.0;
@@ -39,10 +40,10 @@ table!(
         /// Step of each thermometer's converter; 0 for none.
         thermometer_resolution_k = 0.0, in 0.0..=5.0;
     } and {
-        /// Depths of `profile_c`, ascending, 16 at most; none for water that is the same everywhere.
+        /// Depths of `profile_c`, ascending, at most 16; none for water that is the same everywhere.
         #[schemars(with = "Vec<f64>", inner(range(min = 0.0, max = 12_000.0)))]
         profile_depth_m: Points = Points::NONE;
-        /// The water's temperature at those depths, linear between them and constant beyond; replaces `water_c`.
+        /// Water temperature at those depths, linear between them and constant beyond; it replaces `water_c`.
         #[schemars(with = "Vec<f64>", inner(range(min = -2.0, max = 30.0)))]
         profile_c: Points = Points::NONE;
     }
@@ -61,7 +62,7 @@ impl TemperatureSpec {
         Polyline { at: &self.profile_depth_m, values: &self.profile_c }
     }
 
-    /// The water at the start, at a depth.
+    /// Returns the water temperature at the start, at a depth.
     pub(crate) fn water_at_c(&self, depth_m: f64) -> f64 {
         self.profile().value_at(depth_m).unwrap_or(self.water_c)
     }

@@ -9,7 +9,7 @@ fn read(text: &str) -> Result<WorldSpec, SimError> {
     WorldSpec::from_table(&text.parse().expect("valid TOML"), Path::new("r.toml"))
 }
 
-/// Messages about refused tables.
+/// Returns the messages about refused tables.
 fn told<const N: usize>(texts: [&str; N]) -> String {
     texts.map(|text| format!("{text:?}\n  {}\n", read(text).expect_err(text))).concat()
 }
@@ -93,7 +93,7 @@ fn images_have_their_keys_and_limits() {
     ];
     insta::assert_snapshot!("images", told(texts));
     assert!(read("[camera]\nmode = \"rendered\"\nport = \"dome\"").is_ok());
-    // Worlds without images are written as ever.
+    // Worlds without image settings are written without them.
     let text = WorldSpec::default().to_toml().expect("text");
     assert!(!text.contains("image") && !text.contains("mode"), "{text}");
     let rendered = read("[camera]\nmode = \"rendered\"").expect("valid").to_toml().expect("text");

@@ -9,17 +9,17 @@ use crate::spec::points::{Points, Polyline};
 use crate::spec::table::CheckedTable;
 use armcal_core::robot::FileIssue;
 
-/// Sea water about the arm.
+/// Sea water around the arm.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct WaterSpec {
-    /// 0: neither drag nor buoyancy.
+    /// Density; 0: neither drag nor buoyancy.
     #[schemars(range(min = 0.0, max = 2000.0))]
     pub density_kg_m3: f64,
-    /// Of every link, per axis of its shapes.
+    /// Drag coefficient of every link, per axis of its shapes.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub drag_coefficient: f64,
-    /// Weight of the displaced water over the arm's own; the robot's own figure where there is none.
+    /// Weight of the displaced water over the arm's own; without it, that of the robot's file.
     #[schemars(range(min = 0.0, max = 0.95))]
     pub buoyancy_fraction: Option<f64>,
     /// Linear friction of each joint, for slow motion.
@@ -28,13 +28,13 @@ pub struct WaterSpec {
     /// Standard deviation of the depth gauge's constant error; assumed.
     #[schemars(range(min = 0.0, max = 1e7))]
     pub pressure_bias_std_pa: f64,
-    /// Standard deviation of its relative scale error; assumed.
+    /// Standard deviation of the depth gauge's relative scale error; assumed.
     #[schemars(range(min = 0.0, max = 0.1))]
     pub pressure_scale_std: f64,
-    /// Of the vehicle's station below the surface.
+    /// Depth of the vehicle's station below the surface.
     #[schemars(range(min = 0.0, max = 12000.0))]
     pub depth_m: f64,
-    /// Times of `dive_depth_m` since the start, ascending, 16 at most; none for a vehicle that stays at its depth.
+    /// Times of `dive_depth_m` since the start, ascending, at most 16; none for a vehicle that stays at its depth.
     #[serde(skip_serializing_if = "Points::is_empty")]
     #[schemars(with = "Vec<f64>", inner(range(min = 0.0, max = 1e6)))]
     pub dive_time_s: Points,
@@ -42,7 +42,7 @@ pub struct WaterSpec {
     #[serde(skip_serializing_if = "Points::is_empty")]
     #[schemars(with = "Vec<f64>", inner(range(min = 0.0, max = 12000.0)))]
     pub dive_depth_m: Points,
-    /// Noise of a single reading, one sigma.
+    /// Noise of a single reading, one standard deviation.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub pressure_noise_pa: f64,
     /// Scale of the links' theoretical added mass; 0 for none.
@@ -57,7 +57,7 @@ pub struct WaterSpec {
     /// Peak period of the waves.
     #[schemars(range(min = 1.0, max = 30.0))]
     pub wave_period_s: f64,
-    /// Where they run, from the world's x axis about z.
+    /// Direction in which the waves run, from the world's x axis about z.
     #[schemars(range(min = -6.3, max = 6.3))]
     pub wave_direction_rad: f64,
 }
@@ -85,17 +85,17 @@ impl Default for WaterSpec {
 }
 
 impl WaterSpec {
-    /// Weight of the displaced water over the arm's own: as set here, else none at all.
+    /// Returns the weight of the displaced water over the arm's own; 0 if it is not set here.
     pub(crate) fn buoyancy(&self) -> f64 {
         self.buoyancy_fraction.unwrap_or(0.0)
     }
 
-    /// Whether the station's depth changes with time.
+    /// Returns true if the station's depth changes with time.
     pub(crate) fn dives(&self) -> bool {
         !self.dive_time_s.is_empty()
     }
 
-    /// Of the vehicle's station below the surface, so long after the start.
+    /// Returns the depth of the vehicle's station below the surface, `t_s` after the start.
     pub(crate) fn station_depth_m(&self, t_s: f64) -> f64 {
         self.dive().value_at(t_s).unwrap_or(self.depth_m)
     }

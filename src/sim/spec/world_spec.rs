@@ -1,4 +1,4 @@
-//! The whole `[world]`: its sub-tables, and the checks that concern more than one of them.
+//! Whole table `[world]`: its sub-tables, and the checks that concern more than one of them.
 
 use armcal_core::codes::Code;
 use std::collections::BTreeMap;
@@ -28,7 +28,7 @@ use crate::spec::water::WaterSpec;
 use armcal_core::robot::{FileIssue, JointSensorSpec, PartFile, Robot, check_parts, toml_problem};
 use armcal_core::routine::Scene;
 
-/// `[world]`, checked.
+/// Table `[world]`, checked.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
 #[schemars(deny_unknown_fields, default)]
 pub struct WorldSpec {
@@ -42,9 +42,9 @@ pub struct WorldSpec {
     pub clock: ClockSpec,
     /// Lens, mount and detections of the camera.
     pub camera: CameraWorldSpec,
-    /// How well the tags were surveyed.
+    /// Errors of the tag survey.
     pub tags: TagsSpec,
-    /// Written out where images are rendered or it was set.
+    /// Rendered images; written if images are rendered or it was set.
     #[serde(skip_serializing_if = "ImageSpec::is_default")]
     pub image: ImageSpec,
     /// Motion of the vehicle, and its attitude sensor.
@@ -53,30 +53,30 @@ pub struct WorldSpec {
     pub hydraulics: HydraulicsSpec,
     /// Density, current, waves and depth gauge.
     pub water: WaterSpec,
-    /// What gives and pulls about the arm; written out where anything does.
+    /// Compliance, payload and hose; written if any is set.
     #[serde(skip_serializing_if = "StructureSpec::is_default")]
     pub structure: StructureSpec,
-    /// Soft ground under the vehicle; written out where it is not the standard's.
+    /// Soft ground under the vehicle; written if it differs from the standard.
     #[serde(skip_serializing_if = "GroundSpec::is_default")]
     pub ground: GroundSpec,
-    /// Errors of the arm's geometry; written out where it is not as in the URDF.
+    /// Errors of the arm's geometry; written if it is not as in the URDF.
     #[serde(skip_serializing_if = "GeometrySpec::is_default")]
     pub geometry: GeometrySpec,
-    /// By joint: counts per radian over the datasheet's. Negative: they run the other way. The arm's own controller
-    /// knows.
+    /// Counts per radian over the datasheet's, by joint; negative values reverse the sense. The arm's own controller
+    /// knows them.
     #[schemars(extend("additionalProperties" = { "type": "number", "minimum": -100.0, "maximum": 100.0 }))]
     pub gear_ratio: BTreeMap<String, f64>,
-    /// The motion that `vehicle.motion_file` names, read with the routine.
+    /// Motion that `vehicle.motion_file` names, read with the routine.
     #[serde(skip)]
     pub recorded: Option<Arc<RecordedMotion>>,
-    /// Whether the largest gain and offset errors are at most each joint's own bounds in robot.toml: so where a routine
-    /// does not say how large they are.
+    /// True if each joint's own bounds in robot.toml limit the largest gain and offset errors: the case if a routine
+    /// does not state them.
     #[serde(skip)]
     pub by_datasheet: [bool; 2],
-    /// Obstacles that only the simulated world has, not the planner; the keys of `[[obstacle]]`.
+    /// Obstacles that only the simulated world has, not the planner; with the keys of `[[obstacle]]`.
     #[serde(skip_serializing_if = "UnmodelledObstacles::is_none")]
     pub obstacle: UnmodelledObstacles,
-    /// What breaks: in the order of the routine's `fault` steps, then what has a time.
+    /// Faults in the order of the routine's `fault` steps, then the timed ones.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub fault: Vec<ScheduledFault>,
 }
@@ -140,7 +140,7 @@ impl WorldSpec {
         Ok(spec)
     }
 
-    /// Reads the recorded motion that the vehicle shall follow, if any; its file's place counts from `folder`.
+    /// Reads the recorded motion that the vehicle shall follow, if any; its file is relative to `folder`.
     ///
     /// # Errors
     /// [`SimError`] naming that file, line and column.
@@ -151,7 +151,7 @@ impl WorldSpec {
         Ok(())
     }
 
-    /// Numbers of the tables that are numbers throughout: keys, defaults, allowed ranges.
+    /// Returns the keys of the purely numeric tables with their defaults and allowed ranges.
     #[must_use]
     pub fn figures() -> Vec<Figure> {
         [
@@ -170,7 +170,7 @@ impl WorldSpec {
         .concat()
     }
 
-    /// As TOML, every key written out.
+    /// Returns the spec as TOML, every key written out.
     ///
     /// # Errors
     /// [`SimError::SpecText`], which no checked spec causes.
@@ -182,7 +182,7 @@ impl WorldSpec {
         Ok(text)
     }
 
-    /// The scene as it truly is: as drawn, and what nobody has drawn.
+    /// Returns the true scene: the nominal one and the unmodelled obstacles.
     ///
     /// # Errors
     /// None for a checked spec.
@@ -192,27 +192,27 @@ impl WorldSpec {
         Ok(Scene { obstacles, ..*drawn })
     }
 
-    /// With what only the robot says filled in.
+    /// Fills in values that only the robot has.
     #[must_use]
     pub fn completed(mut self, robot: &Robot) -> Self {
         self.water.buoyancy_fraction.get_or_insert(robot.buoyancy_fraction);
         self
     }
 
-    /// What moves the arm: as named, else rapier's multibody where it can carry the vehicle.
+    /// Returns the engine that moves the arm: the named one, else rapier's multibody unless the vehicle floats.
     #[must_use]
     pub fn engine(&self) -> EngineKind {
         let by_default = if self.vehicle_floats() { EngineKind::Featherstone } else { EngineKind::Rapier };
         self.physics.engine.unwrap_or(by_default)
     }
 
-    /// Whether the vehicle is a body of the equations of motion: it floats free or is parked.
+    /// Returns true if the vehicle is a body of the equations of motion: it floats free or is parked.
     #[must_use]
     pub fn vehicle_floats(&self) -> bool {
         matches!(self.vehicle.motion, MotionKind::Free | MotionKind::Parked)
     }
 
-    /// What rapier cannot do is refused by its key.
+    /// Refuses keys that rapier cannot simulate.
     fn check_engine(&self, file: &Path) -> Result<(), FileIssue> {
         if self.engine() != EngineKind::Rapier {
             return Ok(());
@@ -236,7 +236,7 @@ impl WorldSpec {
         }
     }
 
-    /// Largest gain error (relative) and offset error (rad) that a joint's sensor may be built with.
+    /// Returns the largest gain error (relative) and offset error (rad) with which a joint's sensor may be built.
     #[must_use]
     pub fn sensor_errors_max(&self, sensor: &JointSensorSpec) -> [f64; 2] {
         let asked = [self.joint_sensors.gain_error_max, self.joint_sensors.offset_error_max_rad];
@@ -244,7 +244,7 @@ impl WorldSpec {
         std::array::from_fn(|k| if self.by_datasheet[k] { asked[k].min(bounds[k]) } else { asked[k] })
     }
 
-    /// Sizes that are larger than what robot.toml says of a joint, so that no margin holds them.
+    /// Returns a warning for each error limit that exceeds a joint's bound in robot.toml, so that no margin covers it.
     #[must_use]
     pub fn beyond_datasheet(&self, robot: &Robot) -> Vec<String> {
         let keys = [("gain_error_max", "gain_bound"), ("offset_error_max_rad", "offset_bound_rad")];
@@ -263,19 +263,19 @@ impl WorldSpec {
         keys.into_iter().enumerate().filter_map(beyond).collect()
     }
 
-    /// Physics steps in a control period.
+    /// Returns the number of physics steps in a control period.
     #[must_use]
     pub fn steps_per_period(&self) -> u64 {
         (CONTROL_PERIOD_S / self.physics.step_s).round() as u64
     }
 
-    /// Time of a physics step, s.
+    /// Returns the time of a physics step, s.
     pub(crate) fn time_s(&self, step: u64) -> f64 {
-        // Multiplied, not summed: whole periods fall on whole stamps.
+        // Multiplied, not summed, so that whole periods have whole stamps.
         step as f64 / self.steps_per_period() as f64 * CONTROL_PERIOD_S
     }
 
-    /// Images are rendered for rays through one point.
+    /// Refuses rendered images through a port without a single viewpoint: their rays pass through one point.
     fn check_view_point(&self, file: &Path) -> Result<(), FileIssue> {
         let camera = &self.camera;
         let has_one = match camera.port {

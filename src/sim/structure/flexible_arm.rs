@@ -1,4 +1,4 @@
-//! Everything that gives and pulls about one arm.
+//! Compliant parts and external loads of one arm.
 
 use nalgebra::{Isometry3, Vector3};
 
@@ -14,9 +14,9 @@ use armcal_core::streams::{JointAngles, MAX_JOINTS};
 /// Shafts of all joints, mount and hose, and the arm that loads them.
 #[derive(Clone, Debug)]
 pub(crate) struct FlexibleArm {
-    /// On its bent mount; body 0 is the arm's own base.
+    /// Arm on its deflected mount; body 0 is the arm's own base.
     arm: Multibody,
-    /// Of the first joint on the base, as drawn.
+    /// Nominal pose of the first joint on the base.
     drawn: Isometry3<f64>,
     shafts: [JointShaft; MAX_JOINTS],
     is_stiff: bool,
@@ -26,31 +26,31 @@ pub(crate) struct FlexibleArm {
     step_s: f64,
 }
 
-/// Where the arm is at the end of a step, and what surrounds it.
+/// State of the arm at the end of a step, and its surroundings.
 pub(crate) struct ArmState<'a> {
     pub angles: &'a JointAngles,
-    /// rad/s.
+    /// Joint rates, rad/s.
     pub rates: &'a JointAngles,
     pub base: &'a BaseState,
     pub water: &'a WaterMotion,
 }
 
-/// An arm that hangs at rest.
+/// Equilibrium of an arm at rest.
 pub(crate) struct Balance {
-    /// Of the links.
+    /// Angles of the links.
     pub angles: JointAngles,
-    /// Of weight, buoyancy and hose about each joint, N m.
+    /// Torques of weight, buoyancy and hose about each joint, N m.
     pub torques: JointAngles,
 }
 
-/// Rounds until an arm hangs at rest: each leaves a share of what was left, the compliance times the change of the load
-/// with the deflection.
+/// Number of iterations until an arm is in equilibrium. Each leaves a share of the error: the compliance times the
+/// change of the load with the deflection.
 const SETTLING_ROUNDS: usize = 60;
-/// Long against the damping of any mount, s.
+/// Time much longer than the damping of any mount, s.
 const FOREVER_S: f64 = 1e12;
 
 impl FlexibleArm {
-    /// `bodies` are those of the links 0..=n, the arm's own base first.
+    /// Builds the arm; `bodies` are those of the links 0..=n, the arm's own base first.
     pub(crate) fn new(spec: &StructureSpec, robot: &Robot, bodies: Vec<Body>, step_s: f64) -> Self {
         let mut shafts = [JointShaft::default(); MAX_JOINTS];
         for (shaft, joint) in shafts.iter_mut().zip(robot.chain.joints()) {
@@ -68,7 +68,7 @@ impl FlexibleArm {
         }
     }
 
-    /// Lets the arm hang at rest from shafts at these angles.
+    /// Finds the equilibrium of an arm at rest whose shafts have these angles.
     pub(crate) fn settle(&mut self, shafts: &JointAngles, gravity: &Vector3<f64>) -> Balance {
         let n = shafts.len();
         let around = Environment { gravity: *gravity, ..Environment::still(0.0) };
@@ -89,12 +89,12 @@ impl FlexibleArm {
         balance
     }
 
-    /// Place of the first joint in the base frame.
+    /// Returns the pose of the first joint in the base frame.
     pub(crate) fn first_place(&self) -> Isometry3<f64> {
         self.arm.chain().first_place()
     }
 
-    /// Angles and rates of the shafts, which the sensors and the drives are on.
+    /// Returns angles and rates of the shafts, which the sensors and the drives are on.
     pub(crate) fn shafts(&self, angles: &JointAngles, rates: &JointAngles) -> (JointAngles, JointAngles) {
         if self.is_stiff {
             return (*angles, *rates);
@@ -104,13 +104,14 @@ impl FlexibleArm {
         (shaft_angles, JointAngles::from_fn(n, |j| rates[j] + self.shafts[j].twist_rate_rad_s))
     }
 
-    /// What acts about the link of `joint` during a step in which `drive` acts on its shaft; `link` is the link's
-    /// angle and rate at the step's start.
+    /// Returns the load about the link of `joint` during a step in which `drive` acts on its shaft; `link` is the
+    /// link's angle and rate at the step's start.
     pub(crate) fn load(&mut self, joint: usize, drive: JointLoad, link: [f64; 2]) -> JointLoad {
         if self.is_stiff { drive } else { self.shafts[joint].load(drive, link, self.step_s) }
     }
 
-    /// What the hose does to the links, about the base's origin in base axes, and to the vehicle it comes from.
+    /// Returns the hose's forces on the links, about the base's origin in base axes, and on the vehicle from which it
+    /// comes.
     pub(crate) fn pulls(&self, angles: &JointAngles) -> [Force; MAX_JOINTS + 1] {
         let mut pulls = self.pulls_on_links(angles);
         pulls[0] = pulls.iter().fold(Force::zero(), |sum, pull| sum - *pull);
@@ -126,7 +127,7 @@ impl FlexibleArm {
         pulls
     }
 
-    /// Takes the state at a step's end; gives the place of the first joint where the mount has changed it.
+    /// Takes the state at a step's end; returns the pose of the first joint if the mount has changed it.
     pub(crate) fn follow(&mut self, state: &ArmState) -> Option<Isometry3<f64>> {
         let ArmState { angles, rates, .. } = *state;
         if !self.is_stiff {
@@ -146,7 +147,8 @@ impl FlexibleArm {
         Some(place)
     }
 
-    /// The wrench of base and arm on the vehicle: weight, water, inertia and hose. Contacts of the arm are left out.
+    /// Returns the wrench of base and arm on the vehicle: weight, water, inertia and hose. Contacts of the arm are
+    /// excluded.
     fn load_on_mount(&self, state: &ArmState) -> Force {
         let ArmState { angles, rates, base, water } = *state;
         let around = base.environment(water);

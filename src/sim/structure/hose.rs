@@ -1,4 +1,4 @@
-//! A hose that pulls a link toward where it comes from.
+//! Hose that pulls a link toward its anchor.
 
 use nalgebra::Vector3;
 
@@ -7,7 +7,7 @@ use crate::spec::StructureSpec;
 use armcal_core::kinematics::LinkPoses;
 use armcal_core::robot::Robot;
 
-/// A spring that pulls and never pushes, `k max(0, |d| - l)` along the line `d` between its ends.
+/// Spring that pulls and never pushes, `k max(0, |d| - l)` along the line `d` between its ends.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Hose {
     body: usize,
@@ -29,7 +29,7 @@ impl Hose {
         })
     }
 
-    /// The body that it pulls, and the force on it about the base's origin, base axes.
+    /// Returns the body that it pulls, and the force on it about the base's origin, base axes.
     pub(super) fn pull(&self, links: &LinkPoses) -> (usize, Force) {
         let point = links.link(self.body).transform_point(&self.point_m.into()).coords;
         let line = self.anchor_m - point;

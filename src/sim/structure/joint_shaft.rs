@@ -1,7 +1,8 @@
-//! What gives between a joint's sensor and its link: a shaft without mass, in series with the drive.
+//! Compliance between a joint's sensor and its link: a shaft without mass, in series with the drive.
 //!
-//! The sensor sits on the shaft, `q = theta + e + c T` with `theta` the link's angle, `c` the shaft's compliance and
-//! `e = +-p/2` the end of its play on the side where it carries. The drive is linear in the shaft's state over a step:
+//! The sensor is on the shaft: `q = theta + e + c T` with `theta` the link's angle and `c` the shaft's compliance. `e =
+//! +-p/2` is the end of its backlash on the side where it carries. The drive is linear in the shaft's state over a
+//! step:
 //!
 //! ```text
 //! T = a - k q - d dq/dt      hence      c d dT/dt = -(1 + c k) T + a - k (theta + e) - d dtheta/dt
@@ -10,37 +11,37 @@
 //! ```
 //!
 //! The mean is linear in the link's angle and rate, so that the integrator takes it as the load about the joint. Within
-//! the play nothing is carried.
+//! the backlash the shaft carries no torque.
 
 use crate::dynamics::JointLoad;
 
-/// The shaft of one joint.
+/// Shaft of one joint.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct JointShaft {
     compliance_rad_per_nm: f64,
     half_play_rad: f64,
-    /// The shaft's angle less the link's.
+    /// Shaft's angle less the link's.
     pub(super) twist_rad: f64,
     pub(super) twist_rate_rad_s: f64,
-    /// What it carries at the step's start.
+    /// Torque of the shaft at the step's start.
     torque_n_m: f64,
-    /// On the shaft during the step.
+    /// Load of the drive on the shaft during the step.
     drive: JointLoad,
-    /// During the step; none within the play.
+    /// State of a shaft that carries during the step; `None` within the backlash.
     carrying: Option<Carrying>,
 }
 
-/// How the carried torque goes over a step.
+/// Course of the carried torque over a step.
 #[derive(Clone, Copy, Debug)]
 struct Carrying {
-    /// End of the play where the shaft carries.
+    /// End of the backlash at which the shaft carries.
     edge_rad: f64,
-    /// `T_inf`, of the link's angle and rate.
+    /// Torque `T_inf`, from the link's angle and rate.
     settled: JointLoad,
     settled_at_start_n_m: f64,
-    /// `exp(-lambda h)`.
+    /// Factor `exp(-lambda h)`.
     kept: f64,
-    /// Its mean over the step.
+    /// Mean of the factor over the step.
     mean_kept: f64,
 }
 
@@ -53,7 +54,7 @@ impl JointShaft {
         self.compliance_rad_per_nm == 0.0
     }
 
-    /// At rest, with this torque on its link: gives the twist.
+    /// Sets the shaft to rest with this torque on its link; returns the twist.
     pub(super) fn settle(&mut self, torque_n_m: f64) -> f64 {
         self.torque_n_m = torque_n_m;
         self.twist_rad = self.compliance_rad_per_nm * torque_n_m + self.half_play_rad.copysign(torque_n_m);
@@ -61,8 +62,8 @@ impl JointShaft {
         self.twist_rad
     }
 
-    /// What acts about the link during a step in which `drive` acts on the shaft; `link` is the link's angle and rate
-    /// at the step's start.
+    /// Returns the load about the link during a step in which `drive` acts on the shaft; `link` is the link's angle and
+    /// rate at the step's start.
     pub(super) fn load(&mut self, drive: JointLoad, link: [f64; 2], step_s: f64) -> JointLoad {
         self.drive = drive;
         self.carrying = None;
@@ -98,7 +99,8 @@ impl JointShaft {
         self.twist_rate_rad_s = (self.twist_rad - before_rad) / step_s;
     }
 
-    /// Within the play the drive moves the shaft until it gives no torque, or to the play's end.
+    /// Returns the twist within the backlash: the drive moves the shaft until its torque is zero, or to the backlash's
+    /// end.
     fn free_twist_rad(&self, angle_rad: f64, rate_rad_s: f64, step_s: f64) -> f64 {
         let damping = self.drive.damping_n_m_s_rad / step_s;
         let stiffness = self.drive.stiffness_n_m_rad + damping;

@@ -1,5 +1,5 @@
-//! What gives and pulls about an arm: shafts that twist behind the joint sensors, the mount on the vehicle, a payload
-//! in the gripper, a hose.
+//! Compliance and loads of an arm: shafts that twist behind the joint sensors, the mount on the vehicle, a payload in
+//! the gripper, a hose.
 //!
 //! A joint's shaft is a massless spring in series with its drive (`joint_shaft`): the equations of motion have the
 //! link's angle, and the sensor reads the shaft's. The mount follows the arm's wrench (`mount`). A payload is part of

@@ -1,8 +1,8 @@
-//! The mount between vehicle and arm: springs and dampers along and about the base's axes, without mass.
+//! Mount between vehicle and arm: springs and dampers along and about the base's axes, without mass.
 //!
 //! With `F` the wrench of base and arm on the vehicle, about the base's origin, `C` the compliances and `t` the damping
-//! over the stiffness: `t dx/dt = C F - x`. The arm feels where the mount has brought it, not how fast that changes:
-//! the mount is far stiffer than the arm moves fast.
+//! over the stiffness: `t dx/dt = C F - x`. The arm moves with the mount's deflection, not with its rate: the mount is
+//! far stiffer than the arm moves fast.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
@@ -30,7 +30,7 @@ impl Mount {
         })
     }
 
-    /// Lets `elapsed_s` pass under this wrench on the vehicle; gives how far the arm's base has moved.
+    /// Advances by `elapsed_s` under this wrench on the vehicle; returns the motion of the arm's base.
     pub(super) fn follow(&mut self, load: &Force, elapsed_s: f64) -> Isometry3<f64> {
         let share = elapsed_s / (elapsed_s + self.damping_s);
         self.turn_rad += (self.rad_per_nm.component_mul(&load.moment) - self.turn_rad) * share;

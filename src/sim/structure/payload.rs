@@ -1,4 +1,4 @@
-//! A payload in the gripper: a ball that moves with the tool's link.
+//! Payload in the gripper: a ball that moves with the tool's link.
 
 use nalgebra::Vector3;
 
@@ -6,7 +6,7 @@ use crate::dynamics::{Body, WaterProperties};
 use crate::spec::WorldSpec;
 use armcal_core::robot::Robot;
 
-/// The body that carries the payload, and the payload in its frame; `None` without one.
+/// Returns the body that carries the payload, and the payload in its frame; `None` without one.
 pub(crate) fn payload(spec: &WorldSpec, robot: &Robot) -> Option<(usize, Body)> {
     let (structure, mount) = (&spec.structure, &robot.tool.mount);
     let offset_m = Vector3::from(structure.payload_offset_m);

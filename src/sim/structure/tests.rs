@@ -1,4 +1,4 @@
-//! Closed forms of arms that hang at rest, and MuJoCo's figures of one that swings.
+//! Arms at rest compared with closed forms, and a swinging arm with MuJoCo.
 
 use std::path::Path;
 
@@ -19,7 +19,7 @@ const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
 const G: f64 = 9.806_65;
 const DOWN: Vector3<f64> = Vector3::new(0.0, 0.0, -G);
 
-/// A joint about y, `at_m` along its parent's x axis: positive angles turn the link down.
+/// Returns a joint about y, `at_m` along its parent's x axis: positive angles turn the link down.
 fn joint(name: &str, at_m: f64) -> ChainJoint {
     ChainJoint {
         name: name.to_owned(),
@@ -39,7 +39,7 @@ const MASS_KG: f64 = 80.0;
 const CENTER_M: f64 = 1.1;
 const ROOT_M: f64 = 0.3;
 
-/// One link that stands out from the base.
+/// Returns an arm with one link that stands out from the base.
 fn cantilever() -> Robot {
     let mut robot = load(&Path::new(ROOT).join("robots/titan4")).expect("the robot reads");
     robot.chain = Chain::new(vec![joint("root", ROOT_M)]);
@@ -48,7 +48,7 @@ fn cantilever() -> Robot {
     robot
 }
 
-/// Where it hangs, its sensor at `shaft_rad`: the link's angle and the base's turn.
+/// Returns the equilibrium with the sensor at `shaft_rad`: the link's angle and the base's turn.
 fn hangs(spec: &StructureSpec, bodies: Vec<Body>, shaft_rad: f64) -> (f64, f64) {
     let mut arm = FlexibleArm::new(spec, &cantilever(), bodies, 0.002);
     let balance = arm.settle(&JointAngles::from_slice(&[shaft_rad]), &DOWN);
@@ -61,7 +61,7 @@ fn soft(compliance: f64) -> StructureSpec {
     spec
 }
 
-/// The value that stays the same under `next`, which contracts.
+/// Returns the fixed point of `next`, which contracts.
 fn fixed_point<const N: usize>(next: impl Fn([f64; N]) -> [f64; N]) -> [f64; N] {
     (0..500).fold([0.0; N], |at, _| next(at))
 }
@@ -70,7 +70,7 @@ fn assert_near(value: f64, expected: f64, what: &str) {
     assert!((value - expected).abs() <= 1e-9 * expected.abs(), "{what}: {value} for {expected}");
 }
 
-/// `theta = q + c m g l cos(theta)`.
+/// The equilibrium follows `theta = q + c m g l cos(theta)`.
 #[test]
 fn a_cantilever_on_a_soft_joint_hangs_by_its_closed_form() {
     for (shaft_rad, compliance) in [(0.0, 1e-5), (0.4, 1e-4), (-0.7, 3e-5)] {
@@ -80,7 +80,7 @@ fn a_cantilever_on_a_soft_joint_hangs_by_its_closed_form() {
     }
 }
 
-/// It falls to the lower end of its play and gives there.
+/// The link falls to the lower end of its backlash and deflects there.
 #[test]
 fn bearing_play_lets_it_hang_on_the_lower_side() {
     let mut spec = soft(1e-5);
@@ -90,7 +90,7 @@ fn bearing_play_lets_it_hang_on_the_lower_side() {
     assert_near(angle - 0.1, sag, "sag");
 }
 
-/// The base's own weight loads the mount, too; the mount's turn lowers the root, and that turn and the joint's add up.
+/// The base's own weight loads the mount, too. The mount's turn lowers the root and adds to the joint's.
 #[test]
 fn a_cantilever_on_a_soft_mount_hangs_by_its_closed_form() {
     let mut spec = soft(2e-5);
@@ -124,7 +124,7 @@ fn a_payload_hangs_by_its_weight_in_water() {
     assert_near(angle, sag, "sag");
 }
 
-/// A hose from straight above its point, longer than its length by 0.2 m, carries part of the weight.
+/// A hose from straight above its point, stretched by 0.2 m, carries part of the weight.
 #[test]
 fn a_hose_lifts_what_it_is_tied_to() {
     let mut spec = soft(1e-5);
@@ -143,8 +143,8 @@ fn a_hose_lifts_what_it_is_tied_to() {
     assert_near(angle, sag, "sag");
 }
 
-/// Drives that swing two links in the plane, each through a shaft that gives. `tests/oracle/make_structure_golden.py`
-/// has the same figures.
+/// Two links swung in the plane by drives, each through a compliant shaft. `tests/oracle/make_structure_golden.py` has
+/// the same values.
 struct Swing {
     shafts: [JointShaft; 2],
     state: SystemState,
@@ -154,7 +154,7 @@ struct Swing {
 const DRIVE_N_M_RAD: [f64; 2] = [4e4, 1.5e4];
 const DAMPING_N_M_S_RAD: [f64; 2] = [400.0, 150.0];
 
-/// Rest of a drive, and its rate.
+/// Returns the rest angle of a drive, and its rate.
 fn rest(j: usize, t_s: f64) -> (f64, f64) {
     let (turn, swing_rad) = (std::f64::consts::TAU / 1.2, [0.25, -0.35][j]);
     let start_rad = [0.3, -0.6][j];
@@ -165,7 +165,7 @@ fn rest(j: usize, t_s: f64) -> (f64, f64) {
 }
 
 impl Swing {
-    /// From the angles of links and shafts at rest.
+    /// Starts from the angles of links and shafts at rest.
     fn new(row: &[f64], step_s: f64) -> Self {
         let mut shafts = [JointShaft::new(2e-5, 0.0), JointShaft::new(6e-5, 0.0)];
         for (j, shaft) in shafts.iter_mut().enumerate() {
@@ -199,7 +199,7 @@ impl Swing {
     }
 }
 
-/// Largest difference of links, and of shafts, from MuJoCo's, rad.
+/// Returns the largest differences of links, and of shafts, from MuJoCo's, rad.
 fn differences(steps_per_sample: u32) -> [f64; 2] {
     let text = std::fs::read_to_string(Path::new(ROOT).join("tests/golden/structure.csv")).expect("the golden file");
     let rows: Vec<Vec<f64>> =
@@ -221,7 +221,7 @@ fn differences(steps_per_sample: u32) -> [f64; 2] {
     worst
 }
 
-/// The links bend by up to 10 mrad behind their shafts. The step's error is of second order.
+/// The links deflect by up to 10 mrad behind their shafts. The step's error is of second order.
 #[test]
 fn a_swinging_arm_bends_as_mujocos() {
     let (standard, finer, finest) = (differences(25), differences(50), differences(1600));
@@ -232,12 +232,12 @@ fn a_swinging_arm_bends_as_mujocos() {
     }
 }
 
-/// A joint that swings through its play is carried on neither side for a while, and rests on one in the end.
+/// A joint that swings through its backlash is carried on neither side for a time, and rests on one side at the end.
 #[test]
 fn a_shaft_in_its_play_carries_nothing() {
     let (mut shaft, step_s) = (JointShaft::new(1e-5, 4e-3), 1e-3);
     shaft.settle(100.0);
-    // The drive holds the shaft at 0, the link is taken from below it to above it.
+    // The drive holds the shaft at 0; the link moves from below it to above it.
     let drive = JointLoad::spring(1e5, 1e3, 0.0, 0.0);
     let torque = |shaft: &mut JointShaft, angle_rad: f64| {
         let load = shaft.load(drive, [angle_rad, 0.0], step_s);
@@ -255,7 +255,7 @@ fn a_shaft_in_its_play_carries_nothing() {
     }
 }
 
-/// What the simulator's standard water does to a ball.
+/// The water displaced by a ball in the simulator's standard water.
 #[test]
 fn a_ball_displaces_its_volume() {
     let water = WaterProperties::of(&WaterSpec::default());

@@ -1,56 +1,56 @@
-//! Topics of truth.mcap and the messages that ROS has no type for.
+//! Topics of truth.mcap, and messages for which ROS has no type.
 
 use serde::{Deserialize, Serialize};
 
 use armcal_core::log::ros::Header;
 use armcal_core::log::{RosMessage, RosSchema};
 
-/// The header as TOML (robot, vehicle, seed, as-built values, `[world]`), once at the start.
+/// Header as TOML (robot, vehicle, seed, as-built values, `[world]`), once at the start.
 pub const WORLD: &str = "/truth/world";
 /// True angles (rad), rates (rad/s) and torques of the oil columns (N m).
 pub const JOINT_STATES: &str = "/truth/joint_states";
-/// `base_from_tool`.
+/// Pose of the tool, `base_from_tool`.
 pub const TOOL_POSE: &str = "/truth/tool_pose";
-/// `base_from_camera`.
+/// Pose of the camera, `base_from_camera`.
 pub const CAMERA_POSE: &str = "/truth/camera_pose";
-/// `world_from_vehicle`.
+/// Pose of the vehicle, `world_from_vehicle`.
 pub const VEHICLE_POSE: &str = "/truth/vehicle_pose";
 /// True oil temperature, degrees Celsius.
 pub const OIL_TEMPERATURE: &str = "/truth/oil_temperature";
 /// True water temperature, degrees Celsius.
 pub const WATER_TEMPERATURE: &str = "/truth/water_temperature";
-/// The nearest two watched parts and their distance.
+/// Nearest two watched parts and their distance.
 pub const CLEARANCE: &str = "/truth/clearance";
 /// Two parts when they begin to touch.
 pub const CONTACTS: &str = "/truth/contacts";
 /// A fault when it happens.
 pub const FAULTS: &str = "/truth/faults";
 
-/// armcal_msgs/msg/Contact: two parts began to touch.
+/// Message armcal_msgs/msg/Contact: two parts began to touch.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Contact {
     /// Time of the contact; the frame is the base.
     pub header: Header,
-    /// Name of a link or of something around the arm.
+    /// Name of a link or of a part around the arm.
     pub part_a: String,
-    /// The other part.
+    /// Name of the other part.
     pub part_b: String,
 }
 
-/// armcal_msgs/msg/Clearance: the nearest two parts and their distance.
+/// Message armcal_msgs/msg/Clearance: the nearest two parts and their distance.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Clearance {
     /// Time of the state; the frame is the base.
     pub header: Header,
-    /// Not above 0 where they touch.
+    /// Distance of the parts, at most 0 if they touch.
     pub distance_m: f64,
-    /// Name of a link or of something around the arm.
+    /// Name of a link or of a part around the arm.
     pub part_a: String,
-    /// The other part.
+    /// Name of the other part.
     pub part_b: String,
 }
 
-/// armcal_msgs/msg/Fault: what broke, with `details` as the routine has them.
+/// Message armcal_msgs/msg/Fault: a fault, with `details` as in the routine.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FaultMessage {
     pub header: Header,

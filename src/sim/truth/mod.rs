@@ -1,4 +1,4 @@
-//! The truth stream: reference of the score, in a file that belief never opens.
+//! Stream of the truth: reference of the score, in a file that the estimator never opens.
 
 mod messages;
 mod reader;

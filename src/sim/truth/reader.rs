@@ -1,4 +1,4 @@
-//! Reads truth.mcap back, for the score.
+//! Reader of truth.mcap, for the score.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use armcal_core::spatial::{Base, Camera, Frame, Pose, Tool, Vehicle, World};
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
 use armcal_core::time::Stamp;
 
-/// States farther apart than this say nothing of the time between them, s.
+/// Largest interval of states between which the truth is interpolated, s.
 const MAX_GAP_S: f64 = 0.25;
 
 /// Contents of truth.mcap.
@@ -19,11 +19,11 @@ const MAX_GAP_S: f64 = 0.25;
 pub struct Truth {
     /// Constants of the run.
     pub header: TruthHeader,
-    /// In the order of time, at the truth's rate.
+    /// States in the order of time, at the truth's rate.
     pub states: Vec<TruthState>,
-    /// In the order of time.
+    /// Contacts in the order of time.
     pub contacts: Vec<TruthContact>,
-    /// In the order of time, at a rate of their own.
+    /// Clearances in the order of time, at their own rate.
     pub clearances: Vec<TruthClearance>,
     /// Faults in the order of time.
     pub faults: Vec<TruthFault>,
@@ -61,8 +61,8 @@ pub fn read_truth(path: impl AsRef<Path>) -> Result<Truth, SimError> {
 }
 
 impl Truth {
-    /// The state at `stamp`, interpolated between its neighbours; `None` before the first and after the last, and where
-    /// these are farther apart than the arm may be taken to have moved evenly.
+    /// Returns the state at `stamp`, interpolated between its neighbours. `None` before the first and after the last,
+    /// and where the neighbours are too far apart to assume uniform motion.
     #[must_use]
     pub fn state_at(&self, stamp: Stamp) -> Option<TruthState> {
         let next = self.states.partition_point(|state| state.stamp < stamp);
@@ -76,7 +76,7 @@ impl Truth {
         (gap_s <= MAX_GAP_S).then(|| interpolated(before, after, share, stamp))
     }
 
-    /// The smallest distance of any two watched parts, m; `None` if none was measured.
+    /// Returns the smallest distance of any two watched parts, m; `None` if none was measured.
     #[must_use]
     pub fn min_clearance_m(&self) -> Option<f64> {
         self.clearances.iter().map(|clearance| clearance.distance_m).reduce(f64::min)
@@ -99,7 +99,7 @@ fn interpolated(a: &TruthState, b: &TruthState, share: f64, stamp: Stamp) -> Tru
     }
 }
 
-/// Positions on a line, orientations on the shortest arc.
+/// Interpolates positions on a line, orientations on the shortest arc.
 fn between<A: Frame, B: Frame>(a: &Pose<A, B>, b: &Pose<A, B>, share: f64) -> Pose<A, B> {
     Pose::from_isometry(a.isometry().lerp_slerp(b.isometry(), share))
 }
@@ -148,7 +148,7 @@ impl Reader {
         Ok(())
     }
 
-    /// The water's temperature is the last message of a state.
+    /// Completes a state: the water's temperature is its last message.
     fn complete_state(&mut self, water: &Temperature) -> Result<(), String> {
         let parts = (self.joints.take(), self.tool.take(), self.camera.take(), self.vehicle.take(), self.oil_c.take());
         let (Some(joints), Some(base_from_tool), Some(base_from_camera), Some(world_from_vehicle), Some(oil_c)) = parts

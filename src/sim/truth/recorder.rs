@@ -1,4 +1,4 @@
-//! Writes truth.mcap.
+//! Writer of truth.mcap.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -15,7 +15,7 @@ use armcal_core::time::{SIMULATION_EPOCH, Stamp};
 
 const BASE: &str = "base_link";
 
-/// The truth as a recording of its own.
+/// Recorder of the truth in its own file.
 pub struct TruthRecorder {
     writer: RecordingWriter,
     joint_names: Vec<String>,
@@ -27,7 +27,7 @@ impl TruthRecorder {
     /// # Errors
     /// [`LogError`] when it cannot be created.
     pub fn create(path: impl AsRef<Path>) -> Result<Self, LogError> {
-        // The header serves messages of `streams`, of which there are none here.
+        // The header serves messages of `streams`, of which this file has none.
         let writer = RecordingWriter::create(path, RecordingHeader::new(Vec::new()))?;
         Ok(Self { writer, joint_names: Vec::new() })
     }
@@ -67,7 +67,7 @@ impl TruthSink for TruthRecorder {
             ("world".to_owned(), truth.spec_toml.clone()),
             ("as_built".to_owned(), as_built),
         ]);
-        // For people and other tools; `read_truth` takes the message, which cannot get lost without being noticed.
+        // For people and other tools; `read_truth` reads the message, whose loss would be noticed.
         self.writer.metadata("world", metadata)?;
         let text = toml::to_string(truth)?;
         self.write(messages::WORLD, SIMULATION_EPOCH, &StringMessage { data: text })

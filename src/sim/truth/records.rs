@@ -19,22 +19,22 @@ pub struct TruthHeader {
     /// Seed of the world.
     #[serde(with = "seed_text")]
     pub seed: u64,
-    /// `[world]` as TOML text, every key written out.
+    /// Text of `[world]` as TOML, every key written out.
     pub spec_toml: String,
-    /// What was drawn for the seed.
+    /// As-built values that were drawn for the seed.
     pub as_built: AsBuilt,
 }
 
-/// The true state at one instant.
+/// True state at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TruthState {
-    /// By the arm's clock.
+    /// Time by the arm's clock.
     pub stamp: Stamp,
-    /// rad.
+    /// Joint angles, rad.
     pub angles: JointAngles,
-    /// rad/s.
+    /// Joint rates, rad/s.
     pub rates: JointAngles,
-    /// Of the oil columns, N m.
+    /// Torques of the oil columns, N m.
     pub torques: JointAngles,
     /// True pose of the tool point.
     pub base_from_tool: Pose<Base, Tool>,
@@ -48,73 +48,81 @@ pub struct TruthState {
     pub water_c: f64,
 }
 
-/// Two parts began to touch.
+/// Start of a contact of two parts.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TruthContact {
-    /// By the arm's clock.
+    /// Time by the arm's clock.
     pub stamp: Stamp,
-    /// Name of a link or of something around the arm.
+    /// Name of a link or of a part around the arm.
     pub part_a: String,
-    /// The other part.
+    /// Name of the other part.
     pub part_b: String,
 }
 
-/// The nearest two parts at one instant; not above 0 where they touch.
+/// Nearest two parts at one instant.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TruthClearance {
-    /// By the arm's clock.
+    /// Time by the arm's clock.
     pub stamp: Stamp,
-    /// Distance of their surfaces.
+    /// Distance of their surfaces; at most 0 if they touch.
     pub distance_m: f64,
-    /// Name of a link or of something around the arm.
+    /// Name of a link or of a part around the arm.
     pub part_a: String,
-    /// The other part.
+    /// Name of the other part.
     pub part_b: String,
 }
 
-/// Something broke.
+/// Fault in the simulated world.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TruthFault {
-    /// By the arm's clock.
+    /// Time by the arm's clock.
     pub stamp: Stamp,
-    /// As routines name it.
+    /// Kind as routines name it.
     pub kind: String,
-    /// Its other values in the routine: `joint = "wrist_yaw"`.
+    /// Other values in the routine: `joint = "wrist_yaw"`.
     pub details: String,
 }
 
-/// Takes the truth as it comes, in the order of time.
+/// Sink of the truth, in the order of time.
 pub trait TruthSink {
-    /// Comes first, once.
+    /// Takes the header, first and once.
     ///
     /// # Errors
-    /// Here and below: when it cannot be kept.
+    /// [`SinkError`] here and below if it cannot be stored.
     fn begin(&mut self, header: &TruthHeader) -> Result<(), SinkError>;
 
+    /// Takes a state.
+    ///
     /// # Errors
     /// See [`Self::begin`].
     fn state(&mut self, state: &TruthState) -> Result<(), SinkError>;
 
+    /// Takes a contact.
+    ///
     /// # Errors
     /// See [`Self::begin`].
     fn contact(&mut self, contact: &TruthContact) -> Result<(), SinkError>;
 
+    /// Takes a clearance.
+    ///
     /// # Errors
     /// See [`Self::begin`].
     fn clearance(&mut self, clearance: &TruthClearance) -> Result<(), SinkError>;
 
+    /// Takes a fault.
+    ///
     /// # Errors
     /// See [`Self::begin`].
     fn fault(&mut self, fault: &TruthFault) -> Result<(), SinkError>;
 
-    /// Comes last, once.
+    /// Ends the stream, last and once.
     ///
     /// # Errors
     /// See [`Self::begin`].
     fn finish(self: Box<Self>) -> Result<(), SinkError>;
 }
 
-/// TOML has no integers beyond 63 bits: the seed travels as text.
+/// TOML has no integers beyond 63 bits, so the seed is written as text.
 mod seed_text {
     use serde::{Deserialize, Deserializer, Serializer, de};
 

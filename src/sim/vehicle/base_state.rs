@@ -8,20 +8,20 @@ use crate::vehicle::sea::WaterMotion;
 use armcal_core::robot::GRAVITY_M_S2;
 use armcal_core::spatial::{Base, Pose, Vehicle, World};
 
-/// The base frame's motion at one instant, in base axes unless named otherwise.
+/// Motion of the base frame at one instant, in base axes unless named otherwise.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BaseState {
     pub world_from_vehicle: Pose<World, Vehicle>,
     pub world_from_base: Pose<World, Base>,
-    /// Of the base's origin against the world, m/s.
+    /// Velocity of the base's origin against the world, m/s.
     pub velocity: Vector3<f64>,
-    /// Of the base's origin against the world, m/s2.
+    /// Acceleration of the base's origin against the world, m/s2.
     pub acceleration: Vector3<f64>,
-    /// rad/s.
+    /// Angular velocity, rad/s.
     pub angular_velocity: Vector3<f64>,
-    /// rad/s2.
+    /// Angular acceleration, rad/s2.
     pub angular_acceleration: Vector3<f64>,
-    /// m/s2.
+    /// Gravity, m/s2.
     pub gravity: Vector3<f64>,
     /// Angular velocity in vehicle axes, rad/s.
     pub vehicle_rate: Vector3<f64>,
@@ -30,7 +30,7 @@ pub(crate) struct BaseState {
 }
 
 impl BaseState {
-    /// What is around the arm on a base that moves as prescribed, in `water` (world axes).
+    /// Returns the surroundings of the arm on a base with prescribed motion, in `water` (world axes).
     pub(crate) fn environment(&self, water: &WaterMotion) -> Environment {
         let to_base = self.world_from_base.rotation().inverse();
         Environment {
@@ -41,8 +41,8 @@ impl BaseState {
         }
     }
 
-    /// Rigid body: `a_base = a + alpha x r + w x (w x r)`, `v_base = v + w x r`, all in vehicle axes, then in base
-    /// axes.
+    /// Returns the state of the base as a rigid body: `a_base = a + alpha x r + w x (w x r)`, `v_base = v + w x r`, all
+    /// in vehicle axes, then in base axes.
     pub(crate) fn of(jet: &VehicleKinematics, vehicle_from_base: &Pose<Vehicle, Base>) -> Self {
         let mount = vehicle_from_base.isometry();
         let lever = mount.translation.vector;
@@ -68,7 +68,8 @@ impl BaseState {
         }
     }
 
-    /// Of a free base: its pose, its velocity and the rate of that, both about the base's origin in its axes.
+    /// Returns the state of a free base from its pose, its velocity and the rate of that, both about the base's origin
+    /// in its axes.
     pub(crate) fn of_free_base(
         world_from_base: &Isometry3<f64>,
         velocity: &Motion,
@@ -92,12 +93,12 @@ impl BaseState {
         Self::of(&jet, vehicle_from_base)
     }
 
-    /// Velocity about the base's origin.
+    /// Returns the velocity about the base's origin.
     pub(crate) fn motion(&self) -> Motion {
         Motion::new(self.angular_velocity, self.velocity)
     }
 
-    /// Spatial acceleration about the base's origin: that of the point there less `w x v`.
+    /// Returns the spatial acceleration about the base's origin: that of the point there less `w x v`.
     pub(crate) fn spatial_acceleration(&self) -> Motion {
         let linear = self.acceleration - self.angular_velocity.cross(&self.velocity);
         Motion::new(self.angular_acceleration, linear)

@@ -1,4 +1,4 @@
-//! A vehicle that floats free: its body for the equations of motion, and the thrusters that keep it on station.
+//! Vehicle that floats free: its body for the equations of motion, and the thrusters for station keeping.
 
 use armcal_core::codes::Code;
 use nalgebra::{Isometry3, Matrix3, Vector3};
@@ -16,16 +16,16 @@ use armcal_core::robot::{FileIssue, GRAVITY_M_S2, Vehicle, VehicleDynamics};
 /// Duration of an impulse, s: short against the vehicle's motion, long against a step.
 const IMPULSE_DURATION_S: f64 = 0.1;
 
-/// Thrusters, and what pushes the vehicle besides the water that it moves through.
+/// Thrusters and external forces of the vehicle, except those of the water through which it moves.
 #[derive(Clone, Debug)]
 pub(crate) struct FreeVehicle {
     spec: VehicleMotionSpec,
     dynamics: VehicleDynamics,
     base_from_vehicle: Isometry3<f64>,
-    /// Mass and inertia that the controller reckons with, added mass included, vehicle axes: linear, then angular.
+    /// Mass and inertia that the controller assumes, including added mass, vehicle axes: linear, then angular.
     reckoned: [f64; 6],
     integral: [f64; 6],
-    /// Thrust and moment as they are, behind the thrusters' lag, vehicle axes.
+    /// Actual thrust and moment, after the thrusters' lag, vehicle axes.
     thrust: [f64; 6],
     /// Random forces and moments, in the band of the motion's periods.
     disturbance: [SinusoidSum; 6],
@@ -34,6 +34,8 @@ pub(crate) struct FreeVehicle {
 }
 
 impl FreeVehicle {
+    /// Builds the vehicle.
+    ///
     /// # Errors
     /// [`SimError::Spec`] for a vehicle without `[dynamics]`.
     pub(crate) fn new(vehicle: &Vehicle, spec: &VehicleMotionSpec, seed: u64) -> Result<Self, SimError> {
@@ -59,8 +61,9 @@ impl FreeVehicle {
         })
     }
 
-    /// The vehicle as body 0 of the system, ballasted so that it floats level with the arm as it is now: its
-    /// displacement carries vehicle and arm, and the centre of buoyancy lies above the common centre of weight.
+    /// Returns the vehicle as body 0 of the system, ballasted so that it floats level with the arm in its present
+    /// configuration. Its displacement carries vehicle and arm, and the centre of buoyancy is above the common centre
+    /// of weight.
     pub(crate) fn body(&self, vehicle: &Vehicle, water: &WaterSpec, poses: &LinkPoses, links: &[Body]) -> Body {
         let d = &self.dynamics;
         let to_base = &self.base_from_vehicle;
@@ -82,8 +85,8 @@ impl FreeVehicle {
         let (weight, moment) = wet_weight(poses, links);
         let down = to_base.rotation * -Vector3::z();
         body.displaced_kg = vehicle.mass_kg + weight;
-        // Level: the moments of all weights (the vehicle's own at its origin) and of the buoyancy balance about the
-        // base.
+        // The vehicle is level if the moments of all weights (the vehicle's own at its origin) and of the buoyancy
+        // balance about the base.
         let weights = moment + vehicle.mass_kg * body.com_m;
         let above = to_base.rotation * Vector3::new(0.0, 0.0, d.center_of_buoyancy_m[2]);
         let center = weights / body.displaced_kg;
@@ -91,8 +94,8 @@ impl FreeVehicle {
         body
     }
 
-    /// Takes weight off the buoyancy of `body`, the vehicle's, and puts ground below it: where it has sunk in if it is
-    /// parked, else at the seafloor, if there is one.
+    /// Reduces the buoyancy of `body`, the vehicle's, and puts ground below it. A parked vehicle has sunk into the
+    /// ground; otherwise the ground is the seafloor, if there is one.
     ///
     /// # Errors
     /// [`SimError::Spec`] where a parked vehicle's weight is not above its lowest corners.
@@ -118,18 +121,18 @@ impl FreeVehicle {
         Ok(())
     }
 
-    /// What the ground carries, N.
+    /// Returns the load that the ground carries, N.
     #[cfg(test)]
     pub(crate) fn ground_load_n(&self) -> f64 {
         self.ground.as_ref().map_or(0.0, |ground| ground.load_n)
     }
 
-    /// Something hits the vehicle.
+    /// Starts an impulse on the vehicle.
     pub(crate) fn impulse(&mut self, t_s: f64, impulse: &Impulse) {
         self.impulse = Some((t_s, *impulse));
     }
 
-    /// Force on the vehicle in the step from `t_s`, about the base's origin in base axes.
+    /// Returns the force on the vehicle in the step from `t_s`, about the base's origin in base axes.
     pub(crate) fn force(&mut self, t_s: f64, step_s: f64, base: &BaseState) -> Force {
         self.keep_station(step_s, base);
         let mut total = self.thrust;
@@ -139,7 +142,7 @@ impl FreeVehicle {
         if let Some((start_s, impulse)) = &self.impulse {
             let since = t_s - start_s;
             if (0.0..IMPULSE_DURATION_S).contains(&since) {
-                // Half a sine: its mean is 2/pi of its height.
+                // Half a sine, whose mean is 2/pi of its height.
                 let shape = (std::f64::consts::PI * since / IMPULSE_DURATION_S).sin() * std::f64::consts::FRAC_PI_2
                     / IMPULSE_DURATION_S;
                 for i in 0..3 {
@@ -155,8 +158,8 @@ impl FreeVehicle {
         Force::new(moment + to_base.translation.vector.cross(&force), force) + on_ground
     }
 
-    /// PID on position and attitude, as dynamic positioning has it, with the thrusters' lag and limits. It knows where
-    /// it is.
+    /// Controls position and attitude by a PID, as dynamic positioning does, with the thrusters' lag and limits. It
+    /// knows the true pose.
     fn keep_station(&mut self, step_s: f64, base: &BaseState) {
         let w = self.spec.station_keeping_rad_s;
         if w == 0.0 {
@@ -164,7 +167,7 @@ impl FreeVehicle {
         }
         let pose = &base.world_from_vehicle;
         let to_vehicle = pose.rotation().inverse();
-        // Of the vehicle's origin, in its own axes.
+        // Velocity of the vehicle's origin, in its own axes.
         let at_base = Motion::new(base.angular_velocity, base.velocity).at(&self.base_from_vehicle.translation.vector);
         let velocity = self.base_from_vehicle.rotation.inverse() * at_base;
         let away = to_vehicle * pose.origin().vector();
@@ -177,7 +180,7 @@ impl FreeVehicle {
                 (-turned[i - 3], base.vehicle_rate[i - 3], self.dynamics.moment_max_n_m[i - 3])
             };
             let m = self.reckoned[i];
-            // A vehicle without thrusters about an axis leaves it to its buoyancy.
+            // About an axis without thrusters, the buoyancy alone rights the vehicle.
             let wanted = m * (w * w * error - 2.0 * self.spec.station_damping_ratio * w * rate + self.integral[i]);
             let given = wanted.clamp(-limit, limit);
             if given == wanted {
@@ -188,7 +191,7 @@ impl FreeVehicle {
     }
 }
 
-/// Wet mass of the arm, kg, and its first moment about the base's origin, kg m.
+/// Returns the wet mass of the arm, kg, and its first moment about the base's origin, kg m.
 fn wet_weight(poses: &LinkPoses, links: &[Body]) -> (f64, Vector3<f64>) {
     let (mut mass, mut moment) = (0.0, Vector3::zeros());
     for (i, body) in links.iter().enumerate().skip(1) {

@@ -1,8 +1,9 @@
 //! Soft ground under a vehicle: springs, dampers and friction at the corners of its parts.
 //!
-//! A corner at depth `s` below the height where the ground begins is pushed up by `max(0, k s + d ds/dt)` and held
-//! sideways by a bristle of the same stiffness, up to `mu` times that: below, it is a spring and nothing else, so that
-//! nothing creeps. A parked vehicle has sunk in already: the ground begins where each corner carries its share.
+//! A corner at depth `s` below the height where the ground begins is pushed up by `max(0, k s + d ds/dt)`. It is held
+//! sideways by a bristle of the same stiffness, up to `mu` times that force. Below this limit the bristle is only a
+//! spring, so that nothing creeps. A parked vehicle has already sunk in: the ground begins where each corner carries
+//! its share.
 
 use nalgebra::{Isometry3, Matrix3, Vector2, Vector3};
 
@@ -16,29 +17,29 @@ use armcal_core::robot::{PlacedShape, Vehicle};
 pub(super) struct Ground {
     spec: GroundSpec,
     corners: Vec<Corner>,
-    /// Largest distance of a corner from the base's origin.
+    /// Largest distance of a corner from the base's origin, m.
     reach_m: f64,
-    /// World frame.
+    /// Highest point at which the ground begins, world frame.
     highest_z_m: f64,
-    /// What the ground carried in the last step, N.
+    /// Load that the ground carried in the last step, N.
     pub(super) load_n: f64,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Corner {
-    /// Base frame.
+    /// Position of the corner, base frame.
     at_m: Vector3<f64>,
-    /// World frame: where the ground begins.
+    /// Height at which the ground begins, world frame.
     begins_z_m: f64,
-    /// Where the bristle is not bent, world frame; `None` above the ground.
+    /// Position at which the bristle is not bent, world frame; `None` above the ground.
     anchor_m: Option<Vector2<f64>>,
 }
 
-/// Corners that are at most this much higher than the lowest stand in the ground when a vehicle parks, m.
+/// Height above the lowest corner up to which corners are in the ground when a vehicle parks, m.
 const SKID_M: f64 = 0.01;
 
 impl Ground {
-    /// A plane that the vehicle may come down on.
+    /// Returns a plane onto which the vehicle may descend.
     pub(super) fn plane(spec: &GroundSpec, vehicle: &Vehicle, z_m: f64) -> Self {
         let corner = |at_m| Corner { at_m, begins_z_m: z_m, anchor_m: None };
         let base_from_vehicle = vehicle.vehicle_from_base.inverse();
@@ -53,8 +54,9 @@ impl Ground {
         Self { spec: *spec, corners, reach_m, highest_z_m, load_n: 0.0 }
     }
 
-    /// What a vehicle has sunk into on its station, by a weight that acts above `center_m` (vehicle frame); `None`
-    /// where that is not between its lowest corners. Shares differ linearly with the place.
+    /// Returns the ground into which a vehicle on its station has sunk, under a weight that acts above `center_m`
+    /// (vehicle frame). `None` if that point is not between its lowest corners. The corners' shares vary linearly with
+    /// their positions.
     pub(super) fn parked(spec: &GroundSpec, vehicle: &Vehicle, center_m: &Vector3<f64>) -> Option<Self> {
         let lowest_m = corners(vehicle).map(|at| at.z).fold(f64::INFINITY, f64::min);
         let skids: Vec<Vector3<f64>> = corners(vehicle).filter(|at| at.z <= lowest_m + SKID_M).collect();
@@ -74,7 +76,7 @@ impl Ground {
         all_carry.then(|| Self::new(spec, corners))
     }
 
-    /// Force on the vehicle about the base's origin, base axes.
+    /// Returns the force on the vehicle about the base's origin, base axes.
     pub(super) fn force(&mut self, base: &BaseState) -> Force {
         let GroundSpec { stiffness_n_m: k, damping_s, friction, .. } = self.spec;
         let damping = k * damping_s;
@@ -108,7 +110,7 @@ impl Ground {
     }
 }
 
-/// Corners of the boxes about all parts, vehicle frame.
+/// Returns the corners of the boxes about all parts, vehicle frame.
 fn corners(vehicle: &Vehicle) -> impl Iterator<Item = Vector3<f64>> {
     vehicle.parts.iter().flat_map(|part| box_corners(&part.placed))
 }

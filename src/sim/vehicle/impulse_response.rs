@@ -5,18 +5,18 @@ use nalgebra::{UnitQuaternion, Vector3};
 use crate::fault::Impulse;
 use crate::recorded_motion::VehicleKinematics;
 
-/// Response of a vehicle with prescribed motion to an impulse: `x = c t2 exp(-t/T)`, whose fastest moment has the
-/// velocity that the impulse gives to the vehicle alone. Assumed; a free vehicle answers by itself.
+/// Response of a vehicle with prescribed motion to an impulse: `x = c t2 exp(-t/T)`. Its largest velocity is that which
+/// the impulse gives to the vehicle without the arm. Assumed; a free vehicle responds by its equations of motion.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ImpulseResponse {
     start_s: f64,
-    /// World axes, m/s2.
+    /// Coefficient of the translation, world axes, m/s2.
     linear: Vector3<f64>,
-    /// Vehicle axes, rad/s2.
+    /// Coefficient of the rotation, vehicle axes, rad/s2.
     angular: Vector3<f64>,
 }
 
-/// Time constant of the pilot's answer, s.
+/// Time constant of the pilot's response, s.
 const RESPONSE_TIME_S: f64 = 1.5;
 
 impl ImpulseResponse {
@@ -47,7 +47,7 @@ impl ImpulseResponse {
         jet.position += self.linear * shape[0];
         jet.velocity += self.linear * shape[1];
         jet.acceleration += self.linear * shape[2];
-        // `R exp(a s)`: the rate seen from the turned vehicle, and its derivative.
+        // Rotation `R exp(a s)`: the rate in the axes of the turned vehicle, and its derivative.
         let turn = UnitQuaternion::from_scaled_axis(self.angular * shape[0]);
         let (spin, seen) = (self.angular * shape[1], turn.inverse() * jet.rate);
         jet.rate = seen + spin;

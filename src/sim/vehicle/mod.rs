@@ -1,8 +1,8 @@
 //! Motion of the vehicle that carries the arm.
 //!
-//! A `swell` of sinusoids or a recorded motion prescribe it (`prescribed`); the arm does not push back. A `free`
-//! vehicle is a body of its own, with thrusters for station keeping. [`BaseState`] has the motion of the arm's base;
-//! `sea` has that of the water.
+//! A `swell` of sinusoids or a recorded motion prescribes it (`prescribed`); the arm does not move the vehicle. A
+//! `free` vehicle is a separate body, with thrusters for station keeping. [`BaseState`] has the motion of the arm's
+//! base; `sea` has that of the water.
 
 mod base_state;
 mod free;

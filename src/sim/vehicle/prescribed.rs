@@ -1,4 +1,4 @@
-//! A vehicle whose motion is prescribed: a swell or a recorded motion, and its response to impulses.
+//! Vehicle whose motion is prescribed: a swell or a recorded motion, and its response to impulses.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use crate::vehicle::impulse_response::ImpulseResponse;
 use crate::vehicle::swell::Swell;
 use armcal_core::spatial::{Base, Pose, Vehicle};
 
-/// A vehicle whose motion is prescribed.
+/// Vehicle whose motion is prescribed.
 #[derive(Clone, Debug)]
 pub(crate) struct VehicleMotion {
     vehicle_from_base: Pose<Vehicle, Base>,
@@ -27,8 +27,8 @@ enum Path {
 }
 
 impl VehicleMotion {
-    /// The prescribed motion that the world asks for: `recorded` where there is one. A free vehicle starts where this
-    /// is at 0.
+    /// Returns the prescribed motion that the world asks for: `recorded` if there is one. A free vehicle starts with
+    /// its state at 0.
     pub(crate) fn new(
         spec: &VehicleMotionSpec,
         recorded: Option<&Arc<RecordedMotion>>,
@@ -42,13 +42,13 @@ impl VehicleMotion {
         Self { vehicle_from_base, path, impulse_responses: Vec::new() }
     }
 
-    /// Something hits the vehicle at `t_s`: it swings out and its pilot brings it back.
+    /// Adds an impulse on the vehicle at `t_s`: it is deflected, and its pilot brings it back.
     pub(crate) fn impulse(&mut self, t_s: f64, impulse: &Impulse, mass_kg: f64, inertia_kg_m2: &Vector3<f64>) {
         let world_from_vehicle = self.at(t_s).world_from_vehicle.rotation();
         self.impulse_responses.push(ImpulseResponse::new(t_s, impulse, mass_kg, inertia_kg_m2, &world_from_vehicle));
     }
 
-    /// The state at `t_s` seconds after the start.
+    /// Returns the state at `t_s` seconds after the start.
     pub(crate) fn at(&self, t_s: f64) -> BaseState {
         let mut jet = match &self.path {
             Path::Swell(swell) => swell.at(t_s),
@@ -78,10 +78,11 @@ mod tests {
         motion
     }
 
-    /// Central differences of the pose against the closed forms, during the swell and after it, and through an impulse.
+    /// Central differences of the pose agree with the closed forms, during the swell, after it, and through an impulse.
     #[test]
     fn derivatives_agree_with_central_differences() {
-        // Truncation of second differences at h = 1e-3 s for periods of 5 s, and rounding 1e-16/h^2.
+        // Tolerance for the truncation of second differences at h = 1e-3 s for periods of 5 s, and for rounding,
+        // 1e-16/h^2.
         const TOLERANCE: f64 = 2e-6;
         let h = 1e-3;
         for motion in [swell(), swell_with_impulse()] {
@@ -107,7 +108,7 @@ mod tests {
         assert!(state.world_from_vehicle.origin().vector().norm() < 1e-12);
     }
 
-    /// The fastest moment has the velocity of impulse over mass.
+    /// The largest velocity is impulse over mass.
     #[test]
     fn an_impulse_moves_the_vehicle_as_its_impulse_says() {
         let spec = VehicleMotionSpec { rotation_rms_rad: 0.0, translation_rms_m: 0.0, ..VehicleMotionSpec::default() };

@@ -1,9 +1,9 @@
 //! Motion of the water about the vehicle: a current, and waves that fade with depth.
 //!
-//! Waves are a sum of linear deep-water waves, `w2 = g k`, whose orbits have radius `a exp(-k depth)`; their amplitudes
-//! follow the spectrum of Pierson and Moskowitz for the asked significant height and peak period (DNV-RP-C205, section
-//! 3.5.5). The motion is that at the vehicle's station, the same all about the arm, for the waves that reach down are
-//! much longer than an arm.
+//! Waves are a sum of linear deep-water waves, `w2 = g k`, whose orbits have radius `a exp(-k depth)`. Their amplitudes
+//! follow the spectrum of Pierson and Moskowitz for the given significant height and peak period (DNV-RP-C205, section
+//! 3.5.5). The motion is that at the vehicle's station and the same everywhere about the arm, because waves that reach
+//! down are much longer than an arm.
 
 use nalgebra::Vector3;
 use rand::RngExt;
@@ -21,24 +21,24 @@ pub(crate) struct Sea {
     /// Horizontal direction in which the waves run, unit.
     heading: Vector3<f64>,
     waves: Vec<Wave>,
-    /// Of a vehicle that dives.
+    /// Water settings of a vehicle that dives; `None` at constant depth.
     dive: Option<WaterSpec>,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Wave {
-    /// Of the orbit at the vehicle's depth, m; at the surface for a vehicle that dives.
+    /// Radius of the orbit at the vehicle's depth, m; at the surface for a vehicle that dives.
     radius_m: f64,
     rate_rad_s: f64,
     phase_rad: f64,
 }
 
-/// The water's motion against the world, in world axes.
+/// Motion of the water against the world, in world axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct WaterMotion {
-    /// m/s.
+    /// Velocity, m/s.
     pub velocity: Vector3<f64>,
-    /// m/s2.
+    /// Acceleration, m/s2.
     pub acceleration: Vector3<f64>,
 }
 
@@ -50,7 +50,7 @@ impl Sea {
         Self { current: Vector3::from(spec.current_m_s), heading: Vector3::new(cos, sin, 0.0), waves, dive }
     }
 
-    /// The water at `t_s`; z is up.
+    /// Returns the water's motion at `t_s`; z is up.
     pub(crate) fn at(&self, t_s: f64) -> WaterMotion {
         let mut motion = WaterMotion { velocity: self.current, acceleration: Vector3::zeros() };
         for wave in &self.waves {
@@ -65,13 +65,13 @@ impl Sea {
 }
 
 impl Wave {
-    /// Deep water's, times 2 pi.
+    /// Returns the wave number of deep water: 2 pi over the wavelength.
     fn number_per_m(&self) -> f64 {
         self.rate_rad_s * self.rate_rad_s / GRAVITY_M_S2
     }
 }
 
-/// Frequencies in equal shares of 0.6 to 3 times the peak's, each somewhere within its share; random phases.
+/// Draws frequencies in equal shares of 0.6 to 3 times the peak's, each at random within its share, and random phases.
 fn draw_waves(spec: &WaterSpec, seed: u64) -> Vec<Wave> {
     let mut rng = stream_rng(seed, "waves");
     let peak = std::f64::consts::TAU / spec.wave_period_s;
@@ -85,7 +85,7 @@ fn draw_waves(spec: &WaterSpec, seed: u64) -> Vec<Wave> {
             Wave { radius_m: (2.0 * density * share).sqrt(), rate_rad_s, phase_rad }
         })
         .collect();
-    // At the surface: the significant height is four times the standard deviation of the elevation.
+    // At the surface, the significant height is four times the standard deviation of the elevation.
     let std_m = waves.iter().map(|w| 0.5 * w.radius_m * w.radius_m).sum::<f64>().sqrt();
     let depth_m = if spec.dives() { 0.0 } else { spec.depth_m };
     for wave in &mut waves {
@@ -112,7 +112,8 @@ mod tests {
         }
     }
 
-    /// Heave of a particle at the surface: a quarter of the significant height.
+    /// The standard deviation of the heave at the surface is a quarter of the significant height, and decreases with
+    /// depth.
     #[test]
     fn waves_have_their_height_and_fade_with_depth() {
         let rms = |depth_m: f64| sea(depth_m).waves.iter().map(|w| 0.5 * w.radius_m * w.radius_m).sum::<f64>().sqrt();

@@ -14,19 +14,20 @@ pub(super) struct Sinusoid {
     phase_rad: f64,
 }
 
-/// One axis: a sum of sinusoids.
+/// Sum of sinusoids on one axis.
 pub(super) type SinusoidSum = [Sinusoid; N_SINUSOIDS];
 
 /// Value, first and second derivative.
 pub(super) type Derivatives = [f64; 3];
 
-/// Random shares and phases, periods spread evenly in their logarithm; the rms of the sum of sinusoids is exact.
+/// Draws random shares and phases, with periods spread evenly in their logarithm; the RMS of the sum of sinusoids is
+/// exact.
 pub(super) fn draw_sinusoids(spec: &VehicleMotionSpec, rms: f64, seed: u64, name: &str) -> SinusoidSum {
     let mut rng = stream_rng(seed, &format!("vehicle/{name}"));
     let (low, high) = (spec.period_min_s.ln(), spec.period_max_s.ln());
     let mut axis = [Sinusoid::default(); N_SINUSOIDS];
     for (k, sinusoid) in axis.iter_mut().enumerate() {
-        // One period from each sixth of the band: no two alike, for beats would change the rms of a short run.
+        // One period from each sixth of the band: no two are alike, because beats would change the RMS of a short run.
         let place = (k as f64 + rng.random_range(0.0..1.0)) / N_SINUSOIDS as f64;
         sinusoid.rate_rad_s = std::f64::consts::TAU / (low + place * (high - low)).exp();
         sinusoid.amplitude = rng.random_range(0.5..1.0);
@@ -39,7 +40,7 @@ pub(super) fn draw_sinusoids(spec: &VehicleMotionSpec, rms: f64, seed: u64, name
     axis
 }
 
-/// Value and derivatives of the sum.
+/// Returns value and derivatives of the sum.
 pub(super) fn evaluate(axis: &SinusoidSum, t_s: f64) -> Derivatives {
     let mut jet = [0.0; 3];
     for s in axis {

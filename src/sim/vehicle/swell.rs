@@ -1,8 +1,8 @@
 //! Motion of a vehicle in a swell: prescribed, about its station, in closed form.
 //!
-//! Each of x, y, z, roll, pitch, yaw is a sum of sinusoids with random periods and phases, scaled to its rms and
-//! swelling smoothly from rest, so that position, velocity and acceleration are exact and need no integration. The arm
-//! does not push such a vehicle back (4 t against 100 kg, and a pilot's station keeping).
+//! Each of x, y, z, roll, pitch, yaw is a sum of sinusoids with random periods and phases, scaled to its RMS and
+//! growing smoothly from rest. Position, velocity and acceleration are therefore exact and need no integration. The arm
+//! does not move such a vehicle (4 t against 100 kg, and a pilot's station keeping).
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -28,7 +28,7 @@ impl Swell {
         Self { axes, ramp_s: spec.ramp_s }
     }
 
-    /// The motion at `t_s` seconds after the start.
+    /// Returns the motion at `t_s` seconds after the start.
     pub(super) fn at(&self, t_s: f64) -> VehicleKinematics {
         let ramp = smooth_ramp(t_s, self.ramp_s);
         let mut jets = [[0.0; 3]; 6];
@@ -48,7 +48,7 @@ impl Swell {
     }
 }
 
-/// `10 s^3 - 15 s^4 + 6 s^5` of s = t/length: rest, velocity and acceleration zero at both ends.
+/// Returns the ramp `10 s^3 - 15 s^4 + 6 s^5` of s = t/length, with zero velocity and acceleration at both ends.
 fn smooth_ramp(t_s: f64, length_s: f64) -> Derivatives {
     if t_s >= length_s {
         return [1.0, 0.0, 0.0];
@@ -61,12 +61,12 @@ fn smooth_ramp(t_s: f64, length_s: f64) -> Derivatives {
     ]
 }
 
-/// The product rule.
+/// Multiplies two functions with their derivatives, by the product rule.
 fn ramped(f: &Derivatives, r: &Derivatives) -> Derivatives {
     [f[0] * r[0], f[1] * r[0] + f[0] * r[1], f[2] * r[0] + 2.0 * f[1] * r[1] + f[0] * r[2]]
 }
 
-/// Angular velocity and acceleration in body axes from roll, pitch, yaw of `R = Rz(yaw) Ry(pitch) Rx(roll)`.
+/// Returns angular velocity and acceleration in body axes from roll, pitch, yaw of `R = Rz(yaw) Ry(pitch) Rx(roll)`.
 fn body_rates(roll: &Derivatives, pitch: &Derivatives, yaw: &Derivatives) -> (Vector3<f64>, Vector3<f64>) {
     let (sr, cr) = roll[0].sin_cos();
     let (sp, cp) = pitch[0].sin_cos();

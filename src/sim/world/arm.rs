@@ -1,4 +1,4 @@
-//! A world as the arm that a session drives.
+//! World as the arm that a session drives.
 
 use crate::spec::CONTROL_PERIOD_S;
 use crate::world::simulation::World;

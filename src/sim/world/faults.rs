@@ -10,7 +10,7 @@ use crate::world::simulation::World;
 use armcal_core::streams::ArmError;
 
 impl World {
-    /// Brings fault `number` of the script's steps about.
+    /// Executes fault `number` of the script's steps.
     pub(super) fn break_something(&mut self, number: usize) -> Result<(), ArmError> {
         let of_steps = || self.spec.fault.iter().enumerate().filter(|(_, scheduled)| scheduled.at_s.is_none());
         let Some((index, _)) = of_steps().nth(number) else {
@@ -19,7 +19,7 @@ impl World {
         self.bring_about(index)
     }
 
-    /// Brings about what is due at the beginning of a period.
+    /// Executes the faults that are due at the start of a period.
     pub(super) fn break_what_is_due(&mut self) -> Result<(), ArmError> {
         while let Some(index) = self.timeline.take_due(self.time_s()) {
             self.bring_about(index)?;
@@ -83,21 +83,21 @@ impl World {
         }
     }
 
-    /// Impulse on the vehicle: a force on a free one, a displacement and return of a prescribed one.
+    /// Applies an impulse to the vehicle: a force on a free one, a displacement and return of a prescribed one.
     fn impulse(&mut self, impulse: &Impulse) {
         let t_s = self.time_s();
         match &mut self.free {
             Some(free) => free.impulse(t_s, impulse),
             None => {
                 let mass_kg = self.vehicle.mass_kg;
-                // Without figures of its own: a radius of gyration of 0.9 m (assumed).
+                // Without its own values, a vehicle has a radius of gyration of 0.9 m (assumed).
                 let inertia = self.vehicle.dynamics.map_or([0.81 * mass_kg; 3], |dynamics| dynamics.inertia_kg_m2);
                 self.motion.impulse(t_s, impulse, mass_kg, &Vector3::from(inertia));
             }
         }
     }
 
-    /// A push at a link's centre of mass, force in base axes.
+    /// Pushes a link at its centre of mass, force in base axes.
     fn bump(&mut self, link: &str, force_n: [f64; 3], duration_s: f64) {
         let body = self.robot.bodies.iter().position(|body| body.name == link);
         if let Some(body) = body {
@@ -106,7 +106,7 @@ impl World {
     }
 }
 
-/// A translation and a rotation vector in a body's own axes.
+/// Returns the motion of a translation and a rotation vector in a body's own axes.
 fn motion(by_m: [f64; 3], by_rad: [f64; 3]) -> Isometry3<f64> {
     let turn = UnitQuaternion::from_scaled_axis(Vector3::from(by_rad));
     Isometry3::from_parts(Translation3::from(by_m), turn)

@@ -56,10 +56,10 @@ impl WorldSpec {
     }
 }
 
-/// Whether the step is short enough for the oil's stiffness.
+/// Checks that the step is short enough for the oil's stiffness.
 ///
 /// # Errors
-/// [`SimError::Spec`] with the longest step; what [`actuator_inputs`] says.
+/// [`SimError::Spec`] with the longest step; the errors of [`actuator_inputs`].
 fn check_step(spec: &WorldSpec, robot: &Robot, file: &Path) -> Result<(), SimError> {
     let longest_s = Hydraulics::new(&spec.hydraulics, &actuator_inputs(robot)?, spec.physics.step_s).longest_step_s();
     if spec.physics.step_s <= longest_s {

@@ -6,25 +6,25 @@ use crate::world::setup::sample_joint_sensors;
 use crate::world::simulation::World;
 use armcal_core::streams::{Arm, ArmError, JointSensorSample, Message, Sink};
 
-/// The end of a wait that passes step by step, s.
+/// Duration at the end of a wait that is simulated step by step, s.
 const AWAKE_S: f64 = 2.0;
 /// Length of a skipped stride, s.
 const STRIDE_S: f64 = SLOW_PERIODS as f64 * CONTROL_PERIOD_S;
-/// After something broke the arm's dynamics go on for this long, s: it may sag, or drive off by a wrong sensor.
+/// Time after a fault for which the arm's dynamics continue, s: it may sag, or move away by a wrong sensor.
 const UPSET_S: f64 = 10.0;
 
 impl World {
-    /// Of the vehicle now, below the surface.
+    /// Returns the present depth of the vehicle below the surface, m.
     pub(super) fn depth_m(&self) -> f64 {
         self.spec.water.station_depth_m(self.time_s()) - self.base.world_from_vehicle.origin().vector().z
     }
 
-    /// Whole seconds at rest are skipped, with one reading of each slow stream and of the joints a second. The last
-    /// ones pass step by step, so that the controller answers to what drifted meanwhile; so do those in which and after
-    /// which something breaks, so that it breaks at its time and the arm answers to it.
+    /// Skips whole seconds at rest, with one reading of each slow stream and of the joints per second. The last ones
+    /// are simulated step by step, so that the controller responds to the drift meanwhile. Seconds during and after a
+    /// fault are not skipped either, so that it happens at its time and the arm responds to it.
     pub(super) fn rest(&mut self, seconds: f64, sink: &mut dyn Sink) -> Result<(), ArmError> {
         let until = self.now().plus_s(seconds);
-        // To a whole second first, for slow streams keep their beat.
+        // First reaches a whole second, because slow streams keep their rate.
         while self.now() < until && !(self.step / self.spec.steps_per_period()).is_multiple_of(SLOW_PERIODS) {
             self.step(sink)?;
         }
@@ -44,7 +44,7 @@ impl World {
         Ok(())
     }
 
-    /// One second at rest in one go: the world's clock, temperatures and drift go on, the arm's dynamics do not.
+    /// Skips one second at rest: the world's clock, temperatures and drift advance, the arm's dynamics do not.
     fn skip(&mut self) {
         self.settle_jaws();
         self.step += SLOW_PERIODS * self.spec.steps_per_period();

@@ -1,4 +1,4 @@
-//! The camera in step with the world: its images and their arrival.
+//! Camera in step with the world: its images and their arrival.
 
 use nalgebra::Isometry3;
 
@@ -8,7 +8,7 @@ use armcal_core::streams::Message;
 use armcal_core::time::Stamp;
 
 impl World {
-    /// The shutter closes now.
+    /// Takes an image at the present time.
     pub(super) fn expose(&mut self) {
         let links = self.place_solids();
         let shutter = ShutterState {
@@ -23,20 +23,20 @@ impl World {
             demand: self.image_demand,
         };
         let Some(mut image) = self.camera.take_image(&shutter) else { return };
-        // It never arrives before the image ahead of it.
+        // An image never arrives before the one ahead of it.
         if let Some(ahead) = self.images.back() {
             image.arrival = image.arrival.max(ahead.arrival);
         }
         self.images.push_back(image);
     }
 
-    /// Displacement of each jaw from the drawing.
+    /// Returns the displacement of each jaw from the nominal model.
     fn jaw_shifts(&self) -> [Isometry3<f64>; 2] {
         let jaws = self.robot.gripper.as_ref().zip(self.gripper.as_ref());
         std::array::from_fn(|n| jaws.map_or_else(Isometry3::identity, |(spec, jaws)| spec.shift(n, jaws.opening_m)))
     }
 
-    /// Messages of an image.
+    /// Delivers the messages of an image.
     pub(super) fn deliver(&mut self, at: Stamp, image: CameraShot) {
         match image.tags {
             SeenTags::Projected(detections) => self.tell(at, Message::Detections(detections)),

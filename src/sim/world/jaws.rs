@@ -1,11 +1,11 @@
-//! The gripper in step with the world: one motion per control period, and a message when the gap changes.
+//! Gripper in step with the world: one motion per control period, and a message when the gap changes.
 
 use crate::spec::CONTROL_PERIOD_S;
 use crate::world::readings::SLOW_PERIODS;
 use crate::world::simulation::World;
 use armcal_core::streams::{ArmError, GripperSample, Message};
 
-/// Periods between messages of the gap while the jaws move: 25 Hz.
+/// Number of periods between messages of the gap while the jaws move: 25 Hz.
 const TOLD_EVERY: u64 = 4;
 /// Resolution of the measured gap, m (assumed).
 const RESOLUTION_M: f64 = 1e-4;
@@ -19,7 +19,7 @@ impl World {
         Ok(())
     }
 
-    /// Lets a control period pass for the jaws.
+    /// Moves the jaws for a control period.
     pub(super) fn move_jaws(&mut self, period: u64) {
         let Some(jaws) = &mut self.gripper else { return };
         let was_moving = jaws.is_moving();
@@ -30,7 +30,7 @@ impl World {
         }
     }
 
-    /// Lets the jaws come to rest in a stride that is skipped.
+    /// Moves the jaws to rest in a stride that is skipped.
     pub(super) fn settle_jaws(&mut self) {
         if let Some(jaws) = &mut self.gripper {
             jaws.arrive();

@@ -1,8 +1,8 @@
-//! The world: arm, vehicle, water and sensors in step.
+//! World of arm, vehicle, water and sensors in step.
 //!
-//! `setup` has the input and the initial values, `simulation` the parts and their step, `arm` what a session may do
-//! with them. `readings`, `images` and `jaws` make the messages, `idle` lets time pass, `faults` carries faults out,
-//! and `truth_output` writes the truth's stream. `from_routine` reads a routine's `[world]`.
+//! `setup` has the input and the initial values, `simulation` the parts and their step, `arm` the interface for a
+//! session. `readings`, `images` and `jaws` make the messages, `idle` lets time pass, `faults` executes faults, and
+//! `truth_output` writes the truth's stream. `from_routine` reads a routine's `[world]`.
 
 mod arm;
 mod faults;

@@ -11,7 +11,7 @@ const ATTITUDE_PERIODS: u64 = 5;
 pub(super) const SLOW_PERIODS: u64 = 100;
 
 impl World {
-    /// Readings at the end of the period, and images that arrived in it.
+    /// Collects readings at the end of the period, and images that arrived in it.
     pub(super) fn collect_messages(&mut self) {
         let (now, t_s) = (self.stamp(), self.time_s());
         let period = self.step / self.spec.steps_per_period();
@@ -34,18 +34,18 @@ impl World {
         }
     }
 
-    /// Water and oil until `t_s`: what the drives take from the pump and do not pass on as work warms the oil.
+    /// Advances water and oil to `t_s`: power that the drives take from the pump and do not use as work warms the oil.
     pub(super) fn warm(&mut self, t_s: f64, elapsed_s: f64) {
         self.temperatures.advance(t_s, elapsed_s, self.hydraulics.power_w().max(0.0), self.depth_m());
     }
 
-    /// The joint sensors follow the oil's temperature and the pressure at the vehicle.
+    /// Advances the joint sensors' surroundings: they follow the oil's temperature and the pressure at the vehicle.
     pub(super) fn sensor_surroundings(&mut self, elapsed_s: f64) -> OilState {
         let oil = oil_state(&self.spec, &self.temperatures, self.time_s(), self.depth_m());
         self.sensor_surroundings.follow(oil, elapsed_s)
     }
 
-    /// Thermometers and depth gauge.
+    /// Samples thermometers and depth gauge.
     pub(super) fn sample_slow_sensors(&mut self, now: Stamp, t_s: f64) {
         let oil_c = self.temperatures.oil_c(t_s);
         let oil = self.slow.temperature(Thermometer::Oil, oil_c, now);

@@ -18,7 +18,7 @@ use armcal_core::robot::{Robot, Vehicle};
 use armcal_core::routine::Scene;
 use armcal_core::streams::{JointAngles, JointCounts};
 
-/// Parts of a world.
+/// Parts from which a world is built.
 #[derive(Clone, Debug)]
 pub struct WorldInput<'a> {
     /// Nominal arm.
@@ -27,13 +27,13 @@ pub struct WorldInput<'a> {
     pub vehicle: &'a Vehicle,
     /// Nominal seafloor and obstacles.
     pub scene: &'a Scene,
-    /// `[world]`, checked.
+    /// Table `[world]`, checked.
     pub spec: WorldSpec,
-    /// Of everything random in the world.
+    /// Seed of all random numbers in the world.
     pub seed: u64,
 }
 
-/// An arm that starts nearer to an end stop than this starts at this distance, rad.
+/// Distance from an end stop at which an arm starts that would start nearer to it, rad.
 const END_STOP_MARGIN_RAD: f64 = 1e-3;
 
 pub(super) fn joint_sensors(robot: &Robot, built: &AsBuilt, spec: &JointSensorsSpec, seed: u64) -> Vec<JointSensor> {
@@ -41,7 +41,7 @@ pub(super) fn joint_sensors(robot: &Robot, built: &AsBuilt, spec: &JointSensorsS
     sensors.map(|(nominal, joint)| JointSensor::new(nominal, joint, spec, seed)).collect()
 }
 
-/// The true angles at which every sensor reads `stowed` by the datasheet, kept within the end stops.
+/// Returns the true angles at which every sensor reads `stowed` by the datasheet, within the end stops.
 pub(super) fn stowed_angles(robot: &Robot, sensors: &mut [JointSensor], around: &OilState) -> JointAngles {
     JointAngles::from_fn(robot.n_joints(), |j| {
         let wanted = sensors[j].angle_for_reading(robot.stowed[j], around);
@@ -63,12 +63,12 @@ pub(super) fn sample_joint_sensors(
     JointCounts::from_fn(sensors.len(), |j| sensors[j].sample(&JointInput { angle_rad: angles[j], around, elapsed_s }))
 }
 
-/// At a depth below the surface.
+/// Returns the oil's temperature and pressure at a depth below the surface.
 pub(super) fn oil_state(spec: &WorldSpec, temperatures: &Temperatures, t_s: f64, depth_m: f64) -> OilState {
     OilState { oil_c: temperatures.oil_c(t_s), pressure_pa: gauge_pressure_pa(&spec.water, depth_m) }
 }
 
-/// The scene as it truly is, and the solids in it.
+/// Returns the true scene, and the solids in it.
 pub(super) fn scenery(input: &WorldInput) -> Result<(Scene, Solids), SimError> {
     let scene = input.spec.true_scene(input.scene)?;
     let mut solids = Solids::new(input.robot, input.vehicle, &scene);
@@ -79,7 +79,7 @@ pub(super) fn scenery(input: &WorldInput) -> Result<(Scene, Solids), SimError> {
     if pairs.is_empty() { Ok((scene, solids)) } else { Err(SimError::StowedInside { pairs }) }
 }
 
-/// Bodies of the links 0..=n, base first, the payload with the one that carries it.
+/// Returns the bodies of the links 0..=n, base first, the payload with the body that carries it.
 fn bodies(robot: &Robot, spec: &WorldSpec) -> Vec<Body> {
     let water = WaterProperties::of(&spec.water);
     let mut bodies: Vec<Body> = robot.bodies.iter().map(|link| Body::link(link, &water)).collect();
@@ -89,12 +89,13 @@ fn bodies(robot: &Robot, spec: &WorldSpec) -> Vec<Body> {
     bodies
 }
 
-/// What gives and pulls about the arm, its own base and the payload included.
+/// Returns the compliant parts of the arm, with its own base and the payload.
 pub(super) fn flexible_arm(robot: &Robot, spec: &WorldSpec) -> FlexibleArm {
     FlexibleArm::new(&spec.structure, robot, bodies(robot, spec), spec.physics.step_s)
 }
 
-/// The arm on its mount as `chain` has it, and the vehicle that floats or is parked; none for a prescribed motion.
+/// Builds the arm on its mount as `chain` has it, with a vehicle that floats or is parked; without one for a prescribed
+/// motion.
 pub(super) fn arm_physics(
     input: &WorldInput,
     solids: &Solids,

@@ -32,27 +32,27 @@ use armcal_core::robot::{Robot, Vehicle};
 use armcal_core::streams::{ArmError, ImageDemand, JointAngles, JointCounts, LateMessages, MAX_JOINTS, Message};
 use armcal_core::time::{SIMULATION_EPOCH, Stamp};
 
-/// What leaves the world at a log time.
+/// Messages that leave the world at a log time.
 pub(super) enum Outgoing {
     Ready(Stamp, Message),
     Late(Stamp, LateMessages),
 }
 
-/// A simulated arm. Its sensors start at `stowed` by the datasheet, so that the arm itself is where their errors put
-/// it.
+/// Simulated arm. Its sensors start at `stowed` by the datasheet, and the arm itself at the angles that follow from
+/// their errors.
 pub struct World {
     pub(super) spec: WorldSpec,
-    /// As built.
+    /// Robot as built.
     pub(super) robot: Robot,
     pub(super) header: TruthHeader,
-    /// Of a vehicle whose motion is prescribed.
+    /// Motion of a vehicle whose motion is prescribed.
     pub(super) motion: VehicleMotion,
-    /// A vehicle that floats.
+    /// Vehicle that floats.
     pub(super) free: Option<FreeVehicle>,
     pub(super) sea: Sea,
-    /// The water now.
+    /// Present motion of the water.
     pub(super) water: WaterMotion,
-    /// The base now.
+    /// Present state of the base.
     pub(super) base: BaseState,
     pub(super) vehicle: Vehicle,
     pub(super) solids: Solids,
@@ -68,9 +68,9 @@ pub struct World {
     pub(super) attitude: AttitudeSensor,
     pub(super) camera: WristCamera,
     pub(super) contacts: ContactOnsets,
-    /// `None` while nobody takes the truth.
+    /// Watch of the clearance; `None` while nobody takes the truth.
     pub(super) clearance: Option<ClearanceWatch>,
-    /// Images under way; the line keeps their order.
+    /// Images on their way; the line keeps their order.
     pub(super) images: VecDeque<CameraShot>,
     pub(super) image_demand: ImageDemand,
     pub(super) n_images: u64,
@@ -82,6 +82,8 @@ pub struct World {
 }
 
 impl World {
+    /// Builds a world.
+    ///
     /// # Errors
     /// [`SimError`] when the robot lacks masses or effort limits, or is stowed inside something.
     pub fn new(mut input: WorldInput) -> Result<Self, SimError> {
@@ -92,7 +94,7 @@ impl World {
         Self::of_arm(&WorldInput { robot: &arm, ..input }, built)
     }
 
-    /// A world with this arm as built.
+    /// Builds a world with this arm as built.
     fn of_arm(input: &WorldInput, built: AsBuilt) -> Result<Self, SimError> {
         let WorldInput { robot, vehicle, seed, .. } = *input;
         let spec = input.spec.clone();
@@ -200,12 +202,12 @@ impl World {
         Ok(())
     }
 
-    /// Angles and rates of the joints' shafts, which the sensors read.
+    /// Returns angles and rates of the joints' shafts, which the sensors read.
     pub(super) fn shafts(&self) -> (JointAngles, JointAngles) {
         self.structure.shafts(&self.physics.angles(), &self.physics.rates())
     }
 
-    /// Shafts and mount follow the step.
+    /// Updates shafts and mount after the step.
     fn bend(&mut self) {
         let (angles, rates) = (self.physics.angles(), self.physics.rates());
         let state = ArmState { angles: &angles, rates: &rates, base: &self.base, water: &self.water };

@@ -1,4 +1,4 @@
-//! The world's inner state, which its messages do not have.
+//! Inner state of the world, which its messages do not have.
 
 use std::path::Path;
 
@@ -30,8 +30,9 @@ fn world_in(spec: WorldSpec, seed: u64, scene: Scene) -> World {
     World::new(WorldInput { robot: &robot, vehicle: &vehicle, scene: &scene, spec, seed }).expect("a world")
 }
 
-/// With closed valves that do not leak the joints give as far as the oil does, and come back: no creep of any solver in
-/// ten minutes of gravity and rocking. Means over 100 s, several times the slowest period, tell creep from giving.
+/// With closed valves that do not leak, the joints yield only as far as the oil does, and return. No solver creeps in
+/// ten minutes of gravity and rocking. Means over 100 s, several times the slowest period, distinguish creep from
+/// elastic motion.
 #[test]
 fn a_locked_valve_does_not_creep() {
     does_not_creep(EngineKind::Featherstone);
@@ -64,7 +65,7 @@ fn does_not_creep(engine: EngineKind) {
     assert!(swing > crept && swing < 1e-3, "the oil gives: {swing}");
 }
 
-/// Keeps what comes.
+/// Sink that stores the messages.
 #[derive(Default)]
 struct Tape(Vec<Message>);
 
@@ -107,15 +108,15 @@ const DIVE: &str = "
     rotation_rms_rad = 0.0
     translation_rms_m = 0.0";
 
-/// Down to 4000 m within an hour and back within another, at rest, in the strides of a wait: gauge, thermometers and
-/// joint sensors as the closed forms of two lags in a row and of the play have them.
+/// In a dive to 4000 m within an hour and back within another, at rest and in the strides of a wait, all sensors follow
+/// closed forms: two lags in a row and the play operator for gauge, thermometers and joint sensors.
 #[test]
 fn a_dive_is_felt_by_every_sensor() {
     let spec = WorldSpec::from_table(&DIVE.parse().expect("TOML"), Path::new("r.toml")).expect("valid");
     let mut world = world(spec, 5);
     let (start, joints) = (world.measured, world.header.as_built.joints.clone());
     let (oil_s, sensor_s) = (300.0_f64, 600.0_f64);
-    // What `lags` in a row make of a rise of 1 a second.
+    // Response of `lags` in a row to a rise of 1 per second.
     let oil = |t_s: f64| t_s - oil_s * (1.0 - (-t_s / oil_s).exp());
     let both = |t_s: f64| {
         let fading = oil_s.powi(2) * (-t_s / oil_s).exp() - sensor_s.powi(2) * (-t_s / sensor_s).exp();
@@ -144,7 +145,7 @@ fn a_dive_is_felt_by_every_sensor() {
                             } else {
                                 there_and_back(&|t_s| t_s, t_s)
                             };
-                    // The water is held over each second.
+                    // The water is constant over each second.
                     assert!((sample.temperature_c - expected_c).abs() < 0.01, "{sample:?} against {expected_c}");
                 }
                 Message::JointSensors(sample) => {
@@ -170,7 +171,8 @@ fn floating(change: impl Fn(&mut WorldSpec)) -> World {
     world(spec, 3)
 }
 
-/// Position of the vehicle after `seconds` with the valves closed: distance from its station (m), angle (rad).
+/// Returns the position of the vehicle after `seconds` with the valves closed: distance from its station (m), angle
+/// (rad).
 fn drifted(world: &mut World, seconds: f64) -> (f64, f64) {
     for _ in 0..(seconds / world.spec.physics.step_s) as u32 {
         world.physics_step(&[0.0; MAX_JOINTS]).expect("it steps");
@@ -179,8 +181,8 @@ fn drifted(world: &mut World, seconds: f64) -> (f64, f64) {
     (pose.origin().vector().norm(), pose.rotation().angle())
 }
 
-/// Ballasted for its arm it floats level by itself; its thrusters hold it in a current, and without them it drifts
-/// away.
+/// Ballasted for its arm, the vehicle floats level without control. Its thrusters hold it in a current, and without
+/// them it drifts away.
 #[test]
 fn a_free_vehicle_floats_level_and_keeps_its_station() {
     let thrusters_off = |spec: &mut WorldSpec| spec.vehicle.station_keeping_rad_s = 0.0;
@@ -209,13 +211,13 @@ fn a_free_vehicle_takes_the_impulse_of_a_knock() {
         world.physics_step(&[0.0; MAX_JOINTS]).expect("it steps");
     }
     let speed = (world.base.world_from_base.rotation() * world.base.velocity).x;
-    // The arm hangs on by its oil and takes a little of it.
+    // The arm is coupled by its oil and takes a small part of the impulse.
     let alone = 800.0 / (world.vehicle.mass_kg + added_kg);
     eprintln!("{speed:.4} m/s, without the arm {alone:.4}");
     assert!((0.9..1.02).contains(&(speed / alone)), "{speed} {alone}");
 }
 
-/// The arm's own motion moves a free vehicle; the sensors see it.
+/// The arm's own motion moves a free vehicle, and the sensors measure it.
 #[test]
 fn the_arm_rocks_the_vehicle_that_carries_it() {
     let rocked = |motion| {
@@ -238,7 +240,7 @@ fn the_arm_rocks_the_vehicle_that_carries_it() {
     assert!((0.05_f64..10.0).contains(&free.to_degrees()), "{free}");
 }
 
-/// The pistons start where they carry the arm: a jump would be of the order of 5e-3 rad, torque over stiffness.
+/// The pistons start in equilibrium with the arm: a jump would be of the order of 5e-3 rad, torque over stiffness.
 #[test]
 fn it_starts_in_equilibrium() {
     let mut world = world(WorldSpec::default(), 2);
@@ -251,7 +253,7 @@ fn it_starts_in_equilibrium() {
     assert!(moved < 1e-4, "{moved}");
 }
 
-/// Readings at the start are the stowed pose by the datasheet, wherever the arm is.
+/// Readings at the start are those of the stowed configuration by the datasheet, for any true angles.
 #[test]
 fn the_sensors_start_stowed() {
     let world = world(WorldSpec::default(), 3);
@@ -261,7 +263,7 @@ fn the_sensors_start_stowed() {
     assert!(world.physics.angles().max_abs_difference(&world.robot.stowed) > 0.01, "the arm itself is elsewhere");
 }
 
-/// Moves before the vehicle, rad from stowed; the arm stands after each.
+/// Moves in front of the vehicle, rad from stowed; the arm rests after each.
 const MOVES: [[f64; 6]; 5] = [
     [-0.3, -0.2, 0.1, 0.2, -0.2, 1.0],
     [0.1, -0.5, 0.4, -0.3, 0.3, -2.0],
@@ -270,10 +272,10 @@ const MOVES: [[f64; 6]; 5] = [
     [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
 ];
 
-/// One move's end, or one period of it: true angles and tool position.
+/// True angles and tool position, at the end of a move or in one of its periods.
 type Place = (JointAngles, nalgebra::Vector3<f64>);
 
-/// Drives the moves by set-points, as a session does; gives every period on the way and the mean over each rest.
+/// Drives the moves by set-points, as a session does. Returns every period on the way and the mean over each rest.
 fn driven(step_s: f64, seed: u64, engine: EngineKind) -> (Vec<Place>, Vec<Place>) {
     struct Nothing;
     impl Sink for Nothing {
@@ -313,7 +315,7 @@ fn driven(step_s: f64, seed: u64, engine: EngineKind) -> (Vec<Place>, Vec<Place>
     (on_the_way, at_rest)
 }
 
-/// Largest differences of joint angles (rad) and tool positions (m).
+/// Returns the largest differences of joint angles (rad) and tool positions (m).
 fn largest(a: &[Place], b: &[Place]) -> (f64, f64) {
     let pairs = || a.iter().zip(b);
     (
@@ -322,11 +324,11 @@ fn largest(a: &[Place], b: &[Place]) -> (f64, f64) {
     )
 }
 
-/// The same moves with ever longer steps, against a quarter of a millisecond. What differs at rest is mostly where in
-/// its rest band the controller's noisy readings let each valve close.
+/// Moves with ever longer steps are compared with those of a step of a quarter of a millisecond. The differences at
+/// rest arise mostly in the rest band, from where the controller's noisy readings let each valve close.
 #[test]
 fn the_step_is_short_enough() {
-    /// Of the calibrated arm's errors (5 mm), a tenth; and the rest band is 3.5e-4 rad.
+    /// Limit at rest, m: a tenth of the calibrated arm's errors (5 mm); the rest band is 3.5e-4 rad.
     const REST_M: f64 = 5e-4;
     const MOVING_RAD: f64 = 2e-3;
     eprintln!("step_ms  seed  moving_rad  moving_mm  rest_rad  rest_mm");
@@ -350,7 +352,7 @@ fn the_step_is_short_enough() {
     }
 }
 
-/// A vehicle on the seabed: the ground carries its weight while it rocks under the arm, and it stays.
+/// The ground carries the weight of a vehicle on the seabed while it rocks under the arm, and the vehicle stays.
 #[test]
 fn parked_skids_carry_the_weight() {
     let weight_n = 1500.0;
@@ -361,7 +363,7 @@ fn parked_skids_carry_the_weight() {
     let mut mean_n = 0.0;
     const STEPS: u32 = 10_000;
     for step in 0..STEPS {
-        // The shoulder swings to and fro by its valve.
+        // The shoulder's valve swings it to and fro.
         let swing = 0.3 * (f64::from(step) * 2e-3).sin();
         world.physics_step(&std::array::from_fn(|j| if j == 1 { swing } else { 0.0 })).expect("it steps");
         let load_n = world.free.as_ref().expect("it is free").ground_load_n();
@@ -395,8 +397,8 @@ fn a_sinking_vehicle_lands_and_stays() {
     assert!((world.free.as_ref().expect("it is free").ground_load_n() / 800.0 - 1.0).abs() < 0.01);
 }
 
-/// A floating vehicle that is too heavy comes down on a block, on which its skids stand as on springs; without it, it
-/// goes through there.
+/// A floating vehicle that is too heavy descends onto a block, on which its skids stand as on springs. Without the
+/// block it passes through that position.
 #[test]
 fn a_sinking_vehicle_stands_on_an_obstacle() {
     const WEIGHT_N: f64 = 800.0;

@@ -1,4 +1,4 @@
-//! The truth's stream of a world: states, clearances and contacts.
+//! Stream of a world's truth: states, clearances and contacts.
 
 use crate::clearance_watch::ClearanceWatch;
 use crate::error::SimError;
@@ -11,7 +11,7 @@ use armcal_core::streams::ArmError;
 use armcal_core::time::SIMULATION_EPOCH;
 
 impl World {
-    /// Hands the truth to `sink` from now on.
+    /// Sends the truth to `sink` from now on.
     ///
     /// # Errors
     /// [`SimError::Truth`] when the sink refuses.
@@ -26,7 +26,7 @@ impl World {
     /// Ends the truth's stream, if there is one.
     ///
     /// # Errors
-    /// [`SimError::Truth`] when the sink cannot keep what it has.
+    /// [`SimError::Truth`] when the sink cannot store the truth.
     pub fn finish_truth(&mut self) -> Result<(), SimError> {
         self.truth.take().map_or(Ok(()), |sink| sink.finish().map_err(SimError::Truth))
     }
@@ -72,7 +72,7 @@ impl World {
         if is_due(self.spec.physics.clearance_rate_hz) {
             self.place_solids();
             let sampled = self.solids.nearest().map(|nearest| (nearest, self.step));
-            // The least of all steps since the last sample, where nothing was nearer before.
+            // Least of all steps since the last sample, if nothing was nearer before.
             let low = self.clearance.as_mut().zip(sampled).and_then(|(watch, (now, _))| watch.take_low(now.distance_m));
             if let (Some((nearest, step)), Some(truth)) = (low.or(sampled), &mut self.truth) {
                 let stamp = SIMULATION_EPOCH.plus_s(self.spec.time_s(step));
@@ -95,7 +95,7 @@ impl World {
             angles,
             rates,
             torques: self.hydraulics.torques(&shaft_angles, &shaft_rates),
-            // The engine's raw poses get their names here: the tool and the camera in the base frame.
+            // The engine's raw poses get their frames here: the tool and the camera in the base frame.
             base_from_tool: Pose::from_isometry(links.frame(&self.robot.tool.mount)),
             base_from_camera: Pose::from_isometry(self.camera.base_from_camera(&links)),
             world_from_vehicle: self.base.world_from_vehicle,
@@ -105,7 +105,7 @@ impl World {
     }
 }
 
-/// Whole control periods between samples of about `rate_hz`.
+/// Returns the whole number of control periods between samples of about `rate_hz`.
 fn periods_between(rate_hz: f64) -> u64 {
     (1.0 / (rate_hz * CONTROL_PERIOD_S)).round().max(1.0) as u64
 }

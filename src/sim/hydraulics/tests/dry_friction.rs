@@ -6,11 +6,11 @@ use crate::hydraulics::friction::Friction;
 use crate::hydraulics::tests::*;
 
 const INERTIA: f64 = 50.0;
-/// Of the shoulder, N m.
+/// Friction torques of the shoulder, N m.
 const COULOMB: f64 = 30.0;
 const STICTION: f64 = 40.0;
 
-/// The friction alone: a burst hose leaves the oil without torque.
+/// Returns a rig with friction only: a burst hose leaves the oil without torque.
 fn alone(spec: &HydraulicsSpec) -> Rig {
     let mut rig = Rig::new(spec, &[SHOULDER], INERTIA, 0.0);
     rig.hydraulics.lose_pressure(0, 0.0);
@@ -21,14 +21,15 @@ fn dry() -> HydraulicsSpec {
     HydraulicsSpec { coulomb_friction_ratio: 0.015, stiction_ratio: 0.02, ..HydraulicsSpec::default() }
 }
 
-/// A load that is dropped on makes twice its torque: this one comes within ten seconds.
+/// Applies a load over ten seconds: a sudden load would double its torque.
 fn load_slowly(rig: &mut Rig, torque: f64) {
     for step in 1..=5000 {
         rig.step(0.0, torque * f64::from(step) / 5000.0);
     }
 }
 
-/// Ten minutes under `torque(t)`: mean angles over the first and the last whole minute, and lines for a plot.
+/// Returns the drift in ten minutes under `torque(t)`: the difference of the mean angles over the last and the first
+/// minute. Prints lines for a plot.
 fn drift_rad(name: &str, rig: &mut Rig, torque: impl Fn(f64) -> f64) -> f64 {
     let minute = (60.0 / STEP_S).round() as u32;
     let mut means = [0.0; 10];
@@ -45,7 +46,7 @@ fn drift_rad(name: &str, rig: &mut Rig, torque: impl Fn(f64) -> f64) -> f64 {
     means[9] - means[0]
 }
 
-/// Gravity, and a vehicle that rolls: periods that divide the minute.
+/// Returns the torque of gravity and of a vehicle that rolls, with periods that divide the minute.
 fn rocking(gravity: f64, amplitude: f64) -> impl Fn(f64) -> f64 {
     move |t| gravity + amplitude * (0.7 * (TAU * t / 12.0).sin() + 0.3 * (TAU * t / 5.0).cos())
 }
@@ -79,7 +80,7 @@ fn friction_alone_holds_a_load_below_its_breakaway() {
 
 #[test]
 fn it_breaks_away_at_the_stiction_torque() {
-    // A load that grows by 0.2 N m a second.
+    // The load grows by 0.2 N m per second.
     let mut rig = alone(&dry());
     let mut torque = 0.0;
     while rig.angles[0] < 2e-3 && torque < 100.0 {
@@ -108,7 +109,7 @@ fn it_slides_with_the_rest_of_the_load() {
     }
 }
 
-/// Thrown, it comes to rest where its energy is used up.
+/// A joint with an initial rate comes to rest where friction has used up its energy.
 #[test]
 fn a_thrown_joint_stops_where_friction_has_taken_its_energy() {
     let mut rig = alone(&HydraulicsSpec { stiction_ratio: 0.0, ..dry() });
@@ -120,14 +121,14 @@ fn a_thrown_joint_stops_where_friction_has_taken_its_energy() {
         farthest = farthest.max(rig.angles[0]);
     }
     eprintln!("turns at {farthest:.6} rad, {exact:.6} by energy, rests at {:.6}", rig.angles[0]);
-    // What the bristle bends before it slides, and springs back in the end.
+    // Angle by which the bristle bends before it slides, and by which it springs back at the end.
     let presliding = 1e-3;
     assert!((farthest - exact).abs() < 2.0 * presliding, "{farthest}");
     assert!((0.0..2.0 * presliding).contains(&(farthest - rig.angles[0])), "{}", rig.angles[0]);
     assert!(rig.rates[0].abs() < 1e-6, "it rests");
 }
 
-/// Stribeck's curve, read off a joint that its drive moves at a steady rate.
+/// The sliding torque of a joint at a steady rate follows Stribeck's curve.
 #[test]
 fn the_sliding_torque_follows_stribecks_curve() {
     let spec = dry();
@@ -145,8 +146,9 @@ fn the_sliding_torque_follows_stribecks_curve() {
     }
 }
 
-/// There and back at a steady rate, the bristle's torque without its damping: from one turn it unbends and bends the
-/// other way up to the stiction, then slides. The loop holds the energy of a cycle.
+/// The joint moves to and fro at a steady rate, with the bristle's torque without damping. After each reversal the
+/// bristle unbends and bends the other way up to the stiction, then slides. The area of the loop is the energy of a
+/// cycle.
 #[test]
 fn a_cycle_takes_the_energy_of_its_loop() {
     const AMPLITUDE: f64 = 4e-3;
@@ -155,7 +157,7 @@ fn a_cycle_takes_the_energy_of_its_loop() {
         let mut friction = Friction::new(&dry(), SHOULDER.torque_max_n_m);
         friction.settle(0.0);
         let (mut work, mut before) = (0.0, 0.0);
-        // A quarter to get there, a cycle to forget the start, a cycle to measure.
+        // A quarter cycle to the turning point, a cycle to forget the start, a cycle to measure.
         for step in 0..9 * STEPS {
             let cycle = f64::from(step) / f64::from(4 * STEPS);
             let phase = (cycle + 0.25).fract();

@@ -14,7 +14,7 @@ fn a_locked_joint_stays_and_its_neighbour_goes() {
     rig.run(1.0, 0.5, -500.0);
     assert!((rig.angles[0] - at[0]).abs() < 1e-6, "{}", rig.angles[0] - at[0]);
     assert!(rig.angles[1] - at[1] > 0.2);
-    // Not even the relief valve lets it go.
+    // Not even the relief valve releases it.
     rig.run(1.0, -1.0, 5000.0);
     let give = 5500.0 / rig.drive().stiffness_n_m_rad;
     assert!((rig.angles[0] - at[0] - give).abs() < 1e-4, "it gives as far as the oil does");
@@ -38,7 +38,7 @@ fn less_pressure_is_less_rate_and_less_torque() {
         eprintln!("ratio {ratio}, {torque} N m: {rate:.6} rad/s, {exact:.6} by the orifice");
         assert!((rate - exact).abs() < 1e-4, "{rate} {exact}");
     }
-    // More than the relief's share of its torque: it sinks, valve open or not.
+    // The load exceeds the relief's share of the torque: the joint sinks, whether the valve is open or not.
     let mut rig = Rig::new(&slippery(), &[SHOULDER], 50.0, -800.0);
     rig.hydraulics.lose_pressure(0, 0.25);
     rig.run(0.3, 0.0, -800.0);

@@ -1,4 +1,4 @@
-//! The drives against closed forms, on single joints that are inertias.
+//! Drives compared with closed forms, on single joints that are inertias.
 
 mod closed_loop;
 mod dry_friction;
@@ -21,25 +21,25 @@ pub(super) struct Rig {
     pub(super) rates: JointAngles,
 }
 
-/// An inertia whose swinging on the oil dies within a tenth of a second, kg m2.
+/// Inertia whose oscillation on the oil decays within a tenth of a second, kg m2.
 pub(super) const LIGHT: f64 = 5.0;
 
 pub(super) const STEP_S: f64 = 0.002;
 
-/// Two radians of range; 2000 N m and 0.65 rad/s when it is wide open.
+/// Actuator with two radians of range, 2000 N m, and 0.65 rad/s when fully open.
 pub(super) const SHOULDER: ActuatorInput = ActuatorInput {
     limits: Some(JointLimits { lower_rad: -1.0, upper_rad: 1.0 }),
     torque_max_n_m: 2000.0,
     rate_limit_rad_s: 0.5,
 };
 
-/// No friction: for what the oil does by itself.
+/// Returns a spec without friction, for tests of the oil only.
 pub(super) fn slippery() -> HydraulicsSpec {
     HydraulicsSpec { coulomb_friction_ratio: 0.0, stiction_ratio: 0.0, ..HydraulicsSpec::default() }
 }
 
 impl Rig {
-    /// All joints at 0, carrying `-torque_n_m`.
+    /// Starts with all joints at 0, carrying `-torque_n_m`.
     pub(super) fn new(spec: &HydraulicsSpec, inputs: &[ActuatorInput], inertia_kg_m2: f64, torque_n_m: f64) -> Self {
         Self::with_step(spec, inputs, inertia_kg_m2, torque_n_m, STEP_S)
     }
@@ -57,7 +57,7 @@ impl Rig {
         Self { hydraulics, inertia_kg_m2, angles, rates: angles }
     }
 
-    /// One step; `torque_n_m` acts from outside on every joint.
+    /// Advances by one step; `torque_n_m` acts from outside on every joint.
     pub(super) fn step(&mut self, command: f64, torque_n_m: f64) {
         let (angles, rates) = (self.angles, self.rates);
         self.hydraulics.step(&[command; MAX_JOINTS], &angles, &rates);
@@ -73,7 +73,7 @@ impl Rig {
         }
     }
 
-    /// Mean rates over another 0.1 s.
+    /// Returns the mean rates over another 0.1 s.
     pub(super) fn mean_rates(&mut self, command: f64, torque_n_m: f64) -> JointAngles {
         let before = self.angles;
         self.run(0.1, command, torque_n_m);

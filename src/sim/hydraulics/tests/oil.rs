@@ -22,7 +22,7 @@ fn the_flow_depends_on_opening_and_load() {
 
 #[test]
 fn three_joints_share_a_small_pump() {
-    // Unlike joints: each asks for D rate_max.
+    // Different joints: each asks for D rate_max.
     let big = ActuatorInput { torque_max_n_m: 4000.0, ..SHOULDER };
     let fast = ActuatorInput { rate_limit_rad_s: 1.0, ..SHOULDER };
     let inputs = [SHOULDER, big, fast];
@@ -84,14 +84,14 @@ fn the_relief_valve_yields_above_its_torque_and_holds_below() {
     let held = rig.drive().piston_rad;
     rig.run(10.0, 0.0, 2300.0);
     assert_eq!(rig.drive().piston_rad, held, "below its torque the piston stays");
-    // Above, the joint is an inertia under the difference.
+    // Above that torque, the joint is an inertia under the difference.
     rig.run(0.1, 0.0, 2500.0);
     let (start, rate) = (rig.angles[0], rig.rates[0]);
     rig.run(0.4, 0.0, 2500.0);
     let acceleration = (rig.rates[0] - rate) / 0.4;
     eprintln!("slip {:.3} rad, acceleration {acceleration:.4} rad/s2", rig.angles[0] - start);
     assert!((acceleration / (100.0 / 50.0) - 1.0).abs() < 1e-9, "{acceleration}");
-    // Without the load it stops; the column holds what it held at most.
+    // Without the load the joint stops; the column holds at most its earlier torque.
     let largest = (0..500).fold(0.0_f64, |largest, _| {
         rig.step(0.0, 0.0);
         largest.max(rig.drive().column_torque_n_m(rig.angles[0], 0.0).abs())
@@ -100,7 +100,7 @@ fn the_relief_valve_yields_above_its_torque_and_holds_below() {
     assert!(rig.rates[0].abs() < 1e-3 && rig.drive().piston_rad > 0.1, "it has yielded for good");
 }
 
-/// Valve fully open: the pump's power is heat but for the work on the load.
+/// With the valve fully open, the pump's power becomes heat except for the work on the load.
 #[test]
 fn what_the_pump_brings_and_the_load_does_not_take_is_heat() {
     let mut rig = Rig::new(&slippery(), &[SHOULDER], LIGHT, -1000.0);
@@ -110,13 +110,13 @@ fn what_the_pump_brings_and_the_load_does_not_take_is_heat() {
     let exact = 2.07e7 * flow - 1000.0 * rate;
     eprintln!("{:.3} W, {exact:.3} by the orifice", rig.hydraulics.power_w());
     assert!((rig.hydraulics.power_w() / exact - 1.0).abs() < 1e-3, "{} {exact}", rig.hydraulics.power_w());
-    // A load that sinks warms the oil too.
+    // A sinking load warms the oil too.
     let mut rig = Rig::new(&slippery(), &[SHOULDER], LIGHT, -1000.0);
     rig.run(0.6, -1.0, -1000.0);
     let exact = (2000.0 + 1000.0) * 0.65 * 1.5_f64.sqrt();
     eprintln!("{:.3} W, {exact:.3} by the orifice", rig.hydraulics.power_w());
     assert!((rig.hydraulics.power_w() / exact - 1.0).abs() < 1e-3, "{} {exact}", rig.hydraulics.power_w());
-    // A leak: torque times creep.
+    // Power of a leak: torque times creep.
     let mut rig = Rig::new(&HydraulicsSpec { leakage_rad_s: 5e-3, ..slippery() }, &[SHOULDER], 50.0, -1000.0);
     rig.run(5.0, 0.0, -1000.0);
     assert!((rig.hydraulics.power_w() / (1000.0 * 2.5e-3) - 1.0).abs() < 1e-4, "{}", rig.hydraulics.power_w());
@@ -154,7 +154,7 @@ fn an_end_stop_gives_by_torque_over_stiffness_and_does_not_bounce() {
             has_touched |= rig.angles[0] * end > 1.0;
             back = if has_touched { back.min(rig.rates[0] * end) } else { 0.0 };
         }
-        // The valve pushes until the load leaves it no head: the full torque.
+        // The valve pushes until the load leaves it no pressure head: the full torque.
         let error = (rig.angles[0] * end - 1.0) / (2000.0 / stiffness) - 1.0;
         eprintln!("inertia {inertia}: depth off by {error:.1e}, fastest way back {back:.1e} rad/s");
         assert!(error.abs() < 1e-3, "{error}");
@@ -162,7 +162,7 @@ fn an_end_stop_gives_by_torque_over_stiffness_and_does_not_bounce() {
     }
 }
 
-/// Thrown against its stop by a load, with the oil of a burst hose: nothing but the stop.
+/// A load throws the joint against its stop, with a burst hose: only the stop acts.
 #[test]
 fn a_bounce_gains_no_energy() {
     let spec = HydraulicsSpec { end_stop_stiffness_n_m_rad: 1e6, ..slippery() };

@@ -13,15 +13,15 @@ use armcal_core::robot::GRAVITY_M_S2;
 use armcal_core::spatial::{Base, Pose, Vehicle};
 use armcal_core::streams::JointAngles;
 
-/// The arm, the vehicle if it is free, and what they may collide with.
+/// Arm, the vehicle if it is free, and the solids with which they may collide.
 pub(in crate::physics) struct Featherstone {
     multibody: Multibody,
     state: SystemState,
-    /// The rate of a free base's velocity over the last step.
+    /// Rate of change of a free base's velocity over the last step.
     base_rate: Motion,
     is_free: bool,
     poses: LinkPoses,
-    /// `None` for an arm that collides with nothing.
+    /// Contacts; `None` for an arm without collisions.
     contacts: Option<(ContactWorld, Solids)>,
     step_s: f64,
 }
@@ -117,7 +117,7 @@ impl Engine for Featherstone {
     }
 }
 
-/// Environment of a free base, by its own state.
+/// Returns the environment of a free base, from its own state.
 fn free_environment(drive: &Drive, stage: Stage, at: &SystemState) -> (Environment, BaseCoupling) {
     let water = &drive.water[usize::from(stage == Stage::End)];
     let to_base = at.world_from_base.rotation.inverse();
@@ -130,7 +130,7 @@ fn free_environment(drive: &Drive, stage: Stage, at: &SystemState) -> (Environme
     (around, BaseCoupling::Free)
 }
 
-/// Environment of a base that moves as prescribed.
+/// Returns the environment of a base with prescribed motion.
 fn prescribed_environment(drive: &Drive, stage: Stage) -> (Environment, BaseCoupling) {
     let end = usize::from(stage == Stage::End);
     let base = drive.base[end];

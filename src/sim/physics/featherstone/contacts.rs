@@ -19,10 +19,10 @@ use armcal_core::kinematics::{Chain, LinkPoses};
 use armcal_core::robot::parry_pose;
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
-/// Below this slip rate friction is viscous, m/s.
+/// Slip rate below which friction is viscous, m/s.
 const SLIP_M_S: f64 = 1e-3;
 
-/// Shapes in the engine, and what touches.
+/// Shapes in the engine, and the pairs that touch.
 pub(super) struct ContactWorld {
     engine: PhysicsWorld,
     filter: PairFilter,
@@ -38,13 +38,13 @@ pub(super) struct ContactWorld {
 pub(super) struct ContactState<'a> {
     pub poses: &'a LinkPoses,
     pub angles: &'a JointAngles,
-    /// All coordinates' velocities, those of a free base first.
+    /// Velocities of all coordinates, those of a free base first.
     pub velocity: Coordinates,
     pub first_joint: usize,
-    /// Of the base against the ground; nil in `velocity` where it moves as prescribed.
+    /// Velocity of the base against the ground; if the base's motion is prescribed, it is not part of `velocity`.
     pub base_velocity: Motion,
     pub base_from_ground: Isometry3<f64>,
-    /// Of the first joint on the base.
+    /// Pose of the first joint on the base.
     pub first_place: Isometry3<f64>,
 }
 
@@ -77,7 +77,7 @@ impl ContactWorld {
         }
     }
 
-    /// Springs and dampers of everything that touches now.
+    /// Returns the springs and dampers of all present contacts.
     pub(super) fn update(&mut self, solids: &[Solid], state: &ContactState) -> &[ContactRow] {
         self.rows.clear();
         self.touching.clear();
@@ -137,7 +137,7 @@ impl ContactWorld {
                 let place = manifold.subshape_pos1().map_or(*a.position(), |sub| *a.position() * *sub);
                 let contact = Contact {
                     point: from_rapier(place.transform_point(point.local_p1)),
-                    // From the first shape to the second: what pushes the second away.
+                    // The normal points from the first shape to the second, which it pushes away.
                     normal: from_rapier(manifold.data.normal),
                     depth_m: -point.dist,
                     pushed: body(on_b),
@@ -157,7 +157,7 @@ impl ContactWorld {
     }
 }
 
-/// The body that carries a shape; `None` for the ground.
+/// Returns the body that carries a shape; `None` for the ground.
 fn body(carrier: Carrier) -> Option<usize> {
     match carrier {
         Carrier::Body(body) => Some(body),
@@ -166,13 +166,13 @@ fn body(carrier: Carrier) -> Option<usize> {
 }
 
 struct Contact {
-    /// Base frame.
+    /// Point of contact, base frame.
     point: Vector3<f64>,
     normal: Vector3<f64>,
     depth_m: f64,
     pushed: Option<usize>,
     against: Option<usize>,
-    /// Of the pair's stiffness.
+    /// Share of the pair's stiffness.
     share: f64,
 }
 
@@ -182,7 +182,7 @@ impl Contact {
         let damping_n_s_m = spec.contact_damping_s * stiffness_n_m;
         let (direction, ground_rate) = self.direction(&self.normal, state);
         let parting: f64 = (0..MAX_DOF).map(|i| direction[i] * state.velocity[i]).sum::<f64>() + ground_rate;
-        // What parts faster than its spring relaxes is not pulled back.
+        // Bodies that separate faster than the spring relaxes are not pulled back.
         let damping_n_s_m =
             if stiffness_n_m * self.depth_m - damping_n_s_m * parting > 0.0 { damping_n_s_m } else { 0.0 };
         let start_n = stiffness_n_m * self.depth_m - damping_n_s_m * ground_rate;
@@ -198,8 +198,8 @@ impl Contact {
         }
     }
 
-    /// How each coordinate moves the pushed body's point along `axis` against the other's, and what the ground or a
-    /// base that moves as prescribed adds to that rate.
+    /// Returns how each coordinate moves the pushed body's point along `axis` against the other's. The second result is
+    /// the rate that the ground, or a base with prescribed motion, adds.
     fn direction(&self, axis: &Vector3<f64>, state: &ContactState) -> (Coordinates, f64) {
         let unit = Force::at(&self.point, axis);
         let mut direction = [0.0; MAX_DOF];
@@ -215,7 +215,7 @@ impl Contact {
                 }
             }
         }
-        // A pair of two bodies of the vehicle moves with it; against the ground it counts.
+        // A contact of two bodies of the vehicle moves with it; one with the ground does not.
         let moves = f64::from(u8::from(self.pushed.is_some())) - f64::from(u8::from(self.against.is_some()));
         let carried = if state.first_joint == 0 { moves * state.base_velocity.dot(&unit) } else { 0.0 };
         (direction, carried)

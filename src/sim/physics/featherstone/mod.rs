@@ -1,5 +1,5 @@
-//! The engine of our own: `dynamics` has the equations of motion and their integrator of second order; rapier's
-//! collision pipeline finds the contacts, which are springs and dampers within the equations.
+//! Our own engine: `dynamics` has the equations of motion and their integrator of second order. Rapier's collision
+//! pipeline finds the contacts, which are springs and dampers in the equations.
 
 mod arm;
 mod contacts;

@@ -1,4 +1,4 @@
-//! The arm as rapier's multibody, moved step by step.
+//! Arm as rapier's multibody, advanced step by step.
 
 use nalgebra::{Isometry3, Vector3};
 use rapier3d::dynamics::{Multibody, MultibodyJointHandle, RigidBodyBuilder, RigidBodyHandle};
@@ -23,12 +23,12 @@ use armcal_core::streams::{JointAngles, MAX_JOINTS};
 /// Free axis of a revolute joint in rapier's spatial layout (3 linear, then 3 angular): rotation about x.
 const ROTATION_X: usize = 3;
 
-/// The arm in rapier, on a fixed root in base axes.
+/// Arm in rapier, on a fixed root in base axes.
 pub(in crate::physics) struct RapierArm {
     engine: PhysicsWorld,
     chain: Chain,
     links: Vec<Link>,
-    /// Root first.
+    /// Rigid bodies, root first.
     handles: Vec<RigidBodyHandle>,
     tip: MultibodyJointHandle,
     state: State,
@@ -36,28 +36,30 @@ pub(in crate::physics) struct RapierArm {
     step_s: f64,
 }
 
-/// As after the last step. Rapier's step is `v += h a(q); q += h v`: with its angles half a step ahead of its rates
-/// this is the leapfrog, of second order in what depends on the angles.
+/// State after the last step. Rapier's step is `v += h a(q); q += h v`. With its angles half a step ahead of its rates
+/// this is the leapfrog, of second order in forces that depend on the angles.
 struct State {
     rates: JointAngles,
-    /// Over the last step.
+    /// Mean accelerations over the last step.
     accelerations: JointAngles,
-    /// Half a step ahead.
+    /// Angles half a step ahead.
     angles_ahead: JointAngles,
     poses_ahead: LinkPoses,
 }
 
-/// What the arm may collide with.
+/// Solids with which the arm may collide.
 struct Contacts {
     filter: PairFilter,
     guard: ContactGuard,
     colliders: Vec<ColliderHandle>,
     ground: RigidBodyHandle,
-    /// Whether the engine looks for contacts.
+    /// True if the engine searches for contacts.
     is_on: bool,
 }
 
 impl RapierArm {
+    /// Builds the arm.
+    ///
     /// # Errors
     /// [`SimError`] for a base that floats, an arm without joints, or a joint that rapier refuses.
     pub(in crate::physics) fn new(input: PhysicsInput) -> Result<Self, SimError> {
@@ -95,7 +97,7 @@ impl RapierArm {
         Ok(arm)
     }
 
-    /// Puts the joints somewhere, on their way.
+    /// Places the joints at angles, with rates.
     pub(in crate::physics) fn place(&mut self, angles: &JointAngles, rates: &JointAngles) {
         let PhysicsWorld { bodies, multibody_joints, .. } = &mut self.engine;
         let Some((multibody, _)) = multibody_joints.get_mut(self.tip) else { return };
@@ -115,8 +117,9 @@ impl RapierArm {
         self.state = State { rates: *rates, accelerations, angles_ahead: ahead, poses_ahead };
     }
 
-    /// Springs and dampers about the joints; a load without spring is a pair of torques. Rapier takes a spring at the
-    /// angle after the step; resting farther by the way of a steady step it acts at that before it.
+    /// Sets springs and dampers about the joints; a load without a spring is a pair of torques. Rapier evaluates a
+    /// spring at the angle after the step. A rest angle shifted by the motion of a steady step makes it act as before
+    /// the step.
     fn set_loads(&mut self, loads: &[JointLoad; MAX_JOINTS], wrenches: &mut [Force; MAX_JOINTS + 1]) {
         let Some((multibody, _)) = self.engine.multibody_joints.get_mut(self.tip) else { return };
         for (j, load) in loads.iter().enumerate().take(self.links.len()) {
@@ -141,7 +144,7 @@ impl RapierArm {
             let place = self.state.poses_ahead.link(body);
             let com = place.rotation * link.engine_com_m + place.translation.vector;
             let wrench = &wrenches[body];
-            // Added forces stay until they are reset.
+            // Forces that were added stay until they are reset.
             rigid.reset_forces(false);
             rigid.reset_torques(false);
             rigid.add_force(to_rapier(&wrench.force), false);
@@ -149,7 +152,7 @@ impl RapierArm {
         }
     }
 
-    /// Moves the ground, and lets the engine look for contacts only while there can be any.
+    /// Moves the ground, and enables the engine's search for contacts only while contacts are possible.
     fn prepare_contacts(&mut self, drive: &Drive) {
         let Self { contacts: Some(contacts), engine, state, chain, .. } = self else { return };
         let base_from_ground = drive.base.map(|base| *base.world_from_base.inverse().isometry());
@@ -165,7 +168,7 @@ impl RapierArm {
                 }
             }
             if let Some(ground) = engine.bodies.get_mut(contacts.ground) {
-                // Driven there from where it was it would fly through the arm.
+                // If it were driven there from its last position, it would fly through the arm.
                 ground.set_position(parry_pose(&base_from_ground[0]), false);
             }
         }
@@ -174,7 +177,7 @@ impl RapierArm {
         }
     }
 
-    /// Reads the state that the engine has come to.
+    /// Reads the engine's state after the step.
     fn read_state(&mut self) {
         let Some((multibody, _)) = self.engine.multibody_joints.get(self.tip) else { return };
         let State { rates, accelerations, angles_ahead, poses_ahead } = &mut self.state;
@@ -261,7 +264,7 @@ impl Engine for RapierArm {
     }
 }
 
-/// The base's surroundings in the middle of the step, where the angles are.
+/// Returns the base's surroundings in the middle of the step, the time of the angles.
 fn midway(drive: &Drive) -> Environment {
     let [start, end] = drive.base;
     let to_base = start.world_from_base.rotation().inverse();
@@ -274,7 +277,7 @@ fn midway(drive: &Drive) -> Environment {
     }
 }
 
-/// Angle of joint `j`, rad.
+/// Returns the angle of joint `j`, rad.
 fn coordinate(multibody: &Multibody, j: usize) -> f64 {
     multibody.link(j + 1).map_or(f64::NAN, |link| link.joint.coords()[ROTATION_X])
 }

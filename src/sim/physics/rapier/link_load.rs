@@ -1,4 +1,4 @@
-//! Wrenches on the links: gravity, water, and the inertia of a base that moves.
+//! Wrenches on the links: gravity, water, and the inertial forces of a moving base.
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
@@ -6,16 +6,16 @@ use crate::dynamics::{Body, Environment, Force, Inertia, Motion};
 use armcal_core::kinematics::LinkPoses;
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
-/// A link: its body in water, and the rigid body that rapier has in its place.
+/// Link: its body in water, and the rigid body that represents it in rapier.
 pub(super) struct Link {
     body: Body,
-    /// Of rapier's rigid body, about the link's origin.
+    /// Inertia of rapier's rigid body, about the link's origin.
     engine: Inertia,
     pub engine_mass_kg: f64,
     pub engine_com_m: Vector3<f64>,
 }
 
-/// One state of the arm on its base. All in base axes about the base's origin.
+/// State of the arm on its base, in base axes about the base's origin.
 pub(super) struct ArmState<'a> {
     pub poses: &'a LinkPoses,
     pub rates: &'a JointAngles,
@@ -27,8 +27,8 @@ pub(super) struct ArmState<'a> {
 }
 
 impl Link {
-    /// Rapier's masses are scalars: the added mass goes in as the middle between its largest and its smallest
-    /// direction, at the centre of the water that the link displaces, with its inertia about that.
+    /// Builds a link. Rapier's masses are scalars: the added mass is the middle between its largest and its smallest
+    /// direction. It acts at the centre of the water that the link displaces, with its inertia about that point.
     pub(super) fn new(body: Body) -> Self {
         let directions = body.added.linear.symmetric_eigenvalues();
         let added_kg = 0.5 * (directions.max() + directions.min());
@@ -43,19 +43,19 @@ impl Link {
         }
     }
 
-    /// Inertia of rapier's rigid body about its centre of mass, link axes.
+    /// Returns the inertia of rapier's rigid body about its centre of mass, link axes.
     pub(super) fn engine_inertia_kg_m2(&self) -> Matrix3<f64> {
         self.engine.shifted(&-self.engine_com_m).rotational
     }
 
-    /// Wrench of gravity and buoyancy alone.
+    /// Returns the wrench of gravity and buoyancy only.
     #[cfg(test)]
     pub(super) fn weight(&self, place: &Isometry3<f64>, gravity: &Vector3<f64>) -> Force {
         self.body.weight(place, gravity, &Vector3::zeros())
     }
 }
 
-/// Momentum of a motion, the inertia in its own frame at `place`: cheaper than to turn the inertia.
+/// Returns the momentum of a motion, with the inertia in its own frame at `place`: cheaper than turning the inertia.
 fn momentum(inertia: &Inertia, place: &Isometry3<f64>, motion: &Motion) -> Force {
     let to_own = place.rotation.inverse();
     let own = Motion::new(to_own * motion.angular, to_own * motion.at(&place.translation.vector));
@@ -64,7 +64,8 @@ fn momentum(inertia: &Inertia, place: &Isometry3<f64>, motion: &Motion) -> Force
     Force::new(place.rotation * found.moment + place.translation.vector.cross(&force), force)
 }
 
-/// Wrench on each link 1..=n: what moves rapier's rigid bodies, in base axes, as the links move in the world.
+/// Returns the wrench on each link 1..=n, in base axes, that makes rapier's rigid bodies move as the links move in the
+/// world.
 ///
 /// With `V`, `A` a link's velocity and acceleration in the world, `v`, `a` those against the base, `V0`, `A0` the
 /// base's, `I` the link's inertia with added mass and `Ie` that of rapier's body:
@@ -75,8 +76,8 @@ fn momentum(inertia: &Inertia, place: &Isometry3<f64>, motion: &Motion) -> Force
 /// W = loads - I A - V x* I V + Ie a + v x* Ie v
 /// ```
 ///
-/// For a dry link `a` cancels. By what the scalar differs from the added mass `a` is that of the last step; as
-/// `I < 2 Ie` this is a contraction whatever the step, and of first order.
+/// For a dry link `a` cancels. For the difference of the scalar and the added mass, `a` is that of the last step. As `I
+/// < 2 Ie` this is a contraction for every step, and of first order.
 pub(super) fn link_wrenches(links: &[Link], state: &ArmState) -> [Force; MAX_JOINTS + 1] {
     let mut wrenches = [Force::zero(); MAX_JOINTS + 1];
     let base = &state.around.base_velocity;

@@ -13,16 +13,16 @@ use crate::solids::{Carrier, Solids};
 use crate::spec::PhysicsSpec;
 use armcal_core::robot::parry_pose;
 
-/// Without gravity, which is among the loads.
+/// Returns an engine without gravity, which is among the loads.
 pub(super) fn empty_engine(step_s: f64) -> PhysicsWorld {
     let mut engine = PhysicsWorld::new();
     engine.gravity = Vector::ZERO;
     let parameters = &mut engine.integration_parameters;
     parameters.dt = step_s;
-    // Springs and dampers are implicit and apart from the iterative solver: it has contacts alone to resolve.
+    // Springs and dampers are implicit and separate from the iterative solver, which resolves only contacts.
     parameters.num_solver_iterations = 1;
     parameters.num_internal_pgs_iterations = 4;
-    // Nothing moves its own size in a step.
+    // No body moves by its own size in a step.
     parameters.max_ccd_substeps = 0;
     engine
 }
@@ -39,7 +39,7 @@ pub(super) fn rigid_body(link: &Link) -> RigidBodyBuilder {
         .can_sleep(false)
 }
 
-/// Rapier turns a joint about its frames' x axis: both frames have it along `axis`.
+/// Returns a revolute joint. Rapier turns a joint about the x axis of its frames: both have it along `axis`.
 pub(super) fn revolute(parent_from_joint: &Isometry3<f64>, axis: &Unit<Vector3<f64>>) -> GenericJoint {
     let turn = UnitQuaternion::rotation_between_axis(&Vector3::x_axis(), axis)
         .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::y_axis(), std::f64::consts::PI));
@@ -51,7 +51,7 @@ pub(super) fn revolute(parent_from_joint: &Isometry3<f64>, axis: &Unit<Vector3<f
     joint
 }
 
-/// Shapes on the links (root first) and on the ground, without mass, switched off.
+/// Adds shapes on the links (root first) and on the ground, without mass, switched off.
 pub(super) fn add_colliders(
     engine: &mut PhysicsWorld,
     solids: &Solids,

@@ -1,4 +1,4 @@
-//! Rapier's multibody against Pinocchio's golden values, Runge-Kutta, and our own equations.
+//! Rapier's multibody compared with Pinocchio's golden values, Runge-Kutta, and our own equations.
 
 use serde::Deserialize;
 
@@ -64,7 +64,7 @@ fn rapier_arm(robot: &Robot, water: &WaterSpec, step_s: f64) -> RapierArm {
     RapierArm::new(input).expect("an arm")
 }
 
-/// One step from a state at rest or moving; gives the accelerations.
+/// Advances by one step from a state at rest or moving; returns the accelerations.
 fn accelerations(arm: &mut RapierArm, case: &Acceleration, gravity_m_s2: f64, step_s: f64) -> Vec<f64> {
     let (q, qd) = (JointAngles::from_slice(&case.q), JointAngles::from_slice(&case.qd));
     arm.place(&q, &qd);
@@ -91,8 +91,8 @@ fn rapiers_gravity_torques_are_those_of_pinocchio() {
     }
 }
 
-/// On a base that moves in all six directions, in water that moves, with drag and added mass: largest difference of an
-/// angle from our own equations with a step of 0.25 ms, rad.
+/// Simulates a base that moves in all six directions, in moving water, with drag and added mass. Returns the largest
+/// difference of an angle from our own equations with a step of 0.25 ms, rad.
 fn swung_in_the_sea(step_s: f64, expected: &[JointAngles]) -> f64 {
     let (robot, mut worst) = (titan(), 0.0_f64);
     let mut arm = rapier_arm(&robot, &SEA, step_s);
@@ -174,7 +174,7 @@ fn rapiers_accelerations_are_those_of_pinocchio() {
     }
     eprintln!("accelerations off by {worst:?} at 100, 10, 1 us");
     assert!(worst[0] < 1e-3, "{worst:?}");
-    // Of first order: a tenth of the step leaves a tenth of the difference.
+    // The error is of first order: a tenth of the step leaves a tenth of the difference.
     for pair in worst.windows(2) {
         assert!((9.0..11.0).contains(&(pair[0] / pair[1])), "{worst:?}");
     }
@@ -189,7 +189,7 @@ fn rapier_swings_the_shaken_pendulum() {
     assert!(errors[1].abs() < 1e-3, "{errors:?}");
 }
 
-/// Arm, vehicle and a pose with the tool 9 cm above the vehicle's toe plate.
+/// Returns the solids, and a configuration with the tool 9 cm above the vehicle's toe plate.
 fn above_the_plate(robot: &Robot) -> (Solids, JointAngles) {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/vehicles/work-class-front.toml");
     let vehicle = load_vehicle(std::path::Path::new(file)).expect("the vehicle reads");
@@ -201,11 +201,11 @@ fn above_the_plate(robot: &Robot) -> (Solids, JointAngles) {
     (Solids::new(robot, &vehicle, &Scene::default()), angles)
 }
 
-/// The joint that swings; the others are held by springs.
+/// Index of the joint that swings; springs hold the others.
 const SWINGING: usize = 1;
 
-/// An arm that swings at the vehicle about one joint: its momentum about that (N m s) just before they touch, and what
-/// it loses until it approaches no more.
+/// Swings an arm at the vehicle about one joint. Returns its momentum about that joint (N m s) just before contact, and
+/// the momentum that it loses until it no longer approaches.
 fn impact(engine: EngineKind, water: &WaterSpec, step_s: f64) -> [f64; 2] {
     let robot = titan();
     let (solids, angles) = above_the_plate(&robot);

@@ -18,7 +18,7 @@ impl CameraClock {
         Self { spec: *spec, jitter: stream_rng(seed, "camera/clock") }
     }
 
-    /// Arrival of an image whose shutter closed at `closed`, and its stamp by the camera's own clock.
+    /// Returns the arrival time of an image whose shutter closed at `closed`, and its stamp by the camera's own clock.
     pub(super) fn stamps(&mut self, closed: Stamp) -> (Stamp, Stamp) {
         let jitter: f64 = StandardNormal.sample(&mut self.jitter);
         let late_s = (self.spec.camera_latency_s + self.spec.camera_jitter_s * jitter).max(0.0);

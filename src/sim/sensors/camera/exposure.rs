@@ -13,7 +13,7 @@ use armcal_core::streams::JointAngles;
 pub(crate) struct ArmMotion<'a> {
     pub chain: &'a Chain,
     pub angles: JointAngles,
-    /// rad/s.
+    /// Joint rates, rad/s.
     pub rates: JointAngles,
 }
 
@@ -21,13 +21,13 @@ pub(crate) struct ArmMotion<'a> {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Exposure {
     pub exposure_s: f64,
-    /// As built.
+    /// Mount of the camera as built.
     pub mount: Attachment,
 }
 
 impl Exposure {
-    /// `base_from_camera` when the shutter opened and halfway, relative to a tag on `body` (0: the base) that stays
-    /// where it is when the shutter closes; `None` without exposure time.
+    /// Returns `base_from_camera` when the shutter opened and halfway, relative to a tag on `body` (0: the base) at its
+    /// pose when the shutter closes. `None` without exposure time.
     pub(super) fn earlier_poses(
         &self,
         base_from_camera: &Isometry3<f64>,
@@ -38,7 +38,7 @@ impl Exposure {
             return None;
         }
         let ArmMotion { chain, angles, rates } = motion;
-        // By the drawing, relative to the drawing's end: the camera itself is where the bodies are.
+        // The nominal model gives the motion relative to its end; the pose at the end is that of the actual bodies.
         let body_from_camera = |earlier_s: f64| {
             let then = JointAngles::from_fn(angles.len(), |j| angles[j] - earlier_s * rates[j]);
             let poses = chain.link_poses(&then);
@@ -48,8 +48,8 @@ impl Exposure {
         Some([from_end * body_from_camera(self.exposure_s), from_end * body_from_camera(0.5 * self.exposure_s)])
     }
 
-    /// The same with the pose when the shutter closes: `base_from_camera` at three instants, alike without exposure
-    /// time.
+    /// Returns `base_from_camera` when the shutter opened, halfway, and when it closes; the three are equal without
+    /// exposure time.
     pub(super) fn poses(
         &self,
         base_from_camera: &Isometry3<f64>,

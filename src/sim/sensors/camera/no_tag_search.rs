@@ -1,4 +1,4 @@
-//! A build without `images` finds no tags in images: a world that would render them is refused.
+//! Build without `images`: it cannot search images for tags, and refuses worlds that render them.
 
 use crate::error::SimError;
 use crate::imaging::Frame;
@@ -6,11 +6,11 @@ use armcal_core::optics::{CameraModel, TagFamily};
 use armcal_core::streams::LateMessages;
 use armcal_core::time::Stamp;
 
-/// There is none.
+/// Search that cannot be started.
 #[derive(Debug)]
 pub(super) enum TagSearch {}
 
-/// What of an image is recorded.
+/// Recorded parts of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kept {
     TagsAlone,
@@ -18,6 +18,8 @@ pub(super) enum Kept {
 }
 
 impl TagSearch {
+    /// Refuses to start.
+    ///
     /// # Errors
     /// [`SimError::ImagesNotBuilt`], always.
     pub(super) fn start(_: &CameraModel, _: TagFamily, _: u8) -> Result<Self, SimError> {

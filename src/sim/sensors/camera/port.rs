@@ -8,11 +8,11 @@
 
 use nalgebra::Vector3;
 
-/// Of acrylic.
+/// Refractive index of acrylic.
 pub(super) const GLASS_INDEX: f64 = 1.49;
 pub(super) const WATER_INDEX: f64 = 1.333;
 
-/// The window in front of a lens; lengths in the camera's frame.
+/// Window in front of a lens; lengths in the camera's frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Port {
     None,
@@ -21,8 +21,8 @@ pub(super) enum Port {
 }
 
 impl Port {
-    /// Direction in air of the ray from a point in the water to the lens (camera frame, any length). `None` for a point
-    /// that is not in the water or that no ray reaches.
+    /// Returns the direction in air of the ray from a point in the water to the lens (camera frame, any length). `None`
+    /// for a point that is not in the water or that no ray reaches.
     pub(super) fn direction_in_air(&self, point_m: &Vector3<f64>) -> Option<Vector3<f64>> {
         match *self {
             Self::None => Some(*point_m),
@@ -115,8 +115,8 @@ fn through_sphere(point_m: &Vector3<f64>, center_m: &Vector3<f64>, inner_m: f64,
     angle.is_finite().then(|| along * angle.cos() + across * angle.sin())
 }
 
-/// Angle by which a dome turns a ray that starts `lever_m` from its centre, rad, and the derivative by the lever,
-/// rad/m.
+/// Returns the angle by which a dome turns a ray that starts `lever_m` from its centre, rad, and its derivative by the
+/// lever, rad/m.
 fn turn_in_dome(lever_m: f64, inner_m: f64, outer_m: f64) -> (f64, f64) {
     let refractions =
         [(inner_m, 1.0), (GLASS_INDEX * inner_m, -1.0), (GLASS_INDEX * outer_m, 1.0), (WATER_INDEX * outer_m, -1.0)];
@@ -131,7 +131,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Snell's law in vectors: `direction` (unit) meets a surface of normal `normal` (unit, against the ray).
+    /// Refracts a ray by Snell's law in vectors: `direction` (unit) meets a surface of normal `normal` (unit, against
+    /// the ray).
     fn refracted(direction: &Vector3<f64>, normal: &Vector3<f64>, from: f64, to: f64) -> Vector3<f64> {
         let ratio = from / to;
         let cos_in = -normal.dot(direction);
@@ -139,7 +140,8 @@ mod tests {
         direction * ratio + normal * (ratio * cos_in - cos_out)
     }
 
-    /// Traces a ray from the pupil into the water, by intersections and Snell's law: a point on it and its direction.
+    /// Traces a ray from the pupil into the water, by intersections and Snell's law. Returns a point on it and its
+    /// direction.
     fn traced(port: &Port, start: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
         let direction = start.normalize();
         match *port {
@@ -196,7 +198,7 @@ mod tests {
         }
     }
 
-    /// A case that Newton's method once missed.
+    /// Regression test: Newton's method did not converge in this case.
     #[test]
     fn a_thick_decentred_dome_inverts_a_ray_from_its_surface() {
         let center_m = Vector3::new(0.0, -0.005_984_014_066_287_652, 0.0);
@@ -214,7 +216,8 @@ mod tests {
         assert!(flat.direction_in_air(&Vector3::new(0.0, 0.01, 0.025)).is_none());
     }
 
-    /// To first order a thin dome that lies e aside turns the line of sight by `e (1 - 1/n) (1/R - 1/range)`.
+    /// To first order, a thin dome with its centre at a distance e turns the line of sight by `e (1 - 1/n) (1/R -
+    /// 1/range)`.
     #[test]
     fn a_dome_beside_the_pupil_turns_the_view_by_its_closed_form() {
         const ASIDE_M: f64 = 1e-6;
@@ -228,7 +231,7 @@ mod tests {
         }
     }
 
-    /// Through a plane an angle grows by the water's index, near the axis and far from the port.
+    /// A plane port magnifies angles by the water's index, near the axis and far from the port.
     #[test]
     fn a_flat_port_magnifies_by_the_waters_index() {
         let flat = Port::Flat { distance_m: 0.0, thickness_m: 0.0 };

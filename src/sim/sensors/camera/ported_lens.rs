@@ -1,8 +1,8 @@
 //! Projection of points by the camera as built: its port, then its lens.
 //!
-//! The drawing's lens is calibrated in water behind a perfect dome. Behind a flat port the lens's own focal length is
-//! shorter by the water's index. Near the axis both together then have the drawing's focal length; farther out they
-//! differ. A drawing that has a flat port itself has its lens in air, and the world's port takes its place.
+//! The nominal lens is calibrated in water behind a perfect dome. Behind a flat port, the lens's own focal length is
+//! shorter by the water's index. Near the axis, lens and port together have the nominal focal length; farther out they
+//! differ. A nominal model with a flat port has its lens in air, and the world's port replaces its port.
 
 use nalgebra::{Vector2, Vector3};
 
@@ -13,7 +13,7 @@ use armcal_core::optics::CameraModel;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PortedLens {
-    /// In air; behind its own window where the drawing has one and the world no other.
+    /// Lens in air; it includes its own window if the nominal model has one and the world has no port.
     pub lens: CameraModel,
     pub port: Port,
 }
@@ -35,12 +35,12 @@ impl PortedLens {
         }
     }
 
-    /// Pixel of a point in the water (camera frame, m); `None` beyond the field of view.
+    /// Returns the pixel of a point in the water (camera frame, m); `None` beyond the field of view.
     pub(super) fn project(&self, point_m: &Vector3<f64>) -> Option<Vector2<f64>> {
         self.lens.project(&self.port.direction_in_air(point_m)?)
     }
 
-    /// Whether a pixel lies in the image.
+    /// Returns true if a pixel is in the image.
     pub(super) fn contains(&self, pixel_px: &Vector2<f64>) -> bool {
         self.lens.contains(pixel_px)
     }
@@ -50,7 +50,7 @@ fn in_air(lens: &CameraModel) -> CameraModel {
     CameraModel { port: None, ..*lens }
 }
 
-/// The lens in air that has the drawing's focal length in water.
+/// Returns the lens in air that has the nominal focal length in water.
 fn shorter(lens: &CameraModel) -> CameraModel {
     let [fx, fy, rest @ ..] = lens.intrinsics();
     let [cx, cy, a, b, c, d] = rest;

@@ -17,7 +17,7 @@ use armcal_core::routine::Scene;
 use armcal_core::streams::{ImageDemand, LateMessages};
 use armcal_core::time::Stamp;
 
-/// Parts of a world that make a rendered camera.
+/// Parts of a world from which a rendered camera is built.
 #[derive(Clone, Copy)]
 pub(crate) struct RenderInput<'a> {
     pub robot: &'a Robot,
@@ -54,6 +54,8 @@ impl fmt::Debug for RenderedCamera {
 }
 
 impl RenderedCamera {
+    /// Builds the renderer and starts the search for tags.
+    ///
     /// # Errors
     /// [`SimError`] where there is no light, or no detector.
     pub(super) fn new(input: &RenderInput, ported: &PortedLens) -> Result<Self, SimError> {
@@ -74,7 +76,7 @@ impl RenderedCamera {
         let scenery = Scenery::new(robot, vehicle, scene);
         let mut imager = Imager::new(&ported.lens, &image, &lights, seed);
         imager.set_solids(&scenery.shapes);
-        // The detector knows the lens of the drawing.
+        // The detector knows only the nominal lens.
         let search = TagSearch::start(&robot.camera.lens, robot.tag_family, image.jpeg_quality.round() as u8)?;
         Ok(Self {
             imager,
@@ -89,12 +91,12 @@ impl RenderedCamera {
         })
     }
 
-    /// What is printed on the tags.
+    /// Returns the family of the printed tags.
     pub(super) fn family(&self) -> TagFamily {
         self.family
     }
 
-    /// Whether an image is to be taken now.
+    /// Returns true if an image is due.
     pub(super) fn is_due(&self, demand: ImageDemand, now: Stamp) -> bool {
         let preview_s = if self.spec.preview_hz > 0.0 { 1.0 / self.spec.preview_hz } else { f64::INFINITY };
         demand == ImageDemand::All

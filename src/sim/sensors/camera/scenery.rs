@@ -1,4 +1,4 @@
-//! Solids of a rendered image: the arm as drawn, the vehicle, obstacles, the seafloor.
+//! Solids of a rendered image: the nominal arm, the vehicle, obstacles, the seafloor.
 
 use nalgebra::{Isometry3, Point3};
 
@@ -29,7 +29,7 @@ struct CarriedShape {
 pub(crate) struct ScenePoses<'a> {
     pub links: &'a BodyPoses,
     pub base_from_world: Isometry3<f64>,
-    /// Displacements of the jaws from the drawing, on their link.
+    /// Displacements of the jaws from the nominal model, on their link.
     pub jaws: [Isometry3<f64>; 2],
 }
 
@@ -76,8 +76,8 @@ impl Scenery {
         self.shapes.push(SolidShape { shape: shape.clone(), color_rgb: *color_rgb, is_ground: false });
     }
 
-    /// `base_from_shape` of each shape at three instants, into `out`; `carried` has the motions of a body from the last
-    /// instant to each of them.
+    /// Writes `base_from_shape` of each shape at three instants into `out`; `carried` returns the motions of a body
+    /// from the last instant to each of them.
     pub(super) fn place(
         &self,
         poses: &ScenePoses,
@@ -103,7 +103,7 @@ impl Scenery {
     }
 }
 
-/// Whether a shape holds the camera: it is on the camera's link and near its pupil.
+/// Returns true if a shape holds the camera: it is on the camera's link and near its pupil.
 fn is_housing(robot: &Robot, body: usize, placed: &PlacedShape) -> bool {
     let mount = &robot.camera.mount;
     let pose = parry_pose(&(placed.owner_from_shape * placed.shape.axis_fix()));

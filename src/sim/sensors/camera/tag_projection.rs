@@ -9,7 +9,7 @@ use crate::spec::CameraWorldSpec;
 use armcal_core::kinematics::Attachment;
 use armcal_core::optics::{CornerNoise, square_corners};
 
-/// Lines of sight end this far before the tag: neither its pose nor that of its backing is exact.
+/// Distance from the tag at which lines of sight end: neither its pose nor that of its backing is exact.
 const CLEAR_OF_BACKING_M: f64 = 0.006;
 
 #[derive(Clone, Copy, Debug)]
@@ -19,12 +19,12 @@ pub(super) struct TagInBase {
     pub base_from_tag: Isometry3<f64>,
 }
 
-/// A tag on a link, or on the base.
+/// Tag on a link, or on the base.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TagOnLink {
     pub id: u32,
     pub size_m: f64,
-    /// As built.
+    /// Mount of the tag as built.
     pub mount: Attachment,
 }
 
@@ -54,7 +54,7 @@ pub(super) struct TagProjector<'a> {
     pub lens: &'a PortedLens,
     pub solids: &'a Solids,
     pub housing: &'a [usize],
-    /// In place of the standard noise and limits.
+    /// Fitted noise model, which replaces the standard noise and limits.
     pub fitted: Option<&'a CornerNoise>,
 }
 
@@ -88,8 +88,8 @@ impl TagProjector<'_> {
         Some(TagProjection { corners_px, range_m, cos_incidence, side_px, blur_px: 0.0 })
     }
 
-    /// Corners averaged over the exposure (Simpson's rule) by `earlier` camera poses, at its start and halfway. `None`
-    /// for a tag that was not in the image all the time.
+    /// Averages the corners over the exposure (Simpson's rule) by `earlier` camera poses, at its start and halfway.
+    /// `None` for a tag that was not in the image all the time.
     pub(super) fn average_over_exposure(
         &self,
         at_end: TagProjection,
@@ -115,7 +115,8 @@ impl TagProjector<'_> {
 }
 
 impl TagProjection {
-    /// Corners with noise, from normal numbers of unit variance; `None` for a missed tag. `uniform` is in 0..1.
+    /// Returns the corners with noise, from normal numbers of unit variance; `None` for a missed tag. `uniform` is in
+    /// 0..1.
     pub(super) fn detected(
         &self,
         projector: &TagProjector,
@@ -138,13 +139,13 @@ impl TagProjection {
         Some(noisy)
     }
 
-    /// Standard deviation per coordinate.
+    /// Returns the standard deviation per coordinate.
     fn corner_std_px(&self, spec: &CameraWorldSpec) -> f64 {
         let sharp_px = spec.corner_noise_px * (0.8 + 0.2 * self.range_m) / self.cos_incidence.sqrt();
         sharp_px * (1.0 + spec.blur_noise_per_px * self.blur_px)
     }
 
-    /// Plausible margin for a reader who filters by it: large and frontal tags near 100.
+    /// Returns a plausible margin for readers that filter by it: large and frontal tags have nearly 100.
     pub(super) fn decision_margin(&self) -> f64 {
         100.0 * self.cos_incidence * (1.0 - (-self.side_px / 40.0).exp())
     }

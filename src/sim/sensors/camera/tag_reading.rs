@@ -1,4 +1,4 @@
-//! The id that the detector reads on a tag: misreadings by a fault, and wrong ids at random.
+//! Ids that the detector reads on tags: misreadings by a fault, and random wrong ids.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use armcal_core::stats::stream_rng;
 
 #[derive(Debug)]
 pub(super) struct TagReader {
-    /// Ids read in place of an id, by that id.
+    /// Misread ids, keyed by the true id.
     misread: BTreeMap<u32, u32>,
     wrong_id_probability: f64,
     wrong_ids: ChaCha8Rng,
@@ -26,12 +26,12 @@ impl TagReader {
         self.misread.insert(id, as_id);
     }
 
-    /// The id that is read without random errors.
+    /// Returns the id that is read without random errors.
     pub(super) fn usual_id(&self, id: u32) -> u32 {
         self.misread.get(&id).copied().unwrap_or(id)
     }
 
-    /// The id that is read in one image; a wrong one is that of another tag in `tags`.
+    /// Returns the id that is read in one image; a wrong one is that of another tag in `tags`.
     pub(super) fn read_id(&mut self, id: u32, tags: &[TagOnLink]) -> u32 {
         let usual = self.usual_id(id);
         let others = tags.len().saturating_sub(1);

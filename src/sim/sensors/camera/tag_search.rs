@@ -1,4 +1,4 @@
-//! The camera's computer: a thread that compresses images and searches them for tags while the world goes on.
+//! Computer of the camera: a thread that compresses images and searches them for tags while the world continues.
 
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread;
@@ -12,16 +12,16 @@ use armcal_core::streams::{
 use armcal_core::time::Stamp;
 use armcal_detect::{DetectError, DetectorSettings, GreyImage, TagDetector, grey_of_jpeg};
 
-/// Images that wait; a camera that is further ahead waits itself.
+/// Number of images that may wait; a camera that is further ahead waits.
 const QUEUE: usize = 2;
 
-/// Hands images to the thread. It ends with the last of these.
+/// Sender of images to the thread, which ends when the last sender is dropped.
 #[derive(Debug)]
 pub(super) struct TagSearch {
     images: SyncSender<Job>,
 }
 
-/// What of an image is recorded.
+/// Recorded parts of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kept {
     TagsAlone,
@@ -35,14 +35,14 @@ struct Job {
     messages: LateSender,
 }
 
-/// What the thread works with.
+/// State of the thread.
 struct Searcher {
     detector: TagDetector,
     jpeg_quality: u8,
 }
 
 impl TagSearch {
-    /// Searches images of a lens as it is drawn.
+    /// Starts the search of images of a nominal lens.
     ///
     /// # Errors
     /// [`SimError::Detector`] where the detector or the thread does not start.
@@ -62,7 +62,7 @@ impl TagSearch {
             };
             let _ = started.send(Ok(()));
             for Job { frame, stamp, kept, messages } in jobs {
-                // Nobody waits for the images of a world that is gone.
+                // If the world is gone, nobody waits for its images.
                 let _ = messages.send(searcher.search(&frame, stamp, kept));
             }
         };
@@ -71,10 +71,10 @@ impl TagSearch {
         Ok(Self { images })
     }
 
-    /// The messages of an image.
+    /// Returns the messages of an image, which arrive later.
     pub(super) fn search(&self, frame: Frame, stamp: Stamp, kept: Kept) -> LateMessages {
         let (messages, late) = LateMessages::pair();
-        // Without a thread the sender is dropped, which `late` tells.
+        // Without a thread the sender is dropped, and `late` reports it.
         let _ = self.images.send(Job { frame, stamp, kept, messages });
         late
     }
@@ -82,7 +82,8 @@ impl TagSearch {
 
 impl Searcher {
     fn search(&mut self, frame: &Frame, stamp: Stamp, kept: Kept) -> Result<Vec<Message>, LateError> {
-        // The camera hands out JPEG. The detector sees what the recording will hold, whether or not this one goes in.
+        // The camera delivers JPEG. The detector reads the same pixels as in the recording, even if this image is not
+        // recorded.
         let jpeg = jpeg_bytes(frame, self.jpeg_quality)?;
         let unusable = |error: DetectError| SimError::Detector(error.to_string());
         let size_px = [frame.width, frame.height].map(|n| n as u32);
@@ -101,7 +102,7 @@ impl Searcher {
     }
 }
 
-/// As JPEG; colours at half the resolution.
+/// Compresses an image to JPEG; colours at half the resolution.
 fn jpeg_bytes(frame: &Frame, quality: u8) -> Result<Vec<u8>, SimError> {
     use jpeg_encoder::{ColorType, Encoder, SamplingFactor};
     let side = |n: usize| u16::try_from(n).map_err(|_| SimError::Jpeg(format!("a side of {n} pixels is too long")));

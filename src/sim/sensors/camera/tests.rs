@@ -1,4 +1,4 @@
-//! The camera against what its lens, its motion and its clock give in closed form.
+//! Camera compared with closed forms of its lens, its motion and its clock.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -29,12 +29,12 @@ struct Site {
     links: BodyPoses,
 }
 
-/// The stowed arm with exact sensors and a detector without noise, and what `change` makes of it.
+/// Returns the stowed arm with exact sensors and a detector without noise, changed by `change`.
 fn site(change: impl FnOnce(&mut WorldSpec)) -> Site {
     site_of("titan4", |_| {}, change)
 }
 
-/// The same of another robot, changed.
+/// Returns a site like [`site`] with another robot, changed by `arm`.
 fn site_of(robot: &str, arm: impl FnOnce(&mut Robot), change: impl FnOnce(&mut WorldSpec)) -> Site {
     let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots");
     let vehicle = load_vehicle(&root.join("vehicles/work-class-front.toml")).expect("it reads");
@@ -57,7 +57,7 @@ impl Site {
         WristCamera::new(&CameraInput { robot, built, solids, spec, seed: 4 })
     }
 
-    /// The rates of all joints, rad/s.
+    /// Takes an image while all joints move at `rates_rad_s`.
     fn image(&self, camera: &mut WristCamera, rates_rad_s: f64, at_s: f64) -> (Stamp, TagDetections) {
         let rates = JointAngles::from_fn(self.robot.n_joints(), |_| rates_rad_s);
         let motion = ArmMotion { chain: &self.robot.chain, angles: self.robot.stowed, rates };
@@ -68,7 +68,7 @@ impl Site {
         camera.project_tags(&ShutterState { poses, solids, motion, closed, demand })
     }
 
-    /// Corners by the drawing's lens, with the joints where they were `earlier_s` before.
+    /// Returns the corners by the nominal lens, with the joints at their angles `earlier_s` before.
     fn drawn_corners(&self, id: u32, rates_rad_s: f64, earlier_s: f64) -> [Vector2<f64>; 4] {
         let stowed = &self.robot.stowed;
         let angles = JointAngles::from_fn(stowed.len(), |j| stowed[j] - rates_rad_s * earlier_s);
@@ -100,8 +100,8 @@ fn an_instant_shows_where_the_corners_are() {
     }
 }
 
-/// The tag on the gripper is where the last joint carries it, is hidden by the wrist behind it, and moves no other
-/// tag's noise.
+/// The tag on the gripper moves with the last joint and is hidden by the wrist behind it. It changes no other tag's
+/// noise.
 #[test]
 fn the_tag_on_the_gripper_turns_with_the_last_joint_until_the_wrist_hides_it() {
     let mut with = site(|spec| spec.camera.corner_noise_px = 0.3);
@@ -139,7 +139,7 @@ fn the_tag_on_the_gripper_turns_with_the_last_joint_until_the_wrist_hides_it() {
     assert_eq!(seen_at.len() as i32, (last - first) / 10 + 1, "without a gap");
 }
 
-/// Against the mean over 2000 instants of the same motion; it lags by half of the exposure.
+/// The corners are the mean over 2000 instants of the same motion, which lags by half of the exposure.
 #[test]
 fn a_moving_camera_shows_the_mean_over_its_exposure() {
     const INSTANTS: u32 = 2000;
@@ -166,7 +166,7 @@ fn a_moving_camera_shows_the_mean_over_its_exposure() {
     }
 }
 
-/// The same image twice, with and without growth: noise scales by `1 + k blur`.
+/// One image with and without growth of the noise shows that noise scales by `1 + k blur`.
 #[test]
 fn noise_grows_with_the_blur() {
     let noisy = |growth: f64| {
@@ -272,7 +272,7 @@ fn wrong_ids_come_as_often_as_asked_and_are_those_of_other_tags() {
     assert_eq!(by_id.len(), known.len(), "each tag is taken for each other: {by_id:?}");
 }
 
-/// Effects that draw do so from streams of their own.
+/// Random effects have their own streams.
 #[test]
 fn wrong_ids_shift_no_noise() {
     let noisy = |p: f64| {
@@ -294,7 +294,7 @@ fn wrong_ids_shift_no_noise() {
     assert_eq!(noisy(0.0), noisy(1.0));
 }
 
-/// A lens drawn per seed is the one that the corners go through.
+/// The corners are projected by the lens that was drawn for the seed.
 #[test]
 fn corners_go_through_the_lens_as_built() {
     let site = site(|spec| {
@@ -314,8 +314,9 @@ fn corners_go_through_the_lens_as_built() {
     }
 }
 
-/// Behind a thin flat port at the pupil an angle becomes `asin(n sin)`, through a lens shorter by n: the drawing's
-/// focal length on the axis, and another one outwards. A dome beside the pupil shifts corners by some pixels.
+/// Behind a thin flat port at the pupil, an angle becomes `asin(n sin)`, through a lens shorter by n. The result is the
+/// nominal focal length on the axis, and another one outwards. A dome centred off the pupil shifts corners by several
+/// pixels.
 #[test]
 fn ports_keep_the_focal_length_near_the_axis() {
     let shift = |change: &dyn Fn(&mut CameraWorldSpec), angle_rad: f64, range_m: f64| {
@@ -361,8 +362,8 @@ fn ports_keep_the_focal_length_near_the_axis() {
     assert_eq!(shift(&centred, 0.7, 1.0), 0.0);
 }
 
-/// Squared errors in units of the model's covariance are chi-square of 2 degrees, and tags are found as often as it
-/// says.
+/// Squared errors in units of the model's covariance are chi-square of 2 degrees, and tags are found with the model's
+/// probability.
 #[test]
 fn fitted_noise_and_misses_are_those_of_the_model() {
     let site = site(|spec| spec.camera.noise = CornerNoiseKind::Fitted);
@@ -386,7 +387,7 @@ fn fitted_noise_and_misses_are_those_of_the_model() {
             }
         }
     }
-    // Variance 4 each.
+    // The variance is 4 for each.
     let mean = squares.iter().sum::<f64>() / squares.len() as f64;
     assert!((mean - 2.0).abs() < 5.0 * 2.0 / (squares.len() as f64).sqrt(), "{mean} of {}", squares.len());
     for (id, n) in n_found {

@@ -1,4 +1,4 @@
-//! The camera, on the wrist or beside the arm: one image when the shutter closes, by projection or by rendering.
+//! Camera on the wrist or fixed near the arm: one image when the shutter closes, by projection or by rendering.
 
 use std::collections::BTreeSet;
 
@@ -31,9 +31,9 @@ pub(crate) struct WristCamera {
     spec: CameraWorldSpec,
     lens: PortedLens,
     exposure: Exposure,
-    /// As built, by id; beside the arm, or all on one link before a camera that stands still.
+    /// Tags as built, by id: fixed near the arm, or all on one link in front of a fixed camera.
     tags: Vec<TagOnLink>,
-    /// The body that carries them.
+    /// Body that carries the tags.
     tag_body: usize,
     gripper_tag: Option<TagOnLink>,
     /// Indices of the shapes that hold the camera: they hide no tag.
@@ -41,15 +41,15 @@ pub(crate) struct WristCamera {
     /// Ids of tags that fell off.
     lost: BTreeSet<u32>,
     reader: TagReader,
-    /// No tag is detected before this.
+    /// Time before which no tag is detected.
     blind_until: Option<Stamp>,
-    /// In place of the standard noise.
+    /// Fitted noise model, which replaces the standard noise.
     fitted: Option<CornerNoise>,
     random: TagRandom,
-    /// Streams of the gripper tag alone, so that it does not change the noise of other tags.
+    /// Random streams of the gripper tag only, so that it does not change the noise of other tags.
     gripper_random: TagRandom,
     clock: CameraClock,
-    /// With rendered images.
+    /// Renderer, in a world with rendered images.
     rendered: Option<Box<RenderedCamera>>,
 }
 
@@ -68,7 +68,8 @@ impl TagRandom {
         }
     }
 
-    /// A uniform number that decides on a missed detection, and the noise of the corners in standard deviations.
+    /// Returns a uniform number that decides on a missed detection, and the noise of the corners in standard
+    /// deviations.
     fn draw(&mut self) -> (f64, [Vector2<f64>; 4]) {
         let uniform = self.misses.random_range(0.0..1.0);
         let noise = [(); 4].map(|()| Vector2::from_fn(|_, _| StandardNormal.sample(&mut self.corner_noise)));
@@ -76,7 +77,7 @@ impl TagRandom {
     }
 }
 
-/// Parts of a world that make a wrist camera.
+/// Parts of a world from which a wrist camera is built.
 #[derive(Clone, Copy)]
 pub(crate) struct CameraInput<'a> {
     pub robot: &'a Robot,
@@ -86,29 +87,29 @@ pub(crate) struct CameraInput<'a> {
     pub seed: u64,
 }
 
-/// The scene when the shutter closes.
+/// Scene when the shutter closes.
 #[derive(Clone, Copy)]
 pub(crate) struct ShutterState<'a> {
     pub poses: ScenePoses<'a>,
-    /// Placed at `poses`.
+    /// Solids, placed at `poses`.
     pub solids: &'a Solids,
     pub motion: ArmMotion<'a>,
     pub closed: Stamp,
     pub demand: ImageDemand,
 }
 
-/// An image's tags as they arrive.
+/// Tags of an image, with its time of arrival.
 #[derive(Debug)]
 pub(crate) struct CameraShot {
     pub arrival: Stamp,
     pub tags: SeenTags,
 }
 
-/// The tags of an image.
+/// Tags of an image.
 #[derive(Debug)]
 pub(crate) enum SeenTags {
     Projected(TagDetections),
-    /// Searched for in a rendered image: detections, rejects, the image itself if it is to be recorded.
+    /// Results of the search in a rendered image: detections, rejects, and the image itself if it is to be recorded.
     Searched(LateMessages),
 }
 
@@ -141,7 +142,7 @@ impl WristCamera {
         }
     }
 
-    /// Renders images from now on if the world asks for it.
+    /// Renders images from now on, if the world asks for it.
     ///
     /// # Errors
     /// [`SimError`] where there is no light, or no detector.
@@ -152,39 +153,39 @@ impl WristCamera {
         Ok(())
     }
 
-    /// True pose of the camera.
+    /// Returns the true pose of the camera.
     pub(crate) fn base_from_camera(&self, links: &BodyPoses) -> Isometry3<f64> {
         links.frame(&self.exposure.mount)
     }
 
-    /// A tag falls off.
+    /// Removes a tag that falls off.
     pub(crate) fn lose(&mut self, id: u32) {
         self.lost.insert(id);
     }
 
-    /// The camera is displaced on its mount; `motion` in its own axes.
+    /// Moves the camera on its mount by `motion`, in its own axes.
     pub(crate) fn slip(&mut self, motion: Isometry3<f64>) {
         self.exposure.mount.link_from_frame *= motion;
     }
 
-    /// A tag is displaced; `motion` in its own axes.
+    /// Moves a tag by `motion`, in its own axes.
     pub(crate) fn move_tag(&mut self, id: u32, motion: Isometry3<f64>) {
         for tag in self.tags.iter_mut().filter(|tag| tag.id == id) {
             tag.mount.link_from_frame *= motion;
         }
     }
 
-    /// The detector reads another id on a tag from now on.
+    /// Makes the detector read another id on a tag from now on.
     pub(crate) fn misread(&mut self, id: u32, as_id: u32) {
         self.reader.misread(id, as_id);
     }
 
-    /// Silt hides everything until then.
+    /// Hides everything in silt until a time.
     pub(crate) fn blind(&mut self, until: Stamp) {
         self.blind_until = Some(until);
     }
 
-    /// Takes an image; `None` where none is due.
+    /// Takes an image; `None` if none is due.
     pub(crate) fn take_image(&mut self, shutter: &ShutterState) -> Option<CameraShot> {
         let closed = shutter.closed;
         let Some(mut rendered) = self.rendered.take() else {
@@ -203,8 +204,7 @@ impl WristCamera {
         let ShutterState { poses, motion, closed, .. } = shutter;
         let at_end = self.base_from_camera(poses.links);
         let base_from_camera = self.exposure.poses(&at_end, motion, 0);
-        // At each instant a body's shapes stand to the camera as they would to a camera on the path relative to that
-        // body.
+        // A camera on the path relative to a body sees the body's shapes at each instant as the actual camera does.
         let carried = |body: usize| {
             let seen_from = self.exposure.poses(&at_end, motion, body);
             std::array::from_fn(|k| base_from_camera[k] * seen_from[k].inverse())
@@ -225,8 +225,8 @@ impl WristCamera {
         rendered.take_image(&scene, &carried, *closed, stamp)
     }
 
-    /// Detections by projection: the arrival of the image, late with jitter, and its tags with the stamp of the
-    /// camera's clock.
+    /// Detects tags by projection. Returns the arrival of the image, late with jitter, and its tags with the stamp of
+    /// the camera's clock.
     pub(crate) fn project_tags(&mut self, shutter: &ShutterState) -> (Stamp, TagDetections) {
         let ShutterState { poses, solids, motion, closed, .. } = shutter;
         let base_from_camera = self.base_from_camera(poses.links);
@@ -237,8 +237,8 @@ impl WristCamera {
         let is_blind = self.blind_until.is_some_and(|until| *closed < until);
         let n_surveyed = self.tags.len();
         for (i, tag) in self.tags_at(poses.links).into_iter().enumerate() {
-            // Every tag draws its random numbers, detected or not: one more tag in view does not change the noise of
-            // another.
+            // Every tag draws its random numbers, detected or not, so that one more tag in view does not change the
+            // noise of another.
             let is_surveyed = i < n_surveyed;
             let random = if is_surveyed { &mut self.random } else { &mut self.gripper_random };
             let (uniform, noise) = random.draw();
@@ -267,13 +267,14 @@ impl WristCamera {
         (arrival, TagDetections { stamp, tags })
     }
 
-    /// All tags in the base frame: those of the survey by id, fallen ones among them, then the one on the gripper.
+    /// Returns all tags in the base frame: those of the survey by id, including fallen ones, then the one on the
+    /// gripper.
     fn tags_at(&self, links: &BodyPoses) -> Vec<TagInBase> {
         self.tags.iter().chain(&self.gripper_tag).map(|tag| tag.at(links)).collect()
     }
 }
 
-/// The corner noise model fitted to detections in the world's kind of water, if the world asks for it.
+/// Returns the corner noise model for the world's kind of water, if the world asks for a fitted one.
 fn fitted_noise(spec: &WorldSpec) -> Option<CornerNoise> {
     (spec.camera.noise == CornerNoiseKind::Fitted).then_some(match spec.image.water {
         WaterKind::Clear => CornerNoise::CLEAR,

@@ -1,7 +1,7 @@
-//! An encoder: `reading = shaft + offset + e sin(shaft + phase)`, in whole steps of a turn.
+//! Encoder: `reading = shaft + offset + e sin(shaft + phase)`, in whole steps of a turn.
 //!
-//! The once-a-turn error is that of a disc off its axis (eccentricity over the lines' radius). No wiper, no track:
-//! neither temperature, pressure, drift nor noise move it.
+//! The once-a-turn error is that of a disc off its axis (eccentricity over the lines' radius). An encoder has no wiper
+//! and no track: temperature, pressure, drift and noise do not affect it.
 
 use std::f64::consts::TAU;
 
@@ -12,7 +12,7 @@ use crate::spec::JointSensorsSpec;
 pub(super) struct Encoder {
     offset_rad: f64,
     eccentricity: Option<Harmonic>,
-    /// 0 for none.
+    /// Resolution, rad; 0 for none.
     step_rad: f64,
 }
 
@@ -31,7 +31,7 @@ impl Encoder {
         shaft_rad + self.offset_rad + error
     }
 
-    /// The step that a reading falls on.
+    /// Returns the step nearest to a reading.
     pub(super) fn stepped_rad(&self, reading_rad: f64) -> f64 {
         if self.step_rad > 0.0 { (reading_rad / self.step_rad).round() * self.step_rad } else { reading_rad }
     }

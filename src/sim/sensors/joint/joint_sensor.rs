@@ -1,4 +1,4 @@
-//! One joint sensor: backlash, sensing element, slip, gears and quantizer in a row.
+//! Joint sensor: a chain of backlash, sensing element, slip, gears and quantizer.
 
 use crate::as_built::{JointAsBuilt, WornSpot};
 use crate::sensors::OilState;
@@ -9,21 +9,21 @@ use crate::sensors::joint::resolver::Resolver;
 use crate::spec::JointSensorsSpec;
 use armcal_core::robot::{JointSensorSpec, SensorKind};
 
-/// One joint sensor as built.
+/// Joint sensor as built.
 #[derive(Clone, Debug)]
 pub(crate) struct JointSensor {
     center_rad: f64,
     gear_ratio: f64,
-    /// Of the reading by the shaft's angle, nearly.
+    /// Approximate slope of the reading over the shaft's angle.
     slope: f64,
     half_play_rad: f64,
     shaft_rad: f64,
     element: Element,
     /// Sum of the slips on the shaft, rad.
     jump_rad: f64,
-    /// Spots that wore on the way.
+    /// Spots that wore during the run.
     spots: Vec<WornSpot>,
-    /// -1 where it reads the other side of the middle of the joint's range.
+    /// -1 if the sense is reversed about the middle of the joint's range, else 1.
     sense: f64,
     word: Quantizer,
 }
@@ -41,7 +41,7 @@ enum Element {
 pub(crate) struct JointInput {
     pub angle_rad: f64,
     pub around: OilState,
-    /// Since the last sample, s.
+    /// Time since the last sample, s.
     pub elapsed_s: f64,
 }
 
@@ -66,7 +66,7 @@ impl JointSensor {
         }
     }
 
-    /// Centres play and hysteresis at `angle_rad`.
+    /// Centres backlash and hysteresis at `angle_rad`.
     pub(crate) fn settle(&mut self, angle_rad: f64) {
         self.shaft_rad = angle_rad;
         if let Element::Potentiometer(pot) = &mut self.element {
@@ -74,7 +74,7 @@ impl JointSensor {
         }
     }
 
-    /// The reading without noise and steps at a settled shaft angle, rad.
+    /// Returns the reading without noise and steps at a settled shaft angle, rad.
     pub(super) fn reading_rad(&self, shaft_rad: f64, around: &OilState) -> f64 {
         let read = match &self.element {
             Element::Potentiometer(pot) => pot.reading_rad(shaft_rad, around),
@@ -84,39 +84,40 @@ impl JointSensor {
         self.spots.iter().fold(read + self.jump_rad, |read, spot| read + spot.bump_rad(shaft_rad))
     }
 
-    /// Slip: the reading is `by_rad` larger from now on.
+    /// Makes the sensor slip: the reading is `by_rad` larger from now on.
     pub(crate) fn jump(&mut self, by_rad: f64) {
         self.jump_rad += by_rad;
     }
 
-    /// A spot of the track wears.
+    /// Adds a worn spot to the track.
     pub(crate) fn wear(&mut self, spot: WornSpot) {
         self.spots.push(spot);
     }
 
-    /// Its sense turns round.
+    /// Reverses the sense.
     pub(crate) fn reverse(&mut self) {
         self.sense = -self.sense;
     }
 
-    /// The wiper, where it has one, loses contact so often from now on.
+    /// Makes the wiper, if there is one, lose contact at this rate from now on.
     pub(crate) fn lose_contact(&mut self, dropout_per_s: f64) {
         if let Element::Potentiometer(pot) = &mut self.element {
             pot.lose_contact(dropout_per_s);
         }
     }
 
-    /// Stuck: the last word stays from now on.
+    /// Makes the sensor stick: the last word stays from now on.
     pub(crate) fn stick(&mut self) {
         self.word.stick();
     }
 
-    /// Its line breaks: from now on it reads an open input, 0 counts and the converter's noise.
+    /// Breaks the wire: from now on the sensor reads an open input, 0 counts and the converter's noise.
     pub(crate) fn die(&mut self) {
         self.word.die();
     }
 
-    /// The shaft angle at which it reads `reading_rad`: fixed-point iteration, for what bends the scale is slight.
+    /// Returns the shaft angle at which the sensor reads `reading_rad`, by fixed-point iteration: the nonlinearity is
+    /// slight.
     pub(crate) fn angle_for_reading(&self, reading_rad: f64, around: &OilState) -> f64 {
         let mut angle = reading_rad;
         for _ in 0..200 {
@@ -125,7 +126,7 @@ impl JointSensor {
         angle
     }
 
-    /// Takes a sample, raw counts 0..wrap.
+    /// Takes a sample in raw counts, 0..wrap.
     pub(crate) fn sample(&mut self, input: &JointInput) -> f64 {
         let half_play = self.half_play_rad;
         self.shaft_rad = self.shaft_rad.clamp(input.angle_rad - half_play, input.angle_rad + half_play);
@@ -137,7 +138,7 @@ impl JointSensor {
         if let Element::Encoder(encoder) = &self.element {
             reading_rad = encoder.stepped_rad(reading_rad);
         }
-        // Gears between shaft and sensor turn about the middle of the range, where both agree.
+        // Gears between shaft and sensor turn about the middle of the range, where both angles agree.
         let travel_rad = self.sense * self.gear_ratio * (reading_rad - self.center_rad);
         self.word.read((!is_open).then_some(self.center_rad + travel_rad))
     }

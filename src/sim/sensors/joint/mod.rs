@@ -1,4 +1,4 @@
-//! A joint sensor: true angle to raw counts.
+//! Joint sensor: from the true angle to raw counts.
 //!
 //! In stages: backlash between joint and shaft; the sensing element by its kind (`potentiometer`, `encoder`,
 //! `resolver`); a slip on the shaft; gears; and the `quantizer`: nominal scale, noise, resolution, wrap, and the words

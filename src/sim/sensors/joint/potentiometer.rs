@@ -1,12 +1,12 @@
 //! A potentiometer: a wiper on a resistive track.
 //!
-//! `reading = m + (1 + g + cg (T - T0) + pg p) (x - m) + nl(x) + o + co (T - T0) + po p + spot(x) + drift`: m the
-//! middle of the joint's range, T the oil's temperature, p the pressure above the surface's,
-//! `spot = peak exp(-((x - c) / width)^2 / 2)`. The wiper's contact x drags behind the shaft:
-//! `x = shaft + w (play(shaft) - shaft)`, the play `hysteresis / w` wide. Unlike the play between joint and shaft (w =
-//! 1, where a reversal first moves nothing) the contact moves on at once with slope 1 - w, for only part of the spring
-//! has to turn over. `drift` walks with time and with travel. A contact that is lost leaves the input open: a Markov
-//! chain in time with rates `anywhere + worn spot(x) / peak` and `1 / mean length`.
+//! `reading = m + (1 + g + cg (T - T0) + pg p) (x - m) + nl(x) + o + co (T - T0) + po p + spot(x) + drift`. Here m is
+//! the middle of the joint's range, T the oil's temperature, and p the pressure above that of the surface. The spot is
+//! `spot = peak exp(-((x - c) / width)^2 / 2)`. The wiper's contact x drags behind the shaft: `x = shaft + w
+//! (play(shaft) - shaft)`, with a play `hysteresis / w` wide. The backlash between joint and shaft has w = 1: a
+//! reversal first moves nothing. The contact, however, moves at once with slope 1 - w, because only part of the spring
+//! has to turn over. `drift` walks with time and with travel. A lost contact leaves the input open: a Markov chain in
+//! time with rates `anywhere + worn spot(x) / peak` and `1 / mean length`.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -23,7 +23,7 @@ pub(super) struct Potentiometer {
     spec: JointSensorsSpec,
     /// Shaft angle at the last sample.
     shaft_rad: f64,
-    /// The middle of the wiper's play.
+    /// Middle of the wiper's play.
     dragged_rad: f64,
     drift_rad: f64,
     is_open: bool,
@@ -53,7 +53,7 @@ impl Potentiometer {
         self.dragged_rad = shaft_rad;
     }
 
-    /// Follows the shaft; gives the contact's place and whether contact is lost.
+    /// Follows the shaft; returns the contact's position, and true if contact is lost.
     pub(super) fn advance(&mut self, shaft_rad: f64, elapsed_s: f64) -> (f64, bool) {
         self.walk_on((shaft_rad - self.shaft_rad).abs(), elapsed_s);
         self.shaft_rad = shaft_rad;
@@ -65,7 +65,7 @@ impl Potentiometer {
         (contact_rad, self.is_open)
     }
 
-    /// So often from now on, anywhere on the track.
+    /// Sets the rate at which contact is lost anywhere on the track from now on.
     pub(super) fn lose_contact(&mut self, dropout_per_s: f64) {
         self.spec.dropout_per_s = dropout_per_s;
     }
@@ -96,7 +96,7 @@ impl Potentiometer {
         }
     }
 
-    /// One step of the chain, exact for any length of time while the contact stays in its place.
+    /// Advances the chain by one step, exact for any length of time while the contact does not move.
     fn lose_or_find_contact(&mut self, contact_rad: f64, elapsed_s: f64) {
         let (anywhere, on_spot) = (self.spec.dropout_per_s, self.spec.worn_dropout_per_s);
         if anywhere <= 0.0 && on_spot <= 0.0 {

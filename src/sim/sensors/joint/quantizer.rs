@@ -1,7 +1,7 @@
 //! Quantizer of raw counts: `wrap(step round((offset + scale angle + noise) / step))`, by the datasheet's offset and
 //! scale.
 //!
-//! An input without a sensor is pulled to 0 counts and shows the converter's noise, which cannot go below 0 (assumed).
+//! An input without a sensor is pulled to 0 counts and shows the converter's noise, limited at 0 (assumed).
 
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -16,15 +16,16 @@ pub(super) struct Quantizer {
     counts_per_rad: f64,
     wrap_counts: f64,
     noise_rms_counts: f64,
-    /// 0 for none.
+    /// Step of the converter, counts; 0 for none.
     step_counts: f64,
     state: State,
-    /// The last word.
+    /// Last word, counts.
     counts: f64,
     noise: ChaCha8Rng,
 }
 
-/// Nine bits a turn have 1.4 counts a degree. Whatever has fewer is no converter's word but an angle in rad or deg.
+/// Smallest scale of a converter's word: nine bits per turn are 1.4 counts per degree. A smaller scale is that of an
+/// angle in rad or deg.
 const MIN_WORD_COUNTS_PER_DEG: f64 = 1.4;
 
 fn is_word(nominal: &JointSensorSpec) -> bool {
@@ -44,7 +45,7 @@ impl Quantizer {
             offset_counts: nominal.offset_counts,
             counts_per_rad: nominal.counts_per_rad,
             wrap_counts: nominal.wrap_counts,
-            // An encoder counts lines; nothing is converted.
+            // An encoder counts lines; it has no converter.
             noise_rms_counts: if nominal.kind == SensorKind::Encoder { 0.0 } else { spec.noise_rms_counts },
             step_counts: if is_word(nominal) { spec.resolution_counts } else { 0.0 },
             state: State::Alive,
@@ -64,7 +65,8 @@ impl Quantizer {
         self.state = State::Dead;
     }
 
-    /// The word for an angle, or for an open input. Each takes its share of the noise: what breaks does not shift it.
+    /// Returns the word for an angle, or for an open input. Each call draws one noise value, so that faults do not
+    /// shift the stream.
     pub(super) fn read(&mut self, angle_rad: Option<f64>) -> f64 {
         let noise: f64 = StandardNormal.sample(&mut self.noise);
         let noise_counts = self.noise_rms_counts * noise;
@@ -75,7 +77,7 @@ impl Quantizer {
                 self.counts = self.stepped(exact + noise_counts).rem_euclid(self.wrap_counts);
             }
             (State::Dead, _) | (State::Alive, None) => {
-                // Added to, for a rounded -0.3 is a zero with a sign.
+                // The addition turns -0.0, a rounded -0.3, into 0.0.
                 self.counts = self.stepped(noise_counts).clamp(0.0, self.wrap_counts - 1.0) + 0.0;
             }
         }

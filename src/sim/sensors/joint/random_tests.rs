@@ -5,7 +5,7 @@ use crate::sensors::joint::tests::{COUNTS_PER_RAD, at, perfect, pot, reading_of,
 use crate::sensors::joint::*;
 use crate::spec::JointSensorsSpec;
 
-/// The normal distribution: a series without cancellation, exact to rounding within 6 sigma.
+/// Returns the normal distribution function: a series without cancellation, exact to rounding within 6 sigma.
 fn normal_cdf(x: f64) -> f64 {
     let (mut term, mut sum) = (x, x);
     for k in 1..200 {
@@ -15,17 +15,17 @@ fn normal_cdf(x: f64) -> f64 {
     0.5 + sum * (-0.5 * x * x).exp() / std::f64::consts::TAU.sqrt()
 }
 
-/// Mean of squares over the expected one.
+/// Returns the mean of squares over the expected one.
 fn variance_ratio(samples: &[f64], expected: f64) -> f64 {
     samples.iter().map(|x| x * x).sum::<f64>() / samples.len() as f64 / expected
 }
 
-/// Chi-square of the words' histogram against the bell cut at the converter's steps.
+/// The words' histogram agrees with the normal distribution cut at the converter's steps, by chi-square.
 #[test]
 fn the_histogram_of_the_noise_is_the_normal_ones() {
     const N: u32 = 100_000;
     const EXACT: f64 = 30_000.3;
-    /// Words on either side of the middle; what lies beyond is pooled.
+    /// Number of words on either side of the middle; words beyond are pooled.
     const REACH: i32 = 5;
     let spec = JointSensorsSpec { noise_rms_counts: 1.5, resolution_counts: 1.0, ..silent() };
     for seed in 1..=5 {
@@ -53,20 +53,20 @@ fn the_histogram_of_the_noise_is_the_normal_ones() {
         eprintln!("seed {seed}: chi2 {chi2:.1} of 10 degrees of freedom, variance {variance:.4}");
         // 0.01 % and 99.99 % quantiles of chi-square with 10 degrees of freedom.
         assert!((0.89..35.6).contains(&chi2), "{chi2}");
-        // Rounding adds 1/12 count^2; 1e5 samples know the variance to 0.45 %.
+        // Rounding adds 1/12 count^2; 1e5 samples determine the variance to 0.45 %.
         assert!((variance / (2.25 + 1.0 / 12.0) - 1.0).abs() < 0.018, "{variance}");
     }
 }
 
-/// Allan variance of means over `m` samples that follow each other.
+/// Returns the Allan variance of means over `m` consecutive samples.
 fn allan_variance(samples: &[f64], m: usize) -> (f64, usize) {
     let means: Vec<f64> = samples.chunks_exact(m).map(|c| c.iter().sum::<f64>() / m as f64).collect();
     let squares: f64 = means.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).sum();
     (0.5 * squares / (means.len() - 1) as f64, means.len() - 1)
 }
 
-/// White noise falls as sigma^2 / m, the walk grows as q (2 m^2 + 1) / 6 m, which tends to K^2 tau / 3 (Allan variance
-/// of rate random walk, IEEE Std 952): the standard world's sensor, one reading a second for 36 h, 16 seeds.
+/// White noise falls as sigma^2 / m. The walk grows as q (2 m^2 + 1) / 6 m, which tends to K^2 tau / 3 (Allan variance
+/// of rate random walk, IEEE Std 952). The sensor is the standard world's: one reading a second for 36 h, 16 seeds.
 #[test]
 fn the_allan_variance_of_noise_and_drift_is_the_closed_one() {
     const N: usize = 1 << 17;
@@ -104,7 +104,7 @@ fn the_allan_variance_of_noise_and_drift_is_the_closed_one() {
     assert!((falling + 1.0).abs() < 0.05 && (rising - 1.0).abs() < 0.15, "{falling} {rising}");
 }
 
-/// A quarter of an hour: half of the hourly figure, however often it is read.
+/// In a quarter of an hour, the walk reaches half of the hourly figure, regardless of the number of readings.
 #[test]
 fn drift_walks_with_the_root_of_time() {
     let spec = JointSensorsSpec { drift_rad_per_sqrt_h: 1e-3, ..silent() };
@@ -117,12 +117,12 @@ fn drift_walks_with_the_root_of_time() {
             })
             .collect();
         let ratio = variance_ratio(&walked, 5e-4 * 5e-4);
-        // 4000 runs know a variance to 2.2 %.
+        // 4000 runs determine a variance to 2.2 %.
         assert!((ratio - 1.0).abs() < 0.09, "{n} times {elapsed_s} s: {ratio}");
     }
 }
 
-/// 40 sweeps of 1 rad there and back are 80 rad of travel, in whatever time and steps.
+/// 40 sweeps of 1 rad to and fro are 80 rad of travel, for any time and steps.
 #[test]
 fn drift_walks_with_the_root_of_travel() {
     let spec = JointSensorsSpec { drift_rad_per_sqrt_turn: 1e-3, ..silent() };
@@ -144,7 +144,7 @@ fn drift_walks_with_the_root_of_travel() {
             })
             .collect();
         let ratio = variance_ratio(&walked, expected);
-        // 2000 runs know a variance to 3.2 %.
+        // 2000 runs determine a variance to 3.2 %.
         assert!((ratio - 1.0).abs() < 0.13, "{steps} steps a sweep, {elapsed_s} s: {ratio}");
     }
     let mut resting = pot(&perfect(), &spec, 1);
@@ -155,7 +155,7 @@ fn drift_walks_with_the_root_of_travel() {
     }
 }
 
-/// Share of samples that are lost, and the mean length of a drop-out, in samples.
+/// Returns the share of samples that are lost, and the mean length of a drop-out, in samples.
 fn dropouts(spec: &JointSensorsSpec, built: &JointAsBuilt, angle_rad: f64, elapsed_s: f64) -> (f64, f64) {
     const N: u32 = 400_000;
     let mut sensor = pot(built, spec, 3);
@@ -170,8 +170,8 @@ fn dropouts(spec: &JointSensorsSpec, built: &JointAsBuilt, angle_rad: f64, elaps
     (lost / f64::from(N), lost / runs)
 }
 
-/// The chain in time: a share `l / (l + f)` is lost; a drop-out that a sample met lasts `1 / P(found at the next)`
-/// samples on average, `P = f / (l + f) (1 - exp(-(l + f) dt))`.
+/// In the chain, a share `l / (l + f)` is lost. A drop-out that a sample met lasts `1 / P(found at the next)` samples
+/// on average, `P = f / (l + f) (1 - exp(-(l + f) dt))`.
 #[test]
 fn dropouts_come_and_last_as_the_chain_says() {
     let spot = WornSpot { center_rad: -1.0, peak_rad: 0.0, width_rad: 0.05 };
@@ -190,7 +190,7 @@ fn dropouts_come_and_last_as_the_chain_says() {
         let expected_share = lost_per_s / both;
         let expected_length = both / (found_per_s * (1.0 - (-both * elapsed_s).exp()));
         let (share, length) = dropouts(spec, &worn, angle, elapsed_s);
-        // Some 10,000 drop-outs or more.
+        // About 10,000 drop-outs or more.
         assert!((share / expected_share - 1.0).abs() < 0.06, "{share} against {expected_share} lost at {angle}");
         assert!((length / expected_length - 1.0).abs() < 0.04, "{length} against {expected_length} samples");
     }
@@ -198,8 +198,8 @@ fn dropouts_come_and_last_as_the_chain_says() {
     assert_eq!(share, 0.0, "20 widths from the spot");
 }
 
-/// What is switched on shifts nothing else: the noise of a sensor with drop-outs and drift by use is that of one
-/// without.
+/// An effect that is switched on shifts no other random numbers: the noise of a sensor with drop-outs and drift by use
+/// is that of one without.
 #[test]
 fn effects_have_random_streams_of_their_own() {
     let plain = JointSensorsSpec { noise_rms_counts: 1.5, drift_rad_per_sqrt_h: 1e-3, ..silent() };

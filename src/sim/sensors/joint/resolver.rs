@@ -1,8 +1,8 @@
-//! A resolver: `reading = shaft + offset + c (T - T0) + (atan2((1 + a) sin f, cos(f + q)) - f) / p`,
-//! `f = p shaft + phase`.
+//! Resolver: `reading = shaft + offset + c (T - T0) + (atan2((1 + a) sin f, cos(f + q)) - f) / p`, `f = p shaft +
+//! phase`.
 //!
-//! The windings' voltages differ by a and lack q to a right angle; p pole pairs. To first order the error is
-//! `(a sin 2f + q (1 - cos 2f)) / 2p`: twice an electrical turn.
+//! The windings' voltages differ by a, and their angle differs from a right one by q; there are p pole pairs. To first
+//! order the error is `(a sin 2f + q (1 - cos 2f)) / 2p`: twice per electrical turn.
 
 use std::f64::consts::TAU;
 

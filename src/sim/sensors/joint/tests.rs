@@ -1,4 +1,4 @@
-//! Each effect alone against its closed form.
+//! Each effect alone compared with its closed form.
 
 use std::num::NonZeroU8;
 
@@ -11,7 +11,7 @@ use armcal_core::robot::{JointSensorSpec, SensorKind};
 pub(super) const COUNTS_PER_RAD: f64 = 46.0 * 180.0 / std::f64::consts::PI;
 const OFFSET_COUNTS: f64 = 65322.0;
 const WRAP_COUNTS: f64 = 65536.0;
-/// Rounding of sums of figures about 1e5.
+/// Rounding of sums of numbers about 1e5, counts.
 const TOLERANCE_COUNTS: f64 = 1e-8;
 const MPA: f64 = 1e6;
 
@@ -55,12 +55,12 @@ fn sensor_of(kind: SensorKind, built: &JointAsBuilt, spec: &JointSensorsSpec, se
     JointSensor::new(&nominal, built, spec, seed)
 }
 
-/// A potentiometer.
+/// Returns a potentiometer.
 pub(super) fn pot(built: &JointAsBuilt, spec: &JointSensorsSpec, seed: u64) -> JointSensor {
     sensor_of(SensorKind::Potentiometer, built, spec, seed)
 }
 
-/// At the reference temperature and the surface.
+/// Returns the input of an angle at the reference temperature and the surface.
 pub(super) fn at(angle_rad: f64) -> JointInput {
     within(angle_rad, 10.0, 0.0)
 }
@@ -73,7 +73,7 @@ fn word_of(reading_rad: f64) -> f64 {
     (OFFSET_COUNTS + COUNTS_PER_RAD * reading_rad).rem_euclid(WRAP_COUNTS)
 }
 
-/// A reading that counts stand for, rad; for angles within a quarter of the word about -1.5.
+/// Returns the reading for counts, rad; for angles within a quarter of the word about -1.5.
 pub(super) fn reading_of(counts: f64) -> f64 {
     (counts - OFFSET_COUNTS) / COUNTS_PER_RAD
 }
@@ -117,8 +117,8 @@ fn each_static_effect_of_a_potentiometer_is_its_closed_form() {
     }
 }
 
-/// What breaks on the way: a spot wears, the sense turns round about the middle of the range, the wiper loses contact
-/// and finds it again.
+/// Faults during a run: a spot wears, the sense is reversed about the middle of the joint's range, and the wiper loses
+/// and finds contact.
 #[test]
 fn a_spot_wears_the_sense_turns_and_contact_is_lost_from_one_moment_on() {
     let mut sensor = pot(&perfect(), &silent(), 1);
@@ -132,17 +132,17 @@ fn a_spot_wears_the_sense_turns_and_contact_is_lost_from_one_moment_on() {
     assert_word("reversed twice", sensor.sample(&at(0.2)), 0.2);
     sensor.lose_contact(10.0);
     let open = (0..2000).filter(|_| sensor.sample(&at(0.2)) == 0.0).count();
-    // A third of the time: 0.1 s between drop-outs of 0.05 s.
+    // Contact is lost for a third of the time: 0.1 s between drop-outs of 0.05 s.
     assert!((400..1000).contains(&open), "{open} of 2000");
 }
 
-/// rad, across the wrap.
+/// Returns the error of a word, rad, across the wrap.
 fn error_of(counts: f64, angle_rad: f64) -> f64 {
     let half = 0.5 * WRAP_COUNTS;
     ((counts - word_of(angle_rad) + half).rem_euclid(WRAP_COUNTS) - half) / COUNTS_PER_RAD
 }
 
-/// rad by rad.
+/// Error over angle, both in rad.
 type ErrorByAngle<'a> = &'a dyn Fn(f64) -> f64;
 
 #[test]
@@ -178,8 +178,8 @@ fn the_errors_over_the_range_are_their_closed_forms() {
     }
 }
 
-/// From rest: the contact lags by its share of the way up to half the width, and after each turn by as much the other
-/// way.
+/// From rest, the contact lags by its share of the way, up to half the width. After each turn it lags by as much in the
+/// other direction.
 #[test]
 fn the_loops_of_play_and_hysteresis_are_their_closed_forms() {
     let (width, step) = (0.01_f64, 0.0005);
@@ -216,7 +216,8 @@ fn a_slip_adds_a_stuck_sensor_keeps_its_word_and_a_dead_one_reads_an_open_input(
     assert_eq!(sensor.sample(&at(-0.4)), 0.0, "nothing left that could stick");
 }
 
-/// Noise about zero that cannot go below it: half of the words are 0, the mean of the others is that of half a bell.
+/// Noise about zero is limited at 0: half of the words are 0, and the mean of the others is that of half a normal
+/// distribution.
 #[test]
 fn a_dead_sensor_shows_the_converters_noise() {
     let mut sensor = pot(&perfect(), &JointSensorsSpec { noise_rms_counts: 1.5, ..silent() }, 1);
@@ -225,13 +226,13 @@ fn a_dead_sensor_shows_the_converters_noise() {
     let words: Vec<f64> = (0..n).map(|_| sensor.sample(&at(0.3))).collect();
     let mean = words.iter().sum::<f64>() / f64::from(n);
     let expected = 1.5 / std::f64::consts::TAU.sqrt();
-    // The spread of the rectified bell is 0.58 of the bell's.
+    // The standard deviation of the rectified normal distribution is 0.58 of the whole one's.
     let tolerance = 4.0 * 0.58 * 1.5 / f64::from(n).sqrt();
     assert!((mean - expected).abs() < tolerance, "{mean} against {expected}");
     assert!(words.iter().all(|word| (0.0..10.0).contains(word)));
 }
 
-/// Reading minus angle on the way up, on the way down, and `turned_rad` after the turn at the top.
+/// Returns reading minus angle on the way up, on the way down, and `turned_rad` after the turn at the top.
 fn sweep(spec: &JointSensorsSpec, turned_rad: f64) -> [f64; 3] {
     let mut sensor = pot(&perfect(), spec, 1);
     sensor.settle(-2.0);
@@ -246,8 +247,8 @@ fn sweep(spec: &JointSensorsSpec, turned_rad: f64) -> [f64; 3] {
     [up, error(&mut sensor, -1.6), turned]
 }
 
-/// Both lag by half their width on either side. Just after a turn the play of the shaft has not moved at all, while the
-/// wiper has moved by 1 - share of the turn.
+/// Both lag by half their width on either side. Just after a turn, the shaft has not moved at all under backlash, while
+/// the wiper has moved by 1 - share of the turn.
 #[test]
 fn play_and_hysteresis_differ_by_their_width_between_the_directions() {
     let tolerance_rad = TOLERANCE_COUNTS / COUNTS_PER_RAD;
@@ -265,7 +266,7 @@ fn play_and_hysteresis_differ_by_their_width_between_the_directions() {
     }
 }
 
-/// Hysteresis depends on the path, not on its speed: the same turning points, 100 times as many samples.
+/// Hysteresis depends on the path, not on its speed: the turning points are the same with 100 times as many samples.
 #[test]
 fn hysteresis_does_not_depend_on_the_rate() {
     let spec = JointSensorsSpec { hysteresis_rad: 0.01, ..silent() };
@@ -285,7 +286,7 @@ fn hysteresis_does_not_depend_on_the_rate() {
     }
 }
 
-/// A staircase: each word is the multiple of the step nearest to the exact one, over three steps and across the wrap.
+/// Each word is the multiple of the step nearest to the exact value, over three steps and across the wrap.
 #[test]
 fn the_converter_rounds_to_its_step_and_the_word_wraps() {
     for step_counts in [1.0, 16.0] {
@@ -305,7 +306,7 @@ fn the_converter_rounds_to_its_step_and_the_word_wraps() {
     assert!((counts - (65322.0 + 230.0 - 65536.0)).abs() < TOLERANCE_COUNTS, "{counts}");
 }
 
-/// A count of a radian is an angle as a driver reports it.
+/// A count of a radian means that the driver reports angles.
 #[test]
 fn readings_that_are_angles_are_not_rounded_to_whole_counts() {
     let spec = JointSensorsSpec { resolution_counts: 1.0, ..silent() };
@@ -342,12 +343,12 @@ fn an_encoder_has_eccentricity_and_steps_and_nothing_of_a_potentiometer() {
         let step = std::f64::consts::TAU / 4096.0;
         assert_word("stepped", sample(&stepped, &built, &at(angle)), (expected / step).round() * step);
     }
-    // The play of the shaft is before any element.
+    // The backlash of the shaft precedes every element.
     let play = JointSensorsSpec { backlash_rad: 0.01, ..silent() };
     assert_word("play", sample(&play, &perfect(), &at(0.0)), -0.005);
 }
 
-/// Against the first-order error, with windings so good that the second order does not matter.
+/// The error agrees with the first-order one, with windings so good that the second order is negligible.
 #[test]
 fn a_resolver_errs_twice_an_electrical_turn() {
     let pole_pairs = NonZeroU8::new(3).expect("not 0");
@@ -374,7 +375,7 @@ fn a_resolver_errs_twice_an_electrical_turn() {
 #[test]
 fn the_angle_for_a_reading_is_the_inverse() {
     let harmonic = Harmonic { order: 3.0, amplitude_rad: 0.004, phase_rad: 0.3 };
-    // As steep as [world] allows: peak as high as wide.
+    // Worn spot as steep as [world] allows: peak as high as wide.
     let spot = WornSpot { center_rad: -0.45, peak_rad: -0.05, width_rad: 0.05 };
     let bent = JointAsBuilt { harmonics: vec![harmonic], gain_error: -0.05, offset_error_rad: 0.08, ..perfect() };
     let worn = JointAsBuilt { worn_spot: Some(spot), ..bent.clone() };

@@ -1,4 +1,4 @@
-//! The engines against each other: two implementations of one arm, each the other's oracle.
+//! Engines compared with each other: two implementations of one arm.
 
 use super::*;
 use crate::spec::EngineKind::{Featherstone, Rapier};
@@ -11,7 +11,7 @@ fn world_by(engine: EngineKind, change: impl Fn(&mut WorldSpec)) -> World {
     world(spec, 1)
 }
 
-/// Angles and tool in every period with the valves closed, on a vehicle that rocks.
+/// Returns angles and tool in every period with the valves closed, on a vehicle that rocks.
 fn held(engine: EngineKind, seconds: u32) -> Vec<Place> {
     let mut world = world_by(engine, |_| {});
     let period = |world: &mut World| {
@@ -24,7 +24,7 @@ fn held(engine: EngineKind, seconds: u32) -> Vec<Place> {
     (0..100 * seconds).map(|_| period(&mut world)).collect()
 }
 
-/// With valves closed the same oil carries the same arm.
+/// With closed valves, the same oil carries the same arm.
 #[test]
 fn engines_hold_the_tool_alike() {
     const LIMIT_M: f64 = 1e-5;
@@ -36,7 +36,7 @@ fn engines_hold_the_tool_alike() {
     assert!(off_m < LIMIT_M, "{off_m}");
 }
 
-/// The same set-points through valves, friction and a controller with noisy readings.
+/// The engines follow the same set-points through valves, friction and a controller with noisy readings.
 #[test]
 fn engines_move_the_tool_alike() {
     const REST_M: f64 = 7e-4;
@@ -57,7 +57,8 @@ fn engines_move_the_tool_alike() {
     assert!(median < REST_MEDIAN_M && high < REST_M, "{median} {high}");
 }
 
-/// Drives the tool at a point inside the vehicle; gives where it ends, base frame, and what began to touch.
+/// Drives the tool to a point inside the vehicle. Returns its final position, base frame, and the number of contacts
+/// that began.
 fn driven_into_vehicle(engine: EngineKind) -> (nalgebra::Vector3<f64>, usize) {
     struct Nothing;
     impl Sink for Nothing {
@@ -89,7 +90,7 @@ fn the_vehicle_stops_the_arm_in_both_engines() {
     let [(ours, our_touches), (rapiers, rapier_touches)] = [Featherstone, Rapier].map(driven_into_vehicle);
     eprintln!("the tool ends at {ours:.4?} and {rapiers:.4?} m; {our_touches} and {rapier_touches} periods in touch");
     assert!(our_touches > 100 && rapier_touches > 100);
-    // A spring of 5e5 N/m gives by 2 mm per 1000 N; along the plate friction decides.
+    // A spring of 5e5 N/m yields by 2 mm per 1000 N; along the plate, friction determines the position.
     let off = ours - rapiers;
     assert!(off.z.abs() < 3e-3 && off.norm() < 0.03, "{ours} {rapiers}");
 }
@@ -99,7 +100,7 @@ fn a_locked_valve_does_not_creep_under_rapier() {
     does_not_creep(Rapier);
 }
 
-/// Drives under rapier with one seed: all states of the truth.
+/// Runs with one seed under rapier give the same states of the truth.
 #[test]
 fn rapier_gives_the_same_bytes_again() {
     let [first, again] = [(), ()].map(|()| driven(2e-3, 4, Rapier).0);

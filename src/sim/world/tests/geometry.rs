@@ -3,7 +3,7 @@
 use super::*;
 use armcal_core::robot::Robot;
 
-/// Tool and camera are where forward kinematics of the arm as built has them, not where the nominal arm has them.
+/// Tool and camera are at the poses by forward kinematics of the arm as built, not of the nominal arm.
 #[test]
 fn tool_and_camera_follow_the_arm_as_built() {
     let nominal = load(&Path::new(ROOT).join("robots/titan4")).expect("the robot reads");

@@ -1,4 +1,4 @@
-//! The rendered camera against the geometric one.
+//! Rendered camera compared with the geometric one.
 
 use crate::sensors::camera::tests::*;
 use armcal_detect::{DetectorSettings, GreyImage, TagDetector, grey_of_jpeg};
@@ -25,7 +25,7 @@ impl Searched {
 }
 
 impl Site {
-    /// Images of a rendered camera, one a second.
+    /// Returns images of a rendered camera, one per second.
     fn rendered(&self, rates_rad_s: f64, seconds: u32, change: impl Fn(&mut WristCamera, u32)) -> Vec<Searched> {
         let root =
             Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots/vehicles/work-class-front.toml");
@@ -57,7 +57,7 @@ fn clear_deep_water(spec: &mut WorldSpec) {
     spec.camera.mode = CameraMode::Rendered;
 }
 
-/// The geometric camera's corners, read from pixels, at rest and on the way.
+/// The detector finds the geometric camera's corners in rendered pixels, at rest and in motion.
 #[test]
 fn the_detector_reads_what_the_projection_says() {
     for (exposure_s, rate_rad_s) in [(0.0, 0.0), (0.02, 0.1)] {
@@ -102,7 +102,7 @@ fn faults_show_in_the_pixels() {
     assert!(jpeg.starts_with(&[0xff, 0xd8]) && (10_000..400_000).contains(&jpeg.len()), "{}", jpeg.len());
 }
 
-/// The recording's own pixels give the same corners, to the last bit, and so do images that it leaves out.
+/// The recorded pixels give the same corners, to the last bit, and so do images that are not recorded.
 #[test]
 fn the_detector_sees_what_the_recording_holds() {
     let images_kept_every = |period_s: f64| {

@@ -1,4 +1,4 @@
-//! Tags that the arm carries before a camera that stands still.
+//! Tags that the arm carries in front of a fixed camera.
 
 use rand::RngExt;
 
@@ -11,7 +11,7 @@ enum Links {
     WithoutShapes,
 }
 
-/// The watched arm at a random configuration.
+/// Returns the watched arm in a random configuration.
 fn watched(seed: u64, links: Links, change: impl FnOnce(&mut WorldSpec)) -> Site {
     let mut rng = stream_rng(seed, "configuration");
     let pose = |robot: &mut Robot| {
@@ -42,7 +42,7 @@ fn carried_tags_are_where_their_link_is_and_the_camera_stays() {
     assert!(n > 20, "{n} tags seen");
 }
 
-/// Simpson's mean over the exposure, of tags that move.
+/// The corners of moving tags are Simpson's mean over the exposure.
 #[test]
 fn carried_tags_blur_as_they_move() {
     let (mut n, exposure_s, rate_rad_s) = (0, 0.05, 0.3);
@@ -61,7 +61,7 @@ fn carried_tags_blur_as_they_move() {
     assert!(n > 20, "{n} tags seen");
 }
 
-/// What an arm with shapes hides, the same arm without shapes shows, and it shows nothing less.
+/// The tags that an arm with shapes hides are visible on the same arm without shapes, and it hides no others.
 #[test]
 fn the_arms_own_links_hide_its_tags() {
     let (mut hidden, mut seen) = (0, 0);
