@@ -1,9 +1,9 @@
 //! Rows on disk: each one as soon as it is complete, and all in order at the end.
 //!
 //! While a campaign runs, rows grow in FILE.partial: a line with the fingerprint, the names, then rows in the order in
-//! which runs ended, each flushed and synced. A kill can damage only the last line. At the end FILE and its companions
-//! are written completely and put in place, and FILE.partial is removed last. After a kill in between they are only
-//! written again.
+//! which runs ended. Each row is flushed and synced, so a kill can damage only the last line. At the end FILE and its
+//! companions are written completely and put in place, and FILE.partial is removed last. After a kill in between they
+//! are only written again.
 
 use std::collections::BTreeSet;
 use std::fs::{File, OpenOptions, TryLockError};

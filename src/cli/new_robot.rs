@@ -144,7 +144,7 @@ const NEAR_M: f64 = 0.05;
 const STOWED_MARGIN_M: f64 = 0.03;
 
 /// Drafts the robot again with results from the arm's shapes: links that are near each other at nearly every pose, and
-/// a pose where no others are.
+/// a pose with no other near links.
 fn with_shapes(wanted: &NewRobot<'_>, robot: Robot, out: &Path) -> Result<(Vec<NewFile>, Robot)> {
     let read = |wanted: &NewRobot<'_>| -> Result<(Vec<NewFile>, Robot)> {
         let files = draft_robot(wanted, DraftedMeshes::Read)?.files;

@@ -23,7 +23,7 @@ pub(super) fn say_as_it_is(text: &str) -> Result<()> {
     is_written(writeln!(stdout, "{text}").and_then(|()| stdout.flush()))
 }
 
-/// Error if stdout could not be written; a closed pipe is none.
+/// Returns an error if stdout could not be written, except for a closed pipe.
 pub(super) fn is_written(written: IoResult<()>) -> Result<()> {
     match written {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),

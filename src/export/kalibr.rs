@@ -48,7 +48,7 @@ pub fn camchain(file: &Path, calibration: &Calibration, robot: &Robot) -> Result
     Ok(text)
 }
 
-/// Entry `cam` of that number, for the camera `key` in robot.toml, with its pose `place` on its link.
+/// Entry `cam` of that number: the camera that robot.toml has as `key`, with its pose `place` on its link.
 fn entry(
     robot: &Robot,
     (number, key): (usize, &str),

@@ -34,7 +34,7 @@ pub fn csv_rows(calibration: &Calibration) -> String {
     ];
     let head: Vec<String> = fixed.map(str::to_owned).into_iter().chain(nonlinearity).chain(scalars).collect();
     let has_slide = calibration.has_slide();
-    // With slides a column has several units, so a column gives the unit.
+    // With slides the rows have different units, so the last column gives the unit.
     let head = if has_slide { head.iter().map(|key| key.replace("_rad", "")).collect() } else { head };
     let unit = |joint: &JointResult| has_slide.then(|| joint.moves.si().to_owned());
     let head: Vec<String> = head.into_iter().chain(has_slide.then(|| "unit".to_owned())).collect();

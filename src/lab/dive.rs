@@ -1,5 +1,5 @@
-//! Comparison of a dive's tool poses with the truth at each task: by the online estimate from the messages before it,
-//! by the one calibration at the start, and by the datasheet.
+//! Comparison of a dive's tool poses with the truth at each task. The poses are those by the online estimate from the
+//! messages before it, by the one calibration at the start, and by the datasheet.
 
 use nalgebra::{Matrix3, Vector3};
 

@@ -1,9 +1,9 @@
 //! The paper's first method, after Kim et al. (2010): one landmark, seen from many poses, must have one position.
 //!
-//! Objective: `sum_j tr(C_j)`, `C_j` the covariance (divisor m - 1) of the m positions of landmark j in the base frame,
-//! over the landmarks seen at least twice. It needs no map, so motions that turn all positions together do not change
-//! it. An offset of the first joint turns them about its axis and changes no distance between any two of them. (It is
-//! the last joint where the arm carries the landmarks and they are in its hand's frame.) That is an exact gauge
+//! Objective: `sum_j tr(C_j)`, over the landmarks seen at least twice. `C_j` is the covariance (divisor m - 1) of the m
+//! positions of landmark j in the base frame. It needs no map, so motions that turn all positions together do not
+//! change it. An offset of the first joint turns them about its axis and changes no distance between any two of them.
+//! Where the arm carries the landmarks and they are in its hand's frame, that is the last joint. This is an exact gauge
 //! freedom, not a weak direction, and noise does not affect it. The offset is held, and so are all parameters that the
 //! views leave without any effect.
 

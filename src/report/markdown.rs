@@ -1,4 +1,4 @@
-//! The same figures as Markdown, for the replay's summary panel, which is narrow.
+//! A summary as Markdown, for the replay's summary panel, which is narrow.
 
 use crate::report::summary::RunSummary;
 use crate::report::table::{check_lines, labelled, score_rows};

@@ -7,7 +7,7 @@ use armcal_belief::calib::online::{BeliefLog, BeliefRow};
 use armcal_core::stats::quantile;
 use armcal_core::units::Unit;
 
-/// Width of the curve, in the drawing's own units.
+/// Width of the curve's picture, in its own units.
 const WIDTH: f64 = 640.0;
 const HEIGHT: f64 = 180.0;
 const LEFT: f64 = 60.0;

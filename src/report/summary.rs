@@ -95,7 +95,7 @@ pub struct Condition {
     /// Kind of the unobservable parameter, or `not_included`.
     pub code: Code,
     pub what: String,
-    /// One stated sigma, in `unit`.
+    /// Stated standard deviation, in `unit`.
     pub std: f64,
     pub unit: FindingUnit,
     /// Tool motion by one sigma, root mean square over the task, m.

@@ -24,7 +24,7 @@ pub struct PoseRow {
     /// Number of chosen poses; views of no tag are not used.
     pub poses: usize,
     pub views: usize,
-    /// True tool error, root mean square over the task's targets, m. The two next fields are predictions of it.
+    /// True tool error, root mean square over the task's targets, m. `by_bundle_m` and `planned_m` are its predictions.
     pub true_m: f64,
     pub by_bundle_m: f64,
     pub planned_m: f64,

@@ -21,7 +21,7 @@ pub struct PaperRow {
     pub contender: &'static str,
     pub draws: usize,
     /// Root mean square, over the draws, of each draw's tool error, m. A draw's tool error is the root mean square over
-    /// random poses. The next fields are its median and 95th percentile.
+    /// random poses. `tool_median_m` and `tool_p95_m` are its median and 95th percentile.
     pub tool_rms_m: f64,
     pub tool_median_m: f64,
     pub tool_p95_m: f64,

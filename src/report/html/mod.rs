@@ -1,8 +1,8 @@
 //! report.html: one file, no network, no scripts; for a screen, light or dark, and for paper.
 //!
-//! The order is that in which an engineer asks: `verdict` (decision, reasons, next step, details), `accuracy` (error at
-//! each target), `arm` (a picture of the change), `joints` (each sensor's curve). Then follow `geometry` (camera mount,
-//! links, tags), `residuals` and `limits` (conditions and ranges of the result). `figure` draws charts.
+//! The order is that in which an engineer asks. `verdict` has decision, reasons, next step and details, `accuracy` the
+//! error at each target. `arm` is a picture of the change, `joints` each sensor's curve. Then follow `geometry` (camera
+//! mount, links, tags), `residuals` and `limits` (conditions and ranges of the result). `figure` draws charts.
 
 mod accuracy;
 mod arm;

@@ -62,7 +62,7 @@ struct Seen {
 /// Collects counts and samples from every message of a file.
 #[derive(Default)]
 pub(super) struct Collector {
-    /// Topics by name; one topic may have several types.
+    /// Contents of each topic; one topic may have several types.
     seen: BTreeMap<String, Vec<Seen>>,
 }
 
