@@ -93,7 +93,7 @@ pub fn table(summary: &CampaignSummary, width: Option<usize>) -> String {
     text
 }
 
-/// Rates over all settings by their weights.
+/// Rates over all settings by their weights, and the answers to limits on these.
 pub(super) fn over_all(summary: &CampaignSummary) -> Vec<String> {
     let rate = |rate: &WeightedRate| {
         let found = rate.rate.map_or_else(|| "-".to_owned(), |rate| format!("{rate:.2e}"));

@@ -260,7 +260,7 @@ const STATED_DOF: f64 = 16.0;
 /// Figures of many runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoundFigures {
-    /// Error of the estimated tool at rest over all targets of all runs, rms, m; next to it its prediction.
+    /// Error of the estimated tool at rest over all targets of all runs, rms, m; `predicted_m` is its prediction.
     pub at_rest_m: f64,
     pub predicted_m: f64,
     /// Error caused by the parameters and its bound, rms, m.

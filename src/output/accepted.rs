@@ -5,9 +5,8 @@ use std::path::{Path, PathBuf};
 
 use armcal_belief::calib::{Calibration, Status};
 
-/// Factor by which the U95 of a worse result is larger than that of the one in place. Assumed: views of another day
-/// change U95 by a few percent.
-/// change U95 by a few percent.
+/// Factor on the U95 of the result in place above which a new result is worse. Assumed: views of another day change U95
+/// by a few percent.
 const WORSE: f64 = 1.1;
 
 /// Place of a result that does not replace the accepted one.

@@ -345,7 +345,7 @@ fn stop_reason_line(why: &str, renewals: &[RenewalSummary]) -> String {
     )
 }
 
-/// Largest relative change of a gain that may be an encoder's: its scale is its line count.
+/// Relative change below which a gain counts as almost unchanged: that of an encoder, whose scale is its line count.
 const LITTLE: f64 = 0.005;
 
 fn gain_line(largest: &GainChange) -> String {
@@ -383,7 +383,7 @@ fn further_camera_line(camera: &FurtherCamera) -> String {
     format!("camera {name}: {}, mount {}", counted(*views, "view"), known_to(*position_std_m, *rotation_std_rad))
 }
 
-/// The axis with the largest standard deviation; the other axes add nothing to the mount's description.
+/// Largest standard deviations of position and rotation, which bound those of the other axes.
 fn known_to(position_std_m: [f64; 3], rotation_std_rad: [f64; 3]) -> String {
     let worst = |v: [f64; 3]| v.into_iter().fold(0.0, f64::max);
     let (std_mm, std_deg) = (worst(position_std_m) * 1e3, worst(rotation_std_rad).to_degrees());

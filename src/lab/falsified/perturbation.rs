@@ -85,7 +85,7 @@ impl SensorFault {
 }
 
 impl Case {
-    /// Changes that the case makes; empty where it removes views.
+    /// Changes that the case makes; empty for the good arm, and where the case only removes views.
     pub(super) fn perturbations(&self, robot: &Robot, seed: u64) -> Vec<Perturbation> {
         use Perturbation as P;
         let n_tags = robot.tags.len();

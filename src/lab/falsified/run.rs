@@ -48,7 +48,8 @@ pub struct FalsifiedRow {
     pub predicted_with_priors_m: Option<Summary>,
     /// Distance of the estimated tool from the true one over the task's targets, m.
     pub true_m: Option<Summary>,
-    /// Oracle's effect of the falsification; `None` where the case only removes views, so nothing is wrong.
+    /// Oracle's effect of the falsification; `None` where nothing is wrong: for the good arm, and where the case only
+    /// removes views.
     pub oracle: Option<OracleEffect>,
     /// True if the first named cause is the falsification, or one that the data cannot distinguish from it; `None`
     /// where there is nothing to name.

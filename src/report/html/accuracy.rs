@@ -121,7 +121,7 @@ fn target_table(targets: &BTreeMap<usize, Target<'_>>) -> Markup {
     }
 }
 
-/// Charts of the predicted error against the number of views of the last capture, with the true error at its end.
+/// Chart of the predicted error against the number of views of the last capture, with the true error at its end.
 fn growth(report: &Report<'_>) -> Markup {
     let renewals = &report.summary.capture.renewals;
     let last = renewals.chunk_by(|before, after| before.views < after.views).last().unwrap_or_default();

@@ -176,7 +176,7 @@ fn over_image(views: &[ViewResidual]) -> Markup {
     figure(&chart, "Strokes lead from the measured to the predicted corner, 40 times enlarged.")
 }
 
-/// Table of each joint's residual against its calibrated sensor.
+/// Chart of each joint's residual against its calibrated sensor over time.
 fn joint_errors(views: &[ViewResidual], sensors: &[JointSensorSpec]) -> Markup {
     let of_joint = |(joint, spec): (usize, &JointSensorSpec)| {
         let scale = spec.unit().scale();

@@ -43,7 +43,7 @@ fn in_one_sentence(report: &Report<'_>) -> String {
     words
 }
 
-/// Table of the report's details: operator, vehicle, robot, recordings.
+/// Table of the report's details, such as arm, vehicle, operator and recordings.
 fn facts(report: &Report<'_>) -> Markup {
     let (summary, calibration, about) = (report.summary, report.calibration, &report.about);
     let nanos = u64::try_from(calibration.valid.time_nanos).ok().filter(|nanos| *nanos > 0);

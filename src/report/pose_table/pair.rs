@@ -155,7 +155,7 @@ pub(super) fn apart_s(pair: &TablePair<'_>) -> Option<f64> {
     (of_tags[1] < of_joints[0] || of_tags[0] > of_joints[1]).then(|| of_joints[0] - of_tags[0])
 }
 
-/// Tables in the folder of `table` that have what it lacks; empty if it has both joints and tags.
+/// Tables in the folder of `table` that have what it lacks; empty unless it lacks exactly one of joints and tags.
 #[must_use]
 pub fn neighbours(table: &LookedAt, robot: Option<&Robot>) -> Vec<LookedAt> {
     let roles = Roles::of(&table.contents, robot);
