@@ -1,6 +1,6 @@
-//! Estimators of their own: `cargo bench --no-default-features --bench calibration`.
+//! Estimators on their own: `cargo bench --no-default-features --bench calibration`.
 //!
-//! Compare figures of one machine only. Beside other solvers: benches/peers/README.md.
+//! Compare figures of one machine only. Comparison with other solvers: benches/peers/README.md.
 
 mod problems;
 

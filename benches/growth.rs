@@ -1,8 +1,8 @@
-//! What one more view costs after many: processor time and memory of the online belief over a hundred thousand views.
+//! Cost of one more view after many: processor time and memory of the online estimate over a hundred thousand views.
 //!
-//! `cargo bench --bench growth > growth.csv`, then `tests/oracle/plot_growth.py growth.csv`; `ARMCAL_VIEWS` says how
-//! many.
-//! The views are those of the sample, one a minute, over and over again, with the thermometer's readings between them:
+//! Run `cargo bench --bench growth > growth.csv`, then `tests/oracle/plot_growth.py growth.csv`; `ARMCAL_VIEWS` sets
+//! the number of views. The views are those of the sample, one a minute, repeated, with the thermometer's readings
+//! between them. Drift, lags and comparisons of lags are active as in any dive.
 //! drift, lags and races at work as in any dive.
 
 #![allow(clippy::print_stdout, reason = "its table is what it is for")]
@@ -17,7 +17,7 @@ use armcal::stats::stream_rng;
 use rand::RngExt;
 
 const N_VIEWS: usize = 100_000;
-/// Rows of the table.
+/// Number of rows of the table.
 const N_ROWS: usize = 200;
 const VIEW_EVERY_S: f64 = 60.0;
 const READINGS_PER_VIEW: usize = 6;
@@ -65,20 +65,20 @@ fn main() {
     }
 }
 
-/// A day's swing of 4 K.
+/// Temperature of the oil, degC, with a daily swing of 4 K.
 fn oil_c(at_s: f64) -> f64 {
     25.0 + 2.0 * (at_s / 86_400.0 * std::f64::consts::TAU).sin()
 }
 
-/// Processor time of this process so far, which other programs do not lengthen; not a number where the system does not
-/// tell it.
+/// Processor time of this process so far, s, which does not depend on other programs; NaN where the system does not
+/// report it.
 fn processor_s() -> f64 {
     let text = std::fs::read_to_string("/proc/self/schedstat").unwrap_or_default();
     let nanos: Option<f64> = text.split_whitespace().next().and_then(|word| word.parse().ok());
     nanos.map_or(f64::NAN, |nanos| 1e-9 * nanos)
 }
 
-/// Resident memory; not a number where the system does not tell it.
+/// Resident memory, MB; NaN where the system does not report it.
 fn memory_mb() -> f64 {
     let text = std::fs::read_to_string("/proc/self/statm").unwrap_or_default();
     let pages: Option<f64> = text.split_whitespace().nth(1).and_then(|word| word.parse().ok());

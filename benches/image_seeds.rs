@@ -39,16 +39,16 @@ fn program() -> Command {
     Command::new(env!("CARGO_BIN_EXE_armcal"))
 }
 
-/// Runs the program to a verdict: a refusal is a result, too.
+/// Runs the program to a verdict; a refusal is a result, too.
 fn verdict(command: &mut Command) {
     let status = command.status().expect("the program starts");
     assert!(matches!(status.code(), Some(0 | 4)), "{command:?}: {status}");
 }
 
-/// Whose images are looked at.
+/// Choice of the images that are searched.
 #[derive(Clone, Copy)]
 enum Images {
-    /// Of the views that the run's own calibration had.
+    /// Images of the views that the run's own calibration had.
     OfViews,
     All,
 }
@@ -62,7 +62,7 @@ impl Images {
     }
 }
 
-/// The recording without detections and marks, and without the images that are not wanted.
+/// Writes the recording without detections, marks and the unwanted images.
 fn strip(run: &Path, to: &Path, images: Images) {
     let map = TopicMap { only: Some([armcal::log::Stream::Marks].into()), ..TopicMap::default() };
     let marks = armcal::log::read_recording_with(run, &map).expect("it reads").messages;
@@ -104,7 +104,7 @@ impl Seed {
         if !folder.join("run.mcap").exists() {
             let mut command = program();
             command.arg("run").arg(root().join("routines/titan4-rendered.toml")).arg("--seed").arg(seed.to_string());
-            // Each image that the run looked at, not one a second: its views hold several.
+            // The run logs every searched image instead of one per second, because its views hold several.
             command.args(["--set", "world.image.log_period_s=0.0"]);
             verdict(command.arg("--out").arg(&folder));
         }
@@ -130,7 +130,7 @@ impl Seed {
         Calibration::read(&result).expect("it reads")
     }
 
-    /// Distance of the believed from the true tool at each target that was reached, m.
+    /// Distance of the estimated from the true tool at each target that was reached, m.
     fn tool_errors_m(&self, robot: &Robot, recording: &Recording, found: &Calibration) -> Vec<f64> {
         let sensors = found.sensors(robot).expect("this robot");
         let belief = Belief { from: Stamp { nanos: 0 }, sensors: &sensors, links: found.link_corrections() };
@@ -143,7 +143,7 @@ impl Seed {
     }
 }
 
-/// The farthest that a gain or an offset is from the run's own, over its sigma; and of gains alone as they are.
+/// Largest difference of a gain or an offset from the run's own, over its sigma; and the largest difference of a gain.
 fn differences(own: &Calibration, other: &Calibration) -> (f64, f64, String) {
     let (mut farthest, mut gain, mut which) = (0.0, 0.0_f64, String::new());
     for (a, b) in own.joint.iter().zip(&other.joint) {
@@ -164,7 +164,7 @@ fn differences(own: &Calibration, other: &Calibration) -> (f64, f64, String) {
     (farthest, gain, which)
 }
 
-/// The interval of 95 % of the mean log ratio, by the bootstrap over seeds, as ratios.
+/// 95 % interval of the mean log ratio, by the bootstrap over seeds, as ratios.
 fn ratio_interval(logs: &[f64]) -> [f64; 2] {
     let mut rng = stream_rng(1, "image seeds");
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
@@ -176,7 +176,7 @@ fn ratio_interval(logs: &[f64]) -> [f64; 2] {
 }
 
 fn main() {
-    // `cargo test --all-targets` starts benchmarks, too.
+    // Without this check `cargo test --all-targets` would run the benchmark.
     if !std::env::args().any(|argument| argument == "--bench") {
         return;
     }

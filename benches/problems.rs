@@ -1,4 +1,4 @@
-//! What the benchmarks solve: views of a Titan 4 drawn from a fixed seed.
+//! Problems of the benchmarks: views of a Titan 4 drawn from a fixed seed.
 
 use std::path::Path;
 
@@ -18,15 +18,16 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-/// Terms of the nonlinearity of each joint, beside gain and offset.
+/// Number of terms of each joint's nonlinearity, in addition to gain and offset.
 pub const N_TERMS: u8 = 4;
 const CORNER_STD_PX: f64 = 0.3;
 const POSITION_STD_M: f64 = 0.01;
-/// No corner is seen farther from the optical axis, so that a first guess that is 0.1 rad off still sees it.
+/// Largest angle of a corner from the optical axis, so that an initial guess with 0.1 rad of error still sees the
+/// corner.
 const MAX_VIEW_ANGLE_RAD: f64 = 1.25;
 const MIN_RANGE_M: f64 = 0.25;
 
-/// An arm, views of it and what is estimated.
+/// An arm, its views, and the parameters to estimate.
 pub struct Problem {
     pub robot: Robot,
     pub views: Vec<View>,
@@ -47,7 +48,7 @@ impl Problem {
         }
     }
 
-    /// Gains and offsets of the joints before the camera.
+    /// Gains and offsets of the joints that move the camera.
     pub fn straight(&self) -> Vec<Parameter> {
         let straight = |p: &Parameter| matches!(p.kind, ParameterKind::Gain | ParameterKind::Offset);
         self.model.parameters().into_iter().filter(straight).collect()
@@ -58,7 +59,7 @@ fn normal(rng: &mut ChaCha8Rng) -> f64 {
     StandardNormal.sample(rng)
 }
 
-/// A robot whose readings have no noise of their own: a view then has no parameters of its own.
+/// A robot whose readings have no noise of their own, so a view has no parameters of its own.
 pub fn robot() -> Robot {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/titan4");
     let mut robot = load(&folder).expect("the robot is part of the repository");
@@ -80,7 +81,7 @@ fn model(robot: &Robot) -> Model {
     Model { joints: (0..robot.n_joints()).map(kinds).collect(), ..Model::of_blocks(0, blocks) }
 }
 
-/// The arm as it is: drawn from the priors of what has a column.
+/// The true arm, drawn from the priors of the parameters that have a column.
 struct Truth {
     parameters: JointParameters,
     chain: Chain,
@@ -93,12 +94,13 @@ fn moved(pose: &Isometry3<f64>, std_m: f64, std_rad: f64, rng: &mut ChaCha8Rng) 
     pose * exp(&Vector6::from_fn(|k, _| normal(rng) * if k < 3 { std_m } else { std_rad }))
 }
 
-/// What views show.
+/// Noise and tags of the views.
 #[derive(Clone, Copy)]
 pub struct Sight {
-    /// Errors of the joints from view to view.
+    /// Standard deviation of the joints' errors from view to view.
     pub joint_std_rad: f64,
-    /// Tags of a view: those nearest to its axis. As many as there are: a view that misses one is none.
+    /// Number of tags of a view: those nearest to its axis. If it is the number of all tags, a view must show every
+    /// one.
     pub n_tags: usize,
 }
 
@@ -109,7 +111,7 @@ pub fn corners(n_views: u32, joint_std_rad: f64) -> Problem {
     corners_of(robot, n_views, Sight { joint_std_rad, n_tags })
 }
 
-/// The same with columns of all that `bundle` knows of an arm: links, lens and sag, too.
+/// Views of all tags, with columns for all arm parameters of `bundle`: links, lens and sag, too.
 pub fn corners_of_all(n_views: u32) -> Problem {
     let robot = robot();
     let (n, n_tags) = (robot.camera.mount.n_joints, robot.tags.len());
@@ -155,7 +157,7 @@ fn draw(problem: &Problem, rng: &mut ChaCha8Rng) -> Truth {
     Truth { chain: robot.chain.corrected(&parameters.links), parameters, lens, mount, tags }
 }
 
-/// One sigma of a lens's eight columns: focal lengths and centre px, distortion.
+/// Standard deviations of a lens's eight columns: focal lengths and centre px, distortion.
 pub fn lens_std(camera: &CameraSpec) -> [f64; 8] {
     let [fx, fy] = camera.lens.focal_px().map(|px| px * camera.lens_priors.focal_std);
     let (center, k) = (camera.lens_priors.center_std_px, camera.lens_priors.distortion_std);
@@ -167,7 +169,7 @@ fn lens(camera: &CameraSpec, rng: &mut ChaCha8Rng) -> CameraModel {
     camera.lens.with_intrinsics(std::array::from_fn(|k| mean[k] + std[k] * normal(rng)))
 }
 
-/// A view at a random pose; `None` where it does not see the tags wanted.
+/// A view at a random pose; `None` where it does not see the required tags.
 fn view(robot: &Robot, truth: &Truth, sight: Sight, idx: u32, rng: &mut ChaCha8Rng) -> Option<View> {
     let travel_rad =
         JointAngles::from_fn(robot.n_joints(), |j| rng.random_range(-0.9..0.9) * robot.sensors[j].half_range_rad);
@@ -199,7 +201,7 @@ fn view(robot: &Robot, truth: &Truth, sight: Sight, idx: u32, rng: &mut ChaCha8R
     (view.tags.len() == sight.n_tags).then_some(view)
 }
 
-/// What is measured of a tag; `None` where a corner is too far off the axis, or the tag too near.
+/// Measured corners of a tag, px; `None` where a corner is too far off the axis, or the tag too near.
 fn corners_px(
     lens: &CameraModel,
     size_m: f64,

@@ -1,4 +1,4 @@
-//! Where the time goes: kinematics, the objective, the solver, the tag map, clearance, one simulated second.
+//! Time of the parts: kinematics, the objective, the solver, the tag map, clearance, one simulated second.
 //!
 //! `cargo bench --bench speed`. Compare figures of one run only; machines differ and are noisy.
 
@@ -81,7 +81,7 @@ fn calibration(c: &mut Criterion) {
     c.bench_function("minimum distance by BOBYQA, 40 x 6", |b| {
         b.iter(|| minimum_distance(black_box(&problem), &free, &JointParameters::default()))
     });
-    // To 1e-6 of a prior sigma, and the other methods on the same data.
+    // The search ends at 1e-6 of a prior sigma; the other methods have the same data.
     let options = SearchOptions { rho_end: 1e-6, ..SearchOptions::default() };
     let without_gauge = &free[..1].iter().chain(&free[2..]).copied().collect::<Vec<_>>();
     for (name, method, free) in [
@@ -119,7 +119,7 @@ fn planning(c: &mut Criterion) {
     choice(c, &robot, &clearance, &bounds);
 }
 
-/// 30 of 5,000 candidates: what each of them tells, greedy choice, exchange, order and forecast.
+/// Choice of 30 of 5,000 candidates: information of each, greedy choice, exchange, order and forecast.
 fn choice(c: &mut Criterion, robot: &Robot, clearance: &ClearanceModel<'_>, bounds: &JointErrorBounds) {
     use armcal::plan::{PosePool, PoseRequest, VisibilityModel};
 
@@ -163,7 +163,8 @@ fn choice(c: &mut Criterion, robot: &Robot, clearance: &ClearanceModel<'_>, boun
     });
 }
 
-/// 300 images of up to 8 tags through the wrist camera, 0.3 px of noise; from pixels to map with covariances.
+/// Tag map from 300 images of up to 8 tags through the wrist camera, 0.3 px of noise; from pixels to map with
+/// covariances.
 fn tag_map(c: &mut Criterion) {
     use armcal::tagmap::{Body, MapDetection, MapInput, MapSettings, MapView, TagPrior, solve};
     use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
@@ -229,7 +230,7 @@ fn simulation(c: &mut Criterion) {
     c.bench_function("one simulated second", |b| {
         b.iter(|| (0..100).for_each(|_| world.step(&mut Nothing).expect("a sink that takes everything")));
     });
-    // Current, waves, a free vehicle, and the arm always on its way.
+    // The world has current, waves, a free vehicle, and an arm that always moves.
     let mut spec = WorldSpec::default();
     spec.vehicle.motion = armcal::sim::MotionKind::Free;
     spec.water.current_m_s = [0.2, 0.1, 0.0];
@@ -252,7 +253,7 @@ fn simulation(c: &mut Criterion) {
     images(c, &robot, &vehicle, &scene);
 }
 
-/// The wrist camera's view of the stowed arm, the vehicle and its tags, at half and at full resolution, and the same
+/// The wrist camera's view of the stowed arm, the vehicle and its tags, at half and at full resolution, without and
 /// with detection.
 #[cfg(feature = "sim")]
 fn images(c: &mut Criterion, robot: &Robot, vehicle: &Vehicle, scene: &Scene) {
@@ -316,7 +317,7 @@ fn images(c: &mut Criterion, robot: &Robot, vehicle: &Vehicle, scene: &Scene) {
     }
 }
 
-/// The arm on its oil columns in sea water and in the dry, without sensors, hydraulics or contacts.
+/// One step of the arm on its oil columns in sea water and in air, without sensors, hydraulics or contacts.
 #[cfg(feature = "sim")]
 fn one_step(c: &mut Criterion, robot: &Robot) {
     use armcal::robot::LinkBody;
@@ -357,7 +358,7 @@ fn one_step(c: &mut Criterion, robot: &Robot) {
     }
 }
 
-/// Eight tags before the camera at 0.7 to 1.8 m, in clear water.
+/// Detection of eight tags before the camera at 0.7 to 1.8 m, in clear water.
 #[cfg(feature = "sim")]
 fn detect(c: &mut Criterion) {
     use armcal::detect::{DetectorSettings, GreyImage, TagDetector};
@@ -366,7 +367,7 @@ fn detect(c: &mut Criterion) {
     use nalgebra::{Isometry3, Unit, UnitQuaternion, Vector3};
 
     let lens = robot().camera.lens;
-    // The tag's z axis against the camera's.
+    // The tag's z axis points against the camera's.
     let facing = UnitQuaternion::from_scaled_axis(Vector3::x() * std::f64::consts::PI);
     let tags: Vec<TagPlane> = (0..8_u32)
         .map(|k| {
@@ -393,8 +394,8 @@ fn detect(_: &mut Criterion) {}
 #[cfg(not(feature = "sim"))]
 fn simulation(_: &mut Criterion) {}
 
-/// One more view after those of the sample: a belief for each lag beside the others, for the oil has cooled down, and
-/// one alone.
+/// One more view after those of the sample. The first estimator holds one hypothesis per lag, because the oil has
+/// cooled down; the second holds only one.
 fn online(c: &mut Criterion, robot: &Robot) {
     let sample = Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/sample/run.mcap");
     let recording = read_recording(sample).expect("the sample is part of the repository");

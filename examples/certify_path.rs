@@ -1,7 +1,7 @@
-//! A path for an arm of your own: planned, certified for every arm within the sensors' error bounds, and timed.
+//! Plans a path for your own arm, certifies it for every arm within the sensors' error bounds, and computes its timing.
 //!
-//! `cargo run --release --example certify_path -- ROBOT_FOLDER VEHICLE_FILE`; without arguments a Titan 4 class arm on
-//! a work-class vehicle. Start and goal are random configurations that are clear themselves.
+//! Run `cargo run --release --example certify_path -- ROBOT_FOLDER VEHICLE_FILE`; without arguments it uses a Titan 4
+//! class arm on a work-class vehicle. Start and goal are random configurations that are clear themselves.
 
 #![allow(clippy::print_stdout, reason = "a small program, for a terminal")]
 
@@ -15,7 +15,7 @@ use armcal::stats::stream_rng;
 use armcal::{ClearanceModel, JointAngles, JointErrorBounds, PathPlanner, Timing, load_robot, load_vehicle};
 use rand::RngExt;
 
-/// Clearance to keep beyond the error bounds, m.
+/// Clearance required beyond the error bounds, m.
 const MARGIN_M: f64 = 0.05;
 const N_QUERIES: usize = 3;
 

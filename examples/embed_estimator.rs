@@ -1,7 +1,9 @@
-//! The estimator inside an application: messages go in one by one, a calibration with covariance and verdict comes out.
+//! The estimator inside an application: it takes messages one by one and returns a calibration with covariance and
+//! verdict.
 //!
-//! `cargo run --release --example embed_estimator`. The messages come from `recordings/sample/run.mcap`; an application
-//! passes on what its own drivers receive. The estimator reads recorded bytes only, so the messages go to a file first.
+//! Run `cargo run --release --example embed_estimator`. The messages come from `recordings/sample/run.mcap`; an
+//! application passes on the messages of its own drivers. The estimator reads only recorded bytes, so the messages go
+//! to a file first.
 
 #![allow(clippy::print_stdout, reason = "a small program, for a terminal")]
 
@@ -12,7 +14,7 @@ use armcal::streams::MarkKind;
 use armcal::{Message, Method, Recorder, RecordingHeader, RecordingWriter, Sink};
 use armcal::{calibrate, interim_estimate, load_robot, read_recording};
 
-/// Views between two interim estimates.
+/// Number of views between two interim estimates.
 const ESTIMATE_EVERY: usize = 6;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -27,7 +29,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut n_views = 0;
     for (log_time, message) in &received {
         recorder.record(*log_time, message).map_err(|error| error.to_string())?;
-        // A capture mark says: the arm was at rest over this span, and here ends the view.
+        // A capture mark gives the span in which the arm was at rest; it ends the view.
         let Message::Mark(mark) = message else { continue };
         if !matches!(mark.kind, MarkKind::Capture { .. }) {
             continue;

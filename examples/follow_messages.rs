@@ -1,7 +1,7 @@
-//! A belief that is kept up to date, in a program of your own: messages in; sensors, expected tool error, events out.
+//! An online estimate in your own program: it takes messages and returns sensors, predicted tool error and events.
 //!
-//! `cargo run --release --example follow_messages -- RECORDING.mcap ROBOT_FOLDER`; without arguments the sample. Here
-//! the messages come from a recording; a driver pushes what it hears instead.
+//! Run `cargo run --release --example follow_messages -- RECORDING.mcap ROBOT_FOLDER`; without arguments it uses the
+//! sample. Here the messages come from a recording; a driver pushes the messages that it receives.
 
 #![allow(clippy::print_stdout, reason = "a small program, for a terminal")]
 

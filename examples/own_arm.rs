@@ -1,8 +1,8 @@
-//! A driver for an arm of your own: the trait `Arm`, and a whole session with it.
+//! A driver for your own arm: the trait `Arm`, and a whole session with it.
 //!
-//! `cargo run --release --example own_arm`. The arm here is ideal but for its joint sensors, which are off by gain and
-//! offset. It follows set-points by its own readings and sees the tags with some noise. A driver for hardware sends
-//! set-points to a controller, and hands on the messages that come back.
+//! Run `cargo run --release --example own_arm`. The arm here is ideal except for its joint sensors, which have errors
+//! of gain and offset. It follows set-points by its own readings and sees the tags with some noise. A driver for
+//! hardware sends set-points to a controller, and passes on the messages that come back.
 
 #![allow(clippy::print_stdout, reason = "a small program, for a terminal")]
 
@@ -22,16 +22,16 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 const PERIOD_S: f64 = 0.02;
-/// Control periods between two images.
+/// Number of control periods between two images.
 const IMAGE_EVERY: u64 = 10;
-/// Share of the way to the set-point that the arm goes in one period.
+/// Share of the distance to the set-point that the arm moves in one period.
 const FOLLOWING: f64 = 0.3;
 /// Standard deviation of a corner, px.
 const CORNER_NOISE_PX: f64 = 0.3;
 
 struct MyArm<'a> {
     robot: &'a Robot,
-    /// What a reading really means: nobody else knows.
+    /// True sensors of the arm, which the estimator does not know.
     sensors: ArmSensors,
     true_angles: JointAngles,
     set_point: JointCounts,
@@ -57,7 +57,7 @@ impl<'a> MyArm<'a> {
         }
     }
 
-    /// All tags that lie in the image with all corners; nothing hides anything from this camera.
+    /// All tags whose corners all lie in the image; occlusion does not count.
     fn detections(&mut self) -> Vec<TagDetection> {
         let base_from_camera = self.robot.chain.frame(&self.true_angles, &self.robot.camera.mount);
         let lens = &self.robot.camera.lens;

@@ -1,4 +1,4 @@
-//! Robot folders of any arm: what a URDF may hold, which keys robot.toml may leave out, and the folders that
+//! Robot folders of any arm: contents of URDFs that are accepted, optional keys of robot.toml, and the folders that
 //! `new-robot` writes.
 
 use std::path::{Path, PathBuf};
@@ -16,7 +16,8 @@ const LENS: &str = "model = \"equidistant\"\nmax_view_angle_rad = 1.4\nresolutio
 /// A tetrahedron of 0.1 m, as OBJ.
 const OBJ: &str = "v 0 0 0\nv 0 100 0\nv 100 0 0\nv 0 0 100\nf 1 2 3\nf 1 3 4\nf 1 4 2\nf 3 2 4\n";
 
-/// The same corners with the same scale of 0.001 in the URDF: half as large, doubled by a node, 1 m along z and back.
+/// The tetrahedron as COLLADA, with the same scale of 0.001 in the URDF: half as large, doubled by a node, 1 m along z
+/// and back.
 const DAE: &str = "<COLLADA><asset><unit meter=\"1\"/><up_axis>Y_UP</up_axis></asset><library_geometries>\
     <geometry id=\"g\"><mesh>\
     <source id=\"s\"><float_array>0 0 500 0 50 500 50 0 500 0 0 550</float_array></source>\
@@ -34,7 +35,7 @@ fn joint(name: &str, kind: &str, parent: &str, child: &str) -> String {
     )
 }
 
-/// A chain of `n` joints, `PREFIX1` and on, from the link `base` to `PREFIX_link1` and on.
+/// A chain of `n` joints, `PREFIX1` and following, from the link `base` to `PREFIX_link1` and following.
 fn chain(prefix: &str, base: &str, n: usize) -> String {
     let link = |k: usize| if k == 0 { base.to_owned() } else { format!("{prefix}_link{k}") };
     let one = |k: usize| {
@@ -55,7 +56,7 @@ fn with_mesh(name: &str) -> String {
     urdf(&(chain("arm", "base", 3) + &hand + &joint("fixed", "fixed", "arm_link3", "hand")))
 }
 
-/// Files in a folder, and the robot folder that is made of them.
+/// Files in a folder, and the robot folder made from them.
 struct Bench {
     folder: tempfile::TempDir,
 }
@@ -92,7 +93,7 @@ fn check(folder: &Path) -> Answer {
     answer(program().arg("check").arg(folder))
 }
 
-/// The folder that `new-robot` writes for this URDF reads and passes `check` as it is.
+/// The folder that `new-robot` writes for this URDF; it loads and passes `check` unchanged.
 #[track_caller]
 fn made(urdf: &str, more: &[&str]) -> Bench {
     let bench = Bench::new(urdf);
@@ -113,7 +114,7 @@ fn what_stands_beside_the_chain_is_no_error() {
     let beside = [
         chain("arm", "base", 4),
         visual.to_owned() + &joint("cover", "fixed", "arm_link1", "cover"),
-        // A stop of no range, a slide and a joint that follows another.
+        // A joint with a range of zero, a slide and a joint that follows another.
         "<link name=\"flap\"/><link name=\"slide\"/><link name=\"tail\"/>".to_owned(),
         joint("flap", "revolute", "base", "flap").replace("upper=\"2\"", "upper=\"-1\""),
         joint("slide", "prismatic", "base", "slide"),
@@ -124,7 +125,7 @@ fn what_stands_beside_the_chain_is_no_error() {
     assert!(load(&bench.file("robot")).expect("it reads").bodies.iter().all(|body| body.visuals.is_empty()));
 }
 
-/// A chain of `n` joints whose first slides.
+/// A chain of `n` joints whose first one slides.
 fn on_a_slide(n: usize) -> String {
     chain("arm", "base", n).replacen("revolute", "prismatic", 1)
 }
@@ -137,11 +138,11 @@ fn slides_are_joints_of_the_arm() {
     let robot = load(&bench.file("robot")).expect("it reads");
     let slide = &robot.sensors[0];
     assert!(slide.moves.is_slide() && !robot.sensors[1].moves.is_slide());
-    // One count is one metre, as one is one radian for the others.
+    // One count is one metre, as it is one radian for joints that turn.
     assert_eq!((slide.counts_per_rad, slide.center_rad, slide.half_range_rad), (1.0, 0.5, 1.5));
-    // Named without it, the arm begins behind the slide.
+    // With this base the arm begins beyond the slide.
     assert_eq!(joints(&made(&urdf(&on_a_slide(4)), &["--base", "arm_link1"])), ["arm2", "arm3", "arm4"]);
-    // What carries nine joints is not of the arm.
+    // A link that carries nine joints is not part of the arm.
     let bench = made(&urdf(&on_a_slide(9)), &[]);
     assert_eq!((joints(&bench).len(), joints(&bench)[0].as_str()), (8, "arm2"));
     assert_eq!(load(&bench.file("robot")).expect("it reads").base_link, "arm_link1");
@@ -189,7 +190,7 @@ fn collision_meshes_become_hulls_wherever_their_paths_lead() {
         ("package://given/meshes/hand.obj", "given/meshes/hand.obj"),
         ("meshes/hand.obj", "given/meshes/hand.obj"),
         ("../hand.OBJ", "hand.OBJ"),
-        // A converted file in the place of one that is not read.
+        // A converted file replaces one that is not read.
         ("hand.dae", "given/hand.obj"),
         ("package://given/meshes/hand.dae", "given/meshes/hand.dae"),
     ] {
@@ -251,7 +252,7 @@ fn meshes_beyond_what_memory_is_meant_for_are_not_copied() {
     assert!(!bench.file("robot").exists(), "nothing was written");
 }
 
-/// Inertias matter to the simulator alone.
+/// Only the simulator uses inertias.
 #[test]
 fn an_arm_with_a_bad_inertia_records_and_is_not_simulated() {
     let _texts = Texts::of("an_arm_with_a_bad_inertia_records_and_is_not_simulated");
@@ -312,7 +313,7 @@ fn new_robot_reads_limits_rates_and_the_camera() {
     assert!(
         robot.sensors.iter().all(|sensor| sensor.max_rate_rad_s == 1.5 && (sensor.counts_per_rad - 1.0).abs() < 1e-12)
     );
-    // A xacro file, a file without an arm, one that is none.
+    // A xacro file, a file without an arm, and one that is no URDF.
     for text in [
         "<robot name=\"a\" xmlns:xacro=\"x\"><xacro:macro name=\"b\"/></robot>",
         "<robot name=\"a\"><link name=\"b\"/></robot>",
@@ -333,7 +334,7 @@ fn names_of_a_urdf_stay_names() {
     assert_eq!((robot.name.as_str(), robot.joint_names()[1].as_str()), ("x\"\ny = 1", "a\nstowed_rad = [9]\n\""));
 }
 
-/// Every key of a robot.toml is optional, or named when it is missing; all of them at once.
+/// Every key of a robot.toml is optional, or the message names it when it is missing, together with all others.
 #[test]
 fn all_that_robot_toml_lacks_is_named_at_once() {
     let _texts = Texts::of("all_that_robot_toml_lacks_is_named_at_once");
@@ -454,7 +455,7 @@ fn a_stale_list_of_pairs_stops_planning_alone() {
     assert_eq!(found.stderr.matches(stale).count(), 1, "{found:?}");
 }
 
-/// From a URDF to a good calibration: nothing of the folder but lens, tags and the arm's place is our own.
+/// From a URDF to a good calibration: the test adds only lens, tags and the arm's pose to the folder.
 #[test]
 fn an_arm_of_a_urdf_alone_closes_the_loop() {
     let urdf = read(&root().join("robots/titan4/titan4.urdf"));

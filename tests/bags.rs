@@ -1,4 +1,4 @@
-//! ROS 2 bags in SQLite files: the same as MCAP files with the same messages.
+//! ROS 2 bags in SQLite files give the same results as MCAP files with the same messages.
 
 use std::path::{Path, PathBuf};
 
@@ -10,7 +10,7 @@ use crate::support::external::{AS_IN_2018, INPUT_MAP, RealTitan, write_poses};
 use crate::support::texts::Texts;
 use crate::support::{Answer, answer, program, read, robot_folder, root, temp, titan, write};
 
-/// Two folders with the same names of files: one with an MCAP file, one with bags.
+/// Two folders with the same file names: one with an MCAP file, one with bags.
 struct Both {
     folder: tempfile::TempDir,
 }
@@ -73,9 +73,9 @@ fn a_bag_in_several_files_is_one_in_any_order() {
     });
     let [there, back, whole] = calibrations;
     assert!(there == back);
-    // Named by its files.
+    // The result names the bag's files.
     assert_eq!(there.replace("arm_0.db3, arm_1.db3", "arm"), whole);
-    // A folder names its files.
+    // The message for a folder names its files.
     both.answer("", "inspect bag").expect("a folder", 2, &["folder", "arm_0.db3, arm_1.db3"]);
 }
 
@@ -92,7 +92,7 @@ fn what_is_no_bag_is_refused_by_name() {
     both.answer("bag", "watch arm --idle-s 1").expect("not without a map", 2, &["arm", "--write-input"]);
 }
 
-/// A cut bag counts as any cut recording.
+/// A cut bag is treated like any cut recording.
 #[test]
 fn a_cut_bag_is_calibrated_from_what_is_there() {
     let both = Both::new(&titan(), 7, 3);
@@ -115,7 +115,7 @@ fn messages(path: &Path) -> Vec<Message> {
     found
 }
 
-/// Of `rosbags` 0.11.9: tests/oracle/make_bag_golden.py.
+/// The files come from `rosbags` 0.11.9: tests/oracle/make_bag_golden.py.
 #[test]
 fn bags_of_another_writer_hold_the_messages_of_its_mcap_files() {
     let [bag, mcap] = ["arm.db3", "arm.mcap"].map(|name| messages(&root().join("tests/golden/bag").join(name)));
@@ -126,7 +126,7 @@ fn bags_of_another_writer_hold_the_messages_of_its_mcap_files() {
     assert!(last.3.len() > 6000 && last.3.ends_with(&[5998, 5999].map(|n: u32| (n % 251) as u8)));
 }
 
-/// A ROS 1 bag, and the file that the conversion in our message makes of it: tests/oracle/make_ros1_golden.py.
+/// A ROS 1 bag, and its conversion by the command in our message: tests/oracle/make_ros1_golden.py.
 #[test]
 fn the_conversion_that_ros_1_bags_are_refused_with_gives_their_messages() {
     let golden = root().join("tests/golden/bag");

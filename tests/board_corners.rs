@@ -1,4 +1,4 @@
-//! A chessboard or ChArUco board by its inner corners, from tables and messages: known errors come back.
+//! A chessboard or ChArUco board by its inner corners, from tables and messages: known errors are recovered.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -24,9 +24,9 @@ use crate::support::texts::Texts;
 use crate::support::{answer, program, robot_folder, temp, titan, write};
 
 const BOARD: Chessboard = Chessboard { squares: [9, 7], square_m: 0.06 };
-/// How far the board is from where its map has it, one sigma.
+/// Standard deviation of the board's position (m) and rotation (rad) against its map.
 const BOARD_STD: [f64; 2] = [0.002, 0.003];
-/// Corners in view that make a pose.
+/// Least number of visible corners for a pose.
 const MIN_CORNERS: usize = 12;
 
 const CSV_MAP: &str = "version = 1\nkind = \"input\"\n[table]\n[joint_sensors]\n[tags]\nchild_frame = \"board\"\n\
@@ -42,26 +42,27 @@ const MCAP_MAP: &str = "version = 1\nkind = \"input\"\n\
 /// Numbers of corners and where they were seen, px.
 type SeenCorners = Vec<(u32, [f64; 2])>;
 
-/// An arm's words and the corners that its camera saw, pose by pose.
+/// An arm's raw readings and the corners that its camera saw, pose by pose.
 struct BoardTitan<'a> {
     arm: TrueArm<'a>,
     poses: Vec<(Vec<f64>, SeenCorners)>,
 }
 
-/// As the map has it: upright before the arm, its printed side (against z) towards the base.
+/// Pose of the board in its map: upright before the arm, its printed side (against z) towards the base.
 fn drawn_board() -> Isometry3<f64> {
     let axes = Matrix3::from_columns(&[-Vector3::y(), -Vector3::z(), Vector3::x()]);
     let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes));
     Isometry3::from_parts(Translation3::new(1.4, 0.5, 0.0), turn)
 }
 
-/// Where the joints are that were meant for `angles`: what no curve explains, a tenth of the datasheet's linearity.
+/// True angles for commanded `angles`: they differ by errors that no curve explains, a tenth of the datasheet's
+/// linearity.
 pub fn off_from_view_to_view(robot: &Robot, angles: &JointAngles, rng: &mut ChaCha8Rng) -> JointAngles {
     JointAngles::from_fn(angles.len(), |j| angles[j] + 0.1 * robot.sensors[j].linearity_std_rad * normal(rng))
 }
 
 impl<'a> BoardTitan<'a> {
-    /// `n` poses of an arm whose camera and board are not quite where they are drawn.
+    /// Makes `n` poses of an arm whose camera and board differ from their nominal poses.
     fn new(robot: &'a Robot, mut arm: TrueArm<'a>, n: usize, rng: &mut ChaCha8Rng) -> Self {
         arm.misplace(rng);
         let base_from_board = drawn_board() * small_motion(BOARD_STD[0], BOARD_STD[1], rng);
@@ -86,7 +87,7 @@ impl<'a> BoardTitan<'a> {
         Self::new(robot, arm, n, &mut rng)
     }
 
-    /// A row for each pose, with the pose of the board that its corners give.
+    /// Writes a row for each pose, with the board's pose from its corners.
     fn write_poses(&self, path: &Path) {
         let mut text = format!("{},x,y,z,qw,qx,qy,qz\n", self.arm.robot.joint_names().join(","));
         for (words, corners) in &self.poses {
@@ -101,7 +102,7 @@ impl<'a> BoardTitan<'a> {
         write(path, &text);
     }
 
-    /// A row for each corner.
+    /// Writes a row for each corner.
     fn write_csv(&self, path: &Path) {
         let mut text = format!("{},corner,u,v\n", self.arm.robot.joint_names().join(","));
         for (words, corners) in &self.poses {
@@ -113,7 +114,8 @@ impl<'a> BoardTitan<'a> {
         write(path, &text);
     }
 
-    /// The same as messages: each corner is a detection whose id is its number, and whose centre is its place.
+    /// Writes the corners as messages: each one is a detection whose id is its number, and whose centre is its
+    /// position.
     fn write_mcap(&self, path: &Path) {
         let mut writer = RecordingWriter::create(path, RecordingHeader::new(Vec::new())).expect("a file");
         for (k, (words, corners)) in self.poses.iter().enumerate() {
@@ -134,7 +136,7 @@ impl<'a> BoardTitan<'a> {
     }
 }
 
-/// Corners of the board's printed side in the image, with the noise that robot.toml has.
+/// Corners of the board's printed side in the image, with the noise of robot.toml.
 fn corners(robot: &Robot, camera_from_board: &Isometry3<f64>, rng: &mut ChaCha8Rng) -> Vec<(u32, [f64; 2])> {
     let middle = camera_from_board * BOARD.corner(BOARD.n_corners() / 2).expect("a corner");
     let facing = (camera_from_board.rotation * Vector3::z()).dot(&middle.coords) / middle.coords.norm();
@@ -163,7 +165,7 @@ fn tag_map(squares: &str) -> String {
 
 const SQUARES: &str = "squares = [9, 7]\nsquare_m = 0.06\n";
 
-/// What a recording has of the board.
+/// Data on the board in a recording.
 #[derive(Clone, Copy)]
 enum Use {
     Corners,
@@ -199,13 +201,13 @@ fn calibrated(data: CalibrationData) -> Calibration {
     calibrate_data(data, Method::Bundle, None).expect("calibrated")
 }
 
-/// Squared errors of gains and offsets over their covariance, two degrees of freedom a joint, and of the tool at one
-/// pose of the arm, three.
+/// Squared errors normalised by their covariance: of gains and offsets with two degrees of freedom per joint, and of
+/// the tool at one pose with three.
 pub struct SquaredErrors {
     pub parameters: f64,
     pub each: Vec<f64>,
     pub tool: f64,
-    /// The tool's predicted error there.
+    /// Predicted tool error at that pose, m.
     pub predicted_m: f64,
 }
 
@@ -231,7 +233,7 @@ pub fn squared_errors(arm: &TrueArm<'_>, found: &Calibration, rng: &mut ChaCha8R
     let matrix = covariance.matrix.select_rows(&rows).select_columns(&rows);
     let each = (0..rows.len()).map(|k| error[k].powi(2) / matrix[(k, k)]).collect();
     let parameters = error.dot(&matrix.cholesky().expect("a covariance").solve(&error));
-    // At a pose of its own the arm is off by what differs from view to view, too.
+    // At a separate pose the arm also has the error that differs from view to view.
     let angles = arm.random_angles(rng);
     let stood = off_from_view_to_view(robot, &angles, rng);
     let believed = sensors.angles(&arm.counts(&angles));
@@ -242,15 +244,15 @@ pub fn squared_errors(arm: &TrueArm<'_>, found: &Calibration, rng: &mut ChaCha8R
     SquaredErrors { parameters, each, tool, predicted_m: predicted.trace().sqrt() }
 }
 
-/// A sum of squares of independent normals lies within this, but for one time in a thousand.
+/// Range of a sum of squares of independent normals, exceeded once in a thousand cases.
 pub fn by_chance(dof: usize) -> std::ops::Range<f64> {
     chi_square_quantile(0.0005, dof)..chi_square_quantile(0.9995, dof)
 }
 
-/// Arms drawn from what robot.toml, the tag map and the corners' noise say: squared errors over their covariance are
-/// then chi-square, whatever the program does, if it knows what it does not know.
+/// Expects chi-square distributed errors for arms drawn from robot.toml, the tag map and the corners' noise. That holds
+/// for any estimator with a correct covariance.
 fn errors_are_as_large_as_predicted(robot: &Robot, name: &str, seeds: u64) {
-    /// An arm by its datasheet is off by more than 100 mm.
+    /// Limit of the tool error, mm; by its datasheet an arm has an error above 100 mm.
     const MOST_MM: f64 = 3.0;
     let mut all = Vec::new();
     for seed in 0..seeds {
@@ -291,8 +293,8 @@ fn errors_by_a_boards_corners_are_as_large_as_predicted() {
 fn errors_by_a_boards_corners_are_as_large_as_predicted_over_forty_arms() {
     let robot = titan();
     errors_are_as_large_as_predicted(&robot, "sensors as their datasheets", 40);
-    // Better sensors, and a datasheet that knows. Under one that does not, sigmas are too wide, as they must be: no
-    // view tells a straight sensor from a curve where no view was.
+    // Better sensors with a matching datasheet. With the old datasheet the sigmas would be too wide, and must be:
+    // without views in between, a straight sensor cannot be distinguished from a curve.
     let mut better = robot;
     for spec in &mut better.sensors {
         spec.linearity_std_rad *= 0.3;
@@ -301,8 +303,7 @@ fn errors_by_a_boards_corners_are_as_large_as_predicted_over_forty_arms() {
     errors_are_as_large_as_predicted(&better, "better sensors", 40);
 }
 
-/// Corners of the same views, and the pose that they give the board: tool errors, seed by seed.
-/// Tool errors by corners over those by poses.
+/// Tool errors by corners over those by the board's poses from the same corners, seed by seed.
 fn corners_over_poses(seeds: u64) -> Vec<f64> {
     let robot = titan();
     let mut ratios = Vec::new();
@@ -376,7 +377,7 @@ fn a_board_that_is_not_as_the_tag_map_says_is_refused() {
         command.arg(file("map.toml")).arg("--tag-map").arg(file("tags.toml")).arg("--out").arg(file("out"));
         answer(&mut command).expect(map, 2, words);
     };
-    // Columns and rows exchanged; no squares; one of the two keys; a number in place of a name.
+    // Columns and rows exchanged; no squares; one of the two keys; a number where a name belongs.
     refused(&tag_map("squares = [7, 9]\nsquare_m = 0.06\n"), &["not a square"]);
     refused(&tag_map(""), &["map.toml", "tags.child_frame", "board", "squares"]);
     refused(&tag_map("squares = [9, 7]\n"), &["tags.toml", "board", "square_m", "missing"]);

@@ -1,4 +1,5 @@
-//! What nobody has drawn: the arm runs into it, notices, and goes back; and it never thinks so where there is nothing.
+//! Obstacles that are in no description: the arm touches them, notices, and goes back; it never reports a bump without
+//! a touch.
 
 use std::fs::File;
 use std::path::Path;
@@ -15,14 +16,14 @@ use crate::support::{
     Answer, FinishedRun, ShortRoutine, Simulated, answer, finished, program, root, shared, temp, write,
 };
 
-/// A touch that is older than this when it is noticed has been noticed late, s.
+/// Age of a touch above which it has been noticed late, s.
 const NOTICED_S: f64 = 1.0;
-/// A touch that ends sooner pushes no joint as far as a bump does, s.
+/// Duration below which a touch pushes no joint as far as a bump does, s.
 const BRUSH_S: f64 = 0.6;
-/// From noticing until the arm is back where it came from, at most, s.
+/// Largest time from noticing until the arm is back where it came from, s.
 const BACK_S: f64 = 40.0;
 
-/// At the fourth target of the short routine, by the vehicle's frame: the base stands at (1.7, -0.6, 0.1).
+/// An obstacle at the fourth target of the short routine, in the vehicle's frame: the base is at (1.7, -0.6, 0.1).
 const ROCK: &str = "[[world.obstacle]]\nname = \"undrawn\"\nshape = \"sphere\"\nradius_m = 0.2\n\
                     position_m = [3.306, -0.735, 0.585]\n";
 
@@ -35,7 +36,7 @@ fn logged(recording: &Path, word: &str) -> Vec<(Stamp, LogLevel, String)> {
     lines.collect()
 }
 
-/// How long before `stamp` a touch of the arm began, s; `None` where there was none lately.
+/// Time since the latest touch of the arm before `stamp` began, s; `None` where there was none.
 fn touched_before_s(truth: &Truth, stamp: Stamp) -> Option<f64> {
     let ages = truth.contacts.iter().map(|contact| stamp.since_s(contact.stamp)).filter(|age_s| *age_s >= -0.02);
     ages.min_by(f64::total_cmp)
@@ -58,13 +59,13 @@ fn an_undrawn_rock_is_noticed_left_alone_and_calibrated_around() {
         assert_eq!(*level, LogLevel::Warn);
         let age_s = touched_before_s(&truth, *stamp).expect("something was touched");
         assert!(age_s < 5.0, "{text}: {age_s} s after the last touch began");
-        // It ends: some time later nothing is near.
+        // The touch ends: some time later nothing is near.
         let after = |seconds: f64| stamp.plus_s(seconds);
         let freed =
             truth.clearances.iter().any(|c| c.stamp > after(0.5) && c.stamp < after(BACK_S) && c.distance_m > 0.02);
         assert!(freed, "{text}");
     }
-    // A touch after some time without one is noticed at once, or it was a brush in passing and over at once.
+    // A touch after a time without one is noticed at once, unless it is brief and over at once.
     let mut last: Option<Stamp> = None;
     for contact in &truth.contacts {
         let is_first = last.is_none_or(|last| contact.stamp.since_s(last) > BACK_S);
@@ -74,12 +75,12 @@ fn an_undrawn_rock_is_noticed_left_alone_and_calibrated_around() {
         let clear = |c: &TruthClearance| soon(c) && c.distance_m > 0.02;
         assert!(!is_first || noticed || truth.clearances.iter().any(clear), "{contact:?} in {bumps:?}");
     }
-    // Belief knows nothing of the rock: not in what it was given, only in what it felt.
+    // The estimator has no data on the rock: no input names it, only the bump reports do.
     let bytes = String::from_utf8_lossy(&run.bytes("run.mcap")).into_owned();
     assert!(!bytes.contains("undrawn"));
 }
 
-/// With the reason in every place where a run is told of; errors before and after are over the same targets.
+/// Every report of a run names the reason; errors before and after are over the same targets.
 fn skipped_targets_are_named(run: &FinishedRun) {
     let summary = run.summary();
     let skipped = &summary.capture.skipped_targets;
@@ -99,7 +100,7 @@ fn skipped_targets_are_named(run: &FinishedRun) {
     assert_eq!(n(after.tool_error_m), Some(score.compared_targets.len()));
 }
 
-/// "4 of 5" with a target that was skipped is no "all".
+/// A result "4 of 5" with a skipped target does not satisfy "all".
 #[test]
 fn limits_of_hits_and_skipped_targets_fail_a_run_that_hits_few() {
     let folder = temp();
@@ -112,11 +113,11 @@ fn limits_of_hits_and_skipped_targets_fail_a_run_that_hits_few() {
     told.expect("named", 4, &["step 3, target 4", "holds: step 4, poses 10"]);
 }
 
-/// Runs a routine; each bump that the arm noticed is a touch in the truth.
+/// Runs a routine and expects a touch in the truth for each bump that the arm noticed.
 #[track_caller]
 fn expect_no_bump_without_a_touch(routine: &Path, seed: u64, settings: &[(&str, toml::Value)], out: &Path) {
     let run = Simulated::new(routine, Some(seed), settings, out);
-    // With a joint that does not move no view may come about; that is no bump either, and what was recorded stays.
+    // With a locked joint there may be no view; that is no bump either, and the recording stays.
     let truth = read_truth(run.file("truth")).expect("the truth reads");
     for (stamp, _, text) in logged(&run.file("run"), "bump: ") {
         let touched_s = touched_before_s(&truth, stamp);
@@ -124,7 +125,7 @@ fn expect_no_bump_without_a_touch(routine: &Path, seed: u64, settings: &[(&str, 
     }
 }
 
-/// A joint that is declared locked; and rough water about worn sensors.
+/// One run has a joint that is declared locked, the other rough water and worn sensors.
 #[test]
 fn nothing_is_bumped_into_where_there_is_nothing() {
     const LOCKED: &str = "[[failed_joint]]\njoint = \"wrist_yaw\"\nkind = \"locked\"\n\
@@ -139,7 +140,7 @@ fn nothing_is_bumped_into_where_there_is_nothing() {
     }
 }
 
-/// Ten ordinary runs, among them rough water, worn sensors and a vehicle that floats.
+/// Ten ordinary runs, including rough water, worn sensors and a floating vehicle.
 #[test]
 #[ignore = "second tier: 10 routines of the project, 35 s"]
 fn nothing_is_bumped_into_in_ten_routines() {
@@ -174,13 +175,13 @@ fn an_operator_approves_holds_and_aborts() {
     let folder = temp();
     let routine = ShortRoutine::default().write(folder.path());
     let out = |name: &str| folder.path().join(name);
-    // Nobody there: nothing moves.
+    // Without an answer nothing moves.
     let none = confirmed(&routine, &out("none"), "", folder.path());
     none.expect("no answer", 1, &["next: ", "recording"]);
     let kept = out("none").join("run-cut-1.mcap");
     assert_eq!(logged(&kept, "approved: ").len(), 0);
     assert_eq!(logged(&kept, "aborted").len(), 1);
-    // Two motions, a hold before the second, nonsense before the third, and an end.
+    // Two motions, a hold before the second, an invalid answer before the third, and an abort.
     let some = confirmed(&routine, &out("some"), "y\nh\n\nmaybe\na\n", folder.path());
     some.expect("aborted", 1, &[]);
     let kept = out("some").join("run-cut-1.mcap");
@@ -191,7 +192,7 @@ fn an_operator_approves_holds_and_aborts() {
     assert_eq!(held.len(), 1);
     assert!(approved[1].0.since_s(held[0].0) >= 5.0, "it waits");
     assert_eq!(logged(&kept, "aborted").len(), 1);
-    // Approved all the way it is the run that it would have been without.
+    // With every motion approved, the run equals the run without confirmation.
     let all = confirmed(&routine, &out("all"), &"y\n".repeat(2000), folder.path());
     all.expect("approved", 0, &["ACCEPTED"]);
     let free = shared(&ShortRoutine::default());

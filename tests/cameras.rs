@@ -1,4 +1,5 @@
-//! Arms with two cameras, one on the wrist and one on the forearm: known errors come back, more exactly than by one.
+//! Arms with two cameras, one on the wrist and one on the forearm: known errors are recovered, with less error than by
+//! one camera.
 
 use std::path::{Path, PathBuf};
 
@@ -25,7 +26,7 @@ const ONE: &str = "version = 1\nkind = \"input\"\n\
 const FURTHER: &str = "[[further_tags]]\ncamera = \"elbow\"\ntopic = \"/elbow/tags\"\n";
 const N_POSES: usize = 25;
 
-/// Where the second camera hangs: before the last two joints that move the first, and beside it in the middle of all
+/// Mount of the second camera: before the last two joints that move the first, and next to it in the middle of all
 /// ranges.
 fn elbow(robot: &Robot) -> Attachment {
     let middle = JointAngles::from_fn(robot.n_joints(), |j| robot.sensors[j].center_rad);
@@ -65,15 +66,15 @@ fn two_cameras(folder: &Path) -> Robot {
 /// Numbers of tags and their corners, px.
 type SeenTags = Vec<(u32, [[f64; 2]; 4])>;
 
-/// Where an arm stood.
+/// Readings of an arm at rest and its cameras' detections.
 struct Stood {
     angles: JointAngles,
     words: Vec<f64>,
-    /// By each camera.
+    /// Tags by each camera.
     seen: [SeenTags; 2],
 }
 
-/// An arm with its two cameras as they really hang, and where it stood.
+/// An arm with the true mounts of its two cameras, and its poses.
 struct TwoCameraTitan<'a> {
     arm: TrueArm<'a>,
     elbow: Attachment,
@@ -110,7 +111,7 @@ impl<'a> TwoCameraTitan<'a> {
         (Self { arm, elbow, poses }, rng)
     }
 
-    /// The same poses with the elbow camera `off` from where it hung.
+    /// Takes the same poses again with the elbow camera moved by `off`.
     fn look_again_from_elbow(&mut self, off: Isometry3<f64>) {
         self.elbow.link_from_frame *= off;
         let by_elbow = TrueArm { camera: self.elbow, ..self.arm.clone() };
@@ -163,7 +164,7 @@ fn detection(id: u32, corners: &[[f64; 2]; 4]) -> ros::AprilTagDetection {
     }
 }
 
-/// Squared errors of the elbow camera's place over its variances, six of them.
+/// Squared errors of the elbow camera's six pose parameters over their variances.
 fn mount_errors(titan: &TwoCameraTitan<'_>, found: &Calibration) -> [f64; 6] {
     let [found] = &found.further_camera[..] else { panic!("one further camera: {:?}", found.further_camera) };
     assert_eq!(found.name, "elbow");
@@ -224,7 +225,7 @@ fn errors_by_two_cameras_are_as_large_as_predicted_over_forty_arms() {
     expect_errors_by_two_cameras_as_predicted(40);
 }
 
-/// A folder with robot, recording and input map of seed 0, whose elbow camera hangs `off` from where it was drawn.
+/// Writes robot, recording and input map of seed 0, whose elbow camera is `off` from its nominal mount.
 fn files_of(folder: &Path, off: Isometry3<f64>) {
     let robot = two_cameras(folder);
     let (mut titan, _) = TwoCameraTitan::new(&robot, 0);
@@ -275,7 +276,7 @@ fn a_camera_that_hangs_elsewhere_is_named() {
     assert_eq!(found.matches("[[findings]]").count(), 1, "{found}");
 }
 
-/// Ten of its stated sigmas are 2 cm.
+/// Ten of the mount's stated sigmas are 2 cm.
 #[test]
 fn a_camera_that_hangs_farther_off_than_a_repair_may_refuses() {
     let folder = temp();

@@ -1,4 +1,4 @@
-//! Recordings, maps and tables as people bring them, each with the answer that helps: folders of `tests/cases`.
+//! Recordings, maps and tables as users bring them, each with the answer that helps: folders of `tests/cases`.
 
 use std::path::{Path, PathBuf};
 
@@ -43,7 +43,7 @@ impl Case {
         serde_json::from_str(&read(&self.file("out/summary.json"))).expect("summary.json reads")
     }
 
-    /// The first code of a refusal, and the figures behind it.
+    /// First code of a refusal, and the figures behind it.
     fn refused(&self, task: &str) -> Value {
         self.calibrate("run.mcap", task).expect("refused", 4, &[]);
         self.summary()["refusals"][0].clone()
@@ -94,7 +94,7 @@ fn one_joint_in_degrees_is_named_with_its_unit() {
     assert_eq!((&refused["code"], &refused["joint"]), (&"sensor_unit".into(), &"j6".into()), "{refused}");
 }
 
-/// The same readings, stated as angles: the line of robot.toml has no effect on them, that of the input map has.
+/// The readings are stated as angles: the line of robot.toml does not affect them, that of the input map does.
 #[test]
 fn one_joint_in_degrees_among_stated_angles_is_put_right_by_the_advice() {
     let case = Case::new("one_joint_in_degrees");
@@ -149,12 +149,12 @@ fn a_lens_of_air_in_water_is_named_with_the_focal_length() {
     assert_eq!(refused["code"], "lens_contradicted", "{refused}");
     let ratio = refused["ratio"].as_f64().expect("a ratio");
     assert!((ratio / 1.333 - 1.0).abs() < 0.002, "{ratio}");
-    // Held-out views are judged by the lens that was found.
+    // Held-out views are judged by the estimated lens.
     let held_out_m = case.summary()["held_out"]["rms_m"].as_f64().expect("a figure");
     assert!(held_out_m < 0.003, "{held_out_m}");
 }
 
-/// The map of a grid whose camera file has another lens model says so; with the right one it says nothing.
+/// The map of a grid warns of a camera file with another lens model; with the right one there is no warning.
 #[test]
 fn a_tag_map_by_the_wrong_lens_model_is_warned_of() {
     let case = Case::new("tagmap_wrong_lens_model");
@@ -187,7 +187,7 @@ fn poses_of_a_task_in_degrees_are_named_before_anything_is_calibrated() {
     case.calibrate("run.mcap", "poses-in-degrees.toml").expect("refused", 2, &["poses_rad[0]", "[joint_limit]"]);
 }
 
-/// Elements that calibration does not need are left out, and the warning names their link or joint.
+/// Elements that calibration does not need are skipped, and the warning names their link or joint.
 #[test]
 fn urdfs_of_makers_become_robot_folders() {
     for (case, urdf, named) in [

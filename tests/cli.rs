@@ -1,4 +1,4 @@
-//! The program from outside: exit codes, messages, and no panic whatever it is given.
+//! The program as a user calls it: exit codes, messages, and no panic for any input.
 
 mod campaigns;
 mod help;
@@ -58,7 +58,7 @@ fn shells_and_man_know_every_command() {
     answer(program().args(["completions", "abacus"])).expect("no such shell", 2, &["abacus", "zsh"]);
 }
 
-/// A folder below a file can be made by nobody, not even by root.
+/// Not even root can make a folder below a file.
 #[test]
 fn an_output_folder_that_cannot_be_made_is_named() {
     let _texts = Texts::of("an_output_folder_that_cannot_be_made_is_named");

@@ -1,4 +1,4 @@
-//! The point of it all: after calibration the arm goes where it is told.
+//! The main claim: after calibration the arm reaches its targets.
 
 use std::path::Path;
 
@@ -16,12 +16,13 @@ use crate::support::{
     Nowhere, ShortRoutine, Simulated, answer, program, root, shared, shared_run, temp, titan, vehicle_file, write,
 };
 
-/// m, median over the seeds of the median over the targets. 12 poses leave 6.0 mm over these seeds and 2.5 .. 7.4 mm
-/// for each of seeds 1 to 10: the sensors' nonlinearity and a camera mount that no number of views shows.
+/// Tool error, m, median over the seeds of the median over the targets. With 12 poses it is 6.0 mm over these seeds and
+/// 2.5 .. 7.4 mm for each of seeds 1 to 10. It comes from the sensors' nonlinearity and from a camera mount that no
+/// number of views determines.
 const TOOL_ERROR_M: f64 = 0.008;
-/// m, of the miss at the target, which adds what the controller leaves at rest; 5.7 mm over these seeds.
+/// Distance from the target, m, which includes the controller's rest error; 5.7 mm over these seeds.
 const REACH_ERROR_M: f64 = 0.010;
-/// Of before, for every seed; the worst of seeds 1 to 10 is 0.095.
+/// Ratio of the error after calibration to that before, for every seed; the worst of seeds 1 to 10 is 0.095.
 const RATIO: f64 = 1.0 / 6.0;
 
 fn medians(summary: &RunSummary) -> [f64; 3] {
@@ -69,7 +70,7 @@ fn run_of(name: &str, out: &Path) -> Simulated {
     Simulated::new(&root().join("routines").join(name), None, &[], out)
 }
 
-/// By the sensors alone this arm would be 7 mm off. What the simulator bends it by is not in what belief reads.
+/// Without its sag this arm would have 7 mm of error. The estimator's inputs do not include the simulator's bending.
 #[test]
 fn an_arm_that_bends_is_calibrated_with_its_sag() {
     let folder = temp();
@@ -94,7 +95,7 @@ fn an_arm_that_bends_is_calibrated_with_its_sag() {
         assert_eq!(told(&bytes), [false; 3], "{name}");
     }
 
-    // The arm that is believed in bends in the replay, too, if its calibration is there to tell.
+    // The estimated arm bends in the replay, too, if its calibration is present.
     let alone = temp();
     std::fs::copy(&recording, alone.path().join("run.mcap")).expect("copied");
     let replayed = |folder: &Path| {
@@ -119,7 +120,7 @@ fn an_arm_on_a_parked_vehicle_is_calibrated() {
     assert!(after_m < 3e-3 && after_m < RATIO * before_m, "{after_m}");
 }
 
-/// A contact does not go unseen: "no contact" above would be worth nothing.
+/// A contact is detected: without this test "no contact" above would prove nothing.
 #[test]
 fn an_arm_driven_into_the_vehicle_is_in_the_truth_file() {
     let robot = titan();
@@ -149,8 +150,8 @@ fn an_arm_driven_into_the_vehicle_is_in_the_truth_file() {
     assert!(truth.min_clearance_m().is_some_and(|distance_m| distance_m < 1e-3));
 }
 
-/// Between states a second apart the arm may have been anywhere: a score from them would be of a place where it never
-/// was.
+/// Between states a second apart the arm may have been anywhere, so a score from them could use a pose that never
+/// occurred.
 #[test]
 fn a_truth_that_is_too_coarse_tells_no_state() {
     let mut truth = read_truth(shared_run().file("truth.mcap")).expect("it reads");

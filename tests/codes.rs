@@ -1,4 +1,4 @@
-//! Each code is made somewhere in the sources, and the classes of wrong input are produced by small files.
+//! Each code is used somewhere in the sources, and small files produce the classes of wrong input.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -54,7 +54,7 @@ fn explain_prints_every_code_and_proposes_the_nearest() {
     unknown.expect("a misspelt code", 2, &["value_out_of_range", "[name_unknown]"]);
 }
 
-/// One wrong input: what `armcal` is called with, in a folder of its own.
+/// One wrong input: arguments of `armcal` in a folder of its own.
 struct Case {
     code: Code,
     exit: i32,

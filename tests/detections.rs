@@ -1,4 +1,4 @@
-//! Detections that are wrong: they are named, counted, and change nothing.
+//! Wrong detections are named and counted, and change nothing.
 
 use armcal::calib::{ObservationRejection, associate, calibrate};
 use armcal::log::Recording;
@@ -42,7 +42,7 @@ fn site(robot: &Robot) -> (TrueArm<'_>, Vec<Shot>) {
     (arm, shots)
 }
 
-/// One frame of every view has two ids exchanged: as if it had not been there.
+/// One frame of every view has two ids exchanged; the result is that without this frame.
 #[test]
 fn a_misread_id_in_one_frame_of_a_view_changes_nothing() {
     let robot = titan();
@@ -84,7 +84,7 @@ fn what_the_detector_rejected_in_captured_views_is_counted_by_reason() {
         let mut rejects = vec![reject(RejectReason::WrongBits)];
         rejects.extend((k % 2 == 0).then(|| reject(RejectReason::TooSmall)));
         recording.messages.push((log_time, Message::Rejects(DetectionRejects { stamp, rejects })));
-        // Between the views: nobody's.
+        // A detection between the views belongs to no view.
         let stamp = stamp.plus_s(1.0);
         let rejects = vec![reject(RejectReason::PoorEdges)];
         recording.messages.push((log_time, Message::Rejects(DetectionRejects { stamp, rejects })));

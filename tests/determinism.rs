@@ -1,4 +1,4 @@
-//! One routine and one seed give one result, whatever the machine does meanwhile.
+//! One routine and one seed give one result, regardless of the machine's state.
 
 use std::net::TcpListener;
 use std::path::PathBuf;
@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::support::{Answer, ShortRoutine, Simulated, answer, lasting_folder, program, read, shared_run, temp, write};
 
-/// summary.json without what the wall clock says.
+/// summary.json without its wall-clock times.
 fn without_wall_time(summary: &[u8]) -> Value {
     let mut value: Value = serde_json::from_slice(summary).expect("JSON");
     value["wall_s"] = Value::Null;
@@ -16,11 +16,11 @@ fn without_wall_time(summary: &[u8]) -> Value {
     value
 }
 
-/// The shared run again, on one thread, in another place, by other sines, and without the viewer that it asks for.
+/// The shared run repeated on one thread, in another folder, with other sines, and without the viewer that it requests.
 pub struct Elsewhere {
     pub out: PathBuf,
     pub said: Answer,
-    /// Where no viewer listens.
+    /// Address at which no viewer listens.
     pub viewer: String,
 }
 
@@ -29,7 +29,7 @@ pub fn elsewhere() -> &'static Elsewhere {
     RUN.get_or_init(|| {
         let folder = lasting_folder();
         let out = folder.join("again");
-        // The same files, spelled otherwise.
+        // The same files under another spelling of their paths.
         let text = read(&shared_run().routine).replace("/robots/", "/robots/../robots/./");
         write(&folder.join("other.toml"), &text);
         let viewer = TcpListener::bind("127.0.0.1:0").and_then(|port| port.local_addr()).expect("a port").to_string();
@@ -59,8 +59,8 @@ fn a_routine_repeats_byte_for_byte_on_one_thread_and_in_another_place() {
     assert_eq!(without_wall_time(&first.bytes("summary.json")), without_wall_time(&again));
 }
 
-/// glibc has two sines, one for processors with fused multiply-add; it can be told to take the other (elsewhere the
-/// variable means nothing). Belief's fit and the sampling of noise would carry the last bit's difference everywhere.
+/// The C library glibc has two sines, one for processors with fused multiply-add, and a variable selects the other;
+/// other libraries ignore it. The estimator's fit and the sampling of noise would spread a difference in the last bit.
 #[test]
 fn sines_are_not_the_platforms() {
     for name in ["run.mcap", "truth.mcap", "calibration.toml", "calibration.covariance.toml"] {

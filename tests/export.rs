@@ -1,4 +1,4 @@
-//! `armcal export` in the forms of drivers: what other programs read is the arm as calibrated.
+//! `armcal export` in the forms of drivers: other programs read the arm as calibrated.
 
 mod data_forms;
 mod driver_forms;
@@ -15,7 +15,7 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
 use crate::support::{Answer, answer, program, read, robot_folder, root, write};
 
-/// The quickstart's result, with link corrections.
+/// Calibration of the quickstart, with link corrections.
 fn calibration_file() -> PathBuf {
     root().join("tests/golden/export/calibration.toml")
 }
@@ -33,7 +33,7 @@ fn export(file: &Path, robot: Option<&Path>, form: &str) -> Answer {
     answer(&mut command)
 }
 
-/// What `export` writes for the Titan 4.
+/// Output of `export` for the Titan 4.
 #[track_caller]
 fn exported(form: &str) -> String {
     let told = export(&calibration_file(), Some(&robot_folder()), form);
@@ -53,12 +53,12 @@ fn arm_in(folder: &Path) -> Robot {
     load_without_pairs(folder).expect("the robot reads")
 }
 
-/// `base_from_tool` and `base_from_camera` of `robot`.
+/// Poses `base_from_tool` and `base_from_camera` of `robot`.
 fn frames(robot: &Robot, angles: &JointAngles) -> [Isometry3<f64>; 2] {
     [&robot.tool.mount, &robot.camera.mount].map(|mount| robot.chain.frame(angles, mount))
 }
 
-/// `robot` with links and camera as calibrated, by the library alone.
+/// The robot with links and camera as calibrated, computed only by the library.
 fn as_calibrated(robot: &Robot, calibration: &Calibration) -> Robot {
     let mut calibrated = calibration.scaled_robot(robot);
     let mount = calibration.camera_mount.as_ref().expect("a mount");

@@ -1,4 +1,4 @@
-//! A camera that stands still beside the arm and sees a board on its hand.
+//! A stationary camera next to the arm that sees a board on its hand.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -17,10 +17,10 @@ use crate::support::texts::Texts;
 use crate::support::{Answer, Simulated, answer, calibrate, edit, program, read, robot_copy, root, temp, write};
 
 const N_POSES: usize = 40;
-/// Of a measured pose, one sigma per axis.
+/// Standard deviation of a measured position, m per axis.
 const POSE_STD_M: f64 = 5e-4;
 const POSE_STD_RAD: f64 = 1e-3;
-/// The board on the hand as drawn, and how well that is known.
+/// Nominal position of the board on the hand, m.
 const BOARD_M: [f64; 3] = [0.05, -0.1, 0.08];
 const BOARD_STD_M: f64 = 0.002;
 const BOARD_STD_RAD: f64 = 0.005;
@@ -31,7 +31,7 @@ struct Given {
 }
 
 impl Given {
-    /// A Titan 4 whose camera stands 2.5 m before it.
+    /// Makes a Titan 4 whose camera is 2.5 m before it.
     fn new() -> Self {
         let folder = temp();
         let copy = robot_copy(folder.path());
@@ -112,7 +112,7 @@ fn off(std_m: f64, std_rad: f64, rng: &mut ChaCha8Rng) -> Isometry3<f64> {
     Isometry3::from_parts(place, UnitQuaternion::from_scaled_axis(std_rad * three()))
 }
 
-/// All six joints: the board hangs behind the last.
+/// Expects errors of all six joints, because the board is mounted beyond the last one.
 fn expect_errors_before_a_standing_camera_as_predicted(seeds: u64) {
     let given = Given::new();
     let mut figures: Vec<ToolFigures> = Vec::new();
@@ -131,7 +131,7 @@ fn expect_errors_before_a_standing_camera_as_predicted(seeds: u64) {
     let (error_m, worst_m) = (of(|f| f.error_m, 0.5), of(|f| f.error_m, 1.0));
     let nees = figures.iter().map(|f| f.nees).sum::<f64>() / figures.len() as f64;
     eprintln!("tool error, medians: {error_m:.5} m, worst {worst_m:.5} m; NEES {nees:.2} of 3");
-    // Sensors off by 5 % and 5 deg put the tool some 200 mm off.
+    // Sensors with errors of 5 % and 5 deg put the tool about 200 mm off.
     assert!(error_m < 0.006 && worst_m < 0.012, "{error_m} {worst_m}");
     assert!((1.0..5.0).contains(&nees), "{nees}");
 }
@@ -147,11 +147,11 @@ fn eight_arms_before_a_standing_camera_are_calibrated_to_what_is_predicted() {
     expect_errors_before_a_standing_camera_as_predicted(8);
 }
 
-/// m, median over the targets; without a calibration some 90 mm.
+/// Tool error, m, median over the targets; without a calibration about 90 mm.
 const CLOSED_LOOP_M: f64 = 0.003;
 
-/// In the simulator, from the datasheet on: poses at which the standing camera sees the tags, no contact, and a result
-/// that the recording alone gives again.
+/// In the simulator, beginning with the datasheet. The stationary camera sees the tags at the poses, there is no
+/// contact, and the recording gives the same result again.
 #[test]
 fn an_arm_before_a_standing_camera_calibrates_itself() {
     let folder = temp();
@@ -175,7 +175,7 @@ fn an_arm_before_a_standing_camera_calibrates_itself() {
     assert_eq!(read(&again.join("calibration.toml")), calibration.to_toml());
 }
 
-/// Which tags there are is a message, and with it which link carries them.
+/// A message in the recording lists the tags, and the link that carries them.
 #[test]
 fn some_of_the_carried_tags_are_in_the_recording_with_their_link() {
     let (folder, robot) = (temp(), load(&root().join("robots/titan4-watched")).expect("the robot reads"));
@@ -222,7 +222,8 @@ fn a_frame_that_does_not_fit_is_named_with_what_to_do() {
     given.calibrate().expect("a camera nowhere", 2, &["robot.toml", "camera.position_m"]);
 }
 
-/// Bending is known in a frame that turns with the wrist camera's arm: as a prior here it would be used in another.
+/// The prior's bending applies in a frame that turns with the wrist camera's arm; here it would be applied in another
+/// frame.
 #[test]
 fn a_prior_that_knows_how_the_arm_bends_is_refused() {
     let _texts = Texts::of("a_prior_that_knows_how_the_arm_bends_is_refused");
@@ -249,12 +250,13 @@ fn a_prior_that_knows_how_the_arm_bends_is_refused() {
 #[test]
 fn every_method_knows_which_way_the_camera_looks() {
     let given = Given::new();
-    // Of 145 mm by the datasheet. Minimum variance holds the last joint's offset, which turns the board about its axis.
+    // The datasheet's error is 145 mm. Minimum variance holds the last joint's offset, which turns the board about its
+    // axis.
     for (method, limit_m) in [("minimum_distance", 0.03), ("minimum_variance", 0.06)] {
         let mut errors_m = Vec::new();
         for seed in 0..3 {
             let arm = given.record(seed);
-            // A refused one would lie beside the one before it.
+            // A refused result would be written next to the earlier one.
             let _ = std::fs::remove_dir_all(given.file("out"));
             answer(given.command().args(["--method", method]).arg("--out").arg(given.file("out")));
             errors_m.push(arm.tool_figures(&given.calibration()).error_m);

@@ -1,4 +1,5 @@
-//! Sensors that fail in a recording of the simulated arm: its own readings, altered; and priors that no longer hold.
+//! Sensors that fail in a recording of the simulated arm, with its own readings altered; and priors that no longer
+//! hold.
 
 use armcal::calib::{Calibration, Status, calibrate, calibrate_data, prepare_pooled};
 use armcal::log::{Recording, read_recording};
@@ -36,7 +37,7 @@ fn sound(robot: &Robot) -> Calibration {
     calibration
 }
 
-/// A joint's angle in the middle of its range is off by this against the sound recording's, rad.
+/// Difference of a joint's angle at mid-range from the sound recording's, rad.
 fn off_rad(one: &Calibration, other: &Calibration, robot: &Robot, joint: usize) -> f64 {
     let angle = |calibration: &Calibration| {
         let model = &calibration.sensors(robot).expect("its sensors").models[joint];
@@ -66,7 +67,7 @@ fn a_dead_sensor_is_found_the_rest_calibrated_and_the_task_refused() {
         let off_deg = off_rad(&calibration, &sound, &robot, joint).to_degrees();
         assert!(off_deg.abs() < 0.5, "joint {joint}: {off_deg:.3} deg");
     }
-    // And as a file.
+    // The same recording as a file.
     let folder = temp();
     let file = folder.path().join("calibration.toml");
     std::fs::write(&file, calibration.to_toml()).expect("written");
@@ -85,7 +86,7 @@ fn a_lasting_slip_is_found_and_the_sensor_calibrated_as_it_is_now() {
     let calibration = calibrate(&slipped, &robot, Method::Bundle).expect("calibrated");
     let [failed] = &calibration.failed_joint[..] else { panic!("{:?}", calibration.failed_joint) };
     assert_eq!((failed.joint.as_str(), failed.kind), ("forearm_pitch", FailedKind::Jumps), "{failed:?}");
-    // The readings before it are used, with a step of their own.
+    // The readings before the failure are used, with a step of their own.
     assert!(failed.since_pose.is_some() && failed.poses.is_empty(), "{failed:?}");
     assert!(failed.evidence.contains("slipped"), "{failed:?}");
     let off_deg = (off_rad(&calibration, &sound(&robot), &robot, FOREARM) + by_rad).to_degrees();
@@ -132,8 +133,8 @@ fn a_joint_is_declared_on_the_command_line() {
     }
 }
 
-/// A sensor sticks after the first calibration: the joint is held, the rest captures, calibrates and reaches without
-/// it, and the finished recording gives the same calibration.
+/// A sensor sticks after the first calibration: the joint is held, and the script continues without it. The finished
+/// recording gives the same calibration.
 #[test]
 fn an_arm_whose_sensor_sticks_goes_on_without_that_joint() {
     let steps = ["capture", "calibrate", "fault", "reach", "capture", "recalibrate", "reach"].map(|step| {
@@ -141,7 +142,7 @@ fn an_arm_whose_sensor_sticks_goes_on_without_that_joint() {
         format!("[[step]]\ndo = \"{step}\"\n{fault}")
     });
     let folder = temp();
-    // In this world the forearm stops where four of the targets are left.
+    // In this world the forearm stops where four of the targets are still reachable.
     let run = Simulated::of(&ShortRoutine { seed: 3, tail: steps.concat(), ..ShortRoutine::default() }, folder.path());
     let (summary, calibration) = (&run.finished().summary, &run.finished().calibration);
     assert_eq!(summary.status, Status::Accepted);

@@ -1,4 +1,4 @@
-//! Closed loops of arms that differ from their URDF by as much as robot.toml says.
+//! Closed loops of arms whose geometry differs from their URDF within robot.toml's standard deviations.
 
 use armcal::log::read_attachments;
 use armcal::robot::Robot;
@@ -33,7 +33,7 @@ fn the_truth_alone_holds_the_drawn_arm() {
     let values = values(geometry(&truth));
     assert_eq!(values.len(), 3 + 6 * 7);
     let [in_run, in_truth] = ["run.mcap", "truth.mcap"].map(|name| all_contents(&run.file(name)));
-    // One value of each place: a search of the whole recording takes a second.
+    // One value of each pose is enough, because a search of the whole recording takes a second.
     for value in values.into_iter().step_by(6) {
         let text = value.to_string();
         assert!(value != 0.0 && find(&in_truth, text.as_bytes()), "the truth lacks {value}");
@@ -52,7 +52,7 @@ fn the_truth_alone_holds_the_drawn_arm() {
     }
 }
 
-/// Errors of the drawn arm's tool are within what was predicted for them.
+/// Tool errors of the drawn arm are within their predictions.
 #[test]
 fn no_target_is_beyond_three_times_its_u95() {
     for seed in SEEDS {

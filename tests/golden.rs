@@ -1,4 +1,4 @@
-//! Figures that others published: the paper's kinematics of the Titan 4, and the makers' datasheets of both arms.
+//! Published figures: the paper's kinematics of the Titan 4, and the makers' datasheets of both arms.
 
 use armcal::kinematics::LinkPoses;
 use armcal::robot::{Robot, load};
@@ -7,9 +7,9 @@ use nalgebra::Vector3;
 
 use crate::support::{root, titan};
 
-/// m. The published origins have four digits.
+/// Tolerance of origins, m: the published ones have four digits.
 const PUBLISHED_ORIGIN_M: f64 = 6e-5;
-/// The published axes have four digits.
+/// Tolerance of axes: the published ones have four digits.
 const PUBLISHED_AXIS: f64 = 6e-5;
 
 /// Joint origins (m) and axes in the base at the zero pose.
@@ -38,7 +38,7 @@ fn tool_m(robot: &Robot, poses: &LinkPoses) -> Vector3<f64> {
     poses.frame(&robot.tool.mount).translation.vector
 }
 
-/// Climbs joint by joint with shrinking steps from `start`, whatever the limits.
+/// Largest reach found from `start`, joint by joint with shrinking steps, without limits.
 fn largest_reach_from(robot: &Robot, start: JointAngles) -> f64 {
     let reach = |angles: &JointAngles| tool_m(robot, &robot.chain.link_poses(angles)).norm();
     let (mut at, mut best, mut step_rad) = (start, reach(&start), 1.0);
@@ -59,10 +59,10 @@ fn largest_reach_from(robot: &Robot, start: JointAngles) -> f64 {
     best
 }
 
-/// The datasheet says 1922 mm; these kinematics come to 1.9216 m.
+/// The datasheet says 1922 mm; these kinematics give 1.9216 m.
 #[test]
 fn the_largest_reach_is_the_datasheets() {
-    /// m. The figure has four decimals; the search ends within micrometres of a maximum.
+    /// Tolerance, m: the figure has four decimals, and the search ends within micrometres of a maximum.
     const TOLERANCE_M: f64 = 2e-4;
     let robot = titan();
     let starts = [
@@ -81,9 +81,9 @@ fn the_largest_reach_is_the_datasheets() {
 
 #[test]
 fn joint_ranges_and_weight_are_the_datasheets() {
-    /// deg. The datasheet has whole degrees.
+    /// Tolerance, deg: the datasheet has whole degrees.
     const RANGE_DEG: f64 = 0.1;
-    /// kg. The datasheet has whole kilograms; the bracket that stays still is not among the links.
+    /// Tolerance, kg: the datasheet has whole kilograms, and the static bracket is not among the links.
     const MASS_KG: f64 = 0.5;
     let robot = titan();
     let ranges = robot.chain.joints().iter().map(|j| j.limits.map(|l| (l.upper_rad - l.lower_rad).to_degrees()));
@@ -96,7 +96,7 @@ fn joint_ranges_and_weight_are_the_datasheets() {
     assert!((mass_kg - 100.0).abs() < MASS_KG, "{mass_kg} kg");
 }
 
-/// The tool point lies on the last joint's axis, so that no tool position can show that joint's error.
+/// The tool point lies on the last joint's axis, so no tool position depends on that joint's error.
 #[test]
 fn the_last_joint_does_not_move_the_tool_point() {
     let robot = titan();
@@ -109,10 +109,10 @@ fn kraft() -> Robot {
     load(&root().join("robots/kraft-predator")).expect("the robot reads")
 }
 
-/// Datasheet: 875, 566, 121 and 359 mm from axis to axis to tip, 2013 mm of reach; the arm is straight at zero.
+/// The datasheet has 875, 566, 121 and 359 mm from axis to axis to tip, 2013 mm of reach; the arm is straight at zero.
 #[test]
 fn the_second_arm_has_the_lengths_and_the_reach_of_its_datasheet() {
-    /// m. Sums of three-digit figures.
+    /// Tolerance, m, for sums of three-digit figures.
     const TOLERANCE_M: f64 = 1e-9;
     let robot = kraft();
     let zero = JointAngles::zeros(6);
@@ -130,7 +130,7 @@ fn the_second_arm_has_the_lengths_and_the_reach_of_its_datasheet() {
     for start in [[0.3; 6], [1.0, 0.5, -1.5, 1.0, -1.0, 0.0]] {
         let largest = largest_reach_from(&robot, JointAngles::from_slice(&start));
         eprintln!("reach {largest:.6} m");
-        // It ends within micrometres of a maximum, and never above it.
+        // The search ends within micrometres of a maximum, and never above it.
         assert!((largest - 2.013).abs() < 1e-5, "{largest}");
     }
 }
@@ -147,7 +147,7 @@ fn the_second_arms_ranges_and_weights_are_its_datasheets() {
     assert!((mass_kg - 80.0).abs() < 1e-9, "{mass_kg} kg");
     assert!((mass_kg * (1.0 - robot.buoyancy_fraction) - 51.0).abs() < 1e-9, "in sea water");
     assert_eq!(titan().buoyancy_fraction, 0.22, "78 of 100 kg");
-    // The flange of either arm is bolted on 0.325 m below its base frame.
+    // The flange of either arm is bolted 0.325 m below its base frame.
     for robot in [kraft(), titan()] {
         let base = &robot.bodies[0].collisions[0];
         let lowest_m = base.owner_from_shape.translation.z - 0.5 * base.shape.box_m()[2];

@@ -1,4 +1,4 @@
-//! A tag on the gripper ties tool to camera: what the estimator makes of it, with known errors.
+//! A tag on the gripper relates tool to camera: the estimator's use of it, with known errors.
 
 use armcal::calib::{Status, associate, calibrate, mount_by_gripper_tag};
 use armcal::model::JointParameters;
@@ -14,7 +14,7 @@ use crate::support::root;
 use crate::support::synthetic::{Shot, ToolFigures, TrueArm, add_noise};
 
 const NOISE_PX: f64 = 0.3;
-/// How far the last joint turns either way, rad.
+/// Largest turn of the last joint either way, rad.
 const TURNS_RAD: f64 = 1.5;
 
 fn robot() -> Robot {
@@ -39,7 +39,7 @@ fn median(values: &[f64]) -> f64 {
 }
 
 fn expect_the_tool_to_be_known_better_with_a_tag(seeds: u64) {
-    /// Share of the error without, median over seeds.
+    /// Largest ratio of the error to that without the tag, median over seeds.
     const SHARE: f64 = 0.75;
     let with_tag = robot();
     let without_tag = Robot { gripper_tag: None, ..with_tag.clone() };
@@ -92,7 +92,8 @@ fn with_a_tag_on_the_gripper_the_tools_of_forty_arms_are_known_better() {
 
 #[test]
 fn the_mount_is_off_by_as_much_as_its_covariance_says() {
-    /// Mean over seeds of six squared normalized errors and two of the last joint; 40 seeds know it to 0.63.
+    /// Range of the mean over seeds of six squared normalized errors and two of the last joint; its standard deviation
+    /// over 40 seeds is 0.63.
     const NEES: std::ops::RangeInclusive<f64> = 6.1..=9.9;
     const SEEDS: u64 = 40;
     let robot = robot();
@@ -114,7 +115,7 @@ fn the_mount_is_off_by_as_much_as_its_covariance_says() {
     assert!(NEES.contains(&nees), "{nees}");
 }
 
-/// Some tag a hand's breadth from its drawing: the views are calibrated as without it, and the file says why.
+/// The tag is 2 cm from its nominal pose: the views are calibrated without it, and the file gives the reason.
 #[test]
 fn a_tag_that_was_knocked_off_its_place_is_left_out_with_the_reason() {
     let robot = robot();

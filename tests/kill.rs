@@ -1,5 +1,5 @@
-//! Runs that do not end well: killed, interrupted, out of disk, two at once. No recording is lost, and what lies in the
-//! folder never looks like what it is not.
+//! Runs that end badly: killed, interrupted, out of disk, two at once. No recording is lost, and no file in the folder
+//! is mistaken for a finished result.
 //!
 //! `ARMCAL_KILLS=50` makes the kill study longer than the three kills of every test run.
 
@@ -31,14 +31,14 @@ const RESULTS: [&str; 7] = [
     "summary.json",
 ];
 
-/// A run that takes as little time as one can.
+/// A run that takes as little time as possible.
 fn quick() -> ShortRoutine {
     let mut routine = ShortRoutine { poses: 10, held_out: 3, ..ShortRoutine::default() };
     routine.targets_m.truncate(1);
     routine
 }
 
-/// One such run to its end, and how long that took.
+/// One such run to its end, and its duration.
 fn reference() -> &'static (FinishedRun, Duration) {
     static RUN: OnceLock<(FinishedRun, Duration)> = OnceLock::new();
     RUN.get_or_init(|| {
@@ -77,7 +77,7 @@ fn inspect(recording: &Path) -> Answer {
     answer(program().arg("inspect").arg(recording))
 }
 
-/// Waits until the arm has moved for a while: the recording has grown beyond what is written before it moves.
+/// Waits until the arm has moved for a while: the recording is longer than the part written before any motion.
 fn wait_until_it_moves(child: &mut Child, partial: &Path) {
     let began = Instant::now();
     while fs::metadata(partial).map_or(0, |file| file.len()) < 100_000 {
@@ -90,19 +90,19 @@ fn wait_until_it_moves(child: &mut Child, partial: &Path) {
 #[derive(Debug, Default, PartialEq)]
 struct Tally {
     kills: u32,
-    /// Killed before the recording was made.
+    /// Kills before the recording was made.
     no_file: u32,
-    /// The file was made, with nothing in it yet.
+    /// Kills after which the recording was empty.
     empty: u32,
-    /// Cut, and read to the last completed chunk.
+    /// Kills after which the recording was cut, and readable to the last completed chunk.
     readable: u32,
-    /// The run had ended before the kill came.
+    /// Kills that came after the run had ended.
     ended: u32,
-    /// Of the readable ones, those that calibrate.
+    /// Readable recordings that give a calibration.
     calibrated: u32,
 }
 
-/// Looks at what a kill left in `out`, where an earlier run's results lay.
+/// Checks the files that a kill left in `out`, where an earlier run had its results.
 fn look_at_leftover(out: &Path, earlier: &[(&str, Vec<u8>)], whole: &[u8], tally: &mut Tally) {
     let partial = out.join("run.mcap.partial");
     let is_old = |(name, bytes): &(&str, Vec<u8>)| fs::read(out.join(name)).is_ok_and(|found| found == *bytes);
@@ -123,7 +123,7 @@ fn look_at_leftover(out: &Path, earlier: &[(&str, Vec<u8>)], whole: &[u8], tally
         tally.empty += 1;
         return;
     }
-    // A run that was killed while it wrote its results has a finished recording.
+    // A run that was killed while writing its results has a finished recording.
     let (code, state) = if left == whole { (0, "state        whole") } else { (3, "state        cut") };
     inspect(&partial).expect("a leftover", code, &[state]);
     tally.readable += 1;
@@ -138,7 +138,7 @@ fn look_at_leftover(out: &Path, earlier: &[(&str, Vec<u8>)], whole: &[u8], tally
     }
 }
 
-/// kill -9 at random moments of a run.
+/// Sends kill -9 at random moments of a run.
 #[test]
 fn a_killed_run_leaves_a_readable_recording() {
     let kills: u32 = std::env::var("ARMCAL_KILLS").ok().and_then(|n| n.parse().ok()).unwrap_or(3);
@@ -156,7 +156,7 @@ fn a_killed_run_leaves_a_readable_recording() {
             fs::write(out.join(name), bytes).expect("written");
         }
         let mut child = start(&reference.routine, &out);
-        // The first in the first moments, the others anywhere.
+        // The first kill comes early in the run, the others at any time.
         let share = if kill == 0 { 0.02 } else { rng.random_range(0.0..1.0) };
         std::thread::sleep(took.mul_f64(share));
         child.kill().expect("killed");
@@ -179,7 +179,7 @@ fn the_run_after_a_killed_one_keeps_its_recording() {
     let mut first = start(&routine, &out);
     wait_until_it_moves(&mut first, &partial);
 
-    // Meanwhile nobody else may write there.
+    // No other run may write there meanwhile.
     run(&routine, &out).expect("two runs at once", 1, &["--out"]);
     first.kill().expect("killed");
     first.wait().expect("gone");
@@ -203,7 +203,7 @@ fn the_run_after_a_killed_one_keeps_its_recording() {
     inspect(&out.join("truth-cut-2.mcap")).expect("the truth", 0, &["state        whole"]);
 }
 
-/// Finished properly: whole, and the last word is that the arm was told to hold.
+/// Checks that the recording is finished properly: it is complete, and its last message tells the arm to hold.
 fn check_interrupted(path: &Path) {
     inspect(path).expect("interrupted", 0, &["state        whole"]);
     let recording = read_recording(path).expect("it reads");
@@ -220,11 +220,11 @@ fn check_interrupted(path: &Path) {
     assert!(moved < 500.0, "the set-point does not jump: {moved} counts");
 }
 
-/// A run on its way stops by this signal and keeps its recording.
+/// Checks that a moving run stops by this signal and keeps its recording.
 #[cfg(unix)]
 #[track_caller]
 fn stops_by(name: &str, routine: &Path, out: &Path) {
-    // Whatever ran the tests may ignore hangups.
+    // The parent process of the tests may ignore hangups.
     let mut command = Command::new("env");
     command.arg("--default-signal").arg(env!("CARGO_BIN_EXE_armcal")).arg("run").arg(routine).arg("--out").arg(out);
     let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the program starts");
@@ -243,7 +243,7 @@ fn sigterm_stops_a_run_and_a_second_signal_ends_it_at_once() {
     let out = folder.path().join("out");
     stops_by("TERM", &routine, &out);
 
-    // While it plans the first signal waits; the second does not.
+    // During planning the first signal waits; the second does not.
     let out = folder.path().join("twice");
     let mut child = start(&routine, &out);
     while !out.join("run.mcap.partial").exists() {
@@ -258,7 +258,7 @@ fn sigterm_stops_a_run_and_a_second_signal_ends_it_at_once() {
     assert!(matches!(code, Some(1 | 130)), "{code:?} {said}");
 }
 
-/// A run where files cannot grow beyond `limit` blocks of 512 bytes: it stands for the full disk and needs no rights.
+/// Runs where files cannot grow beyond `limit` blocks of 512 bytes, which imitates a full disk without special rights.
 #[cfg(unix)]
 fn run_on_full_disk(limit: u64, reference: &FinishedRun, out: &Path) -> Answer {
     let mut shell = Command::new("sh");
@@ -299,14 +299,14 @@ fn a_full_disk_is_told_and_costs_nothing_that_was_there() {
     }
 }
 
-/// A limit at any size up to that of the largest result, and just below and above that of each: `ARMCAL_FULL_DISKS` of
-/// them.
+/// Expects no loss at `n` limits: any size up to that of the largest result, and just below and above that of each.
+/// `ARMCAL_FULL_DISKS` sets `n`.
 #[cfg(unix)]
 fn expect_full_disks_to_lose_nothing(n: u64) {
     const BLOCK_BYTES: u64 = 512;
     let (reference, _) = reference();
     let sizes = RESULTS.map(|name| fs::metadata(reference.file(name)).expect("a result").len() / BLOCK_BYTES);
-    // The last leaves room for all.
+    // The last limit leaves room for all files.
     let largest = sizes.into_iter().max().unwrap_or(0) + 2;
     let spread = (1..=n).map(|k| largest * k / n);
     let edges = sizes.iter().flat_map(|blocks| [*blocks, *blocks + 2]).filter(|_| n >= 64);
@@ -360,7 +360,7 @@ fn a_disk_that_fills_at_any_size_loses_nothing() {
     );
 }
 
-/// The replay is larger than what is recorded: it alone does not fit, and costs nothing else.
+/// The replay is larger than the recording: only the replay does not fit, and all else is written.
 #[cfg(unix)]
 #[test]
 fn a_replay_that_does_not_fit_is_a_warning() {
@@ -378,7 +378,7 @@ fn a_replay_that_does_not_fit_is_a_warning() {
     inspect(&out.join("run.mcap")).expect("the recording", 0, &["state        whole"]);
 }
 
-/// As a terminal that is closed does it; a run under `nohup` goes on.
+/// A closed terminal sends a hangup; a run under `nohup` continues.
 #[cfg(unix)]
 #[test]
 fn a_hangup_stops_a_run_unless_it_was_started_to_ignore_it() {
@@ -428,7 +428,7 @@ fn a_run_into_a_used_folder_leaves_its_own_files_alone() {
     }
 }
 
-/// Refused before anything moves, and nothing is left.
+/// The run is refused before anything moves, and no file is left.
 #[test]
 fn an_output_that_cannot_take_a_run_is_refused_at_once() {
     let (reference, took) = reference();
@@ -439,7 +439,7 @@ fn an_output_that_cannot_take_a_run_is_refused_at_once() {
     fs::create_dir_all(out.join("summary.json")).expect("a folder in the way");
     let mut cases = vec![(file, "file"), (out.clone(), "summary.json")];
     if cfg!(target_os = "linux") {
-        // Nobody can make files there, not even root.
+        // Not even root can make files there.
         cases.push((PathBuf::from("/proc/self"), "/proc/self"));
     }
     for (out, words) in cases {
@@ -451,7 +451,7 @@ fn an_output_that_cannot_take_a_run_is_refused_at_once() {
     assert_eq!(names(&out), ["summary.json"]);
 }
 
-/// No more than two seconds of the arm's time are in memory alone, and a captured view is on disk at once.
+/// At most two seconds of the arm's time are only in memory, and a captured view is on disk at once.
 #[test]
 fn chunks_are_short_and_end_with_captured_views() {
     let (reference, _) = reference();

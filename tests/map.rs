@@ -1,4 +1,4 @@
-//! Tags that nobody has surveyed: the views themselves say where they are.
+//! Tags without a survey: the views determine their poses.
 
 use std::path::PathBuf;
 use std::sync::OnceLock;
@@ -17,14 +17,14 @@ use crate::support::{
     Answer, ShortRoutine, calibrate as calibrate_file, lasting_folder, read, robot_folder, run, temp, titan,
 };
 
-/// Of a mean over five frames, px.
+/// Standard deviation of a corner's mean over five frames, px.
 const NOISE_PX: f64 = 0.134;
-/// A machined seat, m and rad.
+/// Standard deviations of a machined seat, m and rad.
 const MACHINED: (f64, f64) = (0.0002, 0.00035);
 const SURVEYED: (f64, f64) = (0.001, 0.0035);
 
-/// The arm with straight sensors and a camera where the drawing has it: what is left is the map. Every view has five
-/// frames.
+/// The arm with straight sensors and a camera at its nominal mount: the map is the only source of error. Every view has
+/// five frames.
 fn titan_with(base_std: (f64, f64)) -> Robot {
     let mut robot = titan();
     robot.camera.corner_std_px = NOISE_PX;
@@ -35,7 +35,7 @@ fn titan_with(base_std: (f64, f64)) -> Robot {
     robot
 }
 
-/// What is known when only `known` were surveyed: not even a drawing of the others.
+/// The robot when only `known` tags were surveyed; the others have no nominal pose either.
 fn knowing(robot: &Robot, known: &[u32]) -> Robot {
     let mut robot = robot.clone();
     for tag in robot.tags.iter_mut().filter(|tag| !known.contains(&tag.id)) {
@@ -48,7 +48,7 @@ fn knowing(robot: &Robot, known: &[u32]) -> Robot {
 fn arm_and_shots<'a>(robot: &'a Robot, rng: &mut ChaCha8Rng) -> (TrueArm<'a>, Vec<Shot>) {
     let mut arm = TrueArm::with_sensor_errors(robot, rng);
     arm.misplace(rng);
-    // The base tag in every second view to fit, as views for a map are planned.
+    // The base tag is in every second view for the fit, as in views planned for a map.
     let mut shots = arm.shots(CaptureSet::Fit, 15, rng);
     while shots.len() < 30 {
         let more = arm.shots(CaptureSet::Fit, 1, rng);
@@ -67,7 +67,7 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
     quantile(&values.collect::<Vec<_>>(), 0.5).expect("some values")
 }
 
-/// Medians over the seeds: with the tags in `known` surveyed, and the base tag held to `base_std`.
+/// Tool figures, medians over the seeds: with the tags in `known` surveyed, and the base tag held to `base_std`.
 fn figures(known: &[u32], base_std: (f64, f64), seeds: u64) -> ToolFigures {
     let truth = titan_with(base_std);
     let believed = knowing(&truth, known);
@@ -87,7 +87,7 @@ fn figures(known: &[u32], base_std: (f64, f64), seeds: u64) -> ToolFigures {
 }
 
 fn expect_the_cost_of_an_unknown_map(seeds: u64) {
-    /// m. The map hangs on one tag of 0.15 m, whose direction its corners tell to a milliradian or two.
+    /// Tool error, m. The map depends on one tag of 0.15 m, whose corners give its direction within 1 to 2 mrad.
     const UNKNOWN_M: f64 = 0.004;
     let all: Vec<u32> = titan().tags.iter().map(|tag| tag.id).collect();
     let surveyed = figures(&all, SURVEYED, seeds);
@@ -152,7 +152,7 @@ fn tags_are_found_where_they_are_and_those_that_cannot_be_are_left_out() {
     }
 }
 
-/// A run that maps its tags, and what it said; made once.
+/// A run that maps its tags, and its output; made once.
 pub fn mapping_run() -> &'static (PathBuf, Answer) {
     static RUN: OnceLock<(PathBuf, Answer)> = OnceLock::new();
     RUN.get_or_init(|| {
@@ -165,7 +165,7 @@ pub fn mapping_run() -> &'static (PathBuf, Answer) {
     })
 }
 
-/// The recording says what is known: the file alone gives the same result.
+/// The recording states which tags are known: the file gives the same result without other inputs.
 #[test]
 fn a_run_that_maps_its_tags_can_be_done_again_from_its_recording() {
     let (out, said) = mapping_run();

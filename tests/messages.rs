@@ -1,4 +1,4 @@
-//! Messages of other programs that calibration cannot use as they are: skipped and counted, or named with the remedy.
+//! Messages of other programs that calibration cannot use directly: skipped and counted, or named with the remedy.
 
 use armcal::log::ros;
 use armcal::time::Stamp;
@@ -65,7 +65,7 @@ fn a_topic_without_any_position_is_refused_with_the_reasons() {
     }
 }
 
-/// Names joint number `joint` once more, `by` away from its position.
+/// Adds joint number `joint` a second time, `by` away from its position.
 fn again(joints: &mut ros::JointState, joint: usize, by: f64) {
     joints.name.push(joints.name[joint].clone());
     joints.position.push(joints.position[joint] + by);
@@ -158,7 +158,7 @@ fn clocks_that_differ_are_named_with_the_line_that_helps() {
     arm.calibrate_by(&map).expect("as proposed", 0, &["ACCEPTED"]);
 }
 
-/// A converter that takes the stamps for log times leaves none that both topics share.
+/// A converter that uses the stamps as log times leaves none that both topics share.
 #[test]
 fn clocks_that_log_times_share_are_brought_together_by_an_offset() {
     for (name, mut arm, start_s) in
@@ -202,7 +202,7 @@ fn the_lens_of_a_recording_is_proposed() {
     proposed.expect("bench", 0, &["written"]);
     assert!(read(&map).contains("camera_info = \"/camera_info\""), "{}", read(&map));
     bench.calibrate_by(&map).expect("as proposed", 0, &["ACCEPTED"]);
-    // Another camera has a more similar name; the frame decides.
+    // The topic of another camera has a more similar name; the frame decides.
     let mut arm = titan(60).without_lens();
     let others: Vec<Recorded> = arm
         .messages
@@ -221,7 +221,7 @@ fn the_lens_of_a_recording_is_proposed() {
     let (_, map) = arm.propose();
     assert!(read(&map).contains("camera_info = \"/wrist/camera_info\""), "{}", read(&map));
     arm.calibrate_by(&map).expect("two cameras", 0, &["ACCEPTED"]);
-    // The first messages of a driver that has not read its calibration yet.
+    // The first messages come from a driver that has not read its calibration yet.
     let mut arm = kraft(61).without_lens();
     arm.infos().take(4).for_each(|info| (info.k, info.d) = ([0.0; 9], Vec::new()));
     let (_, map) = arm.propose();
@@ -264,7 +264,7 @@ fn roi([x_offset, y_offset]: [u32; 2], [width, height]: [u32; 2]) -> ros::Region
     ros::RegionOfInterest { x_offset, y_offset, height, width, do_rectify: false }
 }
 
-/// Halves of the pixels of every corner, as from images at half the size.
+/// Halves the pixel coordinates of every corner, as in images of half the size.
 #[test]
 fn images_of_half_the_size_are_refused_with_both_sizes() {
     for (name, mut arm) in [("bench", Scene::bench()), ("titan", titan(64)), ("kraft", kraft(65))] {

@@ -93,7 +93,7 @@ fn a_joint_that_the_vehicle_blocks_keeps_its_datasheet_and_no_stops_at_all_are_r
     let found = calibrate(&some, &robot, Method::JointLimits).expect("four joints");
     assert!(!found.joint[1].gain_estimated && found.joint[1].offset_rad == 0.0);
     assert!(found.joint[2].gain_estimated && largest_error(&arm, &found, 2..N_SEEN) < 1e-9);
-    // Nothing that a camera saw: no evidence, no use.
+    // Without camera data there is no evidence, so the result is not usable.
     let mut blind = arm.recording(&[]);
     add_stops(&mut blind, &arm, &both_stops(&arm));
     let found = calibrate(&blind, &robot, Method::JointLimits).expect("fitted");
@@ -115,11 +115,10 @@ fn minimum_variance_finds_all_but_the_first_offset_and_says_so() {
         assert!(largest_error(&arm, &found, 1..N_SEEN) < 1e-6, "seed {seed}");
         assert!((found.joint[0].gain_over_datasheet.expect("a gain") - arm.gain[0]).abs() < 1e-6);
         assert!(found.fit.cost_final < 1e-12 && found.fit.cost_initial > 1e-4, "{:?}", found.fit);
-        // What is held is right if the datasheet is.
+        // The held offset is right if the datasheet is.
         arm.offset_rad[0] = 0.0;
         let found = calibrate(&recording(&arm, &mut rng), &robot, Method::MinimumVariance).expect("calibrated");
-        // How far the held offset may be off decides: its datasheet's sigma alone moves the tool by about the
-        // tolerance.
+        // The error of the held offset decides: its datasheet's sigma moves the tool by about the tolerance.
         assert!(codes(&found).iter().all(|code| *code == Code::BeyondTolerance), "{:?}", found.refusal);
         assert!(largest_error(&arm, &found, 0..N_SEEN) < 1e-6);
     }

@@ -1,4 +1,4 @@
-//! Files with random changes: no reader panics, hangs or eats the memory, and neither does the program.
+//! Files with random changes: no reader and no command panics, hangs or exhausts the memory.
 //!
 //! Each reader of `fuzz/readers.rs` is called in this process; `program` runs the program under limits.
 
@@ -17,10 +17,10 @@ use crate::support::root;
 use bytes::mutated;
 use readers::{READERS, Scratch};
 
-/// Changed copies of each file of a corpus, a tenth of that where each is calibrated; more with
-/// `ARMCAL_READER_MUTATIONS`.
+/// Number of changed copies of each file of a corpus, a tenth of that where each is calibrated;
+/// `ARMCAL_READER_MUTATIONS` raises it.
 const ROUNDS: u32 = 20;
-/// For one file of at most 4 MiB, on a machine that does other things as well.
+/// Time limit for one file of at most 4 MiB, on a machine with other load.
 const LONGEST: Duration = Duration::from_secs(20);
 
 fn corpus(reader: &str) -> Vec<PathBuf> {
@@ -31,7 +31,7 @@ fn corpus(reader: &str) -> Vec<PathBuf> {
     files
 }
 
-/// The names of the drawings in the corpus differ from those that robot.toml asks for, except the first's.
+/// The URDF names in the corpus differ from those in robot.toml, except the first's.
 #[test]
 fn every_file_of_the_corpora_reads() {
     let scratch = Scratch::new(root());

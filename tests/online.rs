@@ -1,4 +1,4 @@
-//! The online belief on recordings of whole runs.
+//! The online estimate on recordings of whole runs.
 
 use std::fs;
 use std::path::Path;
@@ -14,7 +14,7 @@ fn root(path: &str) -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
 }
 
-/// The sample ends known as well as its batch says, by the same bytes each time.
+/// The estimate ends as certain as the sample's batch, with the same bytes each time.
 #[test]
 fn a_recording_is_followed_and_its_belief_written() {
     let folder = temp();
@@ -36,7 +36,7 @@ fn a_recording_is_followed_and_its_belief_written() {
     assert!(later > median_m(last), "without views the belief gets worse");
 }
 
-/// Where nothing drifts, views one by one come to what the batch of all makes of them.
+/// Without drift, views one by one give the result of the batch.
 #[test]
 fn a_stationary_belief_ends_at_the_batch() {
     let folder = temp();
@@ -67,7 +67,7 @@ fn what_cannot_be_followed_is_refused() {
     assert!(!folder.path().join("belief.jsonl").exists(), "nothing was written");
 }
 
-/// A sensor that is declared dead says nothing of the arm between views: not good enough, whatever the views say.
+/// The angle of a joint with a dead sensor is unknown between views, so the arm is not good enough for any views.
 #[test]
 fn with_a_dead_sensor_the_arm_is_not_good_enough() {
     let folder = temp();
@@ -77,7 +77,7 @@ fn with_a_dead_sensor_the_arm_is_not_good_enough() {
     answer(&mut declared).expect("a dead forearm", 4, &[]);
 }
 
-/// Tags whose place nobody knows are mapped first; nothing is believed by them.
+/// Tags of unknown pose are mapped first; no estimate uses them before.
 #[test]
 fn tags_of_unknown_place_are_not_believed_in() {
     let folder = temp();

@@ -1,4 +1,5 @@
-//! Against tools that share no code with ours; `tests/oracle` has the scripts that made the files of `tests/golden`.
+//! Comparison with tools that share no code with ours; `tests/oracle` has the scripts that made the files of
+//! `tests/golden`.
 
 mod dynamics;
 mod paths;
@@ -14,7 +15,7 @@ use serde::de::DeserializeOwned;
 
 use crate::support::{root, titan};
 
-/// The robots and the files that Pinocchio made of them.
+/// Robots, and the files that Pinocchio made from them.
 const ARMS: [(&str, &str); 3] = [
     ("robots/titan4", "kinematics.json"),
     ("robots/kraft-predator", "kinematics-kraft-predator.json"),
@@ -50,7 +51,7 @@ struct KinematicsCase {
     base_from_link: std::collections::BTreeMap<String, GoldenPose>,
     tool_point_in_base_m: [f64; 3],
     base_from_camera: GoldenPose,
-    /// Rows vx vy vz wx wy wz.
+    /// Rows of the Jacobian: vx vy vz wx wy wz.
     tool_point_jacobian_rows: [Vec<f64>; 6],
 }
 
@@ -70,7 +71,8 @@ impl GoldenPose {
     }
 }
 
-/// m, or of a direction: products of six rotations in double precision, with three digits to spare.
+/// Tolerance of positions (m) and directions: products of six rotations in double precision, with three digits to
+/// spare.
 const KINEMATICS_TOLERANCE: f64 = 1e-9;
 
 #[test]
@@ -142,7 +144,7 @@ fn lenses() -> Vec<(Fisheye, Lens)> {
         center_px: camera.center_px,
         distortion: camera.distortion,
         resolution_px: camera.resolution_px,
-        // OpenCV's points lie up to the angle itself; rounding must not put them beyond.
+        // OpenCV's points reach the limit angle; rounding must not put them beyond.
         max_view_angle_rad: file.max_view_angle_rad + 1e-9,
     };
     let lenses: Vec<_> = file.cameras.into_iter().map(|camera| (lens(&camera), camera)).collect();
@@ -152,7 +154,7 @@ fn lenses() -> Vec<(Fisheye, Lens)> {
 
 #[test]
 fn projection_is_opencvs() {
-    /// px. Double precision at 1e3 px, and the terms summed in another order.
+    /// Tolerance, px: double precision at 1e3 px, with the terms summed in another order.
     const TOLERANCE_PX: f64 = 1e-9;
     for (lens, camera) in lenses() {
         let mut worst: f64 = 0.0;
@@ -167,7 +169,7 @@ fn projection_is_opencvs() {
 
 #[test]
 fn unprojection_is_opencvs_and_gives_the_point_back() {
-    /// rad. OpenCV stops at 1e-15 rad; its file holds tangents, which lose digits towards 80 deg.
+    /// Tolerance, rad: OpenCV stops at 1e-15 rad; its file holds tangents, which lose digits towards 80 deg.
     const TOLERANCE_RAD: f64 = 1e-12;
     for (lens, camera) in lenses() {
         let mut worst: f64 = 0.0;
@@ -175,7 +177,7 @@ fn unprojection_is_opencvs_and_gives_the_point_back() {
             let seen = lens.unproject(&Vector2::from(case.pixel_px)).expect("in view");
             let [x, y] = case.undistorted_xy_over_z;
             for direction in [Vector3::new(x, y, 1.0), Vector3::from(case.point_in_camera_m)] {
-                // The angle by its sine: the cosine of a small angle has no digits left.
+                // The angle comes from its sine: the cosine of a small angle has no digits left.
                 worst = worst.max(seen.cross(&direction.normalize()).norm());
             }
         }
@@ -184,7 +186,7 @@ fn unprojection_is_opencvs_and_gives_the_point_back() {
     }
 }
 
-/// The robot's camera is the one that OpenCV was asked about.
+/// The robot's camera is the one in OpenCV's file.
 #[test]
 fn the_golden_lens_is_the_robots() {
     let robot = titan();

@@ -1,4 +1,4 @@
-//! `armcal plan`: what it promises, held against random arms; what it refuses.
+//! `armcal plan`: its guarantees tested with random arms, and its refusals.
 
 use armcal::codes::Code;
 use std::path::{Path, PathBuf};
@@ -18,7 +18,7 @@ fn plan(routine: &Path, out: &Path, more: &[&str]) -> Answer {
     answer(program().arg("plan").arg(routine).arg("--out").arg(out).args(more))
 }
 
-/// Plans and reads what was written.
+/// Plans, and reads the written plan.
 #[track_caller]
 fn planned(routine: &Path, out: &Path, more: &[&str]) -> PlanFile {
     plan(routine, out, more).expect("a plan", 0, &["predicted after the last pose", "plan"]);
@@ -61,7 +61,7 @@ fn the_same_input_gives_the_same_bytes_and_check_reads_them() {
     }
 }
 
-/// What an operator would command is what the sensors as believed in read at the planned angles.
+/// The counts for the operator are the readings of the estimated sensors at the planned angles.
 #[test]
 fn counts_belong_to_their_angles() {
     let folder = temp();
@@ -73,7 +73,7 @@ fn counts_belong_to_their_angles() {
         for (joint, spec) in robot.sensors.iter().enumerate() {
             let apart = (pose.raw_counts[joint] - counts[joint]).abs();
             let apart = apart.min(spec.wrap_counts - apart);
-            // Digits of the file: 1e-6 rad and 1e-3 counts.
+            // Tolerance from the digits of the file: 1e-6 rad and 1e-3 counts.
             assert!(apart <= 1e-6 * spec.counts_per_rad.abs() + 1e-3, "pose {}: {joint}: {apart}", pose.number);
         }
     }
@@ -101,12 +101,12 @@ fn a_prior_narrows_the_bounds_and_renames_the_angles() {
         let (before, after) = (mean(&datasheet, joint), mean(&prior, joint));
         assert!(after < 0.6 * before, "joint {joint}: {before} {after}");
     }
-    // The start is the same believed pose, but not the same readings: the sensors are believed to be off.
+    // The start is the same estimated pose, but has other readings, because the estimated sensors have errors.
     assert_eq!(prior.start_rad, datasheet.start_rad);
     let robot = crate::support::titan();
     let moved = (0..5).filter(|&j| (prior.start_counts[j] - datasheet.start_counts[j]).abs() > 10.0).count();
     assert!(moved >= 4, "{:?} {:?}", prior.start_counts, datasheet.start_counts);
-    // What the errors take from the believed arm's clearance is less.
+    // The errors reduce the nominal arm's clearance by less.
     let lost = |file: &PlanFile| {
         file.pose.iter().map(|pose| pose.clearance_m - pose.proven_clearance_m).sum::<f64>() / file.pose.len() as f64
     };
@@ -116,10 +116,11 @@ fn a_prior_narrows_the_bounds_and_renames_the_angles() {
     plan(&routine, folder.path(), &["--prior", other.to_str().expect("UTF-8")]).expect("other arm", 2, &["other.toml"]);
 }
 
-/// A true arm within the error box about a believed one, each end of each joint as likely as all between.
+/// Angles of a true arm within the error box about the believed ones. Each joint is at an end of its interval with
+/// probability 1/2, otherwise uniform between the ends.
 fn random_arm(robot: &Robot, bounds: &JointErrorBounds, believed: &JointAngles, rng: &mut impl RngExt) -> JointAngles {
     JointAngles::from_fn(believed.len(), |joint| {
-        // The last joint turns a nearly round gripper: its error moves no outline.
+        // The last joint turns an almost round gripper: its error moves no outline.
         if robot.chain.joints()[joint].limits.is_none() {
             return believed[joint];
         }
@@ -128,7 +129,7 @@ fn random_arm(robot: &Robot, bounds: &JointErrorBounds, believed: &JointAngles, 
     })
 }
 
-/// Every arm within the datasheet's bounds keeps what the plan proves, at the poses and on the way.
+/// Every arm within the datasheet's bounds keeps the plan's certified clearance, at the poses and on the way.
 #[test]
 fn every_edge_keeps_its_proven_clearance_for_random_arms() {
     let folder = temp();
@@ -153,10 +154,10 @@ fn every_edge_keeps_its_proven_clearance_for_random_arms() {
             }
         }
     }
-    // To the digits of the file: 1e-6 rad over 2 m.
+    // The tolerance comes from the digits of the file: 1e-6 rad over 2 m.
     assert!(least_m >= plan.margin_m - 1e-5, "{least_m}");
     assert!(spare_m >= -1e-5, "{spare_m}");
-    // Random arms do come near to what was proven: the promise is no empty one.
+    // Random arms come near to the certified clearance, so the bound is not loose.
     assert!(spare_m < 0.02, "{spare_m}");
 }
 
@@ -180,7 +181,7 @@ fn what_cannot_be_planned_is_named() {
     let robot = crate::support::titan();
     let goal = JointAngles::from_slice(&[-2.4, -0.3, 0.0, 0.0, 0.0, 0.0]);
     let tool = robot.chain.link_poses(&goal).frame(&robot.tool.mount).translation.vector;
-    // The base stands at (1.7, -0.6, 0.1) of the vehicle, turned by nothing.
+    // The base is at (1.7, -0.6, 0.1) of the vehicle, without rotation.
     let [x, y, z] = [tool.x + 1.7, tool.y - 0.6, tool.z + 0.1];
     let rock =
         format!("[[obstacle]]\nname = \"rock\"\nshape = \"sphere\"\nradius_m = 0.1\nposition_m = [{x}, {y}, {z}]\n");
@@ -190,7 +191,7 @@ fn what_cannot_be_planned_is_named() {
     refused(&short(folder.path(), ""), &["--prior", "nowhere.toml"], &["nowhere.toml"]);
 }
 
-/// One target of five beyond the arm's reach before calibration: a warning, and a plan for the others.
+/// One target of five is out of the arm's reach before calibration: a warning, and a plan for the others.
 #[test]
 fn a_single_target_out_of_reach_is_a_warning() {
     let folder = temp();

@@ -1,4 +1,4 @@
-//! `inspect` on tables of poses: what it says of their columns, and the input map that it proposes.
+//! `inspect` on tables of poses: its description of their columns, and the input map that it proposes.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -44,7 +44,7 @@ fn inspect(table: &Path, robot: Option<&Path>, map: Option<&Path>) -> Answer {
     answer(&mut command)
 }
 
-/// The proposed map, and that the table reads by it as `poses` has it.
+/// Returns the proposed map, and checks that the table reads by it as `poses`.
 #[track_caller]
 fn expect_proposal(table: &Path, robot: (&Robot, &Path), poses: &[(JointAngles, Isometry3<f64>)]) -> String {
     let map = table.with_extension("map.toml");
@@ -139,7 +139,7 @@ fn tables_are_described_and_a_map_is_proposed() {
     assert!(map.contains("rows = \"samples\"") && map.contains("tracking.translation.x"), "{map}");
 }
 
-/// As pandas and ROS tools write times; a column of another name, and one of numbers next to it.
+/// Dates in the format of pandas and ROS tools, in a column of another name, next to a column of numbers.
 #[test]
 fn dates_are_proposed_as_times_and_read() {
     let folder = temp();
@@ -267,7 +267,7 @@ fn corners_of_tags_are_found_and_proposed() {
     }
 }
 
-/// Corners as OpenCV's detector lists them, read as those of AprilTag: seen so they are a mirror image.
+/// Corners in the order of OpenCV's detector, read in that of AprilTag: that is a mirror image.
 #[test]
 fn corners_in_another_order_are_refused_with_the_key_to_change() {
     let _texts = Texts::of("corners_in_another_order_are_refused_with_the_key_to_change");

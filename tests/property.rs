@@ -1,4 +1,4 @@
-//! What holds for any input: analytic Jacobians are derivatives, and nothing depends on the order of equal things.
+//! Properties for any input: analytic Jacobians are derivatives, and no result depends on the order of equal elements.
 
 use armcal::calib::{PositionProblem, associate, calibrate};
 use armcal::kinematics::{IkGoal, IkSettings, JointLimits, solve_position};
@@ -15,7 +15,7 @@ use crate::support::titan;
 
 /// Step of central differences in rad (or of a gain): truncation h^2 and rounding 1e-16/h are both about 1e-10.
 const STEP: f64 = 1e-5;
-/// Of central differences with that step for positions of a few m, with room for the third derivative.
+/// Tolerance of central differences with that step for positions of a few m, with room for the third derivative.
 const DIFFERENCE_TOLERANCE: f64 = 1e-8;
 
 #[test]
@@ -71,7 +71,7 @@ fn linearize_is_the_derivative_of_its_residuals() {
 
 #[test]
 fn lens_jacobian_is_the_derivative_of_the_projection() {
-    /// px/m. Third derivatives at 0.2 m are some 1e5 px/m3, times h^2 / 6, and rounding of 1e3 px.
+    /// Tolerance, px/m: third derivatives at 0.2 m are about 1e5 px/m3, times h^2 / 6, plus rounding of 1e3 px.
     const TOLERANCE_PX_M: f64 = 1e-4;
     let lens = titan().camera.lens;
     let mut rng = stream_rng(1, "lens");
@@ -92,7 +92,7 @@ fn lens_jacobian_is_the_derivative_of_the_projection() {
 
 #[test]
 fn pixels_round_trip_over_the_whole_image() {
-    /// px. Newton's method ends at 1e-15 rad; 400 px/rad and rounding at 1e3 px.
+    /// Tolerance, px: Newton's method ends at 1e-15 rad; 400 px/rad and rounding at 1e3 px.
     const TOLERANCE_PX: f64 = 1e-9;
     let lens = titan().camera.lens;
     for u in (0..1224).step_by(51) {
@@ -105,12 +105,12 @@ fn pixels_round_trip_over_the_whole_image() {
     }
 }
 
-/// Whatever pose the tool came from, inverse kinematics finds one that puts it there again.
+/// Inverse kinematics finds a pose with the same tool position, for the tool position of any pose.
 #[test]
 fn inverse_kinematics_reaches_what_forward_kinematics_gives() {
     const TOLERANCE_M: f64 = 1e-6;
-    /// Of random goals and starts, 0.65 of these; the rest ends in a corner of the limits, and planning tries another
-    /// start.
+    /// Least share of random goals and starts that succeed; 0.65 do. The others end in a corner of the limits, and
+    /// planning tries another start.
     const SHARE: f64 = 0.5;
     let robot = titan();
     let mut rng = stream_rng(1, "inverse");
@@ -136,7 +136,7 @@ fn inverse_kinematics_reaches_what_forward_kinematics_gives() {
     assert!(f64::from(reached) > SHARE * 200.0, "{reached}");
 }
 
-/// Messages of one log time, and tags of one image, may stand in any order.
+/// Messages of one log time, and tags of one image, may be in any order.
 #[test]
 fn calibration_does_not_depend_on_the_order_of_messages_and_tags() {
     let robot = titan();
@@ -155,14 +155,14 @@ fn calibration_does_not_depend_on_the_order_of_messages_and_tags() {
     }
     for method in [Method::MinimumDistance, Method::Bundle] {
         let [mut a, mut b] = [&recording, &shuffled].map(|r| calibrate(r, &robot, method).expect("calibrated"));
-        // The hash is of the messages as they came.
+        // The hash covers the messages in their order.
         a.messages_hash.clear();
         b.messages_hash.clear();
         assert_eq!(a, b, "{method}");
     }
 }
 
-/// A sensor that counts a thousand times as fine is the same sensor.
+/// A sensor with a thousand times finer counts is the same sensor.
 #[test]
 fn counts_rescaled_by_a_thousand_change_nothing() {
     const FACTOR: f64 = 1000.0;
@@ -190,7 +190,7 @@ fn counts_rescaled_by_a_thousand_change_nothing() {
             sample.counts.iter_mut().for_each(|counts| *counts *= FACTOR);
         }
     }
-    // Relative: rounding of travels that come from words a thousand times as large; BOBYQA stops within 1e-7 of a
+    // Relative tolerances: rounding of travels from words a thousand times as large; BOBYQA stops within 1e-7 of a
     // prior's sigma.
     for (method, tolerance) in [(Method::MinimumDistance, 1e-6), (Method::Bundle, 1e-9)] {
         let a = calibrate(&recording, &robot, method).expect("calibrated");

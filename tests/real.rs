@@ -1,4 +1,4 @@
-//! Recordings of real arms by an input map: what is made of them, and what is refused and why.
+//! Recordings of real arms by an input map: their results, and refusals with reasons.
 
 use std::path::{Path, PathBuf};
 
@@ -24,7 +24,7 @@ use crate::support::synthetic::{N_SEEN, TrueArm, add_noise};
 use crate::support::texts::Texts;
 use crate::support::{Answer, answer, program, read, robot_folder, temp, titan, write};
 
-/// A folder with a recording and all that goes with it.
+/// A folder with a recording and its companion files.
 struct Given {
     folder: tempfile::TempDir,
 }
@@ -42,7 +42,7 @@ impl Given {
         self.folder.path().join(name)
     }
 
-    /// With an empty folder for the results.
+    /// Calibrates with an empty folder for the results.
     fn calibrate_of(&self, recordings: &[&str], more: &[&str]) -> Answer {
         let _ = std::fs::remove_dir_all(self.file("out"));
         self.calibrate_again(recordings, more)
@@ -72,14 +72,14 @@ impl Given {
     }
 }
 
-/// The paper's equation by hand: nominal angles from the words, the chain, distances to the landmarks, m.
+/// The paper's equation by hand, m: nominal angles from the words, the chain, distances to the landmarks.
 fn sum_of_distances_m(robot: &Robot, titan: &RealTitan) -> f64 {
     let mut sum = 0.0;
     for pose in &titan.poses {
         let angles = armcal::streams::JointAngles::from_fn(robot.n_joints(), |j| {
             let spec = &robot.sensors[j];
             let word = pose.joints[j].1 - spec.offset_counts;
-            // The angle nearest to the middle of the range that the wrapped word can mean.
+            // The angle nearest to mid-range that the wrapped word can have.
             let turns = ((spec.center_rad * spec.counts_per_rad - word) / spec.wrap_counts).round();
             (word + turns * spec.wrap_counts) / spec.counts_per_rad
         });
@@ -119,7 +119,7 @@ fn prepared(robot: &Robot, path: &Path, map: &InputMap) -> CalibrationData {
     prepare_external(&[recording], map, robot, ExternalContext::default()).expect("views")
 }
 
-/// The robot with the landmarks, and the views.
+/// The robot with the landmarks, and its views.
 fn prepared_titan(titan: &RealTitan) -> CalibrationData {
     let folder = temp();
     let (path, tags) = (folder.path().join("arm.mcap"), folder.path().join("tags.toml"));
@@ -131,7 +131,7 @@ fn prepared_titan(titan: &RealTitan) -> CalibrationData {
     prepared(&robot.with_survey(named.survey), &path, &map)
 }
 
-/// Errors in their own sigmas (median, 95 %), offsets' errors over the offsets (median), and how many were refused.
+/// Errors over their own sigmas (median, 95 %), offsets' errors over the offsets (median), and the number of refusals.
 fn recovered(method: Method, seeds: u64) -> [f64; 4] {
     let robot = titan();
     let (mut in_sigmas, mut shrunk, mut refused) = (Vec::new(), Vec::new(), 0.0);
@@ -157,8 +157,8 @@ fn recovered(method: Method, seeds: u64) -> [f64; 4] {
     figures
 }
 
-/// A normal's errors are 0.67 sigma in the median and 1.96 (95 %). The mount's prior makes the sigmas larger than they
-/// need to be here, because the camera hangs as in the nominal model.
+/// Normal errors are 0.67 sigma in the median and 1.96 (95 %). The mount's prior makes the sigmas larger than necessary
+/// here, because the camera is mounted exactly as in the nominal model.
 #[track_caller]
 fn expect_known_errors_to_come_back(method: Method, seeds: u64) {
     let [median, p95, ratio, refused] = recovered(method, seeds);
@@ -179,7 +179,7 @@ fn known_errors_of_many_arms_come_back() {
     expect_known_errors_to_come_back(Method::Bundle, 12);
 }
 
-/// Exact sensors need no calibration: how many of `seeds` were refused for that.
+/// Number of refusals among `seeds` arms with exact sensors, which need no calibration.
 fn n_refused_with_exact_sensors(seeds: u64) -> usize {
     let is_refused = |seed: &u64| {
         let titan = RealTitan::new(&titan(), 57, Noise { sensors: 0.0, ..AS_IN_2018 }, *seed);
@@ -231,7 +231,7 @@ fn order_of_joints_and_names_does_not_matter_and_what_hangs_behind_the_camera_ma
     given.calibrate(&[]).expect("another order", 0, &["ACCEPTED", "gripper"]);
     let mut other = given.calibration();
     other.messages_hash.clone_from(&plain.messages_hash);
-    // Nothing is seen of it in either.
+    // Neither recording shows anything of this joint.
     other.joint[N_SEEN].covered_rad = plain.joint[N_SEEN].covered_rad;
     assert_eq!(other, plain);
 }
@@ -306,7 +306,7 @@ fn the_same_poses_as_a_table_give_the_same_sensors() {
     given.calibrate_of(&["poses.csv"], &[]).expect("no such column", 2, &["poses.csv", "\"id\"", "tags.columns"]);
 }
 
-/// What is done to the poses, and what the refusal must name.
+/// A change to the poses, and the words of the refusal.
 type Spoilt = (&'static str, fn(&mut Vec<Pose>), &'static [&'static str]);
 
 const SPOILT: &[Spoilt] = &[
@@ -400,7 +400,7 @@ fn stamps_that_go_backwards_are_refused_in_recordings_of_our_own() {
     answer.expect("backwards", 2, &["own.mcap", "/joint_sensors", "message 3", "backwards"]);
 }
 
-/// 50 readings and 10 images a second; a second at rest, a second on the way.
+/// The stream has 50 readings and 10 images per second; one second at rest, one second moving.
 #[test]
 fn streams_become_one_view_for_each_rest_of_the_arm() {
     const N: usize = 16;
@@ -422,7 +422,7 @@ fn streams_become_one_view_for_each_rest_of_the_arm() {
             let counts = JointCounts::from_slice(&pose.joints.iter().map(|(_, c)| *c).collect::<Vec<_>>());
             let model = &armcal::sensor::ArmSensors::nominal(&robot).models[j];
             let off = (view.travel_rad[j] - model.nominal_travel_rad(counts[j])) * model.spec.counts_per_rad;
-            // The mean of 40 readings with one count of noise; the first moments of the way count as rest.
+            // The mean of 40 readings with one count of noise; the first moments of a motion count as rest.
             assert!(off.abs() < 3.0, "joint {j}: {off} counts");
             assert!(view.rate_rad_s[j].abs() < 0.02, "joint {j}: {} rad/s", view.rate_rad_s[j]);
         }
@@ -486,7 +486,7 @@ fn poses_are_averaged_as_rotations() {
     for pose in &mut poses {
         pose.tags = vec![("tag36h11:0".into(), Isometry3::from_parts(Translation3::new(0.1, 0.2, 1.0), turn(3.1)))];
     }
-    // Two images of the first pose, on either side of half a turn.
+    // Two images of the first pose, with rotations on either side of half a turn.
     let mut again = poses[0].clone();
     again.tags_at_s += 0.1;
     again.tags[0].1.rotation = turn(-3.1);
@@ -510,8 +510,8 @@ fn poses_are_averaged_as_rotations() {
     assert!(first.rotation.angle_to(&turn(std::f64::consts::PI)) < 1e-9, "{first}");
 }
 
-/// Random readings and random tags; how many of the recordings are accepted, with a task of 20 mm and without one, with
-/// the noise of the tags stated and not.
+/// Lists the accepted recordings among those with random readings and random tags. Each is tried with a task of 20 mm
+/// and without one, with the noise of the tags stated and not.
 fn noise_accepted(n_poses: usize, seeds: std::ops::Range<u64>, tag_use: &str, is_stated: &[bool]) -> Vec<String> {
     let mut accepted = Vec::new();
     for seed in seeds {
@@ -565,7 +565,7 @@ fn recordings_of_noise_of_both_kinds_are_refused() {
     assert!(accepted.is_empty(), "{} are accepted: {accepted:#?}", accepted.len());
 }
 
-/// A refused result, and one that is less certain, lie beside the accepted one.
+/// A refused result, and one that is less certain, are written next to the accepted one.
 #[test]
 fn a_worse_result_replaces_no_better_one() {
     let _texts = Texts::of("a_worse_result_replaces_no_better_one");
@@ -589,7 +589,7 @@ fn a_worse_result_replaces_no_better_one() {
     }
     let refused = given.file("out/refused/calibration.toml");
     answer(program().arg("check").arg(refused)).expect("a refused one", 4, &["REFUSED", "[beyond_tolerance]"]);
-    // An equal result takes the place of the first.
+    // An equal result replaces the first.
     given.calibrate_again(&["arm.mcap"], &[]).expect("the same again", 0, &["ACCEPTED"]);
     assert!(read(&given.file("out/calibration.toml")) == first);
 }

@@ -1,4 +1,4 @@
-//! What recordings of real arms hold beside joints and detections: slow sensors and images; and proposed input maps.
+//! Further contents of real arms' recordings: slow sensors and images; and proposed input maps.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ use crate::support::{answer, program, read, robot_folder, temp, titan, write};
 
 const CONDITIONS: &str = "[conditions]\noil_temperature = \"/oil\"\npressure = \"/depth\"\n";
 
-/// A Titan whose oil warms by 0.1 K each pose while it sinks by 1 kPa; `oil_c` is that of the first pose.
+/// Writes a Titan whose oil warms by 0.1 K each pose while it sinks by 1 kPa; `oil_c` is that of the first pose.
 fn write_dive(path: &Path, titan: &RealTitan, oil_c: f64) {
     let mut writer = RecordingWriter::create(path, RecordingHeader::new(Vec::new())).expect("a file");
     for (k, pose) in titan.poses.iter().enumerate() {
@@ -25,7 +25,7 @@ fn write_dive(path: &Path, titan: &RealTitan, oil_c: f64) {
         writer.write_ros("/joint_states", &ros::JointState::SCHEMA, now, &joints).expect("written");
         let transforms = pose.tags.iter().map(|(frame, tag)| transform(later, "fisheye", frame, tag)).collect();
         writer.write_ros("/tf", &ros::TfMessage::SCHEMA, later, &ros::TfMessage { transforms }).expect("written");
-        // The thermometer speaks half a second before and after the image: what counts is between.
+        // The thermometer reports half a second before and after the image; the value between counts.
         for off_s in [-0.5, 0.5] {
             let stamp = later.plus_s(off_s);
             let temperature = oil_c + 0.1 * (k as f64 + off_s);
@@ -63,7 +63,7 @@ fn oil_temperature_and_pressure_reach_the_views() {
     }
     let without = prepared(INPUT_MAP);
     assert!(without.data.fit.iter().all(|view| view.conditions.oil_c.is_none()));
-    // What is used is in the hash: other temperatures, another hash.
+    // The hash includes all inputs in use: other temperatures give another hash.
     assert!(without.messages_hash != with.messages_hash);
     write_dive(&path, &titan, 21.0);
     assert!(prepared(&format!("{INPUT_MAP}{CONDITIONS}")).messages_hash != with.messages_hash);
@@ -92,7 +92,7 @@ fn slow_sensors_that_are_not_as_the_map_says_are_refused() {
     assert!(problem(&text.replace("/oil", "/no_oil")).contains("/no_oil"));
 }
 
-/// A pinhole camera that sees a wall with one tag.
+/// A pinhole camera and a wall with one tag.
 struct Camera {
     lens: CameraModel,
     family: TagFamily,
@@ -149,7 +149,7 @@ impl Camera {
         }
     }
 
-    /// One pose of the arm, and the image in four forms a second apart.
+    /// Writes one pose of the arm, and the image in four forms a second apart.
     fn write(&self, path: &Path, robot: &Robot) {
         let grey = self.image();
         let (width, height) = (RESOLUTION[0], RESOLUTION[1]);
@@ -191,7 +191,7 @@ fn image_map(topic: &str) -> String {
     )
 }
 
-/// Without a family in the input map, that of the robot's tags is looked for.
+/// Expects tags of a family that only the robot names: the input map has none.
 fn expect_tags_of_a_named_family_to_be_found(families: &[TagFamily]) {
     let (folder, robot) = (temp(), titan());
     for &family in families {
@@ -279,7 +279,7 @@ fn a_proposed_input_map_works_and_overwrites_nothing() {
     let proposed = read(&map);
     inspect().expect("it is there", 2, &["map.toml"]);
     assert_eq!(read(&map), proposed);
-    // The positions of these tags are all that the tag map knows, and their noise is known.
+    // The tag map has only the positions of these tags, and their noise is known.
     let stated =
         proposed.replace("# position_std_m", "position_std_m").replace("# rotation_std_rad", "rotation_std_rad");
     let stated =

@@ -1,4 +1,4 @@
-//! Known sensor errors go in; the estimator gets them back, and knows how well.
+//! Known sensor errors are recovered by the estimator, with the right uncertainty.
 
 use armcal::calib::{Calibration, Status, associate, calibrate, identify_scales};
 use armcal::codes::{Code, Coded};
@@ -16,7 +16,7 @@ use crate::support::{temp, titan};
 
 const N_FIT: usize = 30;
 const N_HELD_OUT: usize = 8;
-/// Of the first tier and of the second.
+/// Number of seeds of the first tier and of the second.
 const SEEDS: [u64; 2] = [12, 40];
 /// px per corner coordinate, the standard world's.
 const NOISE_PX: f64 = 0.3;
@@ -35,13 +35,13 @@ fn tool_m(robot: &Robot, angles: &JointAngles) -> Vector3<f64> {
     robot.chain.link_poses(angles).frame(&robot.tool.mount).translation.vector
 }
 
-/// Poses at which the tool is looked at, over the whole range of the arm.
+/// Poses at which the tool error is computed, over the whole range of the arm.
 fn test_angles(arm: &TrueArm) -> Vec<JointAngles> {
     let mut rng = stream_rng(0, "test angles");
     (0..40).map(|_| arm.random_angles(&mut rng)).collect()
 }
 
-/// Where the arm believes its tool to be, less where it is, at each test pose, m.
+/// Distance between the estimated and the true tool at each test pose, m.
 fn tool_errors_m(arm: &TrueArm, calibration: &Calibration) -> Vec<f64> {
     let sensors = calibration.sensors(arm.robot).expect("made for this robot");
     let error = |angles: &JointAngles| {
@@ -57,8 +57,8 @@ fn median(values: &[f64]) -> f64 {
 
 #[test]
 fn noise_free_linear_sensors_are_recovered_through_a_file() {
-    /// m at the tool. BOBYQA stops at a trust region of 1e-7 prior sigma, 5e-9 rad or 1e-8 m at 2 m; the sum of
-    /// distances has a kink at its minimum, so that some ten times that is left.
+    /// Tolerance at the tool, m. BOBYQA stops at a trust region of 1e-7 prior sigma, 5e-9 rad or 1e-8 m at 2 m. The sum
+    /// of distances has a kink at its minimum, which leaves about ten times that.
     const TOLERANCE_M: f64 = 1e-6;
     let robot = titan();
     let mut rng = stream_rng(1, "noise-free");
@@ -95,11 +95,11 @@ fn normalized_errors(arm: &TrueArm, calibration: &Calibration) -> Vec<f64> {
     ratios
 }
 
-/// The least that any unbiased estimator can leave at the tool, rms over the noise, at each test pose, m: Cramer-Rao
-/// with camera and tags known, from differences of the generator's pixels.
+/// Cramer-Rao bound of the tool error at each test pose, rms over the noise, m. Camera and tags are known; the
+/// derivatives are differences of the generator's pixels.
 fn bound_m(arm: &TrueArm, shots: &[Shot]) -> Vec<f64> {
     const STEP: f64 = 1e-6;
-    // A sensor read as `gain (1 + step)` or `offset + step` puts the arm where `turned` says.
+    // A sensor with `gain (1 + step)` or `offset + step` puts the arm at the angles of `turned`.
     let turned = |angles: &JointAngles, parameter: usize, step: f64| {
         let (joint, is_gain) = (parameter / 2, parameter.is_multiple_of(2));
         let travel = (angles[joint] - arm.robot.sensors[joint].center_rad - arm.offset_rad[joint]) / arm.gain[joint];
@@ -141,13 +141,13 @@ fn bound_m(arm: &TrueArm, shots: &[Shot]) -> Vec<f64> {
     test_angles(arm).iter().map(at).collect()
 }
 
-/// With pixel noise alone, and a robot.toml that promises no other errors.
+/// Pixel noise is the only error, and robot.toml states no other.
 fn expect_errors_of_pixel_noise_as_predicted(seeds: u64) {
-    /// Share of errors within two sigma. 95 % if the sigmas are right; they come from 30 views, and 400 parameters know
-    /// the share to 1 %.
+    /// Share of errors within two sigma. It is 95 % if the sigmas are right. They come from 30 views, and 400
+    /// parameters determine the share to 1 %.
     const SHARE_WITHIN_2_SIGMA: std::ops::RangeInclusive<f64> = 0.85..=0.99;
-    /// The paper's estimator weighs near and far tags alike and uses each tag's depth, which pixels hardly give; the
-    /// bound is for one that knows. 3.5 with these seeds.
+    /// Ratio of the error to the bound. The paper's estimator weighs near and far tags equally and uses each tag's
+    /// depth, which pixels hardly determine; the bound uses right weights. 3.5 with these seeds.
     const TIMES_BOUND: f64 = 5.0;
     let mut robot = titan();
     (robot.camera.mount_std_m, robot.camera.mount_std_rad) = (0.0, 0.0);
@@ -170,7 +170,7 @@ fn expect_errors_of_pixel_noise_as_predicted(seeds: u64) {
     assert_eq!(ratios.len(), seeds as usize * 2 * N_SEEN);
     assert!(SHARE_WITHIN_2_SIGMA.contains(&within), "{within}");
     assert!(error_m < TIMES_BOUND * bound_m, "{error_m} {bound_m}");
-    // Nobody beats the bound but by chance: a median over 40 seeds does not.
+    // An estimator beats the bound only by chance, and a median over 40 seeds does not.
     assert!(error_m > 0.5 * bound_m, "{error_m} {bound_m}: too good to be true");
 }
 
@@ -185,11 +185,12 @@ fn with_pixel_noise_errors_of_forty_arms_are_as_large_as_their_sigmas_say() {
     expect_errors_of_pixel_noise_as_predicted(SEEDS[1]);
 }
 
-/// Camera and tags off as robot.toml says: sigmas must cover that, too.
+/// Camera and tags have the errors of robot.toml: sigmas must cover those, too.
 fn expect_errors_of_mount_and_survey_as_predicted(seeds: u64) {
-    /// As above, but the ten parameters of a seed now share one camera mount: 40 of those know the share to 3 %.
+    /// Share of errors within two sigma. The ten parameters of a seed now share one camera mount: 40 of those determine
+    /// the share to 3 %.
     const SHARE_WITHIN_2_SIGMA: std::ops::RangeInclusive<f64> = 0.85..=1.0;
-    /// m, median over seeds: 2 mm and 0.2 deg of the mount, 1 mm of each tag. 2.8 mm with these seeds.
+    /// Tool error, m, median over seeds: 2 mm and 0.2 deg of the mount, 1 mm of each tag. 2.8 mm with these seeds.
     const TOOL_M: f64 = 0.004;
     let robot = titan();
     let (mut ratios, mut errors_m) = (Vec::new(), Vec::new());
@@ -221,11 +222,12 @@ fn with_wrong_mounts_and_surveys_errors_of_forty_arms_are_as_large_as_their_sigm
     expect_errors_of_mount_and_survey_as_predicted(SEEDS[1]);
 }
 
-/// In 5 % of the views one tag is seen a quarter of the image aside: a square still, but not there.
+/// In 5 % of the views one tag is shifted by a quarter of the image: it is still a square, but at the wrong place.
 fn expect_far_outliers_to_change_little(seeds: u64) {
-    /// m at the tool. A sum of distances pulls at an outlier as hard as at any tag, however far it is. 0.1 mm here.
+    /// Change at the tool, m. In a sum of distances an outlier has the same pull as any tag, at any distance. 0.1 mm
+    /// here.
     const CHANGE_M: f64 = 0.0005;
-    /// Least squares would pay for the distance, some 0.5 m.
+    /// Shift of an outlier, px: least squares would respond to the distance, about 0.5 m.
     const SHIFT_PX: f64 = 250.0;
     let robot = titan();
     let mut changes_m = Vec::new();
@@ -259,7 +261,7 @@ fn a_few_far_outliers_change_little_for_twenty_arms() {
     expect_far_outliers_to_change_little(20);
 }
 
-/// Views that say too little are refused, and never without a reason.
+/// Views with too little information are refused, always with a reason.
 #[test]
 fn too_few_views_are_refused_with_a_reason() {
     let robot = titan();
@@ -275,7 +277,7 @@ fn too_few_views_are_refused_with_a_reason() {
     assert_eq!(refused.refusals[0].code(), Code::TooFewViews);
 }
 
-/// Views in which only one joint moves, of an arm whose other joints are wrong, too.
+/// Views in which only one joint moves, of an arm whose other joints have errors, too.
 fn identify_messages(arm: &TrueArm, joint: usize, rng: &mut ChaCha8Rng) -> Recording {
     let swing = [0.0, 0.03, -0.03, -0.12, -0.09, -0.06, -0.03, 0.0, 0.03, 0.06, 0.09, 0.12];
     let mut shots: Vec<Shot> = Vec::new();
@@ -286,7 +288,7 @@ fn identify_messages(arm: &TrueArm, joint: usize, rng: &mut ChaCha8Rng) -> Recor
         let seen = |idx: usize| Some((arm.robot.tags[idx].id, arm.corners(&angles, idx)?));
         shots.push(Shot { set: CaptureSet::Fit, angles, tags: (0..arm.robot.tags.len()).filter_map(seen).collect() });
     }
-    // Five frames a view.
+    // A view has five frames.
     add_noise(&mut shots, NOISE_PX / 5.0_f64.sqrt(), rng);
     let mut recording = arm.recording(&shots);
     for (_, message) in &mut recording.messages {
@@ -297,8 +299,8 @@ fn identify_messages(arm: &TrueArm, joint: usize, rng: &mut ChaCha8Rng) -> Recor
     recording
 }
 
-/// The gain of one sensor is off by any factor and either sign; the other sensors, the camera and the tags are as wrong
-/// as their datasheets allow.
+/// The gain of one sensor has an error of any factor and either sign. The other sensors, the camera and the tags have
+/// errors within their datasheets.
 fn expect_unknown_scales_to_be_recovered(seeds: u64) {
     let robot = titan();
     let mut errors = Vec::new();

@@ -1,4 +1,4 @@
-//! report.html: what it holds, that it needs nothing beside it, and that its figures are those of the calibration.
+//! report.html: its contents, its independence of other files, and the agreement of its figures with the calibration.
 
 use armcal::calib::{Calibration, CornerResidual, calibrate as estimate};
 use armcal::log::read_recording;
@@ -7,7 +7,7 @@ use armcal::routine::Method;
 use crate::support::texts::{Texts, note};
 use crate::support::{calibrate, edit, program, read, robot_copy, robot_folder, shared_run, temp, titan};
 
-/// Headings in their order.
+/// Headings of the page in their order.
 fn headings(html: &str) -> Vec<&str> {
     html.split("<h2>").skip(1).filter_map(|rest| Some(rest.split_once("</h2>")?.0)).collect()
 }
@@ -42,7 +42,7 @@ fn a_report_needs_nothing_beside_it() {
     assert!(html.len() < 2_000_000, "{} bytes", html.len());
 }
 
-/// What a report shows is what the fit says of itself.
+/// The residuals in the report are those of the fit.
 #[test]
 fn the_residuals_that_are_shown_are_those_of_the_fit() {
     let recording = read_recording(shared_run().file("run.mcap")).expect("it reads");
@@ -63,7 +63,7 @@ fn the_residuals_that_are_shown_are_those_of_the_fit() {
     assert_eq!(kept.to_toml(), calibration.to_toml(), "none of it is in the file");
 }
 
-/// Names come from files that anybody may have written.
+/// Names come from files of unknown origin.
 #[test]
 fn names_from_files_are_text_and_no_markup() {
     let folder = temp();

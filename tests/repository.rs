@@ -1,4 +1,4 @@
-//! The repository itself: its sources keep their structure, its pages lead somewhere, quote commands that exist and do
+//! The repository itself: its sources keep their structure, its pages have valid links, quote existing commands and do
 //! not grow.
 
 mod commands;
@@ -36,7 +36,7 @@ fn the_citation_has_the_version_of_the_program() {
     assert!(read(&root().join("CITATION.cff")).contains(version), "CITATION.cff lacks{version}");
 }
 
-/// Fails with all of `violations`, one a line.
+/// Fails with all of `violations`, one per line.
 #[track_caller]
 fn expect_none(violations: &[String]) {
     assert!(violations.is_empty(), "{} violations:\n{}", violations.len(), violations.join("\n"));

@@ -1,4 +1,4 @@
-//! Routines as scripts: steps in order, the world going on meanwhile, and the recording as the only thing belief has.
+//! Routines as scripts: steps run in order while the world continues, and the recording is the estimator's only input.
 
 use armcal::calib::{Calibration, Status};
 use armcal::sim::truth::read_truth;
@@ -11,10 +11,10 @@ use crate::support::{ShortRoutine, Simulated, answer, calibrate, edit, program, 
 const CAPTURE: &str = "[[step]]\ndo = \"capture\"\nposes = 11\nheld_out = 3\n";
 const REACH: &str = "[[step]]\ndo = \"reach\"\ntargets = [0, 2]\n";
 const CALIBRATE: &str = "[[step]]\ndo = \"calibrate\"\n";
-/// Found in no drawing, so that it can be looked for in the recording.
+/// Step of a sensor, rad: a number in no description, so that the recording can be searched for it.
 const JUMP_RAD: f64 = 0.061_803_398_875;
 
-/// Found in no drawing either: a tag falls off on the way, whatever the script does at that time.
+/// Time at which a tag falls off, during any step, s: also a number in no description.
 const TIMED_S: f64 = 70.718_281_828;
 const TIMED: &str = "[[world.fault]]\nat_s = 70.718281828\nkind = \"tag_lost\"\nid = 7\n";
 
@@ -35,8 +35,8 @@ fn same_from_the_recording_alone(run: &Simulated) {
     assert!(read(&out.path().join("calibration.toml")) == run.finished().calibration.to_toml());
 }
 
-/// A sensor slips after the first calibration: the next reach misses, a recalibration mends it, and the estimator finds
-/// both calibrations again in the recording.
+/// A sensor slips after the first calibration: the next reach misses, and a recalibration corrects it. The estimator
+/// finds both calibrations again in the recording.
 #[test]
 fn a_slipped_sensor_is_mended_by_a_recalibration() {
     let recalibrate = "[[step]]\ndo = \"recalibrate\"\n";
@@ -55,13 +55,13 @@ fn a_slipped_sensor_is_mended_by_a_recalibration() {
         score.reaches.iter().map(|r| (r.step, r.calibrated)).collect::<Vec<_>>(),
         [(1, false), (4, true), (7, true), (10, true)]
     );
-    // 0.06 rad half a metre from the tool.
+    // The error is 0.06 rad half a metre from the tool.
     assert!(medians_m[2] > medians_m[1] + 0.01 && medians_m[3] < medians_m[2] - 0.01, "{medians_m:?}");
     assert_eq!(score.after.as_ref(), Some(&score.reaches[3].side));
     assert!(summary.asserts_hold() && summary.asserts.len() == 4);
     assert!((119.0..122.0).contains(&summary.waited_s.expect("known")));
     same_from_the_recording_alone(&run);
-    // What broke is the truth's alone.
+    // Only the truth names the fault.
     let recording = armcal::log::read_recording(run.file("run")).expect("it reads");
     let (recorded, truth) = (run.bytes("run"), read_truth(run.file("truth")).expect("it reads"));
     assert!(truth.header.spec_toml.contains(&JUMP_RAD.to_string()));
@@ -73,7 +73,7 @@ fn a_slipped_sensor_is_mended_by_a_recalibration() {
     assert_eq!(told, [("tag_lost", "id = 7"), ("sensor_jump", jumped.as_str())]);
     let start = armcal::time::SIMULATION_EPOCH;
     assert!((truth.faults[0].stamp.since_s(start) - TIMED_S).abs() < 0.0101, "{:?}", truth.faults);
-    // The views after that time lack the tag, and nobody was told.
+    // The views after that time lack the tag, and no message says so.
     let views = |lost: bool| {
         let images = recording.messages.iter().filter_map(|(_, message)| match message {
             Message::Detections(image) => Some(image),
@@ -87,7 +87,7 @@ fn a_slipped_sensor_is_mended_by_a_recalibration() {
     assert!(views(false) > 0 && views(true) == 0, "{} {}", views(false), views(true));
 }
 
-/// Nobody knows of the ratio, and after the first step the arm does.
+/// No input states the ratio; after the first step the estimator knows it.
 #[track_caller]
 fn expect_a_ratio_to_be_measured(seed: u64, joint: &str, ratio: f64) {
     let identify = format!("[[step]]\ndo = \"identify\"\njoint = {joint:?}\n");
@@ -112,7 +112,7 @@ fn expect_a_ratio_to_be_measured(seed: u64, joint: &str, ratio: f64) {
     same_from_the_recording_alone(&run);
 }
 
-/// Twice the counts, backwards.
+/// The true ratio is two, with reversed sign.
 #[test]
 fn an_unknown_gear_ratio_is_measured_with_its_sign() {
     expect_a_ratio_to_be_measured(1, "forearm_pitch", -2.0);
@@ -139,7 +139,7 @@ fn a_limit_that_does_not_hold_gives_exit_code_4_and_says_which() {
     );
 }
 
-/// Three poses are too few for ten parameters: the verdict is no, and what then happens is the script's to say.
+/// Three poses are too few for ten parameters: the verdict is a refusal, and the script decides what follows.
 #[test]
 fn a_refusal_stops_a_script_unless_it_says_otherwise() {
     let few = "[[step]]\ndo = \"capture\"\nposes = 3\nheld_out = 3\n";
@@ -155,7 +155,7 @@ fn a_refusal_stops_a_script_unless_it_says_otherwise() {
     went_on.expect("went on", 0, &["ACCEPTED", "holds: step 5, contacts"]);
 }
 
-/// Calibrated, the jaws close about the targets; the recording says so, and belief is the same with it.
+/// After calibration the jaws close about the targets. The recording shows it, and does not change the estimate.
 #[test]
 fn calibrated_jaws_close_on_their_targets() {
     let _texts = Texts::of("calibrated_jaws_close_on_their_targets");
@@ -194,7 +194,7 @@ fn calibrated_jaws_close_on_their_targets() {
     same_from_the_recording_alone(&run);
 }
 
-/// The arm has moved by then: what was recorded is not thrown away with the plan.
+/// The arm has moved before the plan fails: the recording is not discarded.
 #[test]
 fn a_plan_that_fails_in_the_middle_of_a_script_keeps_the_recording() {
     let _texts = Texts::of("a_plan_that_fails_in_the_middle_of_a_script_keeps_the_recording");
@@ -266,7 +266,7 @@ fn check_explains_what_is_wrong_with_a_script() {
     check(&format!("{body}[world.gear_ratio]\nwrist_yaw = 0.0\n")).expect("gears", 2, &["world.gear_ratio.wrist_yaw"]);
 }
 
-/// A recording that marks no calibration is one as a whole, as those made before there were scripts are.
+/// A recording without calibration marks, as made before scripts existed, is calibrated as a whole.
 #[test]
 fn an_old_recording_still_calibrates() {
     let folder = temp();

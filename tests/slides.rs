@@ -1,4 +1,4 @@
-//! An arm with two prismatic joints (tests/golden/slides): a lift that leans, and a telescope for a forearm.
+//! An arm with two prismatic joints (tests/golden/slides): a lift that leans, and a telescope as forearm.
 
 use std::path::{Path, PathBuf};
 
@@ -29,7 +29,7 @@ fn arm() -> Robot {
     load(&folder()).expect("the robot reads")
 }
 
-/// Joint positions as `unit` has them ("rad", "deg", "counts"); slides always in metres, but for counts.
+/// The input map for joint positions in `unit` ("rad", "deg", "counts"); slides are in metres, except for counts.
 fn input_map(unit: &str) -> String {
     let unit = if unit == "mm" { "rad\"\nslide_unit = \"mm" } else { unit };
     format!(
@@ -39,10 +39,10 @@ fn input_map(unit: &str) -> String {
     )
 }
 
-/// An arm as its datasheet has it, and what it read and saw, pose by pose.
+/// An arm drawn from its datasheet, with its readings and detections, pose by pose.
 struct Recorded<'a> {
     arm: TrueArm<'a>,
-    /// Raw words, and what was seen.
+    /// Raw words, and the detections.
     poses: Vec<(Vec<f64>, Shot)>,
 }
 
@@ -69,7 +69,7 @@ impl<'a> Recorded<'a> {
         Self { arm, poses }
     }
 
-    /// The position that a word stands for by the datasheet, as a driver publishes it.
+    /// The position that a word has by the datasheet, as a driver publishes it.
     fn position(&self, joint: usize, word: f64, unit: &str) -> f64 {
         let spec = &self.arm.robot.sensors[joint];
         let si = (word - spec.offset_counts) / spec.counts_per_rad;
@@ -111,7 +111,7 @@ impl<'a> Recorded<'a> {
     }
 }
 
-/// How far a slide's gain and offset are from the truth, and one sigma.
+/// Errors of a slide's gain and offset, each with its standard deviation.
 fn of_slide(found: &Calibration, arm: &TrueArm<'_>, joint: usize) -> [(f64, f64); 2] {
     let (of, spec) = (&found.joint[joint], &arm.robot.sensors[joint]);
     let gain = of.gain_rad_per_count * spec.counts_per_rad - arm.gain[joint];
@@ -119,13 +119,14 @@ fn of_slide(found: &Calibration, arm: &TrueArm<'_>, joint: usize) -> [(f64, f64)
     [(gain, gain_std), (of.offset_rad - arm.offset_rad[joint], of.offset_std_rad)]
 }
 
-/// Arms drawn from their datasheet: what comes back is off by as much as is predicted, and slides are told as well as
-/// joints that turn. By the datasheet alone the tool is off by some 30 mm.
+/// Expects errors of the predicted size for arms drawn from their datasheet, and slides as well determined as joints
+/// that turn. With only the datasheet the tool error is about 30 mm.
 fn expect_errors_of_slides_as_predicted(seeds: u64) {
-    /// Fixed before the first run: the tool, median over poses, then the middle and nine in ten of the arms.
+    /// Tool error, m, median over poses, then median over the arms; `NINE_IN_TEN_M` is for nine in ten arms. Both were
+    /// fixed before the first run.
     const MEDIAN_M: f64 = 0.003;
     const NINE_IN_TEN_M: f64 = 0.006;
-    /// A slide's sigmas over what the datasheet says of it.
+    /// Largest ratio of a slide's sigmas to the datasheet's.
     const TOLD: f64 = 0.4;
     let robot = arm();
     let (mut all, mut errors_m) = (Vec::new(), Vec::new());
@@ -191,7 +192,7 @@ fn positions_in_metres_beside_angles_in_any_unit_give_one_calibration() {
     }
 }
 
-/// The program's own files and words of an arm with slides.
+/// The program's own files and messages name the units of slides.
 #[test]
 fn millimetres_for_metres_are_refused_by_name() {
     let robot = arm();
@@ -234,7 +235,7 @@ fn files_and_words_are_in_metres_for_slides() {
     let found = Calibration::read(&toml).expect("it reads again");
     assert_eq!(found.to_toml(), text, "written as it was read");
     assert!(found.sensors(&robot).is_ok());
-    // A slide's figure in rad is no figure of a slide.
+    // A slide has no value in rad.
     write(&file("wrong.toml"), &text.replacen("offset_m = ", "offset_rad = ", 1));
     let export = |calibration: &Path, form: &str| {
         answer(program().arg("export").arg(calibration).args(["--as", form]).arg("--robot").arg(folder()))

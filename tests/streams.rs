@@ -1,4 +1,4 @@
-//! Recordings of real arms that hold everything all the time: which way joints came to rest, and which way is up.
+//! Continuous recordings of real arms: the direction in which joints came to rest, and the direction of up.
 
 use std::path::Path;
 
@@ -18,7 +18,7 @@ use crate::support::external::{
 use crate::support::synthetic::{N_SEEN, TrueArm, normal};
 use crate::support::{temp, titan, write};
 
-/// The views of a recording that `write` makes.
+/// Views of a recording that `write_to` makes.
 fn prepared(robot: &Robot, titan: &RealTitan, map: &str, write_to: impl Fn(&Path)) -> CalibrationData {
     let folder = temp();
     let (path, tags) = (folder.path().join("arm.mcap"), folder.path().join("tags.toml"));
@@ -31,12 +31,12 @@ fn prepared(robot: &Robot, titan: &RealTitan, map: &str, write_to: impl Fn(&Path
     prepare_external(&[recording], &map, &robot, ExternalContext::default()).expect("views")
 }
 
-/// Half of what each joint can move behind its sensor, rad.
+/// Half of each joint's backlash, rad.
 const HALF_BACKLASH_RAD: f64 = 0.006;
-/// A camera on a good mount: what is left in a view is not backlash's size.
+/// Noise of a camera on a good mount: the residuals of a view are smaller than the backlash.
 const STEADY: Noise = Noise { sensors: 1.0, camera_rad: 0.002, camera_m: 0.001, tag_m: 0.001 };
 
-/// Which way each joint came to pose `k`, by the words.
+/// Direction in which each joint came to pose `k`, from the words.
 fn came_from(robot: &Robot, titan: &RealTitan, k: usize, joint: usize) -> f64 {
     let word = |k: usize| titan.poses[k].joints[joint].1;
     (way(word(k - 1), word(k)) * robot.sensors[joint].counts_per_rad).signum()
@@ -64,17 +64,17 @@ fn streams_tell_which_way_each_joint_came_to_rest() {
     assert_eq!(views.len(), 16);
     assert_eq!(views[0].approach, [0.0; 8], "nothing was recorded before");
     for (k, view) in views.iter().enumerate().skip(1) {
-        // The last joint stands still.
+        // The last joint does not move.
         for joint in 0..N_SEEN {
             assert_eq!(view.approach[joint], came_from(&robot, &titan, k, joint), "view {k}, joint {joint}");
         }
     }
-    // Of single readings nobody knows what was between them.
+    // Single readings do not show the motion between them.
     let sparse = prepared(&robot, &titan, INPUT_MAP, |path| write_poses(path, &titan.poses)).data.fit;
     assert!(sparse.len() == 16 && sparse.iter().all(|view| view.approach == [0.0; 8]));
 }
 
-/// Half the backlash of each joint before the camera and its sigma, rad.
+/// Half the backlash of each joint that moves the camera, with its sigma, rad.
 fn half_backlash(found: &Calibration) -> Vec<(f64, f64)> {
     let of_joint = |joint: &armcal::calib::JointResult| {
         let terms = joint.terms.as_ref()?;
@@ -93,7 +93,7 @@ fn expect_backlash_to_be_found(seeds: u64) {
         let halves = half_backlash(&found);
         assert_eq!(halves.len(), N_SEEN, "seed {seed}: {:?}", found.refusal);
         for (joint, (half_rad, std_rad)) in halves.into_iter().enumerate() {
-            // In counts it was one size for all: a gain shows it larger or smaller.
+            // All joints have the same backlash in counts: a gain makes it larger or smaller in rad.
             let error = half_rad - HALF_BACKLASH_RAD * titan.gain[joint];
             errors_rad.push(error.abs());
             in_sigmas.push(error.abs() / std_rad);
@@ -122,17 +122,17 @@ fn backlash_is_found_from_streams_of_eight_arms() {
     expect_backlash_to_be_found(8);
 }
 
-/// What the camera's stamps are late by, and how they scatter about that, s.
+/// Delay of the camera's stamps, s; `JITTER_S` is its scatter.
 const CAMERA_LATE_S: f64 = 0.04;
 const JITTER_S: f64 = 0.003;
 
-/// An arm that never rests: 50 readings a second, five images with late stamps, for 50 s.
+/// Writes an arm that never rests: 50 readings and five images with late stamps per second, for 50 s.
 fn write_moving(path: &Path, robot: &Robot, landmarks_m: &[Vector3<f64>], seed: u64) {
     let mut rng = stream_rng(seed, "moving");
     let arm = TrueArm::with_sensor_errors(robot, &mut rng);
     let middle = arm.random_angles(&mut rng);
     let phases: Vec<f64> = (0..robot.n_joints()).map(|_| std::f64::consts::TAU * normal(&mut rng)).collect();
-    // Up to 0.28 rad/s; no two joints in step.
+    // The joints move with up to 0.28 rad/s, no two in step.
     let angles_at = |t_s: f64| {
         let swing = |joint: usize| 0.5 * ((0.35 + 0.04 * joint as f64) * t_s + phases[joint]).sin();
         JointAngles::from_fn(robot.n_joints(), |joint| middle[joint] + swing(joint))
@@ -184,7 +184,7 @@ fn expect_the_clocks_offset_to_be_found(seeds: std::ops::Range<u64>) {
     eprintln!("clock off by {errors_s:?} s, {in_sigmas:?} sigma; held out {held_out_m:?} m");
     assert!(errors_s.iter().all(|error_s| *error_s < 1e-3), "{errors_s:?}");
     assert!(in_sigmas.iter().filter(|sigmas| **sigmas > 2.0).count() <= 1, "{in_sigmas:?}");
-    // What is predicted of an image is of its time: 40 ms at 0.2 rad/s are 8 mrad.
+    // The prediction for an image is for its time: 40 ms at 0.2 rad/s are 8 mrad.
     assert!(held_out_m.iter().all(|rms_m| *rms_m < 0.004), "{held_out_m:?}");
 }
 
@@ -199,12 +199,12 @@ fn the_clocks_offset_is_found_while_six_arms_move() {
     expect_the_clocks_offset_to_be_found(0..6);
 }
 
-/// How the attitude sensor is turned in the base: a quarter about z, then about y.
+/// Rotation of the attitude sensor in the base: a quarter turn about z, then about y.
 fn base_from_sensor() -> UnitQuaternion<f64> {
     UnitQuaternion::from_euler_angles(0.0, 0.4, 1.2)
 }
 
-/// Up in the base at pose `k`: the vehicle leans more and more, and has turned.
+/// Up in the base at pose `k`: the vehicle leans more with each pose, and has turned.
 fn up_at(k: usize) -> Vector3<f64> {
     world_from_base(k).inverse() * Vector3::z()
 }
@@ -213,7 +213,7 @@ fn world_from_base(k: usize) -> UnitQuaternion<f64> {
     UnitQuaternion::from_euler_angles(0.02 * k as f64, -0.3, 2.0 + 0.1 * k as f64)
 }
 
-/// Poses with an attitude half a second before and after each image of the first `n_told`; the frame is `imu`.
+/// Writes poses with an attitude half a second before and after each of the first `n_told` images; the frame is `imu`.
 fn write_leaning(path: &Path, titan: &RealTitan, n_told: usize, change: impl Fn(&mut ros::Imu)) {
     let mut writer = RecordingWriter::create(path, RecordingHeader::new(Vec::new())).expect("a file");
     for (k, pose) in titan.poses.iter().enumerate() {
@@ -245,7 +245,7 @@ fn attitudes_tell_each_view_which_way_is_up() {
     let with = of(&map_with_attitude());
     assert_eq!(with.data.fit.len(), 12);
     for (k, view) in with.data.fit.iter().enumerate() {
-        // The last two are too far from any attitude.
+        // The last two poses are too far from any attitude.
         assert_eq!(view.up.is_some(), k < 10, "view {k}");
         let off = view.up.map_or(0.0, |up| (up - up_at(k)).norm());
         assert!(off < 1e-9, "view {k}: {off}");
@@ -255,7 +255,7 @@ fn attitudes_tell_each_view_which_way_is_up() {
     assert!(without.messages_hash != with.messages_hash, "what is used is in the hash");
 }
 
-/// What is done to the attitudes.
+/// A change to the attitudes.
 type Change = &'static dyn Fn(&mut ros::Imu);
 
 #[test]

@@ -2,7 +2,7 @@
 
 use crate::support::{Answer, answer, program, read, robot_copy, root, temp, write};
 
-/// The sample's calibration with these tables at the end of robot.toml.
+/// Calibrates the sample with these tables at the end of robot.toml.
 fn calibrated(tables: &str) -> (Answer, String) {
     let folder = temp();
     let robot = robot_copy(folder.path());
@@ -25,7 +25,7 @@ fn n_checks(calibration: &str) -> usize {
     table["verdict"]["checks"].as_array().expect("checks").len()
 }
 
-/// Of the centres of tags 0 and 3 in robots/titan4, m.
+/// Distance between the centres of tags 0 and 3 in robots/titan4, m.
 const APART_M: f64 = 1.9078;
 
 #[test]

@@ -1,4 +1,4 @@
-//! `armcal tagmap` on recordings of others and of ours, and the pinhole camera against OpenCV.
+//! `armcal tagmap` on recordings of other programs and of ours, and the pinhole camera against OpenCV.
 
 use std::path::{Path, PathBuf};
 
@@ -38,7 +38,7 @@ struct Case {
 
 #[test]
 fn the_pinhole_camera_is_opencvs() {
-    /// px. Double precision at 1e3 px, and the terms summed in another order.
+    /// Tolerance, px: double precision at 1e3 px, with the terms summed in another order.
     const TOLERANCE_PX: f64 = 1e-9;
     let text = read(&root().join("tests/golden/radtan.json"));
     let file: Pinholes = serde_json::from_str(&text).expect("the golden file reads");
@@ -57,10 +57,10 @@ fn the_pinhole_camera_is_opencvs() {
     }
 }
 
-/// A hall with six tags as another's recorder would have it, and its files.
+/// A hall with six tags as recorded by another program, and its files.
 struct Hall {
     folder: tempfile::TempDir,
-    /// hall_from_tag.
+    /// Poses hall_from_tag of the tags.
     truth: Vec<Isometry3<f64>>,
 }
 
@@ -229,7 +229,7 @@ fn bad_input_is_refused_with_file_and_key() {
     answer(program().args(["tagmap", "x.mcap"])).expect("usage", 2, &["--robot"]);
 }
 
-/// In the place of the size of tag 4.
+/// A line that replaces the size of tag 4.
 fn size_off_by_ten(hall: &Hall) -> String {
     let place = hall.truth[4].translation.vector;
     let rotation = hall.truth[4].rotation.scaled_axis();
@@ -240,7 +240,7 @@ fn size_off_by_ten(hall: &Hall) -> String {
     )
 }
 
-/// The page says what the table says, and what is wrong first; nothing of it comes from elsewhere.
+/// The page agrees with the table and begins with the warnings; it loads nothing from elsewhere.
 #[test]
 fn the_page_has_the_figures_of_the_table_and_the_warnings() {
     let hall = Hall::new();
@@ -265,7 +265,7 @@ fn the_page_has_the_figures_of_the_table_and_the_warnings() {
     assert!(warning.is_some() && warning < table, "{warning:?} {table:?}");
 }
 
-/// Size ten times too large, beside a tag of known distance.
+/// The size is ten times too large, next to a tag of known distance.
 #[test]
 fn a_size_that_is_off_by_ten_is_warned_of() {
     let hall = Hall::new();
@@ -274,7 +274,7 @@ fn a_size_that_is_off_by_ten_is_warned_of() {
     said.expect("off by ten", 3, &["0.10"]);
 }
 
-/// A recording of ours: the tags come out where the survey has them, to within what the simulated survey is off.
+/// A recording of ours: the tags are mapped to their surveyed poses, within the simulated survey's error.
 #[test]
 fn our_own_recording_is_mapped_by_its_robot() {
     let folder = temp();

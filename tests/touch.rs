@@ -1,4 +1,5 @@
-//! The tool against surveyed plates: felt where they are, used by the calibration, and telling of a wrong drawing.
+//! The tool against surveyed plates: it touches them where they are, the calibration uses that, and it reveals a wrong
+//! nominal model.
 
 use std::path::Path;
 
@@ -43,14 +44,14 @@ fn touches(recording: &Recording) -> Vec<&ToolTouch> {
     messages.collect()
 }
 
-/// By how much the tip is above the surface while it is felt, m, by the truth.
+/// Distance of the tip above the surface during the touch, m, from the truth.
 fn gap_m(robot: &Robot, truth: &Truth, touch: &ToolTouch) -> f64 {
     let angles = truth.state_at(touch.stamp.plus_s(0.5 * touch.duration_s)).expect("a state").angles;
     let tool_m = robot.chain.link_poses(&angles).frame(&robot.tool.mount).translation.vector;
     Vector3::from(touch.normal).dot(&(tool_m - Vector3::from(touch.point_m))) - touch.tip_radius_m
 }
 
-/// Drawings of the arm that are wrong where no view sees it.
+/// Nominal models of the arm with errors that no view shows.
 fn wrong_drawings(robot: &Robot) -> Vec<(String, Robot)> {
     let mut drawings = Vec::new();
     for axis in 0..2 {

@@ -13,14 +13,14 @@ use crate::support::synthetic::{TrueArm, add_noise};
 use crate::support::texts::Texts;
 use crate::support::{Answer, answer, edit, program, read, root, temp, write};
 
-/// Numbers of the corners as printed, in armcal's order and the other way round from the top left.
+/// Numbers of the corners as printed, in armcal's order; `OPENCV` has the opposite winding from the top left.
 const APRILTAG: [usize; 4] = [0, 1, 2, 3];
 const OPENCV: [usize; 4] = [3, 2, 1, 0];
 
 /// Raw readings, and the corners of each tag by its number.
 type Pose = (Vec<f64>, Vec<(u32, [[f64; 2]; 4])>);
 
-/// What an arm's script has measured at each pose.
+/// Measurements of an arm's script at each pose.
 struct Rig {
     robot_folder: PathBuf,
     robot: Robot,
@@ -28,7 +28,7 @@ struct Rig {
     folder: TempDir,
 }
 
-/// A column before the others: its name, and the cell of a pose.
+/// A column before the others: its name, and its cell for each pose.
 type Lead<'a> = (&'a str, &'a dyn Fn(usize) -> String);
 
 impl Rig {
@@ -58,7 +58,7 @@ impl Rig {
         write(&self.file(name), &text);
     }
 
-    /// Four corners a row.
+    /// Writes the four corners of a tag per row.
     fn write_tags(&self, name: &str, lead: Lead<'_>, order: [usize; 4]) {
         let mut text = format!("{},tag,x0,y0,x1,y1,x2,y2,x3,y3\n", lead.0);
         for (k, (_, tags)) in self.poses.iter().enumerate() {
@@ -70,7 +70,7 @@ impl Rig {
         write(&self.file(name), &text);
     }
 
-    /// A corner a row.
+    /// Writes one corner per row.
     fn write_corners(&self, name: &str, lead: Lead<'_>, order: [usize; 4]) {
         let mut text = format!("{};Tag ID;corner;u [px];v [px]\n", lead.0);
         for (k, (_, tags)) in self.poses.iter().enumerate() {
@@ -106,7 +106,7 @@ impl Rig {
         Calibration::read(&self.file("out/calibration.toml")).expect("it reads")
     }
 
-    /// A key of `[tags]` in the proposed map.
+    /// Values of keys of `[tags]` in the proposed map.
     fn tags(&self, keys: &[&str]) -> toml::Value {
         let map: toml::Value = toml::from_str(&read(&self.file("map.toml"))).expect("TOML");
         keys.iter().fold(map["tags"].clone(), |found, key| found[*key].clone())
@@ -117,7 +117,7 @@ fn image(k: usize) -> String {
     format!("img_{k:04}.png")
 }
 
-/// Times in s; images are taken 30 ms after the joints were read.
+/// Time in s; images are taken 30 ms after the joints were read.
 fn seconds(k: usize) -> String {
     format!("{:.3}", 1.5 * k as f64 + 7.0)
 }
@@ -136,7 +136,7 @@ fn tables_are_joined_by_the_images_name_as_one_table_would_be() {
     let keys = [&["table", "key"][..], &["table", "joints_key"], &["columns", "corner_order"]];
     assert_eq!(keys.map(|keys| rig.tags(keys)), ["file_name", "image", "opencv"].map(toml::Value::from));
     let two = rig.expect_accepted("joints.csv");
-    // The same in one table.
+    // The same data in one table.
     let joints = read(&rig.file("joints.csv"));
     let rows: Vec<&str> = joints.lines().map(|line| line.split_once(',').expect("a key").1).collect();
     let corners = read(&rig.file("corners.csv"));
@@ -154,7 +154,7 @@ fn tables_are_joined_by_the_images_name_as_one_table_would_be() {
     }
 }
 
-/// The table of the tags is named alone, and its times have another unit.
+/// Only the table of the tags is named, and its times have another unit.
 #[test]
 fn tables_next_to_each_other_are_joined_by_time() {
     let _texts = Texts::of("tables_next_to_each_other_are_joined_by_time");
@@ -184,7 +184,7 @@ fn dates_and_nanoseconds_are_joined_by_time() {
     rig.expect_accepted("joints.csv");
 }
 
-/// A camera with a clock of its own: the message's line, added to the map, makes the tables fit.
+/// A camera with its own clock: the message's line, added to the map, makes the tables fit.
 #[test]
 fn clocks_of_tables_that_differ_are_named_and_the_advice_works() {
     let _texts = Texts::of("clocks_of_tables_that_differ_are_named_and_the_advice_works");
@@ -212,7 +212,7 @@ fn rows_without_their_other_half_are_counted_and_none_is_taken_twice() {
     let n: usize = rig.poses[..3].iter().map(|(_, tags)| tags.len()).sum();
     let left_out = format!("joints.csv: {n} rows of ");
     rig.calibrate("joints.csv").expect("27 poses", 3, &["ACCEPTED", &left_out, "[messages_rejected]"]);
-    // Rows that are there twice.
+    // Some rows occur twice.
     let twice = |name: &str| {
         let text = read(&rig.file(name));
         let line = text.lines().next_back().expect("a row").to_owned() + "\n";
@@ -223,21 +223,21 @@ fn rows_without_their_other_half_are_counted_and_none_is_taken_twice() {
     };
     twice("joints.csv").expect("a pose twice", 2, &["[table_invalid]"]);
     twice("corners.csv").expect("a tag twice", 2, &["[table_invalid]"]);
-    // No text in common, and no column that might have one.
+    // The tables have no text in common, and no column that might have one.
     rig.write_tags("corners.csv", ("frame", &|k| format!("shot{k}")), OPENCV);
     rig.calibrate("joints.csv").expect("no match", 2, &["shot0", "img_0003", "joints_key", "[table_invalid]"]);
     std::fs::remove_file(rig.file("map.toml")).expect("removed");
     let both = ["joints.csv", "corners.csv"];
     rig.inspect(&both).expect("nothing joins them", 2, &["[joints_mismatch]"]);
     assert!(!rig.file("map.toml").exists());
-    // Which of several is for the user to say.
+    // With several candidates the user must choose.
     rig.write_tags("corners.csv", ("frame", &image), OPENCV);
     rig.write_tags("old.csv", ("frame", &image), OPENCV);
     rig.inspect(&both[..1]).expect("two others", 2, &["corners.csv", "old.csv", "[usage_invalid]"]);
     rig.inspect(&both).expect("named", 0, &["written"]);
 }
 
-/// Both ways round in both forms; corners that are listed row by row are read after the advice.
+/// Both windings in both forms; corners that are listed row by row are read after the advice is followed.
 #[test]
 fn the_order_of_corners_is_proposed_by_their_winding() {
     let _texts = Texts::of("the_order_of_corners_is_proposed_by_their_winding");
@@ -257,14 +257,14 @@ fn the_order_of_corners_is_proposed_by_their_winding() {
         let proposed = orders.map(|order| propose(name, order));
         assert_eq!(proposed, ["apriltag", "opencv", "opencv", "apriltag", "opencv"].map(toml::Value::from), "{name}");
     }
-    // Listed row by row: with the columns of the last two exchanged they are read.
+    // The corners are listed row by row: with the columns of the last two exchanged they are read.
     propose("four.csv", [3, 2, 0, 1]);
     rig.calibrate("joints.csv").expect("crossed", 2, &["corner_order", "[input_corner_order]"]);
     edit(&rig.file("map.toml"), "\"x2\", \"y2\", \"x3\", \"y3\"", "\"x3\", \"y3\", \"x2\", \"y2\"");
     rig.expect_accepted("joints.csv");
 }
 
-/// The first corner is bottom right, and `inspect` takes it as top left: half of the tags would pass as moved.
+/// The first corner is bottom right, and `inspect` takes it as top left: half of the tags would be accepted as moved.
 #[test]
 fn a_turn_of_all_tags_is_no_repair_of_each() {
     let rig = Rig::new("kraft-predator", 30, 5);
@@ -274,7 +274,7 @@ fn a_turn_of_all_tags_is_no_repair_of_each() {
     rig.calibrate("joints.csv").expect("turned", 4, &["[input_tag_frames]"]);
 }
 
-/// The map names its table from its own folder.
+/// The map names its table relative to its own folder.
 #[test]
 fn a_map_elsewhere_names_the_table_by_its_whole_path() {
     let rig = Rig::new("titan4", 30, 6);

@@ -1,4 +1,4 @@
-//! Sensors of which nobody knows more than 8 % and 8 degrees: the arm finds its way without touching anything.
+//! Sensors that are known only to 8 % and 8 degrees: the arm calibrates without touching anything.
 
 use std::sync::OnceLock;
 
@@ -36,7 +36,7 @@ fn shared() -> &'static (RunSummary, Vec<u8>) {
     RUN.get_or_init(|| run(FIRST, SEED, &[]))
 }
 
-/// Links of the arm whose margins were looked at, and of how many the error was beyond its margin.
+/// Number of the arm's compared link positions, and of those whose error exceeded its margin.
 fn expect_a_good_calibration_without_contact(site: Site, seed: u64, summary: &RunSummary) -> [usize; 2] {
     let name = format!("{}, {}, seed {seed}", ROUTINES[site.routine], ARMS[site.arm]);
     assert_eq!(summary.status, Status::Accepted, "{name}: {:?}", summary.refusal);
@@ -53,7 +53,7 @@ fn expect_a_good_calibration_without_contact(site: Site, seed: u64, summary: &Ru
     [margins.links, margins.exceeded_q99]
 }
 
-/// The other sites are of the second tier.
+/// The other sites are in the second tier.
 #[test]
 fn one_arm_is_calibrated_without_contact() {
     let [links, beyond] = expect_a_good_calibration_without_contact(FIRST, SEED, &shared().0);
@@ -75,20 +75,21 @@ fn no_contact_on_the_way_to_a_good_calibration() {
         let of_run = expect_a_good_calibration_without_contact(site, seed, &run(site, seed, &[]).0);
         (links, beyond) = (links + of_run[0], beyond + of_run[1]);
     }
-    // Links of one run share their arm: six runs are not many.
+    // Links of one run share their arm, so six runs are a small sample.
     assert!(beyond * 100 < links * 5, "{beyond} of {links}");
 }
 
-/// The worlds are hard: planned once for the believed arm, without margins for wrong sensors, arms do touch things.
+/// The worlds are hard: with paths planned once for the nominal arm, without margins for wrong sensors, arms touch
+/// things.
 #[test]
 fn without_margins_arms_collide() {
     let off = [("capture.margins", "off".into()), ("capture.replan_every", 0.into())];
     let collides = |seed| run(Site { routine: 1, arm: 0 }, seed, &off).0.capture.collisions.expect("truth") > 0;
-    // The fourth does on the machines that were tried.
+    // The fourth seed does on the machines that were tried.
     assert!([4, 1, 2, 3].into_iter().any(collides));
 }
 
-/// Why there were no more views is said: the time was over, or the tolerance reached.
+/// The result says why the capture ended: the time was over, or the tolerance reached.
 #[test]
 fn a_capture_says_why_it_ended() {
     let why = |summary: &RunSummary| summary.capture.stop_reason.clone().expect("a reason");

@@ -1,5 +1,5 @@
-//! URDFs as they are found: what calibration does not use is skipped with a warning that names link or joint, and what
-//! it uses and is wrong is refused with line, column and name. Each kind of problem is tried on three arms.
+//! URDFs as found in practice. Calibration skips unused elements with a warning that names link or joint. It refuses
+//! wrong elements that it needs, with line, column and name. Each kind of problem is tried on three arms.
 
 use std::path::{Path, PathBuf};
 
@@ -9,19 +9,19 @@ use armcal::robot::{Robot, load};
 use crate::support::texts::Texts;
 use crate::support::{Answer, answer, program, temp, write};
 
-/// Places of an arm's URDF that a test fills in.
+/// Parts of an arm's URDF that a test sets.
 #[derive(Clone)]
 struct Parts {
     base: String,
     tool: String,
-    /// Readings of the second joint.
+    /// Type of the second joint.
     kind: String,
     origin: String,
     axis: String,
     limit: String,
-    /// In the second joint, behind the others.
+    /// Elements at the end of the second joint.
     joint_more: String,
-    /// Links and joints behind all others.
+    /// Links and joints after all others.
     more: String,
     head: String,
 }
@@ -42,10 +42,10 @@ impl Default for Parts {
     }
 }
 
-/// Numbers of joints of the arms that each kind is tried on; that of 4 has a slide.
+/// Numbers of joints of the arms on which each kind is tried; the arm with 4 has a slide.
 const ARMS: [usize; 3] = [4, 6, 7];
 
-/// An arm of `n` joints `j1` and on, from `base_link` over `l1` and on to `tool`.
+/// An arm of `n` joints `j1` and following, from `base_link` over `l1` and following to `tool`.
 fn arm(n: usize, parts: &Parts) -> String {
     let link = |k: usize| if k == 0 { "base_link".to_owned() } else { format!("l{k}") };
     let mut text = format!("{}<robot name=\"arm_{n}\">\n<link name=\"base_link\">{}</link>\n", parts.head, parts.base);
@@ -79,7 +79,7 @@ fn joint(name: &str, kind: &str, [parent, child]: [&str; 2], more: &str) -> Stri
     )
 }
 
-/// A URDF and the folder that is made of it.
+/// A URDF and the folder made from it.
 struct Bench {
     folder: tempfile::TempDir,
 }
@@ -101,7 +101,7 @@ impl Bench {
         answer(command.args(options))
     }
 
-    /// The robot, after `new-robot` and `check` passed and said `words`.
+    /// The robot, after `new-robot` and `check` passed with `words` in their output.
     #[track_caller]
     fn made(&self, options: &[&str], words: &[&str]) -> Robot {
         let what = std::fs::read_to_string(self.folder.path().join("arm.urdf")).expect("the URDF");
@@ -118,7 +118,7 @@ impl Bench {
     }
 }
 
-/// Every arm with each of `values` put in by `edit` reads with all its joints, and a warning says `words`.
+/// Expects every arm with each of `values`, set by `edit`, to load with all its joints and a warning with `words`.
 #[track_caller]
 fn skipped(values: &[&str], edit: fn(&mut Parts, &str), words: &[&str]) -> Vec<Robot> {
     let mut robots = Vec::new();
@@ -134,7 +134,7 @@ fn skipped(values: &[&str], edit: fn(&mut Parts, &str), words: &[&str]) -> Vec<R
     robots
 }
 
-/// Every arm with each of `values` put in by `edit` is refused in `words`, with a line.
+/// Expects every arm with each of `values`, set by `edit`, to be refused with `words` and a line.
 #[track_caller]
 fn refused(values: &[&str], edit: fn(&mut Parts, &str), words: &[&str]) {
     for n in ARMS {
@@ -186,7 +186,7 @@ fn shapes_and_materials_that_are_none_are_left_out() {
     skipped(&["<material name=\"a\"><color rgba=\"red\"/></material>"], edit, &["`base_link`", "colour"]);
 }
 
-/// One message of each kind, as people read it.
+/// One message of each kind, for people to read.
 #[test]
 fn messages_about_a_urdf_name_place_value_and_remedy() {
     let _texts = Texts::of("messages_about_a_urdf_name_place_value_and_remedy");
@@ -392,7 +392,7 @@ fn xacro_is_named_with_the_command_that_expands_it() {
     }
 }
 
-/// A joint of the chain that follows another has no sensor of its own.
+/// A chain joint that follows another has no sensor of its own.
 #[test]
 fn a_mimic_joint_in_the_chain_is_refused_by_its_name() {
     for n in ARMS {
@@ -402,7 +402,7 @@ fn a_mimic_joint_in_the_chain_is_refused_by_its_name() {
             bench.refused(&[], &words);
             bench.refused(&["--base", "base_link"], &words);
             bench.refused(&["--base", "base_link", "--tip", "tool"], &words);
-            // The remedies of the message.
+            // The message proposes these remedies.
             let robot = bench.made(&["--base", "l2", "--tip", "tool"], &[]);
             assert_eq!((robot.n_joints(), robot.base_link.as_str()), (n - 2, "l2"));
         }
@@ -449,20 +449,20 @@ fn options_are_obeyed_or_refused() {
     Bench::new(&text).refused(&["--base", "l5", "--tip", "l2"], &["`l5`", "`l2`", "urdf_structure"]);
     Bench::new(&text).refused(&["--base", "tool"], &["`tool`"]);
     Bench::new(&text).refused(&["--tip", "base_link"], &["`base_link`"]);
-    // A root called world that moves is of the arm.
+    // A root called world that moves belongs to the arm.
     let world = text.replace("base_link", "world");
     assert_eq!(Bench::new(&world).made(&[], &[]).base_link, "world");
-    // A root that only joints name is the only one.
+    // A root that only joints name is valid if it is the only one.
     let implied = text.replace("<link name=\"base_link\"></link>", "");
     assert_eq!(Bench::new(&implied).made(&[], &["`base_link`", "urdf_skipped"]).n_joints(), 6);
-    // One that stands still is not, unless it is named.
+    // A static root does not belong to the arm, unless it is named.
     let on_world =
         text.replace("</robot>", &(joint("w", "fixed", ["world", "base_link"], "") + "<link name=\"world\"/></robot>"));
     assert_eq!(Bench::new(&on_world).made(&[], &[]).base_link, "base_link");
     assert_eq!(Bench::new(&on_world).made(&["--base", "world"], &[]).base_link, "world");
 }
 
-/// A map's frame hundreds of metres away costs no digit of the arm's own motion.
+/// A map's frame hundreds of metres away does not reduce the precision of the arm's own motion.
 #[test]
 fn frames_far_from_the_base_lose_no_precision() {
     for (n, at) in ARMS.into_iter().zip([[640.0, -310.0, 12.5], [-1250.5, 77.0, 0.25], [50_000.0, 4_800_000.0, 96.0]]) {
@@ -476,7 +476,7 @@ fn frames_far_from_the_base_lose_no_precision() {
             let angles = JointAngles::from_fn(n, |joint| (f64::from(seed) * 1.3 + joint as f64).sin());
             let [near, far] = [&near, &far].map(|robot| robot.chain.frame(&angles, &robot.tool.mount));
             let off = far.translation.vector - near.translation.vector - nalgebra::Vector3::from(at);
-            // A double's last digit at that distance, a few times.
+            // A few times a double's last digit at that distance.
             let smallest_m = 8.0 * f64::EPSILON * x.abs().max(y.abs());
             assert!(off.norm() < smallest_m, "{n}: {}", off.norm());
             assert!(far.rotation.angle_to(&near.rotation) < 1e-7);

@@ -1,4 +1,4 @@
-//! Every arm on every vehicle; tags that belong to the vehicle; meshes that stand in the way and travel with a
+//! Every arm on every vehicle; tags that belong to the vehicle; meshes that are obstacles and are stored in a
 //! recording.
 
 use std::fmt::Write as _;
@@ -55,7 +55,7 @@ fn every_arm_starts_clear_of_every_vehicle_with_tags_in_view() {
     }
 }
 
-/// The shapes as drawn: no moving link begins in contact with anything, under any of these seeds.
+/// With the nominal shapes, no moving link begins in contact with anything, for any of these seeds.
 #[test]
 fn no_world_begins_in_contact() {
     for name in VEHICLES {
@@ -72,7 +72,7 @@ fn no_world_begins_in_contact() {
     }
 }
 
-/// Pairs of parts that touched while the arm was told to go to `angles` by the datasheet.
+/// Pairs of parts that touched while the arm was commanded to `angles` by the datasheet.
 fn contacts_of(input: WorldInput<'_>, angles: &JointAngles, seconds: f64) -> Vec<(String, String)> {
     let counts = ArmSensors::nominal(input.robot).counts(angles);
     let folder = temp();
@@ -85,7 +85,7 @@ fn contacts_of(input: WorldInput<'_>, angles: &JointAngles, seconds: f64) -> Vec
     read_truth(&file).expect("it reads").contacts.into_iter().map(|c| (c.part_a, c.part_b)).collect()
 }
 
-/// The tags that a vehicle carries are placed in its own frame, on plates of its own.
+/// The tags of a vehicle have poses in its own frame, on its own plates.
 #[test]
 fn tags_of_a_vehicle_lie_on_its_plates() {
     for name in &VEHICLES[1..] {
@@ -118,7 +118,7 @@ fn box_obj() -> String {
     text + "f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\n"
 }
 
-/// The same box at `at_m` (world frame), drawn as a box and as a mesh.
+/// The same box at `at_m` (world frame), as a box and as a mesh.
 fn box_and_mesh(folder: &Path, at_m: [f64; 3]) -> [Scene; 2] {
     write(&folder.join("block.obj"), &box_obj());
     let place = format!("position_m = {at_m:?}\nquaternion_wxyz = [0.9238795325, 0.0, 0.0, 0.3826834324]\n");
@@ -175,7 +175,7 @@ fn calibration_of(recording: &Path, robot: &Path) -> String {
     read(&out.path().join("calibration.toml"))
 }
 
-/// A copy of an arm's folder, to be edited.
+/// A copy of an arm's folder for editing.
 fn copy_of(arm: &str, folder: &Path) -> PathBuf {
     let copy = folder.join(arm);
     fs::create_dir_all(&copy).expect("a folder");
@@ -185,8 +185,8 @@ fn copy_of(arm: &str, folder: &Path) -> PathBuf {
     copy
 }
 
-/// The whole loop with the second arm, on a vehicle with tags of its own, beside a mesh: what calibration takes from it
-/// is in the recording's messages, and what the replay draws in its attachments.
+/// The whole loop with the second arm, on a vehicle with its own tags, next to a mesh. The recording's messages have
+/// all inputs of the calibration, and its attachments have all shapes of the replay.
 #[test]
 fn tags_of_the_vehicle_and_meshes_travel_with_the_recording() {
     const ARM: &str = "kraft-predator";
@@ -208,7 +208,7 @@ fn tags_of_the_vehicle_and_meshes_travel_with_the_recording() {
     assert_eq!((summary.capture.collisions, summary.capture.targets_skipped), (Some(0), 0));
     let expected = read(&run.file("calibration.toml"));
 
-    // Alone in another folder, and without attachments and metadata.
+    // A copy without other files in its folder, and without attachments and metadata.
     let alone = folder.path().join("alone.mcap");
     fs::copy(run.file("run.mcap"), &alone).expect("copied");
     assert!(calibration_of(&alone, &arm_folder(ARM)) == expected);
@@ -216,12 +216,12 @@ fn tags_of_the_vehicle_and_meshes_travel_with_the_recording() {
     strip(&alone, &bare).expect("stripped");
     assert!(calibration_of(&bare, &arm_folder(ARM)) == expected, "without attachments");
 
-    // The robot's own tags do not matter: the recording says what was there.
+    // The robot's own tags do not matter, because the recording has the survey.
     let robot = copy_of(ARM, folder.path());
     edit(&robot.join("robot.toml"), "position_m = [-0.4785, 0.45, -0.4]", "position_m = [0.0, 0.0, 5.0]");
     assert!(calibration_of(&alone, &robot) == expected, "with other tags in robot.toml");
 
-    // They would, if it did not.
+    // The robot's own tags matter if the recording has no survey.
     let recording = read_recording(&alone).expect("it reads");
     let unsurveyed = folder.path().join("unsurveyed.mcap");
     let mut writer =

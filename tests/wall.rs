@@ -1,4 +1,5 @@
-//! What belief does not know: it gets a recording and a robot folder, and nothing of the truth comes with them.
+//! Separation from the truth: the estimator gets a recording and a robot folder, and no part of the truth comes with
+//! them.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -28,7 +29,7 @@ fn a_recording_and_a_robot_are_all_that_calibration_takes() {
     let expected = read(&run.file("calibration.toml"));
     assert!(calibration_of(&run.file("run.mcap"), &robot_folder()) == expected);
 
-    // In a folder of its own: nothing lies beside it.
+    // The copy is in its own folder, with no other files.
     let folder = temp();
     let alone = folder.path().join("alone.mcap");
     fs::copy(run.file("run.mcap"), &alone).expect("copied");
@@ -47,7 +48,7 @@ fn attachments_and_metadata_do_not_matter() {
     assert!(calibration_of(&bare, &robot_folder()) == read(&run.file("calibration.toml")));
 }
 
-/// What viewers draw by is told to nobody else: without it the calibration is the same, byte for byte.
+/// The calibration does not use the viewers' topics: without them it is the same, byte for byte.
 #[test]
 fn topics_for_viewers_do_not_matter() {
     let run = shared_run();
@@ -73,7 +74,7 @@ fn topics_for_viewers_do_not_matter() {
     assert!(with.len() * 4 < without.len() * 5, "{} bytes, {} without", with.len(), without.len());
 }
 
-/// The same words twice as fine, in recording and datasheet alike.
+/// The words are twice as fine, in recording and datasheet.
 #[test]
 fn counts_twice_as_fine_halve_the_gains_and_change_nothing_else() {
     let run = shared_run();
@@ -117,11 +118,11 @@ fn counts_twice_as_fine_halve_the_gains_and_change_nothing_else() {
         joint.gain_rad_per_count *= 0.5;
         joint.gain_std_rad_per_count *= 0.5;
     }
-    // Halving is exact in binary, so the rest is not just near but the same.
+    // Halving is exact in binary, so all else is not only close but equal.
     assert_eq!(doubled, expected);
 }
 
-/// Everything in a recording that a program could read: messages, types, channels, attachments, metadata, headers.
+/// All contents of a recording that a program could read: messages, types, channels, attachments, metadata, headers.
 pub fn all_contents(path: &Path) -> Vec<u8> {
     let mut contents = Vec::new();
     for_each_raw(path, |message| {
@@ -153,7 +154,8 @@ fn the_recording_holds_neither_seed_nor_world() {
     let run = shared_run();
     let contents = all_contents(&run.file("run.mcap"));
     let lower = contents.to_ascii_lowercase();
-    // As the words are written: of two megabytes of compressed chunks one in a hundred holds four letters in any case.
+    // The search in the file is case-sensitive: two megabytes of compressed chunks hold a word of four letters in any
+    // case with a probability of 1/100.
     let file = fs::read(run.file("run.mcap")).expect("a file");
     for word in ["seed", "gain_error", "as_built", "[world", "backlash", "harmonic", "drift_rad", "miss_probability"] {
         assert!(!find(&lower, word.as_bytes()), "the recording holds `{word}`");
@@ -164,7 +166,7 @@ fn the_recording_holds_neither_seed_nor_world() {
     }
     assert!(!find(&contents, &SHARED_SEED.to_le_bytes()) && !find(&contents, &SHARED_SEED.to_be_bytes()));
 
-    // The numbers themselves, as the truth has them; the search is good for something, for it finds them there.
+    // The search is for the numbers themselves. It finds them in the truth, which shows that it works.
     let truth = read_truth(run.file("truth.mcap")).expect("it reads");
     assert_eq!(truth.header.seed, SHARED_SEED);
     let truth_contents = all_contents(&run.file("truth.mcap"));
@@ -191,7 +193,7 @@ fn attached_drawings_are_the_files_that_belief_may_read() {
     assert!(attached["robot.toml"] == robot_toml);
 }
 
-/// The compiler lets a crate name only what it depends on.
+/// The compiler lets a crate name only its dependencies.
 #[test]
 fn belief_does_not_depend_on_the_simulator_nor_truth_on_belief() {
     for (member, allowed) in [
@@ -211,7 +213,7 @@ fn belief_does_not_depend_on_the_simulator_nor_truth_on_belief() {
     }
 }
 
-/// The wall is of this robot: an edit of its drawing does change the result, so the tests above compare something.
+/// A change of the nominal model does change the result, so the tests above compare something.
 #[test]
 fn the_robot_folder_does_matter() {
     let run = shared_run();
@@ -224,8 +226,8 @@ fn the_robot_folder_does_matter() {
     assert!(read(&out.path().join("calibration.toml")) != read(&run.file("calibration.toml")));
 }
 
-/// The crate `live` alone reaches an arm, and only `drive`, `discover` and `serve` know it: `run` and all that it is
-/// made of have no way to a socket but the replay's, to a viewer.
+/// Only the crate `live` reaches an arm, and only `drive`, `discover` and `serve` use it. `run` and its dependencies
+/// have no socket except the replay's, to a viewer.
 #[test]
 fn only_drive_discover_and_serve_reach_an_arm() {
     let src = root().join("src");
@@ -239,7 +241,7 @@ fn only_drive_discover_and_serve_reach_an_arm() {
         let is_free = is_allowed(&["cli/discover.rs", "live/", "replay/tests/"]);
         assert!(is_free || !sockets.iter().any(|socket| text.contains(socket)), "{path} opens a socket");
     }
-    // No other crate depends on what speaks over a network.
+    // No other crate depends on network libraries.
     for manifest in ["", "src/core", "src/belief", "src/paper", "src/detect", "src/sim", "src/lab"] {
         let file = root().join(manifest).join("Cargo.toml");
         let table: toml::Table = read(&file).parse().expect("TOML");

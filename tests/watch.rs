@@ -1,4 +1,4 @@
-//! `armcal watch` on recordings that are finished, that grow, and that go wrong meanwhile.
+//! `armcal watch` on recordings that are finished, that grow, and that become invalid meanwhile.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::Write;
@@ -10,14 +10,14 @@ use std::time::{Duration, Instant};
 use crate::support::texts::Texts;
 use crate::support::{Answer, ShortRoutine, answer, program, read, robot_folder, root, temp};
 
-/// For whatever is waited for.
+/// Time limit for any wait.
 const LONGEST: Duration = Duration::from_secs(60);
 
 fn sample() -> PathBuf {
     root().join("recordings/sample/run.mcap")
 }
 
-/// belief.jsonl of a recording that is read whole, in the order of time.
+/// Contents of belief.jsonl for a recording that is read whole, in the order of time.
 fn of_whole(recording: &Path) -> String {
     let out = temp();
     let mut command = program();
@@ -37,7 +37,7 @@ fn watch(recording: &Path, words: &[&str]) -> Command {
     command
 }
 
-/// A watch under way that prints JSON lines, and their number so far.
+/// A running `watch` that prints JSON lines.
 struct Watching {
     child: Child,
     stdout: PathBuf,
@@ -53,7 +53,7 @@ impl Watching {
         Self { child: command.spawn().expect("it starts"), stdout }
     }
 
-    /// Waits until it has printed so many lines.
+    /// Waits until `n` lines are printed.
     fn await_lines(&mut self, n: usize) {
         let began = Instant::now();
         while read(&self.stdout).lines().count() < n {
@@ -91,7 +91,7 @@ impl Watching {
     }
 }
 
-/// Adds bytes to a file, in pieces of an odd size and with pauses.
+/// Adds bytes to a file, in pieces of irregular size and with pauses.
 fn grow(file: &Path, bytes: &[u8]) {
     let mut file = OpenOptions::new().create(true).append(true).open(file).expect("opened");
     for piece in bytes.chunks(76_543) {
@@ -112,7 +112,7 @@ fn a_finished_recording_gives_the_bytes_of_calibrate_online() {
     assert_eq!(said.stderr, "");
 }
 
-/// That a watch of a recording, which is the sample's by now, ends well, with the sample's lines on stdout and in
+/// Expects a `watch` of a recording that now equals the sample to end well, with the sample's lines on stdout and in
 /// the file.
 #[track_caller]
 fn ends_as_the_sample(watching: Watching, folder: &Path, says: &[&str]) {
@@ -122,7 +122,8 @@ fn ends_as_the_sample(watching: Watching, folder: &Path, says: &[&str]) {
     assert_eq!(read(&folder.join("out/belief.jsonl")), of_sample());
 }
 
-/// Waited for, followed piece by piece, renamed meanwhile as a run does: each line as of the finished file.
+/// The recording is awaited, followed piece by piece, and renamed as by a run: each line equals that of the finished
+/// file.
 #[test]
 fn a_recording_that_grows_gives_the_same_lines() {
     let folder = temp();
@@ -158,7 +159,7 @@ fn after_a_kill_the_next_watch_comes_to_the_same() {
     ends_as_the_sample(watching, folder.path(), &[]);
 }
 
-/// What is left of a killed recorder: as far as it goes, with what the beginning of its last chunk holds.
+/// The recording of a killed recorder is read to its end, including the beginning of its last chunk.
 #[test]
 fn a_recording_without_an_end_is_lost_data() {
     let folder = temp();
@@ -191,7 +192,7 @@ fn a_recording_that_is_taken_away_is_told_of() {
         }
         let said = watching.end();
         said.expect("taken away", 2, &["run.mcap: "]);
-        // What was believed until then is kept.
+        // The estimates until then are kept.
         assert_eq!(read(&folder.path().join("out/belief.jsonl")), said.stdout);
     }
 }
@@ -208,7 +209,7 @@ fn a_signal_ends_it_with_its_last_line() {
         watching.await_lines(1);
         watching.signal(name);
         let said = watching.end();
-        // The recording goes on: it is not cut.
+        // The recording is continued: it is not cut.
         said.expect(name, 0, &[]);
         assert_eq!(said.stderr, "");
         assert_eq!(read(&folder.path().join(name).join("belief.jsonl")), said.stdout);
@@ -249,7 +250,7 @@ fn what_cannot_be_watched_is_refused() {
     answer(&mut other).expect("another arm", 2, &["run.mcap", "shoulder"]);
 }
 
-/// The closed loop and who watches it, side by side.
+/// The closed loop and a `watch` of it, at the same time.
 #[test]
 fn a_run_is_watched_while_it_lasts() {
     let folder = temp();

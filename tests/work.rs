@@ -1,4 +1,4 @@
-//! Work on a dive: targets at times, tags passed by the way, and a world that changes meanwhile.
+//! Work on a dive: targets at given times, tags passed on the way, and a world that changes meanwhile.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use crate::support::{
 };
 
 const EVERY_S: f64 = 120.0;
-/// Task 1 passes no tags for its time is in the gap, task 3 does.
+/// Task 1 passes no tags because its time is in the gap; task 3 does.
 const STEPS: &str = "
     [[step]]
     do = \"capture\"
@@ -39,7 +39,7 @@ const STEPS: &str = "
     pressure_offset_std_rad_per_mpa = 1e-3
 ";
 
-/// One run for all tests of this file, to be read only.
+/// One read-only run for all tests of this file.
 fn worked() -> &'static FinishedRun {
     shared(&ShortRoutine {
         targets_m: vec![[1.401, -1.220, 0.115], [1.375, -0.582, 0.391], [1.173, -0.947, 0.587]],
@@ -52,7 +52,7 @@ fn recording() -> Recording {
     read_recording(worked().file("run.mcap")).expect("it reads")
 }
 
-/// When each task began, and what the log says of it.
+/// Start of each task, and its line in the log.
 fn tasks(recording: &Recording) -> Vec<(Stamp, String)> {
     let line = |message: &Message| match message {
         Message::Log(line) => Some((line.stamp, line.text.strip_prefix("work: task ")?.to_owned())),
@@ -61,7 +61,7 @@ fn tasks(recording: &Recording) -> Vec<(Stamp, String)> {
     recording.messages.iter().filter_map(|(_, message)| line(message)).collect()
 }
 
-/// When the arm came to rest at a target, and which.
+/// Time and target of each rest of the arm.
 fn rests(recording: &Recording) -> Vec<(Stamp, u32)> {
     let rest = |message: &Message| match message {
         Message::Mark(mark) => match mark.kind {
@@ -93,7 +93,7 @@ fn tasks_begin_at_their_times_and_pass_tags_in_their_turns() {
         recording.messages.iter().filter(|(_, message)| sees(message)).count()
     };
     let seen: Vec<usize> = tasks.iter().map(|(began, _)| images_with_tags(began)).collect();
-    // At rest there are three images; the others were taken on the way.
+    // Three images come at rest; the others were taken on the way.
     assert!(seen[..3] == [0, 0, 0] && seen[3] > 12, "{seen:?}");
 }
 
@@ -126,11 +126,11 @@ fn between_tasks_the_arm_idles_and_in_them_it_is_as_slow_as_asked() {
         (0..robot.n_joints()).map(joint).fold(0.0, f64::max)
     };
     let fastest = commands.windows(2).map(rate).fold(0.0, f64::max);
-    // By the datasheet's scale, 5 % off at most.
+    // The rate is by the datasheet's scale, which has at most 5 % of error.
     assert!((0.27..0.32).contains(&fastest), "{fastest} rad/s");
 }
 
-/// 15 MPa of 1 mrad each: the sensors are wrong at depth, and the score says by how much at which time.
+/// At 15 MPa, with 1 mrad per MPa, the sensors are wrong at depth, and the score gives the error with its time.
 #[test]
 fn each_task_is_scored_with_its_time() {
     let score = worked().summary().score.expect("scored");
@@ -153,8 +153,8 @@ fn work_changes_nothing_of_the_calibration_before_it() {
     assert!(read(&again.path().join("calibration.toml")) == read(&worked().file("calibration.toml")));
 }
 
-/// Hours without tags at great depth, under a tolerance of 8 mm: where the next task would miss it, the arm looks
-/// before. It works by what it believes then, and says so.
+/// Hours without tags at great depth, with a tolerance of 8 mm: the arm looks at tags before a task that would miss it.
+/// It works by its estimate of that moment, and logs it.
 #[test]
 fn calibration_poses_are_asked_for_where_a_task_would_miss() {
     let _texts = Texts::of("calibration_poses_are_asked_for_where_a_task_would_miss");
@@ -182,7 +182,7 @@ fn calibration_poses_are_asked_for_where_a_task_would_miss() {
     }
     let work = summary.score.expect("scored").work;
     assert!(work.len() == 6 && work.iter().all(|task| task.tool_error_m < 0.008), "{work:?}");
-    // What the run believed is what its recording says.
+    // The recording gives the run's online estimates again.
     let followed = folder.path().join("followed");
     let mut again = program();
     again.arg("watch").arg(out.join("run.mcap")).arg("--robot").arg(robot_folder());
@@ -197,8 +197,8 @@ fn work_by_the_calibration_asks_for_nothing() {
     assert!(summary.online.is_none() && !worked().file("belief.jsonl").exists());
 }
 
-/// A sensor that slips between tasks is named when tags are passed next, and nothing else is. The study of dives with
-/// faults is of the second tier (`online`).
+/// A sensor that slips between tasks is named when tags are passed next, and no other fault is named. The study of
+/// dives with faults is in the second tier (`online`).
 #[test]
 fn a_slip_between_tasks_is_named() {
     const BY_RAD: f64 = 0.03;
@@ -221,7 +221,7 @@ fn a_slip_between_tasks_is_named() {
     assert!((event.finding.size.expect("a size").abs() - BY_RAD).abs() < 0.005, "{event:?}");
 }
 
-/// Five tasks worked by the online belief, at the fourth of which the wrist's sensor dies; `faults` are more of them.
+/// Five tasks worked by the online estimate; the wrist's sensor dies at the fourth. `faults` adds further ones.
 fn with_a_dead_wrist(faults: &str) -> ShortRoutine {
     let steps = STEPS
         .replace("look_every = 2", "look_every = 1000\n    belief = \"online\"")
@@ -236,8 +236,7 @@ fn with_a_dead_wrist(faults: &str) -> ShortRoutine {
     }
 }
 
-/// A wrist whose sensor dies is given up, looked for by the camera, and worked on without: no task is off by more than
-/// the tolerance.
+/// A wrist whose sensor dies is abandoned, located by the camera, and held: no task has an error above the tolerance.
 #[test]
 fn with_a_dead_sensor_the_arm_does_only_what_it_knows() {
     let _texts = Texts::of("with_a_dead_sensor_the_arm_does_only_what_it_knows");
@@ -253,8 +252,8 @@ fn with_a_dead_sensor_the_arm_does_only_what_it_knows() {
     assert!(work.iter().all(|task| task.tool_error_m < 0.03), "{work:?}");
 }
 
-/// The same where all tags are gone, too: nobody knows where the wrist stands, and the dive goes on without it. Whoever
-/// calibrates from the recording gets the calibration from before.
+/// All tags are gone, too: the wrist's angle is unknown, and the dive continues without it. A calibration from the
+/// recording equals the earlier one.
 #[test]
 fn a_dive_goes_on_where_no_view_shows_where_a_dead_joint_stands() {
     let _texts = Texts::of("a_dive_goes_on_where_no_view_shows_where_a_dead_joint_stands");
@@ -263,7 +262,7 @@ fn a_dive_goes_on_where_no_view_shows_where_a_dead_joint_stands() {
     let folder = temp();
     let out = folder.path().join("out");
     let routine = with_a_dead_wrist(&faults).write(folder.path());
-    // Exit code: the tool is not known well enough at the end.
+    // The exit code says that the tool is not known well enough at the end.
     run(&routine, &out).expect("a lost wrist", 4, &["wrist_pitch"]);
     let again = folder.path().join("again");
     calibrate(&out.join("run.mcap"), &robot_folder(), &again).expect("the calibration before", 0, &["ACCEPTED"]);

@@ -16,9 +16,9 @@ use crate::measure::{Row, measured};
 use crate::problems::{Problem, Sight, corners_of, robot};
 
 const JOINT_STD_RAD: f64 = 2e-4;
-/// Tags of a view, whatever the number there is.
+/// Number of tags in a view, for any number of tags around the arm.
 const TAGS_A_VIEW: usize = 8;
-/// How far about the robot's own tags further ones are put.
+/// Largest distance of further tags from the robot's own, m.
 const SPREAD_M: f64 = 0.4;
 const TURN_RAD: f64 = 0.3;
 const RELATIVE_GAIN: f64 = 1e-10;
@@ -29,7 +29,7 @@ fn problem(n_views: usize, n_tags: usize) -> Problem {
     corners_of(robot, n_views as u32, sight)
 }
 
-/// The first of the robot's tags, and as many more about them as are wanted.
+/// The robot with `n_tags` tags: its own first ones, and as many further ones near them as needed.
 fn with_tags(mut robot: Robot, n_tags: usize) -> Robot {
     let mut rng = stream_rng(1, "tags of the growth");
     let own = robot.tags.clone();
@@ -47,14 +47,14 @@ fn with_tags(mut robot: Robot, n_tags: usize) -> Robot {
     robot
 }
 
-/// Least squares with the scales given.
+/// Cost of least squares with the given scales.
 pub fn solved(n_views: usize, n_tags: usize) -> Row {
     let problem = problem(n_views, n_tags);
     let (found, cost) = measured(|| least_squares(&problem.input(HyperparameterMode::Given), RELATIVE_GAIN));
     row(&problem, found.iterations, cost)
 }
 
-/// The whole estimate: robust start, outliers, scales by evidence.
+/// Cost of the whole estimate: robust start, outliers, scales by evidence.
 pub fn estimated(n_views: usize, n_tags: usize) -> Row {
     let problem = problem(n_views, n_tags);
     let (steps, cost) = measured(|| {
@@ -65,7 +65,7 @@ pub fn estimated(n_views: usize, n_tags: usize) -> Row {
     row(&problem, steps, cost)
 }
 
-/// All of `armcal calibrate` on a recording of the views that was read: from messages to the verdict.
+/// Cost of `armcal calibrate` on a recording of the views after it was read: from messages to the verdict.
 pub fn calibrated(n_views: usize, n_tags: usize) -> Row {
     let problem = problem(n_views, n_tags);
     let recording = recorded(&problem);
@@ -77,7 +77,7 @@ pub fn calibrated(n_views: usize, n_tags: usize) -> Row {
     row(&problem, steps, cost)
 }
 
-/// Every fifth view held out.
+/// Recording of the views, every fifth of them held out.
 fn recorded(problem: &Problem) -> Recording {
     let sensors = ArmSensors::nominal(&problem.robot);
     let mut messages = Vec::new();

@@ -1,4 +1,4 @@
-//! A corridor of tags on two walls, of TagSLAM's kind: the camera goes along it and sees its neighbours only.
+//! A corridor of tags on two walls, as for TagSLAM: the camera moves along it and sees only nearby tags.
 
 use armcal::optics::{CameraModel, Radtan, square_corners};
 use armcal::stats::stream_rng;
@@ -12,15 +12,15 @@ use rand_distr::{Distribution, StandardNormal};
 use crate::measure::{Cost, FarEnd, Row, measured};
 
 const HALF_WIDTH_M: f64 = 1.25;
-/// From tag to tag along the corridor, which are on the left and on the right by turns.
+/// Distance from tag to tag along the corridor, m; tags are alternately on the left and on the right.
 const PITCH_M: f64 = 0.25;
 const TAG_SIZE_M: f64 = 0.16;
-/// Farther off a detector finds none.
+/// Largest range at which the detector finds a tag, m.
 const MAX_RANGE_M: f64 = 3.0;
-/// Of the line of sight with the tag's plane, as a sine.
+/// Least sine of the angle between the line of sight and the tag's plane.
 const LEAST_SLANT: f64 = 0.25;
 const CORNER_STD_PX: f64 = 0.3;
-/// The camera swings from wall to wall as it goes.
+/// Angle by which the camera swings from wall to wall along its way.
 const SWING_RAD: f64 = 0.6;
 const SWING_EVERY_M: f64 = 1.7;
 const N_SEEDS: u64 = 20;
@@ -40,7 +40,7 @@ pub fn mapped(n_views: usize, n_tags: usize) -> Row {
     mapped_by_seed(n_views, n_tags, 1)
 }
 
-/// The sum over seeds; errors and standard deviations as root mean squares, distances as their mean.
+/// Sum over seeds; errors and standard deviations as root mean squares, distances as their mean.
 pub fn mapped_over_seeds(n_views: usize, n_tags: usize) -> Row {
     let rows: Vec<Row> = (1..=N_SEEDS).map(|seed| mapped_by_seed(n_views, n_tags, seed)).collect();
     let ends: Vec<&FarEnd> = rows.iter().filter_map(|row| row.far_end.as_ref()).collect();
@@ -94,7 +94,7 @@ fn corridor(n_views: usize, n_tags: usize, seed: u64) -> Corridor {
     let camera: CameraModel =
         Radtan::new([800.0, 800.0], [640.0, 512.0], [-0.23, 0.06, 1e-4, -1e-4, 0.0], [1280, 1024]).into();
     let truth: Vec<_> = (0..n_tags).map(|id| tag(id, &mut rng)).collect();
-    // From where the first tags are seen to where the last ones are no more.
+    // The way begins where the first tags are visible and ends where the last ones are not any more.
     let (first_m, last_m) = (-2.5, PITCH_M * n_tags as f64 - 1.0);
     let views = (0..n_views).map(|k| {
         let x = first_m + (last_m - first_m) * k as f64 / n_views as f64;
@@ -106,7 +106,7 @@ fn corridor(n_views: usize, n_tags: usize, seed: u64) -> Corridor {
     Corridor { camera, truth, views }
 }
 
-/// Even ones on the left, y > 0.
+/// Pose of a tag; even ones are on the left, y > 0.
 fn tag(id: usize, rng: &mut ChaCha8Rng) -> Isometry3<f64> {
     let side = if id.is_multiple_of(2) { 1.0 } else { -1.0 };
     let place = Vector3::new(PITCH_M * id as f64, side * HALF_WIDTH_M, rng.random_range(1.0..1.8));
@@ -116,7 +116,7 @@ fn tag(id: usize, rng: &mut ChaCha8Rng) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::from(place), UnitQuaternion::from_rotation_matrix(&upright) * lean)
 }
 
-/// corridor_from_camera: looking ahead, x to the right, y down.
+/// Pose corridor_from_camera: it looks ahead, x to the right, y down.
 fn camera_at(x: f64, rng: &mut ChaCha8Rng) -> Isometry3<f64> {
     let at = Vector3::new(x, 0.1 * normal(rng), 1.4 + 0.1 * normal(rng));
     let ahead = Matrix3::from_columns(&[-Vector3::y(), -Vector3::z(), Vector3::x()]);
@@ -127,7 +127,7 @@ fn camera_at(x: f64, rng: &mut ChaCha8Rng) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::from(at), turned * ahead * shaken)
 }
 
-/// The whole tags within range and image.
+/// Observations of the tags that are wholly within range and image.
 fn look(
     camera: &CameraModel,
     pose: &Isometry3<f64>,

@@ -1,8 +1,8 @@
-//! How calibrations of an arm and maps of tags grow: processor time and memory over views and tags.
+//! Growth of calibrations of an arm and of maps of tags: processor time and memory over views and tags.
 //!
-//! `cargo bench --no-default-features --bench batch_growth > batch-growth.csv`, then
-//! `tests/oracle/plot_batch_growth.py batch-growth.csv`. Each figure is that of a process of its own, the time the
-//! least of a few. `ARMCAL_MOST_VIEWS` leaves out what has more.
+//! Run `cargo bench --no-default-features --bench batch_growth > batch-growth.csv`, then
+//! `tests/oracle/plot_batch_growth.py batch-growth.csv`. Each figure comes from a process of its own, and the time is
+//! the least of a few. `ARMCAL_MOST_VIEWS` omits cases with more views.
 
 #![allow(clippy::print_stdout, reason = "its table is what it is for")]
 
@@ -17,14 +17,14 @@ use std::process::Command;
 
 use measure::Row;
 
-/// Names the one measurement that a process makes.
+/// Environment variable that names the one measurement of a process.
 const CASE: &str = "ARMCAL_GROWTH_CASE";
 const MOST_VIEWS: &str = "ARMCAL_MOST_VIEWS";
-/// Repetitions, where one takes less than this in all.
+/// Number of repetitions, where all together take less than `ENOUGH_S`.
 const N_REPETITIONS: usize = 5;
 const ENOUGH_S: f64 = 30.0;
 
-/// What is measured: name, views, tags.
+/// Measurement: name, views, tags.
 type Case = (&'static str, usize, usize);
 
 const CASES: [Case; 32] = [
@@ -90,7 +90,7 @@ fn row(name: &str, n_views: usize, n_tags: usize) -> Row {
     }
 }
 
-/// The row of the repetition that took least time.
+/// The row of the fastest repetition.
 fn least(name: &str, n_views: usize, n_tags: usize) -> String {
     let program = std::env::current_exe().expect("this program has a path");
     let mut best: Option<(f64, String)> = None;

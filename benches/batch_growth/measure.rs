@@ -1,6 +1,6 @@
-//! What a computation costs this process.
+//! Cost of a computation in this process.
 
-/// Processor time of a measurement: a hundred times what the system's clock is off by.
+/// Least processor time of a measurement, s: a hundred times the error of the system's clock.
 const LEAST_S: f64 = 0.4;
 
 /// One measurement.
@@ -14,12 +14,12 @@ pub struct Row {
 #[derive(Clone, Copy)]
 pub struct Cost {
     pub cpu_s: f64,
-    /// Most memory that was resident, less what was before.
+    /// Peak resident memory, less the memory before, MB.
     pub memory_mb: f64,
 }
 
-/// Of the tag that is farthest from the one that anchors a map: error and predicted standard deviation, along the
-/// corridor and across it, and the squared Mahalanobis distance of its position.
+/// Accuracy of the tag that is farthest from the map's anchor tag. Each pair is error and predicted standard deviation,
+/// along the corridor and across it; `squared_distance` is the squared Mahalanobis distance of its position.
 pub struct FarEnd {
     pub along_mm: [f64; 2],
     pub across_mm: [f64; 2],
@@ -27,7 +27,7 @@ pub struct FarEnd {
 }
 
 impl Row {
-    /// The last columns of the table.
+    /// Last columns of the table.
     pub fn text(&self) -> String {
         let Row { n_detections, steps, cost: Cost { cpu_s, memory_mb }, far_end } = self;
         let far_end = far_end.as_ref().map_or_else(
@@ -40,7 +40,7 @@ impl Row {
     }
 }
 
-/// What `compute` gives, and what it costs: again and again where once is shorter than the system's clock is coarse.
+/// Result of `compute`, and its cost: repeated if one run is too short for the resolution of the system's clock.
 pub fn measured<T>(mut compute: impl FnMut() -> T) -> (T, Cost) {
     let (memory_mb, started_s) = (status_mb("VmRSS:"), processor_s());
     let mut n = 0.0;
@@ -48,22 +48,22 @@ pub fn measured<T>(mut compute: impl FnMut() -> T) -> (T, Cost) {
         let out = compute();
         n += 1.0;
         let spent_s = processor_s() - started_s;
-        // Not a number ends it, too.
+        // NaN ends the loop, too.
         if spent_s.is_nan() || spent_s >= LEAST_S {
             return (out, Cost { cpu_s: spent_s / n, memory_mb: status_mb("VmHWM:") - memory_mb });
         }
     }
 }
 
-/// Processor time of this process so far, which other programs do not lengthen; not a number where the system does not
-/// tell it.
+/// Processor time of this process so far, s, which does not depend on other programs; NaN where the system does not
+/// report it.
 fn processor_s() -> f64 {
     let text = std::fs::read_to_string("/proc/self/schedstat").unwrap_or_default();
     let nanos: Option<f64> = text.split_whitespace().next().and_then(|word| word.parse().ok());
     nanos.map_or(f64::NAN, |nanos| 1e-9 * nanos)
 }
 
-/// A figure of this process's memory; not a number where the system does not tell it.
+/// A memory figure of this process, MB; NaN where the system does not report it.
 fn status_mb(key: &str) -> f64 {
     let text = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = text.lines().find_map(|line| line.strip_prefix(key));

@@ -1,7 +1,7 @@
-//! Ours beside NLopt and Ceres on the same numbers, one core, in one run: README.md beside this file says how.
+//! Our solver compared with NLopt and Ceres on the same numbers, one core, in one run; see README.md in this folder.
 //!
-//! `cargo bench --no-default-features --bench peers -- BUILD_FOLDER`. Without the folder of the built C++ programs only
-//! ours runs.
+//! Run `cargo bench --no-default-features --bench peers -- BUILD_FOLDER`. Without the folder of the built C++ programs
+//! only our solver runs.
 
 #![allow(clippy::print_stdout, reason = "a small program, for a terminal")]
 
@@ -21,7 +21,7 @@ const RELATIVE_GAIN: f64 = 1e-10;
 const RHO: [f64; 2] = [0.5, 1e-6];
 /// Half-width of the search's box in prior sigma.
 const BOX_SIGMAS: f64 = 6.0;
-/// Ours and theirs by turns, so that both meet the same machine.
+/// Number of rounds: ours and theirs alternate, so that both run on the same machine state.
 const N_ROUNDS: usize = 5;
 const RUNS_A_ROUND: usize = 3;
 
@@ -47,7 +47,7 @@ impl Contest {
         self.contenders.push(Contender { name: name.to_owned(), times_ms: vec![time_ms], evaluations, cost });
     }
 
-    /// Lines `name, time ms, evaluations, cost` of a program that solved the problem in `file`.
+    /// Adds the results of a program for the problem in `file`: lines `name, time ms, evaluations, cost`.
     fn add_program(&mut self, program: &Path, file: &Path) {
         let output = Command::new(program).arg(file).arg(RUNS_A_ROUND.to_string()).output();
         let output = output.unwrap_or_else(|error| panic!("{}: {error}", program.display()));
@@ -60,7 +60,7 @@ impl Contest {
         }
     }
 
-    /// The first contender is ours.
+    /// Table of the contenders; the first one is our solver, to which ratios refer.
     fn table(&mut self) -> Table {
         let mut table = Table::new();
         table.set_header(["solver", "least ms", "median ms", "least/ours", "evaluations", "cost", "cost/ours - 1"]);
@@ -83,7 +83,7 @@ impl Contest {
     }
 }
 
-/// Processor time of this thread, ms. Linux brings its account up to date when a thread yields.
+/// Processor time of this thread, ms. Linux updates its account when a thread yields.
 fn processor_ms() -> f64 {
     std::thread::yield_now();
     let account =

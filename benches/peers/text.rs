@@ -1,5 +1,5 @@
-//! The problems as plain text: words and numbers with 17 digits, separated by blanks, in the order that arm.h,
-//! bundle.h and distance_nlopt.cpp read.
+//! Problems as plain text: words and numbers with 17 digits, separated by blanks, in the order that arm.h, bundle.h and
+//! distance_nlopt.cpp read.
 
 use std::fmt::Write;
 use std::ops::Range;
@@ -14,13 +14,13 @@ use crate::problems::{Problem, lens_std};
 
 fn numbers(out: &mut String, values: impl IntoIterator<Item = f64>) {
     for value in values {
-        // Writing to a string does not fail.
+        // Writing to a string cannot fail.
         let _ = write!(out, " {value:.17e}");
     }
     out.push('\n');
 }
 
-/// Rotation row by row, then translation.
+/// Writes the rotation row by row, then the translation.
 fn pose(out: &mut String, pose: &Isometry3<f64>) {
     let rotation = pose.rotation.to_rotation_matrix();
     let by_row = rotation.matrix().transpose();
@@ -49,7 +49,7 @@ fn arm(out: &mut String, problem: &Problem) {
     }
 }
 
-/// What `bundle_ceres` reads.
+/// Input of `bundle_ceres`.
 pub fn bundle(problem: &Problem, relative_gain: f64) -> String {
     let mut out = String::new();
     let robot = &problem.robot;
@@ -88,7 +88,8 @@ pub fn bundle(problem: &Problem, relative_gain: f64) -> String {
     out
 }
 
-/// What links, sag and lens need: the joints beyond the camera, what all links weigh, one sigma of each column.
+/// Writes the inputs of links, sag and lens: the joints beyond the camera, the weight of all links, one sigma of each
+/// column.
 fn body(out: &mut String, problem: &Problem, stds: &[f64]) {
     let robot = &problem.robot;
     let (n, loads) = (robot.camera.mount.n_joints, robot.chain.loads());
@@ -113,7 +114,7 @@ fn body(out: &mut String, problem: &Problem, stds: &[f64]) {
     }
 }
 
-/// What `distance_nlopt` reads. `box_sigmas`: half-width of the box.
+/// Input of `distance_nlopt`. `box_sigmas` is the half-width of the box.
 pub fn distance(problem: &Problem, box_sigmas: f64, rho: [f64; 2]) -> String {
     let mut out = String::new();
     let robot = &problem.robot;

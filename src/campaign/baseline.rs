@@ -1,4 +1,4 @@
-//! Tables that runs of today can be compared with.
+//! Tables with which later runs can be compared.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use crate::campaign::{CampaignError, Metric, Origin, Prepared, Request, Table, p
 use armcal_core::files::{self, FileKind};
 use armcal_core::routine::Overrides;
 
-/// The table with what it is of in its first lines.
+/// The table's text, with its routine, robot and vehicle in its first lines.
 ///
 /// # Errors
 /// [`CampaignError::Read`] for a file that has vanished meanwhile.
@@ -15,11 +15,11 @@ pub fn baseline_text(prepared: &Prepared, table: &Table) -> Result<String, Campa
     Ok(Origin::of_campaign(prepared)?.head() + &table_text(table))
 }
 
-/// Reads a baseline, or a campaign's table with its summary beside it, that `prepared` can be compared with: of the
-/// same routine (overrides of today aside), robot and vehicle, and with all figures that are looked at.
+/// Reads a baseline, or a campaign's table with its summary next to it, that `prepared` can be compared with. It must
+/// have the same routine (without the current overrides), robot and vehicle, and all compared figures.
 ///
 /// # Errors
-/// [`CampaignError::Table`] saying what is different, and how to make the baseline anew.
+/// [`CampaignError::Table`] that names the difference, and how to make a new baseline.
 pub fn read_baseline(path: &Path, prepared: &Prepared) -> Result<Table, CampaignError> {
     let bytes = files::read_bytes(path, FileKind::Table)
         .map_err(|source| CampaignError::Read { path: path.to_owned(), source })?;
@@ -34,7 +34,7 @@ pub fn read_baseline(path: &Path, prepared: &Prepared) -> Result<Table, Campaign
         None => read_summary(path)?.and_then(|summary| summary.origin),
     };
     let origin = origin.ok_or_else(|| anew("does not name its routine and robot".to_owned()))?;
-    // The overrides are what is under test, unless the baseline was made with them.
+    // The overrides are under test, unless the baseline was made with them.
     let (plainly, with_overrides) = (Origin::of(prepared, &[])?, Origin::of_campaign(prepared)?);
     if let (Some(difference), Some(_)) = (origin.difference(&plainly), origin.difference(&with_overrides)) {
         return Err(anew(difference));
@@ -45,12 +45,13 @@ pub fn read_baseline(path: &Path, prepared: &Prepared) -> Result<Table, Campaign
     }
 }
 
-/// A figure that is compared and that the table lacks.
+/// The first compared figure that the table lacks.
 fn lacking(table: &Table) -> Option<Metric> {
     Metric::COMPARED.iter().copied().find(|metric| table.place(*metric).is_none())
 }
 
-/// Reads the new rows from a campaign's table in place of making them: those that have a partner in `baseline`.
+/// Reads the new rows from a campaign's table instead of running them. Only rows that have a partner in `baseline` are
+/// kept.
 ///
 /// # Errors
 /// [`CampaignError::Table`] for a table without a figure that is compared, of another robot or vehicle, or with none of
@@ -63,7 +64,7 @@ pub fn read_rows(path: &Path, prepared: &Prepared, baseline: &Table) -> Result<T
     }
     if let Some(origin) = read_summary(path)?.and_then(|summary| summary.origin) {
         let mut here = Origin::of(prepared, &[])?;
-        // What `--set` changed may be under test; another routine is not.
+        // Changes by `--set` may be under test; another routine is not.
         if here.routine.name == origin.routine.name {
             here.routine = origin.routine.clone();
         }
@@ -78,8 +79,8 @@ pub fn read_rows(path: &Path, prepared: &Prepared, baseline: &Table) -> Result<T
     Ok(table)
 }
 
-/// The routine, the robot and the vehicle as they were asked for. What `--set` changes is under test, and no part of a
-/// baseline.
+/// Command options for the requested routine, robot and vehicle. Other changes by `--set` are under test, so no
+/// baseline has them.
 fn command_options(request: &Request) -> String {
     let mut words = request.routine.display().to_string();
     let Overrides { robot, vehicle, .. } = &request.overrides;

@@ -11,7 +11,7 @@ const TARGET_U95: &str = "u95_m.";
 const TARGET_ERROR: &str = "tool_error_after_m.";
 const TARGET_P_LARGER: &str = "p_larger_error.";
 
-/// The figures of a campaign: the same for every run, then two for each joint and three for each target.
+/// Figures of a campaign: the same ones for every run, then two for each joint and three for each target.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Columns {
     joints: Vec<String>,
@@ -19,8 +19,8 @@ pub struct Columns {
 }
 
 impl Columns {
-    /// `joints`: names over all robots of the campaign; one that a run's robot lacks has no value there. `n_targets`:
-    /// of the longest task.
+    /// Builds the columns. `joints` are the names over all robots of the campaign; a run whose robot lacks a joint has
+    /// no value there. `n_targets` is that of the longest task.
     #[must_use]
     pub fn new(joints: Vec<String>, n_targets: usize) -> Self {
         Self { joints, n_targets }
@@ -36,7 +36,7 @@ impl Columns {
         fixed.chain(joints).chain(targets).collect()
     }
 
-    /// What a column is measured in, by its name; columns of other versions are numbers without a unit.
+    /// Unit of a column, by its name; columns of other versions are numbers without a unit.
     #[must_use]
     pub fn unit(name: &str) -> Unit {
         let begins = |all: &[&str]| all.iter().any(|what| name.starts_with(what));

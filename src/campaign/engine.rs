@@ -8,27 +8,27 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use crate::campaign::row::one_line;
 use crate::campaign::{CampaignError, Job, Row, RunStatus};
 
-/// How jobs are run.
+/// Settings of the execution of jobs.
 #[derive(Clone, Copy, Debug)]
 pub struct Engine<'a> {
-    /// All cores if not given.
+    /// Number of threads; all cores if not given.
     pub threads: Option<usize>,
-    /// Once set, no further job begins; those under way come to their end.
+    /// Stop request: once set, no further job begins, and running ones finish.
     pub stop: &'a AtomicBool,
-    /// Figures in a row.
+    /// Number of figures in a row.
     pub n_figures: usize,
     /// Exit code of the row of a run that panicked.
     pub panic_exit_code: u8,
 }
 
-/// As the main thread has it: a run needs no more stack here than there.
+/// Stack size of the main thread: a run needs no more stack here than there.
 const STACK_BYTES: usize = 8 << 20;
 
-/// Runs `jobs`; `on_row` gets each row as soon as it is there, in any order. A runner that panics leaves a row that
-/// says so. `false` when it was stopped before the last job.
+/// Runs `jobs`; `on_row` gets each row as soon as it is complete, in any order. A runner that panics leaves a row with
+/// the reason. Returns false if it was stopped before the last job.
 ///
 /// # Errors
-/// What `runner` or `on_row` says, whereupon no further job begins; [`CampaignError::Threads`].
+/// The first error of `runner` or `on_row`, after which no further job begins; [`CampaignError::Threads`].
 pub fn run_jobs(
     engine: &Engine<'_>,
     jobs: &[Job],
@@ -55,7 +55,7 @@ pub fn run_jobs(
     pool.broadcast(|_| {
         while !engine.stop.load(Ordering::SeqCst) {
             let Some(job) = jobs.get(next.fetch_add(1, Ordering::SeqCst)) else { break };
-            // Nothing outlives a broken run but its row: every run builds its own world.
+            // Only the row remains of a broken run: every run builds its own world.
             let row = catch_unwind(AssertUnwindSafe(|| runner(job)));
             give(row.unwrap_or_else(|why| Ok(engine.panicked(job, &*why))));
         }

@@ -1,4 +1,4 @@
-//! What keeps a campaign from being run, continued or merged. A run that fails is none of these: it is a row.
+//! Errors that keep a campaign from being run, continued or merged. A failed run is none of these: it is a row.
 
 use armcal_core::codes::{Code, Coded};
 use std::path::PathBuf;
@@ -8,7 +8,7 @@ use crate::output::OutputError;
 use crate::run::RunError;
 use armcal_core::routine::RoutineError;
 
-/// Why a campaign did not start, or could not keep its rows.
+/// Reason that a campaign did not start, or could not keep its rows.
 #[derive(Debug, thiserror::Error)]
 pub enum CampaignError {
     #[error("{0}")]
@@ -58,7 +58,7 @@ fn listed(shards: &[Shard]) -> String {
 }
 
 impl CampaignError {
-    /// Whether the user's input is at fault, not the machine. [`Self::Input`] leaves that to its source.
+    /// True if the user's input is at fault, not the machine. For [`Self::Input`] the source decides.
     #[must_use]
     pub fn is_invalid_input(&self) -> bool {
         #[cfg(feature = "parquet")]

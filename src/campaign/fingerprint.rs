@@ -1,4 +1,4 @@
-//! What a campaign's rows depend on, as one number.
+//! Hash of all inputs that a campaign's rows depend on.
 
 use toml::Table;
 
@@ -6,12 +6,12 @@ use crate::campaign::CampaignError;
 use crate::run::RunInputs;
 use armcal_core::files::{self, FileKind};
 
-/// A new meaning of rows gets a new version.
+/// Version of the rows' meaning; a new meaning needs a new version.
 const DOMAIN: &[u8] = b"armcal campaign 1";
 
 /// BLAKE3 over the routine with its overrides, the files that its settings name, and the program's version; 64
-/// hexadecimal digits. Seeds, weights and `[regress]` are left out: they say which rows there are and what is thought
-/// of them, not what stands in them. So are comments and the places of files.
+/// hexadecimal digits. Seeds, weights and `[regress]` are omitted: they select or judge rows and do not change their
+/// contents. Comments and paths of files are omitted too.
 ///
 /// # Errors
 /// [`CampaignError::Read`] for a file that has vanished meanwhile.
@@ -33,7 +33,7 @@ pub fn fingerprint(effective: &Table, settings: &[RunInputs]) -> Result<String, 
     Ok(hasher.finalize().to_hex().to_string())
 }
 
-/// Places of files are left out, for their contents count.
+/// The routine without seeds and limits. It omits paths of files as well, because their contents count.
 pub(super) fn without_seeds(effective: &Table) -> Table {
     let mut table = effective.clone();
     for key in ["seed", "regress", "robot", "vehicle"] {

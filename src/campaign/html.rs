@@ -15,7 +15,7 @@ use crate::campaign::worst::worst_rows;
 use crate::campaign::{Metric, Row};
 use crate::report::{chart, page, panel};
 
-/// What is drawn over the seeds, and its axis.
+/// Figures that are drawn over the seeds, with the titles of their axes.
 const DRAWN: [(Metric, &str); 4] = [
     (Metric::ToolErrorAfterMedian, "tool error after, median over the targets"),
     (Metric::ToolErrorAfterMax, "tool error after, worst target"),
@@ -23,7 +23,7 @@ const DRAWN: [(Metric, &str); 4] = [
     (Metric::MinClearance, "nearest to anything"),
 ];
 
-/// One file, no network.
+/// Page of a campaign: one file that needs no network.
 #[must_use]
 pub(super) fn campaign_page(table: &Table, summary: &CampaignSummary) -> String {
     let body = markup! {
@@ -83,7 +83,7 @@ fn verdict(table: &Table, summary: &CampaignSummary) -> Markup {
     }
 }
 
-/// What the rows are of.
+/// Table with the origin of the rows.
 fn facts(table: &Table, summary: &CampaignSummary) -> Markup {
     let seeds: BTreeSet<u64> = table.rows.iter().map(|row| row.seed).collect();
     let is_whole = table.rows.len() == seeds.len() * summary.settings.len();
@@ -127,7 +127,7 @@ fn failures(failures: &[FailureLine]) -> Markup {
     }
 }
 
-/// The share of the seeds up to each value of a figure, a line a setting.
+/// Chart of the share of the seeds up to each value of a figure, one line per setting.
 fn shares(table: &Table, metric: Metric, what: &str) -> Markup {
     let Some(place) = table.place(metric) else { return Markup::default() };
     let line = |rows: &[Row]| {
@@ -148,7 +148,7 @@ fn shares(table: &Table, metric: Metric, what: &str) -> Markup {
     chart(&Panel { title: what.to_owned(), ..panel(what, &x, "share of the seeds", shown) }, "")
 }
 
-/// The same of a comparison with a baseline.
+/// Page of a comparison with a baseline: one file that needs no network.
 #[must_use]
 pub fn regress_page(comparison: &Comparison, routine: &str) -> String {
     let class = match comparison.verdict {

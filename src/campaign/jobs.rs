@@ -1,4 +1,4 @@
-//! What is to be run: the settings' checked inputs, and one job for each of their seeds.
+//! Jobs of a campaign: the settings' checked inputs, and one job for each of their seeds.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -8,39 +8,39 @@ use crate::campaign::{CampaignError, Columns, Shard, Weights, fingerprint};
 use crate::run::RunInputs;
 use armcal_core::routine::{self, Overrides, Routine, SeedRange, effective_table};
 
-/// A routine and its overrides, as given.
+/// A routine and its overrides, as the user gave them.
 #[derive(Clone, Debug)]
 pub struct Request {
     pub routine: PathBuf,
     pub overrides: Overrides,
 }
 
-/// Everything read and checked before the first run.
+/// All inputs, read and checked before the first run.
 #[derive(Debug)]
 pub struct Prepared {
     pub request: Request,
     /// The routine with the overrides, before any point of the matrix.
     pub routine: Routine,
     pub settings: Vec<Setting>,
-    /// One for each setting.
+    /// Checked inputs of each setting.
     pub inputs: Vec<RunInputs>,
     pub columns: Columns,
     pub fingerprint: String,
 }
 
-/// One run to be made.
+/// One run that is to be made.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Job {
     /// Index of the setting.
     pub setting: u32,
     pub settings: String,
     pub seed: u64,
-    /// Repeats it.
+    /// Command that repeats the run.
     pub command: String,
 }
 
 impl Prepared {
-    /// Reads the routine, and all that any point of its matrix names.
+    /// Reads the routine, and all files that any point of its matrix names.
     ///
     /// # Errors
     /// [`CampaignError`] naming file, key and allowed range.
@@ -69,7 +69,7 @@ impl Prepared {
         Ok(Self { routine, settings, inputs, columns: Columns::new(joints, n_targets), fingerprint, request })
     }
 
-    /// The run of one seed under one setting.
+    /// The job for one seed under one setting.
     #[must_use]
     pub fn job(&self, setting: &Setting, seed: u64) -> Job {
         Job { setting: setting.index, settings: setting.text(), seed, command: self.command(setting, seed) }
@@ -90,12 +90,12 @@ impl Prepared {
 }
 
 impl Prepared {
-    /// Settings that the seed at `place` in the range, from 0, meets.
+    /// Settings that the seed at `place` in the range, counted from 0, is run under.
     pub fn met_by(&self, place: u64) -> impl Iterator<Item = &Setting> {
         self.settings.iter().filter(move |setting| setting.takes(place))
     }
 
-    /// How often each setting occurs; `None` where the routine does not say.
+    /// Weight of each setting; `None` where the routine gives none.
     #[must_use]
     pub fn weights(&self) -> Option<Weights> {
         let weights = self.settings.iter().map(|setting| (setting.index, setting.weight));
@@ -103,7 +103,7 @@ impl Prepared {
     }
 }
 
-/// The jobs of a campaign that are not done yet, seed by seed, so that the settings of a seed stay together.
+/// Remaining jobs of a campaign, seed by seed, so that the settings of a seed stay together.
 #[must_use]
 pub fn jobs(prepared: &Prepared, range: SeedRange, shard: Option<Shard>, done: &BTreeSet<(u32, u64)>) -> Vec<Job> {
     let taken = (0..).zip(range.seeds()).filter(|(place, _)| shard.is_none_or(|shard| shard.takes(*place)));
@@ -114,7 +114,7 @@ pub fn jobs(prepared: &Prepared, range: SeedRange, shard: Option<Shard>, done: &
         .collect()
 }
 
-/// A word as a shell takes it.
+/// A word quoted for a shell, where it needs quotes.
 fn quoted(word: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-./=:,+@%".contains(c);
     if !word.is_empty() && word.chars().all(is_plain) {

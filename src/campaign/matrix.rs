@@ -8,25 +8,26 @@ use armcal_core::routine::Override;
 /// One point of the matrix.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setting {
-    /// From 0; the last key varies fastest.
+    /// Number of the point, from 0; the last key varies fastest.
     pub index: u32,
     pub set: Vec<Override>,
-    /// How often it occurs, of all together 1.
+    /// Probability that the setting occurs; all settings together have 1.
     pub weight: f64,
-    /// Of the seeds, the part that it meets: all of them for the most frequent one, and for the others the square root
-    /// of their weight over its: of allocations of equally many runs, the one that knows best the rate of an event that
-    /// none of them had. 1 without weights.
+    /// Share of the seeds that are run under the setting: 1 for the most frequent setting, and without weights. For
+    /// another it is the square root of its weight over the largest weight. With equally many runs, this allocation
+    /// gives the tightest bound on the rate of an event that never occurred.
     pub share: f64,
 }
 
 impl Setting {
-    /// `key=value;key=value`; empty without a matrix.
+    /// The overrides as `key=value;key=value`; empty without a matrix.
     #[must_use]
     pub fn text(&self) -> String {
         self.set.iter().map(Override::to_string).collect::<Vec<_>>().join(";")
     }
 
-    /// Whether the seed at `place` in the range, from 0, meets it: the first always, the others at equal distances.
+    /// True if the seed at `place` in the range, from 0, is run under the setting: the first always, others at equal
+    /// distances.
     #[must_use]
     pub fn takes(&self, place: u64) -> bool {
         let before = |place: u64| (place as f64 * self.share).ceil();
@@ -34,13 +35,13 @@ impl Setting {
     }
 }
 
-/// More points than anybody would wait for: a slip in the routine.
+/// Largest number of points; more indicate a mistake in the routine.
 const MAX_SETTINGS: usize = 10_000;
 
-/// All points; one without settings where there is no matrix. `weights`: of values of some of its keys.
+/// All points; a single one without overrides where there is no matrix. `weights` are those of values of some keys.
 ///
 /// # Errors
-/// [`CampaignError::Usage`] for a key that is none, or far too many points.
+/// [`CampaignError::Usage`] for an unknown key, or too many points.
 pub fn settings(
     matrix: &[(String, Vec<Value>)],
     weights: &[(String, Vec<f64>)],
@@ -91,8 +92,8 @@ mod tests {
         assert!(settings(&huge, &[]).is_err());
     }
 
-    /// Of three points of weights 1, 0.25 and 0.01 every seed meets the first, every second the next, every tenth the
-    /// last.
+    /// With points of weights 1, 0.25 and 0.01, every seed is run under the first, every second under the next, every
+    /// tenth under the last.
     #[test]
     fn rare_points_meet_fewer_seeds_but_more_than_their_weight() {
         let numbers = [1, 2, 3].map(Value::Integer).to_vec();

@@ -1,4 +1,4 @@
-//! The tables of several shards as one.
+//! Merging of the tables of several shards.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -9,15 +9,15 @@ use crate::campaign::{
 };
 use crate::output;
 
-/// Whether the shards that are not there keep the others from being put together.
+/// Treatment of missing shards.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MissingShards {
     Refuse,
-    /// The table is of those that are there.
+    /// The merged table has only the shards that were given.
     LeaveOut,
 }
 
-/// Which shards there are, by the summaries beside their tables.
+/// Shards found so far, from the summaries next to their tables.
 #[derive(Default)]
 struct Shares {
     first: Option<Share>,
@@ -39,18 +39,18 @@ impl Shares {
         Ok(())
     }
 
-    /// Those that no table is of.
+    /// Shards without a table.
     fn missing(&self) -> Vec<Shard> {
         let all = self.first.iter().flat_map(|first| first.shard.all());
         all.filter(|shard| !self.found.contains(shard)).collect()
     }
 }
 
-/// Puts tables of one campaign together. A row that is in several must be the same in all.
+/// Merges tables of one campaign. A row in several tables must be the same in all.
 ///
 /// # Errors
-/// [`CampaignError`] for tables of different campaigns, figures or numbers of shards, rows that contradict each other,
-/// a shard that is still under way, and missing ones unless they may be left out.
+/// [`CampaignError`] for tables of different campaigns, figures or numbers of shards, and for rows that contradict each
+/// other. Also for an unfinished shard, and for missing ones unless they may be omitted.
 pub fn merge(paths: &[PathBuf], missing: MissingShards) -> Result<(Table, CampaignSummary), CampaignError> {
     let mut shares = Shares::default();
     let mut rows: BTreeMap<(u32, u64), Row> = BTreeMap::new();
@@ -147,7 +147,7 @@ mod tests {
         let mut told = vec![merge(&two, MissingShards::Refuse).expect_err("one is missing")];
         let (rest, summary) = merge(&two, MissingShards::LeaveOut).expect("two of three");
         assert_eq!((rest.rows.len(), summary.share), (2, None));
-        // Of another number of shards, or of other seeds.
+        // One has another number of shards, the other has other seeds.
         for other in [shard(2, 4, [1, 3]), shard(2, 3, [1, 9])] {
             told.push(merge(&[first.clone(), other], MissingShards::LeaveOut).expect_err("other shares"));
         }

@@ -1,11 +1,11 @@
-//! The figures of a run that a campaign keeps: name, unit, which way is worse, and where in a finished run they stand.
+//! Figures of a run that a campaign keeps: name, unit, direction of worsening, and source in a finished run.
 
 use crate::run::Finished;
 use crate::score::{ScoreSide, TargetScore};
 use armcal_core::stats::Summary;
 use armcal_core::units::Unit;
 
-/// Which way a figure gets worse.
+/// Direction in which a figure gets worse.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Worsening {
     MoreIsWorse,
@@ -21,7 +21,7 @@ struct Facts {
     of: fn(&Finished) -> Option<f64>,
 }
 
-/// One line a metric: what all of the program knows of it.
+/// Definition of all metrics, one line each: the only place that needs to know a new one.
 macro_rules! metrics {
     ($($metric:ident = $name:literal, $unit:ident, $worsening:ident, $of:expr;)*) => {
         /// A figure of a run; the same for every robot.
@@ -29,7 +29,7 @@ macro_rules! metrics {
         pub enum Metric { $($metric),* }
 
         impl Metric {
-            /// In the order of a table's columns.
+            /// All metrics in the order of a table's columns.
             pub const ALL: &[Self] = &[$(Self::$metric),*];
 
             const fn facts(self) -> Facts {
@@ -126,7 +126,7 @@ fn errors_over_u95(finished: &Finished) -> Vec<f64> {
 }
 
 impl Metric {
-    /// What `armcal regress` looks at.
+    /// Metrics that `armcal regress` compares.
     pub const COMPARED: &[Self] = &[
         Self::Contacts,
         Self::HitsAfter,
@@ -141,13 +141,13 @@ impl Metric {
         Self::MinClearance,
     ];
 
-    /// As tables and summaries name it.
+    /// Name of the metric in tables and summaries.
     #[must_use]
     pub const fn name(self) -> &'static str {
         self.facts().name
     }
 
-    /// `None` for a column of another version, or of a joint.
+    /// Metric of a column; `None` for a column of another version, or of a joint.
     #[must_use]
     pub fn of_name(name: &str) -> Option<Self> {
         Self::ALL.iter().copied().find(|metric| metric.name() == name)
@@ -163,7 +163,7 @@ impl Metric {
         self.facts().worsening
     }
 
-    /// Its value; `None` where the run has none.
+    /// Value of the metric; `None` where the run has none.
     #[must_use]
     pub fn of(self, finished: &Finished) -> Option<f64> {
         (self.facts().of)(finished)

@@ -1,10 +1,10 @@
-//! Many runs of one routine: seeds times settings, one row of figures a run.
+//! Many runs of one routine: seeds times settings, one row of figures per run.
 //!
-//! `Prepared` holds the settings' checked inputs, `jobs` what is to be run, `run_jobs` runs it on some threads, `Store`
-//! keeps every finished row at once and puts the sorted files in place at the end, `until` ends a campaign once a rate
-//! is known, `merge` puts shards together, `statistics` sums rows up, `regress` compares rows with those of a
-//! baseline, pair by pair. Rows hold no wall time: files do not depend on the number of threads, nor on how often a
-//! campaign was broken off. Exit codes come in from the command line.
+//! `Prepared` holds the settings' checked inputs, `jobs` lists the runs, `run_jobs` runs them on some threads. `Store`
+//! keeps every finished row at once and puts the sorted files in place at the end. `until` ends a campaign once a rate
+//! is known, `merge` merges shards, `statistics` summarises rows. `regress` compares rows with those of a baseline,
+//! pair by pair. Rows hold no wall time: files do not depend on the number of threads, nor on interruptions of the
+//! campaign. The command line provides the exit codes.
 
 mod baseline;
 mod columns;

@@ -1,4 +1,4 @@
-//! Which routine, robot and vehicle rows are of: told in a baseline's first lines.
+//! Routine, robot and vehicle of rows, as written in a baseline's first lines.
 
 use std::fmt::Write as _;
 
@@ -10,24 +10,24 @@ use crate::campaign::{CampaignError, Prepared};
 use armcal_core::files::{self, FileKind};
 use armcal_core::routine::effective_table;
 
-/// Of the lines before the table; a new meaning of its columns gets a new one.
+/// Version of the lines before the table; a new meaning of its columns needs a new version.
 const FORMAT: u32 = 1;
 const MARK: &str = "# armcal baseline ";
 
-/// What rows are of: pairs with others are worth something only if these are the same.
+/// Origin of rows: a comparison of pairs is valid only if both sides have the same origin.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Origin {
     pub routine: Named,
-    /// Of all settings, in their order.
+    /// Robots of all settings, in their order.
     pub robots: Vec<Named>,
     pub vehicles: Vec<Named>,
 }
 
-/// A file's name of itself, and the hash of what it says: comments, seeds, `[regress]` and `assert` steps aside.
+/// Name that a file gives itself, and the hash of its contents without comments, seeds, `[regress]` and `assert` steps.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Named {
     pub name: String,
-    /// BLAKE3, the first 16 of its hexadecimal digits.
+    /// First 16 hexadecimal digits of the BLAKE3 hash.
     pub hash: String,
 }
 
@@ -41,18 +41,18 @@ impl Named {
         Self { name: name.to_owned(), hash: hasher.finalize().to_hex()[..16].to_owned() }
     }
 
-    /// `titan4 (hash 9be7058b2b0ac6d5)`.
+    /// The file in words: `titan4 (hash 9be7058b2b0ac6d5)`.
     pub(super) fn in_words(&self) -> String {
         format!("{} (hash {})", self.name, self.hash)
     }
 }
 
-/// The file's values without comments; as it is where it is no TOML.
+/// The file's values without comments; the unchanged text where it is no TOML.
 fn plain(text: &str) -> String {
     text.parse::<Toml>().map_or_else(|_| text.to_owned(), |table| table.to_string())
 }
 
-/// What limits a run is held against does not change what happens in it.
+/// The routine without its `assert` steps: limits on a run do not change the run.
 fn without_limits(mut table: Toml) -> String {
     if let Some(steps) = table.get_mut("step").and_then(Value::as_array_mut) {
         steps.retain(|step| step.get("do").and_then(Value::as_str) != Some("assert"));
@@ -61,7 +61,7 @@ fn without_limits(mut table: Toml) -> String {
 }
 
 impl Origin {
-    /// What `prepared` runs, with its overrides or as the routine's file has it.
+    /// Origin of the runs of `prepared` with the overrides `set`.
     pub(super) fn of(prepared: &Prepared, set: &[armcal_core::routine::Override]) -> Result<Self, CampaignError> {
         let table = effective_table(&prepared.request.routine, set)?;
         let routine = Named::new(&prepared.routine.name, &[&without_limits(without_seeds(&table))]);
@@ -82,7 +82,7 @@ impl Origin {
         Ok(Self { routine, robots, vehicles })
     }
 
-    /// What the campaign runs.
+    /// Origin of the campaign's runs.
     ///
     /// # Errors
     /// [`CampaignError::Read`] for a file that has vanished meanwhile.
@@ -101,7 +101,7 @@ impl Origin {
         text
     }
 
-    /// Reads what [`Self::head`] wrote; `None` where the first line is not the mark.
+    /// Reads the output of [`Self::head`]; `None` where the first line is not the mark.
     pub(super) fn read(text: &str) -> Result<Option<Self>, String> {
         let Some(format) = text.lines().next().and_then(|line| line.strip_prefix(MARK)) else { return Ok(None) };
         if format.trim() != FORMAT.to_string() {
@@ -116,7 +116,7 @@ impl Origin {
         Ok(Some(Self { routine, robots: all("robot"), vehicles: all("vehicle") }))
     }
 
-    /// What of `self`, a baseline's, is not what `now` has.
+    /// First difference between `self`, a baseline's origin, and `now`, in words.
     pub(super) fn difference(&self, now: &Self) -> Option<String> {
         let sides = [
             ("routine", std::slice::from_ref(&self.routine), std::slice::from_ref(&now.routine)),

@@ -1,11 +1,11 @@
-//! Is it worse than it was? New rows against a baseline's, pair by pair: the same setting, the same seed.
+//! Regression test: new rows against a baseline's, pair by pair, with the same setting and seed.
 //!
-//! A pair shares its world, so that what differs is the program or the setting under test, not luck with a seed. What
-//! is typical of the pairs is too much when it reaches the budget AND the pairs are worse beyond doubt: the lower end
-//! of the interval is on the worse side of no change. Noise alone moves pairs both ways, and meets the second condition
-//! in one case of twenty at most, whichever of all figures it is (Bonferroni's correction); a worsening of the budget's
-//! size in all pairs meets both. An interval that holds both no change and the budget decides nothing, and is said to
-//! be inconclusive. Of the clearance the nearest runs are looked at as well as the typical pair.
+//! A pair shares its world, so differences come from the program or the setting under test, not from the seed. A
+//! worsening of the typical pair fails on two conditions. It reaches the budget, and it is significant: the lower end
+//! of the interval is on the worse side of no change. Noise moves pairs both ways, and meets the second condition in at
+//! most one case of twenty over all figures (Bonferroni's correction). A worsening of the budget's size in all pairs
+//! meets both. An interval that holds both no change and the budget decides nothing, and is reported as inconclusive.
+//! For the clearance, the nearest runs are compared as well as the typical pair.
 
 mod nearest;
 mod paired;
@@ -17,48 +17,48 @@ use armcal_core::routine::RegressSettings;
 use armcal_core::stats::{median_interval, quantile};
 use armcal_core::units::Unit;
 
-/// What came out of a comparison.
+/// Result of a comparison.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Comparison {
     pub version: u32,
     pub verdict: Verdict,
     pub pairs: usize,
-    /// Every figure of every pair is the same.
+    /// True if every figure of every pair is the same.
     pub identical: bool,
     pub checks: Vec<Check>,
-    /// The repeat commands of the worst pairs of the checks that failed, each once.
+    /// Repeat commands of the worst pairs of the failed checks, each once.
     pub worst: Vec<WorstPair>,
 }
 
-/// How a check came out; of several the last one of this list counts.
+/// Result of a check. The result of several checks is their last one in this list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     NotWorse,
-    /// The pairs fit both no change and more than the budget.
+    /// The pairs are consistent with no change, and with more than the budget.
     Inconclusive,
     Worse,
 }
 
-/// One thing that was compared.
+/// Result for one compared figure.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Check {
     pub what: &'static str,
-    /// Pairs with the figure on both sides.
+    /// Number of pairs that have the figure on both sides.
     pub n: usize,
     #[serde(skip)]
     pub unit: Unit,
-    /// Typical of the pairs (Hodges and Lehmann); the median of new figures; or the number of pairs that are worse.
+    /// Typical change of the pairs (Hodges and Lehmann), median of the new figures, or number of worse pairs.
     pub value: Option<f64>,
-    /// Of all such intervals together 5 % at most lie above their truth, and 5 % of each below. No `high` where only a
-    /// worsening is looked for.
+    /// Lower end of the interval. At most 5 % of all these intervals together lie above their true value, and 5 % of
+    /// each below it. Tests for a worsening only have no `high`.
     pub low: Option<f64>,
     pub high: Option<f64>,
     pub budget: f64,
     pub verdict: Verdict,
 }
 
-/// A pair to look at.
+/// A pair to examine, with the command that repeats it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct WorstPair {
     pub what: &'static str,
@@ -68,9 +68,9 @@ pub struct WorstPair {
     pub command: String,
 }
 
-/// Pairs named for each check that failed.
+/// Number of pairs that are named for each failed check.
 const WORST_NAMED: usize = 3;
-/// Of the interval beside a limit, whose ends do not count.
+/// Coverage of the interval that accompanies a limit; its ends do not affect the verdict.
 const COVERAGE: f64 = 0.90;
 
 struct Pair<'a> {
@@ -78,7 +78,7 @@ struct Pair<'a> {
     now: &'a Row,
 }
 
-/// Compares `now` with `baseline`. Rows without a partner are left out.
+/// Compares `now` with `baseline`, without the rows that have no partner.
 #[must_use]
 pub fn compare(baseline: &Table, now: &Table, budgets: &RegressSettings) -> Comparison {
     let partner = |row: &&Row| baseline.rows.iter().find(|b| b.seed == row.seed && b.settings == row.settings);
@@ -122,7 +122,7 @@ impl<'a> Judge<'a> {
         figure(self.baseline, pair.baseline, metric)
     }
 
-    /// Any run that ended worse than its partner.
+    /// Checks that no run ended worse than its partner.
     fn endings(&mut self) {
         let rank = |status| match status {
             RunStatus::Accepted => 0,
@@ -138,7 +138,8 @@ impl<'a> Judge<'a> {
         self.any("missed, refused or failed, new", self.pairs.len(), found);
     }
 
-    /// Any run with a count that `is_worse` than its partner's; a run that has none, though its partner has, counts 0.
+    /// Checks that no run has a count that `is_worse` than its partner's. A run without a count, though its partner has
+    /// one, counts 0.
     fn count(&mut self, what: &'static str, metric: Metric, is_worse: fn(f64, f64) -> bool) {
         let figures = self.figures(metric);
         let detail = |one: &Figures<'a>| {
@@ -166,7 +167,7 @@ impl<'a> Judge<'a> {
         }));
     }
 
-    /// The new figure itself.
+    /// Checks the median of the new figure against its limit.
     fn limit(&mut self, what: &'static str, metric: Metric, budget: Option<f64>) {
         let Some(budget) = budget else { return };
         let mut found: Vec<(&Pair<'_>, f64)> =
@@ -190,12 +191,12 @@ impl<'a> Judge<'a> {
 }
 
 impl Check {
-    /// Of no figures at all.
+    /// An empty check with this verdict.
     fn without(verdict: Verdict) -> Self {
         Self { what: "", n: 0, unit: Unit::None, value: None, low: None, high: None, budget: 0.0, verdict }
     }
 
-    /// A value of this check, as people read it.
+    /// A value of this check, formatted for people.
     pub(super) fn shown(&self, value: f64) -> String {
         match self.unit {
             Unit::Ratio => format!("x {value:.3}"),
@@ -244,8 +245,8 @@ mod tests {
         assert!(!is_worse(&base, &table(errors.map(|e| e / 1.5))), "better is not worse");
     }
 
-    /// Each run draws anew, 30 % about the same mean: at most one comparison in twenty may fail, by the interval's own
-    /// meaning. With 25 % worse on top of it nearly all must.
+    /// Each run draws new errors, 30 % about the same mean: by the interval's meaning, at most one comparison in twenty
+    /// may fail. With 25 % worsening added, nearly all must fail.
     #[test]
     fn noise_alone_seldom_fails_and_a_real_worsening_nearly_always() {
         let noise = LogNormal::new(0.0, 0.2).expect("a distribution");
@@ -289,7 +290,7 @@ mod tests {
         assert!(!is_worse(&touched, &touched) && !is_worse(&touched, &base));
     }
 
-    /// "4 of 4" after "0 of 3" with a skipped target, or hits that are lost, passed once.
+    /// These cases passed in an earlier version: "4 of 4" after "0 of 3" with a skipped target, and lost hits.
     #[test]
     fn lost_hits_skipped_targets_and_fewer_poses_are_worse() {
         let names = [Metric::HitsAfter, Metric::TargetsSkipped, Metric::Poses].map(|metric| metric.name().to_owned());
@@ -323,7 +324,7 @@ mod tests {
         assert_eq!(compare(&base, &lost, &RegressSettings::default()).verdict, Verdict::Inconclusive);
     }
 
-    /// Ten figures that only scatter: judged each at 5 %, a fifth of such comparisons had one on the worse side.
+    /// Ten figures that only scatter. With 5 % for each figure, a fifth of such comparisons had one on the worse side.
     #[test]
     fn many_figures_raise_no_more_alarms_than_one() {
         let metrics = [

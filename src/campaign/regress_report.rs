@@ -1,4 +1,4 @@
-//! A comparison for people and for the machines that build and test: table, Markdown, JUnit.
+//! A comparison for people and for build systems: table, Markdown, JUnit.
 
 use comfy_table::Table as Grid;
 use comfy_table::presets::{ASCII_MARKDOWN, UTF8_FULL_CONDENSED};
@@ -76,7 +76,7 @@ fn grid(comparison: &Comparison, preset: &str) -> Grid {
     grid
 }
 
-/// The last line: what it comes to.
+/// The last line: the overall result.
 pub(super) fn conclusion(comparison: &Comparison) -> &'static str {
     match comparison.verdict {
         Verdict::Worse => "WORSE than the baseline",
@@ -90,7 +90,7 @@ pub(super) fn conclusion(comparison: &Comparison) -> &'static str {
 
 const SAME: &str = "every figure of every run is the same as in the baseline";
 
-/// Lays a comparison out for a terminal of so many columns, or for anything of any width.
+/// Lays a comparison out for a terminal with `width` columns, or without a limit of the width.
 #[must_use]
 pub fn regress_table(comparison: &Comparison, width: Option<usize>) -> String {
     let mut grid = grid(comparison, UTF8_FULL_CONDENSED);
@@ -105,7 +105,7 @@ pub fn regress_table(comparison: &Comparison, width: Option<usize>) -> String {
     format!("{text}\nregress      {}", conclusion(comparison))
 }
 
-/// The same as Markdown, for the page of a build.
+/// The comparison as Markdown, for the page of a build.
 #[must_use]
 pub fn regress_markdown(comparison: &Comparison, routine: &str) -> String {
     let mut text =
@@ -122,11 +122,11 @@ pub fn regress_markdown(comparison: &Comparison, routine: &str) -> String {
     text
 }
 
-/// The same as JUnit's XML: a test case a check, which fails where it is worse. `inconclusive`: what becomes of a check
-/// that decides nothing.
+/// The comparison as JUnit XML: one test case per check, which fails where the check is worse. `inconclusive` is the
+/// treatment of checks that decide nothing.
 ///
 /// # Errors
-/// When the text cannot be made.
+/// An error if the text cannot be made.
 pub fn regress_junit(
     comparison: &Comparison,
     routine: &str,
@@ -156,7 +156,7 @@ pub fn regress_junit(
     report.to_string()
 }
 
-/// What becomes of a check that decides nothing.
+/// Treatment of a check that decides nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Undecided {
     Fails,

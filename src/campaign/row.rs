@@ -1,14 +1,14 @@
-//! One run in one line.
+//! One run as one line of a table.
 
-/// How a run ended.
+/// Ending of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RunStatus {
     Accepted,
     /// The calibration was accepted, but an `assert` of the routine does not hold.
     Missed,
-    /// The calibration was refused; the figures say why.
+    /// The calibration was refused; `failure` has the reason.
     Refused,
-    /// There is no result.
+    /// The run has no result.
     Failed,
 }
 
@@ -29,35 +29,35 @@ impl RunStatus {
     }
 }
 
-/// What a run gave. Its texts hold no line breaks, so a row is a line.
+/// Results of a run. Its texts hold no line breaks, so a row is a line.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
-    /// Index of the matrix point, and the point itself as text.
+    /// Index of the matrix point; `settings` is the point as text.
     pub setting: u32,
     pub settings: String,
     pub seed: u64,
     pub status: RunStatus,
-    /// What `armcal run` would have exited with.
+    /// Exit code that `armcal run` would have returned.
     pub exit_code: u8,
-    /// How far a failed run came; empty for others.
+    /// Stage that a failed run reached; empty for others.
     pub stage: String,
-    /// Why it failed or was refused; empty where accepted.
+    /// Reason of the failure or refusal; empty for an accepted run.
     pub failure: String,
-    /// Repeats the run.
+    /// Command that repeats the run.
     pub command: String,
-    /// In the order of the table's figures.
+    /// Figures in the order of the table's columns.
     pub figures: Vec<Option<f64>>,
 }
 
 impl Row {
-    /// Rows are sorted and told apart by this.
+    /// Setting and seed, by which rows are sorted and identified.
     #[must_use]
     pub fn key(&self) -> (u32, u64) {
         (self.setting, self.seed)
     }
 }
 
-/// `text` on one line.
+/// The text on one line.
 pub(super) fn one_line(text: &str) -> String {
     text.split(['\n', '\r']).map(str::trim).filter(|part| !part.is_empty()).collect::<Vec<_>>().join("; ")
 }

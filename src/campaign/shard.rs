@@ -14,19 +14,19 @@ pub struct Shard {
 }
 
 impl Shard {
-    /// Whether the seed at `place` in the range, from 0, is in this share.
+    /// True if the seed at `place` in the range, from 0, is in this share.
     #[must_use]
     pub fn takes(self, place: u64) -> bool {
         place % self.n == self.k - 1
     }
 
-    /// All shares of which this is one, in order.
+    /// All shares of the campaign to which this one belongs, in order.
     pub fn all(self) -> impl Iterator<Item = Self> {
         (1..=self.n).map(move |k| Self { k, ..self })
     }
 }
 
-/// What a shard's summary says of it: which share, and of which seeds.
+/// Identity of a shard in its summary: its share, and the range of all seeds.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Share {
     pub shard: Shard,

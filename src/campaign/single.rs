@@ -1,4 +1,4 @@
-//! One job: a run in a folder of its own, and its row.
+//! One job: a run in its own folder, and its row.
 
 use std::path::{Path, PathBuf};
 
@@ -10,22 +10,22 @@ use crate::run::{Failure, Finished, Keep, RunError, RunInputs, RunOutput, execut
 use armcal_belief::calib::Status;
 use armcal_belief::session::Progress;
 
-/// What the runs of a campaign share.
+/// Inputs that the runs of a campaign share.
 pub struct SingleRun<'a> {
     pub prepared: &'a Prepared,
-    /// Runs have their folders in here, `SETTING-SEED`.
+    /// Folder that holds the runs' folders, `SETTING-SEED`.
     pub folder: &'a Path,
-    /// Whether a run's folder stays, as `armcal run` leaves it.
+    /// Files of a run that stay, as for `armcal run`.
     pub keep: Keep,
-    /// What the command line exits with, for a run that came to its end (whether it is good) or one that failed.
+    /// Exit code of the command line for a finished run, by its summary, or for a failed one.
     pub exit_code: &'a (dyn Fn(Result<&RunSummary, &RunError>) -> u8 + Sync),
 }
 
-/// Runs a job. Whatever happens to the arm is in the row.
+/// Runs a job. Every outcome for the arm is in the row.
 ///
 /// # Errors
-/// [`CampaignError::Machine`] where the machine was at fault, such as a full disk: that is no row, for the next try may
-/// go well.
+/// [`CampaignError::Machine`] where the machine was at fault, such as a full disk: that gives no row, because the next
+/// try may succeed.
 pub fn run_job(run: &SingleRun<'_>, job: &Job, progress: &mut dyn Progress) -> Result<Row, CampaignError> {
     let folder = run.folder.join(format!("{}-{}", job.setting, job.seed));
     let n_figures = run.prepared.columns.names().len();
@@ -34,7 +34,7 @@ pub fn run_job(run: &SingleRun<'_>, job: &Job, progress: &mut dyn Progress) -> R
     };
     let result = in_folder(inputs, job, &folder, run.keep, progress);
     if run.keep == Keep::StreamsAlone {
-        // A folder that cannot be removed does no harm to the figures, and goes with the folder about it.
+        // A folder that cannot be removed does not affect the figures, and is removed with its parent folder.
         let _ = std::fs::remove_dir_all(&folder);
     }
     match result {
@@ -58,7 +58,7 @@ fn in_folder(
     keep: Keep,
     progress: &mut dyn Progress,
 ) -> Result<Finished, Failure> {
-    // Left behind by a campaign that was killed.
+    // An interrupted campaign has left this folder.
     if folder.exists() {
         let _ = std::fs::remove_dir_all(folder);
     }
@@ -82,7 +82,7 @@ fn of_finished(run: &SingleRun<'_>, job: &Job, finished: &Finished) -> Row {
     Row { status, figures: run.prepared.columns.figures(finished), ..job.failed("", failure, 0) }
 }
 
-/// The message with its causes, without the folder of this run: a row does not depend on where it was made.
+/// The error message with its causes, without the path of this run: a row does not depend on the folder of its run.
 fn failure_text(error: &RunError, folder: &Path) -> String {
     let mut text = error.to_string();
     let mut cause = std::error::Error::source(error);

@@ -1,4 +1,4 @@
-//! Rows summed up: per setting, how runs ended and how each figure is spread over the seeds.
+//! Summary of rows: per setting, how runs ended, and the spread of each figure over the seeds.
 
 use std::collections::BTreeMap;
 
@@ -7,68 +7,68 @@ use serde::{Deserialize, Serialize};
 use crate::campaign::{Metric, MixedRate, Origin, Row, RunStatus, Share, Table, UntilResult, Weights, Worsening};
 use armcal_core::stats::{RateSequence, median_interval, quantile};
 
-/// The summary beside a campaign's table.
+/// The summary next to a campaign's table.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CampaignSummary {
     pub version: u32,
     pub routine: String,
     pub fingerprint: String,
-    /// What the rows are of, for a comparison with them.
+    /// Origin of the rows, for later comparisons.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub origin: Option<Origin>,
-    /// Which share of a campaign the rows are; `None` for all of it.
+    /// Share of the campaign that the rows are; `None` for the whole campaign.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub share: Option<Share>,
-    /// What `--until` asked for; empty without.
+    /// Answers to the limits of `--until`; empty without.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub until: Vec<UntilResult>,
-    /// Where settings have weights: how often runs end in each way over all of them.
+    /// Rates over all settings by their weights; empty where settings have none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub weighted: Vec<WeightedRate>,
     pub settings: Vec<SettingStatistics>,
 }
 
-/// How often something happens over all settings, each by its weight.
+/// Rate of an event over all settings, each by its weight.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WeightedRate {
-    /// contacts, missed, refused or failed.
+    /// Name of the event: contacts, missed, refused or failed.
     pub event: String,
-    /// Absent while a setting has no run.
+    /// Estimated rate; absent while a setting has no run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rate: Option<f64>,
-    /// 95 % interval, which holds however often one looks.
+    /// Lower end of the 95 % interval, which is valid however often it is evaluated.
     pub low: f64,
     pub high: f64,
 }
 
-/// All runs of one point of the matrix.
+/// Statistics of all runs of one point of the matrix.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SettingStatistics {
     pub setting: u32,
     pub settings: String,
-    /// How often it occurs, where the routine says so.
+    /// Weight of the setting, where the routine gives one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub weight: Option<f64>,
     pub runs: usize,
     pub accepted: usize,
-    /// Accepted, but an `assert` of the routine does not hold.
+    /// Runs whose calibration is accepted while an `assert` of the routine does not hold.
     pub missed: usize,
     pub refused: usize,
     pub failed: usize,
     /// Runs in which the arm touched anything.
     pub with_contacts: usize,
     pub figures: Vec<FigureStatistics>,
-    /// Runs without a result, by seed; the first few.
+    /// The first runs without a result, by seed.
     pub failures: Vec<FailureLine>,
 }
 
-/// One figure over the seeds; of all runs that have it.
+/// Distribution of one figure over the seeds, from all runs that have it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FigureStatistics {
     pub name: String,
     pub n: usize,
     pub median: f64,
-    /// 95 % interval of the median, by the percentile bootstrap over the seeds.
+    /// Lower end of the median's 95 % interval, by the percentile bootstrap over the seeds.
     pub median_low: f64,
     pub median_high: f64,
     pub p95: f64,
@@ -85,11 +85,11 @@ pub struct FailureLine {
     pub command: String,
 }
 
-/// Failures that a summary names; the table has them all.
+/// Number of failures that a summary names; the table has them all.
 const MAX_FAILURES: usize = 10;
 const COVERAGE: f64 = 0.95;
 
-/// Sums a table up.
+/// Summarises a table.
 #[must_use]
 pub fn statistics(table: &Table, routine: &str, fingerprint: &str) -> CampaignSummary {
     let mut by_setting: BTreeMap<u32, Vec<&Row>> = BTreeMap::new();
@@ -110,11 +110,11 @@ pub fn statistics(table: &Table, routine: &str, fingerprint: &str) -> CampaignSu
     }
 }
 
-/// What runs are counted for, and how many of a setting's have it.
+/// Name of an event, and the number of a setting's runs that have it.
 type CountedEvent = (&'static str, fn(&SettingStatistics) -> usize);
 
 impl CampaignSummary {
-    /// The same, with rates over all settings where these have weights.
+    /// Adds the rates over all settings, where these have weights.
     #[must_use]
     pub fn weighed(mut self, weights: Option<&Weights>) -> Self {
         let Some(weights) = weights else { return self };
@@ -141,7 +141,7 @@ impl CampaignSummary {
         self
     }
 
-    /// What [`Self::weighed`] was given.
+    /// Weights that [`Self::weighed`] received.
     #[must_use]
     pub fn weights(&self) -> Option<Weights> {
         let weight = |setting: &SettingStatistics| Some((setting.setting, setting.weight?));
@@ -149,7 +149,7 @@ impl CampaignSummary {
     }
 }
 
-/// `rows`: one or more.
+/// Statistics of one setting; `rows` holds at least one row.
 fn of_setting(table: &Table, rows: &[&Row]) -> SettingStatistics {
     let count = |status| rows.iter().filter(|row| row.status == status).count();
     let contacts = table.place(Metric::Contacts);
@@ -185,7 +185,7 @@ fn of_figure(name: &str, place: usize, rows: &[&Row]) -> Option<FigureStatistics
         Some(Worsening::LessIsWorse) => -1.0,
         Some(Worsening::MoreIsWorse) | None => 1.0,
     };
-    // Of equals the first seed.
+    // Among equal values the first seed counts.
     let &(worst, worst_seed) = pairs.iter().min_by(|a, b| (sign * b.0).total_cmp(&(sign * a.0)).then(a.1.cmp(&b.1)))?;
     let interval = median_interval(&values, COVERAGE)?;
     Some(FigureStatistics {

@@ -1,9 +1,9 @@
-//! Rows on disk: each as soon as it is there, all of them in order at the end.
+//! Rows on disk: each one as soon as it is complete, and all in order at the end.
 //!
 //! While a campaign runs, rows grow in FILE.partial: a line with the fingerprint, the names, then rows in the order in
-//! which runs ended, each flushed and synced. A kill can tear the last line at most. At the end FILE and what belongs
-//! to it are written as a whole and put in place, FILE.partial goes last: a kill in between only means to write them
-//! again.
+//! which runs ended. Each row is flushed and synced, so a kill can damage only the last line. At the end FILE and its
+//! companions are written completely and put in place, and FILE.partial is removed last. After a kill in between they
+//! are only written again.
 
 use std::collections::BTreeSet;
 use std::fs::{File, OpenOptions, TryLockError};
@@ -18,7 +18,7 @@ use crate::campaign::{CampaignError, Origin, Row, Share, Stopping, UntilResult, 
 use crate::output::{self, OutputError};
 use armcal_core::files::{self, FileKind};
 
-/// The rows of one campaign; no other process writes to them meanwhile.
+/// Rows of one campaign, locked against other processes.
 #[derive(Debug)]
 pub struct Store {
     out: PathBuf,
@@ -29,27 +29,27 @@ pub struct Store {
     until: Vec<UntilResult>,
     weights: Option<Weights>,
     table: Table,
-    /// Whether the files in place already hold all rows.
+    /// True if the files in place already hold all rows.
     in_place: bool,
 }
 
-/// What to do with rows that are there already.
+/// Treatment of rows that exist already.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExistingRows {
-    /// Go on from them.
+    /// Continue from the existing rows.
     Keep,
     Discard,
 }
 
-/// Begins the first line of a partial file.
+/// Beginning of a partial file's first line.
 const MARK: &str = "# armcal campaign ";
 
 impl Store {
-    /// Opens the rows at `out` (a .csv), with those that earlier calls have left there.
+    /// Opens the rows at `out` (a .csv), including those of earlier calls.
     ///
     /// # Errors
-    /// [`CampaignError::OtherCampaign`] when they are of another fingerprint, [`CampaignError::Busy`], or what cannot
-    /// be read or written.
+    /// [`CampaignError::OtherCampaign`] for rows of another fingerprint, [`CampaignError::Busy`], or an error of
+    /// reading or writing.
     pub fn open(
         out: &Path,
         fingerprint: &str,
@@ -64,7 +64,7 @@ impl Store {
         match file.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => return Err(CampaignError::Busy { path: out.to_owned() }),
-            // Some file systems have no locks; then nobody guards, as before there were any.
+            // Some file systems have no locks; then nothing prevents two writers.
             Err(TryLockError::Error(_)) => {}
         }
         let table = Table { names, rows: Vec::new() };
@@ -86,26 +86,26 @@ impl Store {
         loaded.map(|()| store)
     }
 
-    /// The same, with what the summary says that the rows are of.
+    /// Sets the rows' origin for the summary.
     #[must_use]
     pub fn of(self, origin: Origin) -> Self {
         Self { origin: Some(origin), ..self }
     }
 
-    /// The same, with which share of a campaign the rows are.
+    /// Sets the share of a campaign that the rows are.
     #[must_use]
     pub fn sharing(self, share: Option<Share>) -> Self {
         Self { share, ..self }
     }
 
-    /// The same, with how often each setting occurs.
+    /// Sets the weight of each setting.
     #[must_use]
     pub fn weighed(self, weights: Option<Weights>) -> Self {
-        // Weights are no part of the fingerprint: rows in place may have been summed up by others.
+        // Weights are no part of the fingerprint: the rows in place may have been summarised with other weights.
         Self { in_place: self.in_place && weights.is_none(), weights, ..self }
     }
 
-    /// The same, ended early: with the answers that it was run for, and without the seeds that these do not need.
+    /// Ends the campaign early: records the answers, and removes the seeds that they do not need.
     #[must_use]
     pub fn answered(mut self, stopping: &Stopping) -> Self {
         let beyond = stopping.beyond();
@@ -134,7 +134,7 @@ impl Store {
         self.restart()
     }
 
-    /// Takes over the rows of a campaign that was broken off. `bytes`: whole lines, one or more.
+    /// Takes over the rows of an interrupted campaign. `bytes` holds at least one whole line.
     fn resume(&mut self, bytes: &[u8], partial: &Path) -> Result<(), CampaignError> {
         let first = bytes.iter().position(|byte| *byte == b'\n').map_or(bytes.len(), |end| end + 1);
         if bytes[..first] != *self.mark_line().as_bytes() {
@@ -154,7 +154,7 @@ impl Store {
         Ok(())
     }
 
-    /// Takes over the rows of a campaign that has come to its end.
+    /// Takes over the rows of a finished campaign.
     fn rows_in_place(&mut self) -> Result<(), CampaignError> {
         let other = || CampaignError::OtherCampaign { path: self.out.clone() };
         if read_summary(&self.out)?.is_none_or(|summary| summary.fingerprint != self.fingerprint) {
@@ -178,7 +178,7 @@ impl Store {
         format!("{MARK}{}\n", self.fingerprint)
     }
 
-    /// Writes the partial file anew, with the rows known so far.
+    /// Writes a new partial file with the rows known so far.
     fn restart(&mut self) -> Result<(), CampaignError> {
         let path = output::partial(&self.out);
         let text = self.mark_line() + &table_text(&self.table);
@@ -195,7 +195,7 @@ impl Store {
         self.file.sync_data()
     }
 
-    /// (setting, seed) of the rows that are there.
+    /// Setting and seed of every row in the store.
     #[must_use]
     pub fn done(&self) -> BTreeSet<(u32, u64)> {
         self.table.rows.iter().map(Row::key).collect()
@@ -235,19 +235,19 @@ impl Store {
     }
 }
 
-/// Length of the part of `bytes` that is whole lines; `None` for no whole line.
+/// Length of the part of `bytes` that is whole lines; `None` without any whole line.
 fn whole_lines(bytes: &[u8]) -> Option<usize> {
     bytes.iter().rposition(|byte| *byte == b'\n').map(|last| last + 1)
 }
 
-/// The table and what is written beside it.
+/// Paths of the table and of the files written with it.
 fn results(out: &Path) -> [PathBuf; 4] {
     let bare = out.with_extension("");
     let beside = |suffix| output::with_suffix(&bare, suffix);
     [out.to_owned(), beside("-summary.json"), beside("-summary.md"), beside("-report.html")]
 }
 
-/// The summary beside a table; `None` where there is none.
+/// The summary next to a table; `None` if there is none.
 pub(super) fn read_summary(out: &Path) -> Result<Option<CampaignSummary>, CampaignError> {
     let [_, path, ..] = results(out);
     match files::read_bytes(&path, FileKind::Table) {
@@ -259,8 +259,8 @@ pub(super) fn read_summary(out: &Path) -> Result<Option<CampaignSummary>, Campai
     }
 }
 
-/// Writes the table, sorted by the caller, as CSV (and Parquet, where it is built), and its summary as JSON, Markdown
-/// and a page.
+/// Writes the table, sorted by the caller, as CSV (and Parquet, where the build has it). Writes its summary as JSON,
+/// Markdown and a page.
 ///
 /// # Errors
 /// [`CampaignError`] naming the file that could not be written.
@@ -268,13 +268,13 @@ pub fn write_results(out: &Path, table: &Table, summary: &CampaignSummary) -> Re
     let [csv, json, text, html] = results(out);
     #[cfg(feature = "parquet")]
     crate::campaign::parquet_file::write_parquet(&out.with_extension("parquet"), table)?;
-    // One of another build would hold other rows.
+    // A Parquet file of another build would hold other rows.
     #[cfg(not(feature = "parquet"))]
     output::remove(&out.with_extension("parquet"))?;
     output::write_whole(&json, format!("{}\n", serde_json::to_string_pretty(summary)?).as_bytes())?;
     output::write_whole(&text, markdown(summary).as_bytes())?;
     output::write_whole(&html, campaign_page(table, summary).as_bytes())?;
-    // Last: a table is there only with all that belongs to it.
+    // The table comes last: it exists only with all files that belong to it.
     Ok(output::write_whole(&csv, table_text(table).as_bytes())?)
 }
 
@@ -302,12 +302,12 @@ mod tests {
         let partial = output::partial(&out);
         let bytes = std::fs::read(&partial).expect("rows");
         let begins: Vec<usize> = bytes.iter().enumerate().filter(|(_, b)| **b == b'\n').map(|(at, _)| at + 1).collect();
-        // Every place in the last line, and a sample of those before it: each cut costs a dozen syncs.
+        // Cuts at many places in the last line, and at a sample of those before it: each cut costs a dozen syncs.
         let last = begins[begins.len() - 2];
         for cut in (0..last).step_by(23).chain((last - 1..=bytes.len()).step_by(3)).chain([bytes.len()]) {
             std::fs::write(&partial, &bytes[..cut]).expect("cut");
             let store = open(&out, "f").expect("opened");
-            // Two lines stand before the rows.
+            // The file has two lines before the rows.
             let expected = begins.iter().filter(|begin| **begin <= cut).count().saturating_sub(2);
             assert_eq!(
                 store.done(),
@@ -361,7 +361,7 @@ mod tests {
         store.finish("r").expect("finished");
         assert!(std::fs::read(&out).expect("rows") == before);
         started(&out, &[2]);
-        // Broken off: the rows of before are in the partial file, too.
+        // The campaign was interrupted: the partial file holds the earlier rows, too.
         assert_eq!(open(&out, "f").expect("opened").done().len(), 2);
     }
 

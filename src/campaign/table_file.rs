@@ -9,13 +9,13 @@ use crate::campaign::row::{Row, RunStatus};
 use armcal_core::files::{self, FileKind};
 use armcal_core::units::Unit;
 
-/// In front of the figures.
+/// Columns before the figures.
 const FIXED: [&str; 8] = ["setting", "settings", "seed", "status", "exit_code", "stage", "failure", "command"];
 
-/// Bytes of a line: the reader of CSV keeps the places of all its cells.
+/// Largest length of a line, bytes: the CSV reader keeps the positions of all its cells.
 const MAX_LINE_BYTES: usize = 1 << 16;
 
-/// Rows with the names of their figures.
+/// Rows, and the names of their figures.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
     pub names: Vec<String>,
@@ -23,14 +23,14 @@ pub struct Table {
 }
 
 impl Table {
-    /// The column of a metric; `None` where the table lacks it.
+    /// Index of a metric's column; `None` where the table lacks it.
     #[must_use]
     pub fn place(&self, metric: Metric) -> Option<usize> {
         self.names.iter().position(|name| name == metric.name())
     }
 }
 
-/// The line with the names.
+/// Header line of the table.
 fn header_line(names: &[String]) -> String {
     line(FIXED.iter().map(|name| (*name).to_owned()).chain(names.iter().cloned()))
 }
@@ -47,7 +47,7 @@ pub(super) fn row_line(row: &Row, names: &[String]) -> String {
         row.failure.clone(),
         row.command.clone(),
     ];
-    // Rust's shortest text of a number reads back as the same number.
+    // The shortest decimal text of a number, which Rust prints, reads back as the same number.
     let figures = row.figures.iter().zip(names).map(|(value, name)| match (value, Columns::unit(name)) {
         (None, _) => String::new(),
         (Some(value), Unit::Count) => format!("{}", *value as u64),
@@ -58,7 +58,7 @@ pub(super) fn row_line(row: &Row, names: &[String]) -> String {
 
 fn line(fields: impl Iterator<Item = String>) -> String {
     let mut writer = csv::WriterBuilder::new().from_writer(Vec::new());
-    // Writing into memory cannot fail, and fields of text are text.
+    // Writing into memory cannot fail, and the fields are valid text.
     let written = writer.write_record(fields).ok().and_then(|()| writer.into_inner().ok());
     written.and_then(|bytes| String::from_utf8(bytes).ok()).unwrap_or_default()
 }
@@ -80,7 +80,7 @@ pub fn read_table(path: &Path) -> Result<Table, CampaignError> {
     parse_table(&bytes).map_err(|problem| CampaignError::Table { path: path.to_owned(), problem })
 }
 
-/// `bytes`: header and rows; lines that begin with # are left out.
+/// Parses a table; `bytes` holds header and rows, and lines that begin with # are skipped.
 pub(crate) fn parse_table(bytes: &[u8]) -> Result<Table, String> {
     if let Some(at) = bytes.split(|byte| *byte == b'\n').position(|line| line.len() > MAX_LINE_BYTES) {
         return Err(format!("line {} is longer than {MAX_LINE_BYTES} bytes", at + 1));
@@ -106,7 +106,7 @@ pub(crate) fn parse_table(bytes: &[u8]) -> Result<Table, String> {
     }
 }
 
-/// The row, or the name of the column that holds what it should not.
+/// Parses a row; the error is the name of the column with an invalid value.
 fn parse_row(record: &csv::StringRecord) -> Result<Row, String> {
     let field = |k: usize| record.get(k).unwrap_or_default();
     let bad = |k: usize| FIXED[k].to_owned();

@@ -7,7 +7,7 @@ use crate::campaign::statistics::WeightedRate;
 use crate::campaign::{CampaignSummary, FigureStatistics, Metric, SettingStatistics};
 use crate::report::fit_columns;
 
-/// What people look at first, and what it is to them; the JSON has all of them.
+/// Figures in the summary for people, with their descriptions; the JSON has all figures.
 const SHOWN: [(Metric, &str); 14] = [
     (Metric::ToolErrorBeforeMedian, "tool error before, median over the targets"),
     (Metric::ToolErrorAfterMedian, "tool error after, median over the targets"),
@@ -55,7 +55,7 @@ pub(super) fn title(setting: &SettingStatistics) -> String {
     )
 }
 
-/// Lays a summary out for a terminal of so many columns, or for anything of any width.
+/// Lays a summary out for a terminal with `width` columns, or without a limit of the width.
 #[must_use]
 pub fn table(summary: &CampaignSummary, width: Option<usize>) -> String {
     let mut text = String::new();
@@ -93,7 +93,7 @@ pub fn table(summary: &CampaignSummary, width: Option<usize>) -> String {
     text
 }
 
-/// What holds over all settings by their weights.
+/// Rates over all settings by their weights, and the answers to limits on these.
 pub(super) fn over_all(summary: &CampaignSummary) -> Vec<String> {
     let rate = |rate: &WeightedRate| {
         let found = rate.rate.map_or_else(|| "-".to_owned(), |rate| format!("{rate:.2e}"));
@@ -103,7 +103,7 @@ pub(super) fn over_all(summary: &CampaignSummary) -> Vec<String> {
     summary.weighted.iter().map(rate).chain(answers.map(ToString::to_string)).collect()
 }
 
-/// The same as Markdown.
+/// The summary as Markdown.
 #[must_use]
 pub fn markdown(summary: &CampaignSummary) -> String {
     let mut text = format!("# Campaign of `{}`\n", summary.routine);

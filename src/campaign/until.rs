@@ -1,4 +1,4 @@
-//! `--until`: a campaign that stops as soon as a rate is known to be below a limit, or above it.
+//! `--until`: a campaign that stops as soon as a rate is known to be below or above a limit.
 //!
 //! Rows count in the order of their seeds, so that the campaign ends at the same seed on any number of threads.
 
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::campaign::{Row, RunStatus, Weights};
 use armcal_core::stats::RateSequence;
 
-/// What a run can be counted for.
+/// Event that runs are counted for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RunEvent {
@@ -33,7 +33,7 @@ const EVENTS: [(&str, RunEvent); 5] = [
 ];
 
 impl RunEvent {
-    /// `contacts`: the figure of that name, where the run has it.
+    /// True if the run has the event. `contacts` is the figure of that name, where the run has it.
     fn is_in(self, row: &Row, contacts: Option<f64>) -> bool {
         match self {
             Self::Contacts => contacts.is_some_and(|n| n > 0.0),
@@ -45,13 +45,13 @@ impl RunEvent {
     }
 }
 
-/// "contacts < 0.001 at 95 %".
+/// A limit on the rate of an event, such as "contacts < 0.001 at 95 %".
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Until {
     event: RunEvent,
-    /// Of all runs.
+    /// Limit of the event's share of all runs.
     limit: f64,
-    /// 0.95 for 95 %.
+    /// Confidence level, 0.95 for 95 %.
     level: f64,
 }
 
@@ -79,13 +79,13 @@ impl FromStr for Until {
 impl fmt::Display for Until {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let name = EVENTS.iter().find(|(_, event)| *event == self.event).map_or("", |(name, _)| name);
-        // 99.9, not 99.90000000000001.
+        // Rounding gives 99.9 instead of 99.90000000000001.
         let level = (1e5 * self.level).round() / 1e3;
         write!(f, "{name} < {} at {level} %", self.limit)
     }
 }
 
-/// What is known of a rate.
+/// Relation of a rate's interval to its limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Answer {
@@ -93,22 +93,22 @@ pub enum Answer {
     Below,
     /// The whole interval is above it.
     Above,
-    /// The limit is in the interval.
+    /// The interval contains the limit.
     Open,
 }
 
-/// What the campaign says of one limit, under one setting or over all by their weights.
+/// Answer of the campaign to one limit, under one setting or over all by their weights.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct UntilResult {
-    /// `None`: over all settings.
+    /// Index of the setting; `None` over all settings.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub setting: Option<u32>,
     pub until: String,
     pub answer: Answer,
-    /// Runs with the event, and all runs, when the answer was there, or at the end.
+    /// Runs with the event when the answer was reached, or at the end; `runs` counts all runs until then.
     pub events: u64,
     pub runs: u64,
-    /// The interval of the rate then.
+    /// Lower end of the rate's interval at that moment.
     pub low: f64,
     pub high: f64,
 }
@@ -125,27 +125,27 @@ impl fmt::Display for UntilResult {
     }
 }
 
-/// A seed with how many settings it meets.
+/// A seed, and the number of settings that it is run under.
 pub type MetSeed = (u64, usize);
 
-/// Counts rows until all limits have their answers.
+/// Counter of rows until all limits have their answers.
 #[derive(Debug)]
 pub struct Stopping {
     limits: Vec<Until>,
-    /// In the order in which they count.
+    /// Seeds in the order in which they count.
     seeds: Vec<MetSeed>,
     n_counted: usize,
-    /// Which settings of a seed are there, and for each limit whether the event was.
+    /// Completed settings of each seed, and for each limit whether the event occurred.
     waiting: BTreeMap<u64, BTreeMap<u32, Vec<bool>>>,
     contacts: Option<usize>,
-    /// By setting, by limit.
+    /// Counts and answers by setting, then by limit.
     sequences: BTreeMap<u32, Vec<(RateSequence, Option<UntilResult>)>>,
-    /// Where settings have weights, one answer to each limit is for all of them.
+    /// Weights of the settings, where they have some, and one answer per limit for all settings together.
     weights: Option<(Weights, Vec<Option<UntilResult>>)>,
 }
 
 impl Stopping {
-    /// `names`: of the rows' figures. Each setting is answered by itself.
+    /// Starts the counting. `names` are those of the rows' figures. Each setting gets its own answer.
     #[must_use]
     pub fn new(limits: &[Until], seeds: Vec<MetSeed>, settings: BTreeSet<u32>, names: &[String]) -> Self {
         let fresh = vec![(RateSequence::default(), None); limits.len()];
@@ -160,7 +160,7 @@ impl Stopping {
         }
     }
 
-    /// The same, answered for all settings together where they have weights.
+    /// Asks for one answer over all settings, where they have weights.
     #[must_use]
     pub fn weighted(self, weights: Option<Weights>) -> Self {
         let n_limits = self.limits.len();
@@ -220,7 +220,7 @@ impl Stopping {
         limit.answered(None, [events, runs], [mixed.low, mixed.high])
     }
 
-    /// Whether nothing more has to be run.
+    /// True if no further run is needed.
     #[must_use]
     pub fn is_answered(&self) -> bool {
         let are_answered = match &self.weights {
@@ -230,7 +230,7 @@ impl Stopping {
         !self.limits.is_empty() && are_answered
     }
 
-    /// The seeds that are not needed for the answers.
+    /// Seeds that the answers do not need.
     #[must_use]
     pub fn beyond(&self) -> BTreeSet<u64> {
         if !self.is_answered() {
@@ -239,7 +239,7 @@ impl Stopping {
         self.seeds[self.n_counted..].iter().map(|(seed, _)| *seed).collect()
     }
 
-    /// The answers so far.
+    /// Answers so far.
     #[must_use]
     pub fn results(&self) -> Vec<UntilResult> {
         if let Some((weights, results)) = &self.weights {
@@ -281,7 +281,7 @@ mod tests {
         Stopping::new(&limits, seeds, (0..n_settings).collect(), &names())
     }
 
-    /// Refused once in `every` seeds.
+    /// A row that is refused once in `every` seeds.
     fn row_of(setting: u32, seed: u64, every: u64) -> Row {
         let status = if seed.is_multiple_of(every) { RunStatus::Refused } else { RunStatus::Accepted };
         Row { status, ..row(setting, seed) }
@@ -304,7 +304,7 @@ mod tests {
         insta::assert_snapshot!("limits", texts.map(|text| text.parse::<Until>().expect_err(text)).join("\n"));
     }
 
-    /// In whatever order rows come, the campaign ends at the same seed with the same answers.
+    /// For any order of the rows, the campaign ends at the same seed with the same answers.
     #[test]
     fn the_last_seed_does_not_depend_on_the_order_of_rows() {
         let rows: Vec<Row> = (1..=400).flat_map(|seed| [row_of(0, seed, 50), row_of(1, seed, 2)]).collect();

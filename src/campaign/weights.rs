@@ -1,17 +1,17 @@
-//! Rates over settings of which some are rare: each setting's rate times how often it occurs.
+//! Rates over settings of unequal frequency: the sum of each setting's rate times its weight.
 
 use std::collections::BTreeMap;
 
 use armcal_core::stats::RateSequence;
 
-/// How often each setting occurs, by its number; of all together 1.
+/// Weight of each setting, by its number; the sum is 1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Weights(BTreeMap<u32, f64>);
 
-/// A rate over all settings.
+/// A rate over all settings, with its interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MixedRate {
-    /// `None` while a setting has no run.
+    /// Estimated rate; `None` while a setting has no run.
     pub rate: Option<f64>,
     pub low: f64,
     pub high: f64,
@@ -22,20 +22,20 @@ impl Weights {
         Self(by_setting)
     }
 
-    /// Both, as shards tell of different settings.
+    /// Union of both, because shards know of different settings.
     pub(super) fn joined(mut self, other: Self) -> Self {
         self.0.extend(other.0);
         self
     }
 
-    /// The setting's weight; 0 for none of these.
+    /// Weight of the setting; 0 for an unknown one.
     #[must_use]
     pub fn of(&self, setting: u32) -> f64 {
         self.0.get(&setting).copied().unwrap_or(0.0)
     }
 
-    /// The rate by what was counted under each setting. The interval holds however often one looks, as each setting's
-    /// own does, and for all of them together: each has its part of what may go wrong.
+    /// Rate over all settings from the counts under each. The interval is valid however often it is evaluated, as each
+    /// setting's own. It holds for all settings together: they share the allowed probability of error.
     #[must_use]
     pub fn mixed(&self, counted: impl Fn(u32) -> RateSequence, level: f64) -> MixedRate {
         let each = 1.0 - (1.0 - level) / self.0.len().max(1) as f64;
@@ -69,7 +69,8 @@ mod tests {
         assert!(unmet.rate.is_none() && unmet.high > 0.01, "what was not tried may always happen: {unmet:?}");
     }
 
-    /// At equal numbers of runs, none with the event, a share by the square root of the weight leaves the least doubt.
+    /// With equally many runs, none with the event, shares by the square root of the weight give the smallest
+    /// uncertainty.
     #[test]
     fn the_share_of_runs_leaves_the_least_doubt() {
         let high = |rare: u64| {

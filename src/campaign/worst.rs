@@ -1,11 +1,11 @@
-//! The runs that somebody should look at first.
+//! The runs to examine first.
 
 use std::cmp::Ordering;
 
 use crate::campaign::{Metric, Row, RunStatus, Table};
 
-/// The `n` worst rows, the worst first: contacts, then failures, refusals and missed limits, then the largest tool
-/// error at any target; of equals the first setting and seed.
+/// The `n` worst rows, the worst first. The order is contacts, then failures, refusals and missed limits, then the
+/// largest tool error at any target; among equals the first setting and seed.
 #[must_use]
 pub fn worst_rows(table: &Table, n: usize) -> Vec<&Row> {
     let mut rows: Vec<&Row> = table.rows.iter().collect();

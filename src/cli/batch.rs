@@ -1,4 +1,4 @@
-//! What `campaign` and `regress` share: runs on all cores, progress, Ctrl-C.
+//! Common parts of `campaign` and `regress`: runs on all cores, progress, Ctrl-C.
 
 use armcal_core::codes::Code;
 use std::path::Path;
@@ -23,17 +23,17 @@ use armcal_core::routine::SeedRange;
 use armcal_core::stats::quantile;
 use armcal_core::streams::Phase;
 
-/// How the runs are made.
+/// Settings of the runs.
 pub(super) struct BatchRun<'a> {
     pub prepared: &'a Prepared,
-    /// Runs have their folders in here.
+    /// Folder that holds the runs' folders.
     pub folder: &'a Path,
     pub keep: Keep,
     pub threads: Option<u16>,
     pub stop: &'a AtomicBool,
 }
 
-/// Runs the jobs; `false` when it was stopped before the last one.
+/// Runs the jobs; returns false if it was stopped before the last one.
 pub(super) fn run_many(
     many: &BatchRun<'_>,
     jobs: &[Job],
@@ -48,21 +48,21 @@ pub(super) fn run_many(
     };
     let result = run_jobs(&engine, jobs, &|job| run_job(&single, job, &mut Unwatched(Instant::now())), on_row);
     if many.keep == Keep::StreamsAlone {
-        // Empty but for what a killed campaign left; it does no harm where it cannot be removed.
+        // Only a killed campaign leaves files in the folder; they do no harm if they cannot be removed.
         let _ = std::fs::remove_dir_all(many.folder);
     }
     Ok(result?)
 }
 
-/// What `armcal run` exits with.
+/// Exit code of `armcal run` for this result.
 fn exit_code(result: Result<&RunSummary, &RunError>) -> u8 {
     result.map_or_else(|error| of_cause(error), of_summary).code()
 }
 
-/// The worst that happened to any row.
+/// Exit for the worst result of any row.
 pub(super) fn exit_of(summary: &CampaignSummary) -> Exit {
     let any = |of: fn(&crate::campaign::SettingStatistics) -> usize| summary.settings.iter().any(|s| of(s) > 0);
-    // With limits, the campaign is good where they hold, whatever single runs came to.
+    // With limits, the campaign is good if they hold, regardless of single runs.
     if !summary.until.is_empty() {
         let holds = summary.until.iter().all(|result| result.answer == Answer::Below);
         return if holds { Exit::Ok } else { Exit::Refused };
@@ -76,7 +76,7 @@ pub(super) fn exit_of(summary: &CampaignSummary) -> Exit {
     }
 }
 
-/// The seeds asked for, or else the routine's.
+/// The requested seeds, or else the routine's.
 pub(super) fn range_of(asked: Option<SeedRange>, prepared: &Prepared) -> Result<SeedRange> {
     let problem = || {
         let file = prepared.routine.file.display();
@@ -85,7 +85,8 @@ pub(super) fn range_of(asked: Option<SeedRange>, prepared: &Prepared) -> Result<
     Ok(asked.or(prepared.routine.campaign.seeds).ok_or_else(problem)?)
 }
 
-/// Tables are .csv: the other files' names come from it. Tried before hours of work, not after.
+/// Checks that the table's name ends in .csv, because the other files' names are derived from it. The check comes
+/// before hours of work.
 pub(super) fn check_name(out: &Path) -> Result<()> {
     if out.extension().is_some_and(|extension| extension == "csv") {
         return output::check_writable(out).map_err(Into::into);
@@ -93,7 +94,7 @@ pub(super) fn check_name(out: &Path) -> Result<()> {
     Err(UsageError::new(Code::FileFormat, format!("{}: the name of a table must end in .csv", out.display())).into())
 }
 
-/// A clock alone: nobody watches a single run of many.
+/// A clock without display: the progress of a single run among many is not shown.
 struct Unwatched(Instant);
 
 impl Progress for Unwatched {
@@ -104,7 +105,7 @@ impl Progress for Unwatched {
     }
 }
 
-/// One line on stderr: how many runs are over, how many failed, the median so far.
+/// Progress line on stderr: number of finished and failed runs, and the median error so far.
 pub(super) struct CampaignBar {
     bar: ProgressBar,
     tool_error: Option<usize>,
@@ -114,7 +115,7 @@ pub(super) struct CampaignBar {
 }
 
 impl CampaignBar {
-    /// `before`: rows that are there already.
+    /// Makes the line; `before` has the existing rows.
     pub fn new(prepared: &Prepared, before: &Table, n_jobs: usize) -> Self {
         let bar = if is_quiet() { ProgressBar::hidden() } else { ProgressBar::new(n_jobs as u64) };
         if let Some(style) = bar_style("{elapsed_precise} {msg} {wide_bar} {pos}/{len}{left}") {
@@ -143,7 +144,7 @@ impl CampaignBar {
         self.bar.inc(1);
     }
 
-    /// A line above the bar, on stderr, whether that is a terminal or not.
+    /// Prints a line above the bar, on stderr, whether that is a terminal or not.
     pub fn say(&self, line: &str) {
         self.bar.suspend(|| note(line));
     }

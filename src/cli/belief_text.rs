@@ -1,4 +1,4 @@
-//! What is believed of an arm, in words.
+//! The online estimate of an arm, in words.
 
 use crate::cli::exit::{Exit, UsageError};
 use crate::cli::stdout::warn;
@@ -6,10 +6,10 @@ use armcal_belief::calib::online::{BeliefRow, Follower};
 use armcal_core::codes::Code;
 use armcal_core::stats::Summary;
 
-/// What is believed at the end, with a note of the tags that were not used.
+/// Estimate at the end, with a note on the tags that were not used.
 ///
 /// # Errors
-/// That no view was used, and why.
+/// No view was used; the error gives the reason.
 pub(super) fn belief(follower: &Follower) -> Result<BeliefRow, UsageError> {
     let tags = follower.estimator().robot().tags.iter().filter(|tag| !tag.is_known());
     let ids: Vec<String> = tags.map(|tag| tag.id.to_string()).collect();
@@ -38,7 +38,7 @@ fn mm(summary: &Summary) -> String {
     format!("{:.2} mm median, {:.2} mm worst", 1e3 * summary.median, 1e3 * summary.max)
 }
 
-/// How it ended.
+/// Summary of the estimate at the end.
 pub(super) fn summary(follower: &Follower, row: &BeliefRow) -> String {
     let health = match follower.is_good_enough() {
         Some(true) => "good enough for the task, as far as the sensors go (links and tool point are taken as drawn)",
@@ -55,7 +55,7 @@ pub(super) fn summary(follower: &Follower, row: &BeliefRow) -> String {
     )
 }
 
-/// What is believed at one time, in a line.
+/// Estimate at one time, in one line.
 pub(super) fn line(follower: &Follower, row: &BeliefRow) -> String {
     let health = match follower.is_good_enough() {
         Some(true) => ", good enough",
@@ -66,7 +66,7 @@ pub(super) fn line(follower: &Follower, row: &BeliefRow) -> String {
     format!("{} views, tool error {now}; in an hour {later}{health}", row.views)
 }
 
-/// By the belief at the end; `else_by_data` where it is good enough or has no limit.
+/// Exit by the estimate at the end; `else_by_data` if it is good enough or has no limit.
 pub(super) fn exit_of(follower: &Follower, else_by_data: Exit) -> Exit {
     if follower.is_good_enough() == Some(false) { Exit::Refused } else { else_by_data }
 }

@@ -56,7 +56,7 @@ pub(super) struct CalibrateArgs {
 
 pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
     let robot = load_robot(&args.robot, &args.failed)?;
-    // Before minutes of work, not after.
+    // The lock is taken before minutes of work, not after.
     let _lock = output::FolderLock::take(&args.out)?;
     let given = CalibrationInputs {
         recordings: &args.recordings,
@@ -78,7 +78,7 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
     output::make_folder(&out)?;
     write_results(&out, &args.recordings, &robot, (&calibration, &summary))?;
     if let Some((views, robot)) = &external {
-        // What is calibrated is in place: a picture that does not come is a warning.
+        // The calibration is in place already, so a failed picture is only a warning.
         if let Err(error) = draw(&out, views, robot, (&calibration, &summary)) {
             warn(Code::ReplayMissing, format_args!("no replay: {error:#}"));
         }
@@ -108,7 +108,7 @@ pub fn save_results(out: &Path, robot: &Robot, of: (&Calibration, &RunSummary)) 
     Ok(folder)
 }
 
-/// Calibration with its covariance, report, summary and, where tags were mapped, the map.
+/// Writes the calibration with its covariance, report and summary, and the map where tags were mapped.
 fn write_results(
     out: &Path,
     recordings: &[PathBuf],
@@ -132,25 +132,25 @@ fn write_results(
         (summary_file.as_path(), json.as_bytes()),
     ]);
     output::write_together(&written)?;
-    // A result that our own reader refuses is an error.
+    // A result that our own reader rejects is an error.
     Calibration::read(&calibration_file)?.sensors(robot)?;
     written.iter().for_each(|(path, bytes)| tracing::info!("{}: {} bytes written", path.display(), bytes.len()));
     Ok(())
 }
 
-/// Where the results are, and what to look at.
+/// Text with the folder of the results, and the file to open next.
 fn next_step(out: &Path, replay: Option<&Path>) -> String {
     let replay = replay.map_or_else(String::new, |file| format!("; {} to look at", file.display()));
     let out = out.display();
     format!("written      {out}\nnext         {out}/report.html{replay}")
 }
 
-/// File names, for a report: a path would be of this machine alone.
+/// File names for a report, without their paths, which are valid only on this machine.
 fn names(recordings: &[PathBuf]) -> Vec<String> {
     recordings.iter().filter_map(|path| Some(path.file_name()?.to_string_lossy().into_owned())).collect()
 }
 
-/// The views as a file for the Rerun viewer, replay.rrd in `out`; one of an earlier calibration does not stay.
+/// Writes the views as a file for the Rerun viewer, replay.rrd in `out`, and removes that of an earlier calibration.
 #[cfg(feature = "viewer")]
 fn draw(out: &Path, views: &[View], robot: &Robot, of: (&Calibration, &RunSummary)) -> Result<()> {
     let file = out.join("replay.rrd");

@@ -1,4 +1,4 @@
-//! What `armcal calibrate` is given: recordings, and the files beside them, as the estimator takes them.
+//! Inputs of `armcal calibrate`: recordings and their companion files, as the estimator takes them.
 
 use armcal_core::codes::Code;
 use armcal_core::kind::Kind;
@@ -39,10 +39,10 @@ use armcal_core::streams::{Message, ReachTask};
 use armcal_core::text::counted;
 use armcal_core::time::Stamp;
 
-/// What keeps up a belief message by message.
+/// Name of the online estimator in messages.
 const ONLINE: &str = "the belief kept up online";
 
-/// All that a calibration from files is made of.
+/// Inputs of a calibration from files.
 pub(super) struct CalibrationInputs<'a> {
     pub recordings: &'a [PathBuf],
     pub robot: &'a Robot,
@@ -53,17 +53,17 @@ pub(super) struct CalibrationInputs<'a> {
     pub task: Option<&'a Path>,
 }
 
-/// What came of it.
+/// Result of a calibration from files.
 pub(super) struct Calibrated {
     pub calibration: Calibration,
-    /// Whether a recording had lost something.
+    /// True if a recording had lost data.
     pub lost: bool,
-    /// The views of a real arm's recordings, and the arm with the tags that were around it.
+    /// Views of a real arm's recordings, and the arm with the tags around it.
     pub external: Option<(Vec<View>, Robot)>,
 }
 
 impl CalibrationInputs<'_> {
-    /// Refuses files that are known to be something else.
+    /// Refuses files that are known to be of another kind.
     pub fn check_kinds(&self) -> Result<()> {
         self.recordings.iter().try_for_each(|path| expect_recording(path))?;
         let is_own = |path: &&PathBuf| FileKind::of(path) == Some(FileKind::Bag);
@@ -97,7 +97,7 @@ impl CalibrationInputs<'_> {
         }
     }
 
-    /// Robot, tags and task.
+    /// The calibrator with robot, tags and task.
     fn calibrator(&self, landmarks: Option<(&Path, LandmarkFile)>, task: Option<ReachTask>) -> Calibrator<'_> {
         let calibrator = Calibrator::new(self.robot).method(self.method);
         let calibrator = match landmarks {
@@ -110,7 +110,7 @@ impl CalibrationInputs<'_> {
         }
     }
 
-    /// Recordings that armcal made: they mark their views.
+    /// Calibrates from recordings that armcal made: they mark their views.
     fn of_own(
         &self,
         landmarks: Option<(&Path, LandmarkFile)>,
@@ -124,7 +124,7 @@ impl CalibrationInputs<'_> {
         Ok((calibrator.of_marked(&mut recordings)?, lost))
     }
 
-    /// Recordings of a real arm, by an input map.
+    /// Calibrates from recordings of a real arm, by an input map.
     fn of_external(
         &self,
         file: &Path,
@@ -141,7 +141,7 @@ impl CalibrationInputs<'_> {
         Ok(Calibrated { calibration: calibrate_data(prepared, self.method, prior)?, lost, external })
     }
 
-    /// A belief that has heard nothing yet, of an arm whose recordings armcal makes.
+    /// An online estimator without any message yet, for an arm whose recordings armcal makes.
     pub fn listener(&self, settings: OnlineSettings) -> Result<Listener> {
         self.robot.require_turning(ONLINE)?;
         let survey = self.survey(self.landmarks()?)?;
@@ -162,8 +162,8 @@ impl CalibrationInputs<'_> {
         self.task.map(read).transpose()
     }
 
-    /// Feeds the recordings to a belief, message by message; `hear` is told after each of them. Returns whether a
-    /// recording had lost something.
+    /// Passes the recordings to an online estimator, message by message; calls `hear` after each of them. Returns true
+    /// if a recording had lost data.
     pub fn follow(
         &self,
         settings: OnlineSettings,
@@ -194,7 +194,7 @@ impl CalibrationInputs<'_> {
         Ok((listener.finish(hear), lost))
     }
 
-    /// The batch of all marked views, and whether a recording had lost something.
+    /// The batch of all marked views, and true if a recording had lost data.
     pub fn batch(&self) -> Result<(Batch, bool)> {
         self.robot.require_turning(ONLINE)?;
         let (task, landmarks) = (self.task()?, self.landmarks()?);
@@ -218,7 +218,7 @@ impl CalibrationInputs<'_> {
         Ok(named.map(|named| named.survey))
     }
 
-    /// Recordings that armcal made, and whether one had lost something.
+    /// Recordings that armcal made, and true if one had lost data.
     fn marked(&self) -> Result<(Vec<Recording>, bool)> {
         self.robot.require_lens()?;
         let mut recordings = Vec::new();
@@ -232,7 +232,7 @@ impl CalibrationInputs<'_> {
         Ok((recordings, lost))
     }
 
-    /// The same without further cameras, of which `what` knows nothing.
+    /// The views without further cameras, which the command `what` does not support.
     fn views_of_first_camera(
         &self,
         file: &Path,
@@ -250,7 +250,7 @@ impl CalibrationInputs<'_> {
         Ok((prepared, lost))
     }
 
-    /// The views of recordings of a real arm, and whether one had lost something.
+    /// Views of recordings of a real arm, and true if one had lost data.
     fn external_views(
         &self,
         file: &Path,
@@ -292,7 +292,7 @@ impl CalibrationInputs<'_> {
     }
 }
 
-/// Images are looked at as they are read, one at a time.
+/// Reads a recording, and searches its images for tags one at a time.
 #[cfg(feature = "images")]
 fn read_with_images(path: &Path, map: &InputMap, robot: &Robot) -> Result<ExternalRecording> {
     let family = map.tag_family.unwrap_or(robot.tag_family);
@@ -305,14 +305,14 @@ fn read_with_images(path: &Path, map: &InputMap, robot: &Robot) -> Result<Extern
     Ok(read_external_images(path, map, robot, &mut Watched { detector, waiting })?)
 }
 
-/// A sign of life for recordings whose tags are in images; their number is found in a pass of its own, which takes next
-/// to no time beside the search.
+/// Progress display for recordings whose tags are in images. A separate pass counts the images, which takes almost no
+/// time compared with the search.
 #[cfg(feature = "images")]
 fn watched_images(path: &Path, topics: &Topics) -> Result<Option<Waiting>> {
     if !Waiting::on("looking for images").is_seen() {
         return Ok(None);
     }
-    // Of each topic of images: when the next one is looked at.
+    // Time from which the next image of each topic is searched.
     let names = std::iter::once(&topics.tags).chain(topics.further.iter().map(|further| &further.topic));
     let mut next_nanos: BTreeMap<&str, u64> = names.map(|topic| (topic.as_str(), 0)).collect();
     let mut n = 0;
@@ -326,7 +326,7 @@ fn watched_images(path: &Path, topics: &Topics) -> Result<Option<Waiting>> {
     Ok((n > 0).then(|| Waiting::for_each_of(n, "searching images for tags")))
 }
 
-/// A search of images that says how far it is.
+/// An image search that reports its progress.
 #[cfg(feature = "images")]
 struct Watched {
     detector: crate::recorded_images::RecordedImageDetector,
@@ -350,10 +350,10 @@ fn read_with_images(path: &Path, map: &InputMap, robot: &Robot) -> Result<Extern
     Ok(read_external(path, map, robot)?)
 }
 
-/// A belief that hears messages.
+/// An online estimator that takes messages.
 pub(super) struct Listener {
     pub follower: Follower,
-    /// A map that is given is another one than the recording's.
+    /// True if a map was given, which replaces the recording's.
     has_map: bool,
 }
 
@@ -366,7 +366,7 @@ impl Listener {
         hear(&self.follower, events);
     }
 
-    /// After the last message.
+    /// Finishes after the last message.
     pub fn finish(mut self, hear: &mut dyn FnMut(&Follower, Vec<OnlineEvent>)) -> Follower {
         let events = self.follower.finish();
         hear(&self.follower, events);
@@ -374,11 +374,11 @@ impl Listener {
     }
 }
 
-/// The robot of a folder, with the joints that are declared as failed, `wrist_pitch=dead`.
+/// Loads a robot folder, with the joints that are declared as failed, such as `wrist_pitch=dead`.
 pub(super) fn load_robot(folder: &Path, failed: &[String]) -> Result<Robot> {
     expect_kind(folder, &[FileKind::RobotFolder])?;
     let robot = robot::load(folder)?;
-    // Of no matter here, and refused where paths are planned.
+    // An outdated file does not matter here; commands that plan paths refuse it.
     if let Some(stale) = robot.planning_issues.iter().find(|issue| issue.key == SELF_COLLISION_FILE) {
         warn(Code::FileOutdated, format_args!("{}: {}", stale.file.display(), stale.problem));
     }
@@ -391,7 +391,7 @@ pub(super) fn load_robot(folder: &Path, failed: &[String]) -> Result<Robot> {
     Ok(robot.with_failed(&failed))
 }
 
-/// An accepted calibration of this robot.
+/// Reads an accepted calibration of this robot.
 pub(super) fn read_prior(file: &Path, robot: &Robot) -> Result<Calibration> {
     let prior = Calibration::read(file)?;
     if prior.status == Status::Refused {

@@ -25,14 +25,14 @@ use crate::output;
 use crate::run::Keep;
 use armcal_core::routine::SeedRange;
 
-/// Folders of runs that stay.
+/// Runs whose folders stay.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum KeptRuns {
     All,
     Worst(u16),
 }
 
-/// Most folders of worst runs.
+/// Largest number of folders of worst runs.
 const MAX_WORST: u16 = 1000;
 
 fn kept(text: &str) -> Result<KeptRuns, String> {
@@ -144,7 +144,7 @@ fn run(args: &CampaignArgs, routine: &Path) -> Result<Exit> {
     if !jobs.is_empty() {
         note(format_args!("{} runs in {:.0} s", jobs.len(), started.elapsed().as_secs_f64()));
     }
-    // What ended the campaign by its answer does not end this.
+    // The answer that ended the campaign must not stop these runs.
     stop.flag().store(false, Ordering::SeqCst);
     keep_worst(
         args,
@@ -154,7 +154,7 @@ fn run(args: &CampaignArgs, routine: &Path) -> Result<Exit> {
     show(args, &summary, &out)
 }
 
-/// The rows that are there, with what the summary says of them.
+/// Opens the store with its existing rows, and sets the contents of the summary.
 fn opened(args: &CampaignArgs, prepared: &Prepared, range: SeedRange, out: &Path) -> Result<Store> {
     let existing = if args.fresh { ExistingRows::Discard } else { ExistingRows::Keep };
     let store = Store::open(out, &prepared.fingerprint, prepared.columns.names(), existing)?;
@@ -163,7 +163,7 @@ fn opened(args: &CampaignArgs, prepared: &Prepared, range: SeedRange, out: &Path
     Ok(store.of(Origin::of_campaign(prepared)?).sharing(share).weighed(prepared.weights()))
 }
 
-/// What `--until` asks for, with the rows that are there counted.
+/// Limits of `--until`, with the existing rows counted.
 fn stopping(args: &CampaignArgs, prepared: &Prepared, range: SeedRange, store: &Store) -> Stopping {
     let seeds = (0..).zip(range.seeds()).map(|(place, seed)| (seed, prepared.met_by(place).count()));
     let settings = prepared.settings.iter().map(|setting| setting.index).collect();
@@ -173,8 +173,8 @@ fn stopping(args: &CampaignArgs, prepared: &Prepared, range: SeedRange, store: &
     stopping
 }
 
-/// Makes the worst runs again, for their folders: none was kept while nobody knew which they would be. Folders that are
-/// whole stay.
+/// Repeats the worst runs to get their folders, because no folder was kept before the worst runs were known. Complete
+/// folders stay.
 fn keep_worst(args: &CampaignArgs, many: &BatchRun<'_>, rows: &Table) -> Result<()> {
     let KeptRuns::Worst(n_worst) = args.keep else { return Ok(()) };
     let is_there = |row: &Row| many.folder.join(format!("{}-{}/summary.json", row.setting, row.seed)).exists();

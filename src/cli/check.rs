@@ -1,4 +1,4 @@
-//! `armcal check`: what is wrong with a file, before anything moves.
+//! `armcal check`: errors of a file, before anything moves.
 
 use armcal_core::codes::{Code, Coded, Warning};
 use std::path::{Path, PathBuf};
@@ -72,22 +72,22 @@ fn only_robot(files: &[PathBuf]) -> Option<Robot> {
     robot::load(folder).ok()
 }
 
-/// What was found of one file.
+/// Result for one file.
 #[derive(Serialize)]
 struct Checked {
     file: String,
     ok: bool,
-    /// A calibration that was refused; `error` says why.
+    /// True for a refused calibration; `error` has the reason.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     refused: bool,
-    /// What it holds.
+    /// Contents of the file in words.
     #[serde(skip_serializing_if = "Option::is_none")]
     holds: Option<String>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     warnings: Vec<Warning>,
     #[serde(skip_serializing_if = "Option::is_none")]
     error: Option<String>,
-    /// Class of the error.
+    /// Code of the error.
     #[serde(skip_serializing_if = "Option::is_none")]
     code: Option<Code>,
 }
@@ -120,11 +120,11 @@ impl Checked {
     }
 }
 
-/// What a file holds, and what a run would go on without.
+/// Contents of a file, and its warnings.
 struct Found {
     text: String,
     warnings: Vec<Warning>,
-    /// Reason why a calibration was refused, and its code.
+    /// Reason of a calibration's refusal, and its code.
     refusal: Option<(String, Code)>,
 }
 
@@ -146,7 +146,7 @@ fn check_one(file: &Path, context: &Context) -> Result<Found> {
     check_kind(file, kind, &text, context)
 }
 
-/// Refuses a file that other commands read by its keys.
+/// Refuses a file without the key `kind` if its other keys identify its kind to other commands.
 fn expect_stated(file: &Path, kind: Kind, table: &toml::Table) -> Result<()> {
     if table.contains_key("kind") { Ok(()) } else { Err(missing_kind(file, kind).into()) }
 }
@@ -173,7 +173,7 @@ fn check_kind(file: &Path, kind: Kind, text: &str, context: &Context) -> Result<
     }
 }
 
-/// Recordings and drawings have commands of their own.
+/// Refuses recordings and URDFs, and names the commands for them.
 fn expect_toml(file: &Path) -> Result<()> {
     let advice = match FileKind::of(file) {
         Some(FileKind::Recording | FileKind::Bag) => "`armcal inspect` says what is in it",
@@ -185,7 +185,7 @@ fn expect_toml(file: &Path) -> Result<()> {
     Err(UsageError::new(Code::FileKind, format!("{name}: is {kind}, which `check` does not read; {advice}")).into())
 }
 
-/// Describes a file that is read alone.
+/// Describes a file that needs no other one.
 fn describe(file: &Path, kind: Kind) -> Result<String> {
     match kind {
         Kind::Plan => {
@@ -222,7 +222,7 @@ fn describe(file: &Path, kind: Kind) -> Result<String> {
     }
 }
 
-/// Describes a task, which is also held against the robot's joints where one is checked with it.
+/// Describes a task, and checks it against the robot's joints where one is given with it.
 fn describe_task(file: &Path, robot: Option<&Robot>) -> Result<Found> {
     let task = read_task(file)?;
     if let Some(robot) = robot {
@@ -233,7 +233,8 @@ fn describe_task(file: &Path, robot: Option<&Robot>) -> Result<Found> {
     Ok(Found::whole(text))
 }
 
-/// One without its covariance still moves an arm; one beside another's is wrong.
+/// Describes a calibration. Without its covariance it can still move an arm; with another calibration's covariance it
+/// is an error.
 fn describe_calibration(file: &Path, text: &str) -> Result<Found> {
     let (calibration, without) = match Calibration::read(file) {
         Ok(calibration) => (calibration, String::new()),
@@ -279,7 +280,7 @@ fn describe_input(map: &InputMap) -> String {
     }
 }
 
-/// What only planning lacks is a warning: an arm that records needs none of it.
+/// Describes a robot folder. Missing data for planning is only a warning, because recording needs none of it.
 fn check_robot(folder: &Path) -> Result<Found> {
     let robot = robot::load(folder)?;
     let file = folder.join("robot.toml");
@@ -321,11 +322,11 @@ fn describe_robot(robot: &Robot) -> Result<String> {
     ))
 }
 
-/// The scene's geometry: stowed arm, tags and targets.
+/// Checks the scene's geometry: stowed arm, tags and targets.
 fn scene_issues(routine: &Routine, robot: &Robot, vehicle: &Vehicle) -> SceneIssues {
     let model = || ClearanceModel::new(robot, vehicle, &routine.scene);
     let (clearance, open) = (model(), model().with_open_jaws());
-    // As a run plans them.
+    // The clearance model is that of a run.
     let clearance_at_targets = if grips_at_first(&routine.steps) { &open } else { &clearance };
     let check = SceneCheck { robot, routine, clearance: &clearance, clearance_at_targets };
     check.issues(&mut stream_rng(routine.seed, "check"))
@@ -345,7 +346,7 @@ fn check_routine(file: &Path, overrides: &Overrides) -> Result<Found> {
     }
     #[cfg(feature = "sim")]
     if !routine.campaign.matrix.is_empty() {
-        // Every point of the matrix is a routine of its own.
+        // Every point of the matrix is a separate routine.
         crate::campaign::Prepared::load(Request { routine: file.to_owned(), overrides: overrides.clone() })?;
     }
     let farthest = routine.task.targets_m.iter().map(|t| nalgebra::Vector3::from(*t).norm()).fold(0.0, f64::max);

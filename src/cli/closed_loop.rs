@@ -35,10 +35,10 @@ pub(super) struct LoopArgs {
     overrides: OverrideArgs,
 }
 
-/// Before each motion.
+/// Confirmation before each motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Asking {
-    /// The operator is asked on stdin.
+    /// The operator must confirm each motion on stdin.
     EachMotion,
     Nobody,
 }
@@ -49,7 +49,7 @@ impl LoopArgs {
         Ok(RunInputs::load(routine, &self.overrides.overrides())?)
     }
 
-    /// Carries the loop out by `execute`, and says how it ended.
+    /// Runs the loop by `execute`, and prints its result.
     pub fn carry_out(
         &self,
         inputs: &RunInputs,
@@ -93,7 +93,7 @@ impl LoopArgs {
     }
 }
 
-/// Names the recording that a broken run leaves.
+/// Adds the path of the recording that an interrupted run leaves.
 fn explained(failure: Failure) -> anyhow::Error {
     let error = anyhow::Error::new(*failure.error);
     match failure.kept {

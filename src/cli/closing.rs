@@ -9,21 +9,21 @@ use clap::Args;
 use crate::cli::stdout::{is_quiet, say, say_as_it_is};
 use crate::report::{RunSummary, closing, table};
 
-/// Every line begins with a label of this width; what goes on below begins where the text did.
+/// Width of the label of every line; continuation lines are indented by it.
 const LABEL_WIDTH: usize = 13;
-/// A terminal narrower than this gets lines of this width.
+/// Least width of the lines, also on a narrower terminal.
 const MIN_WIDTH: usize = 40;
 const GREEN: &str = "\u{1b}[32m";
 const RED: &str = "\u{1b}[31m";
 const DIM: &str = "\u{1b}[2m";
 const PLAIN: &str = "\u{1b}[0m";
-/// Words that say how it went.
+/// Words of a result, with their colors.
 const COLORED: [(&str, &str); 4] = [("ACCEPTED", GREEN), ("REFUSED", RED), ("FAILS", RED), ("CONTRADICTS", RED)];
 
-/// What the place that lines go to can show.
+/// Capabilities of the output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Look {
-    /// Columns; `None` where nobody reads line by line, as in a pipe.
+    /// Number of columns; `None` where lines have no limit, as in a pipe.
     width: Option<usize>,
     colors: bool,
 }
@@ -32,14 +32,14 @@ impl Look {
     fn of_stdout() -> Self {
         let is_terminal = stdout().is_terminal();
         let width = terminal_size::terminal_size().map(|(width, _)| usize::from(width.0));
-        // https://no-color.org: any value but none.
+        // By https://no-color.org any value but an empty one disables colors.
         let wants_none = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
         let is_dumb = std::env::var_os("TERM").is_none_or(|term| term == "dumb");
         Self { width: width.filter(|_| is_terminal), colors: is_terminal && !wants_none && !is_dumb }
     }
 }
 
-/// Behind it the closing lines say how to see more.
+/// File name after which the closing lines mention further output.
 const REPORT: &str = "report.html";
 
 /// What is said at the end.
@@ -54,7 +54,7 @@ pub(super) struct ClosingArgs {
 }
 
 impl ClosingArgs {
-    /// Writes the verdict and its figures, then `next`: where the files are, and what to do.
+    /// Writes the verdict and its figures, then `next`: the folder of the files and the next step.
     pub fn say(self, summary: &RunSummary, next: &str) -> Result<()> {
         if self.json {
             return say(&serde_json::to_string_pretty(summary).context("the summary has no JSON form")?);
@@ -73,7 +73,7 @@ impl ClosingArgs {
     }
 }
 
-/// Columns of the terminal that stdout is.
+/// Number of columns if stdout is a terminal.
 pub(super) fn terminal_width() -> Option<usize> {
     Look::of_stdout().width
 }
@@ -96,7 +96,7 @@ fn laid_out(text: &str, look: Look) -> String {
     lines.collect::<Vec<String>>().join("\n")
 }
 
-/// Tables stay as they are: their lines are short.
+/// True for lines of tables, which are never wrapped because they are short.
 fn is_of_table(line: &str) -> bool {
     line.starts_with(|c: char| ('\u{2500}'..='\u{257f}').contains(&c))
 }

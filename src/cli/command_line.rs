@@ -28,7 +28,7 @@ use crate::cli::{campaign, regress, run, serve};
 #[cfg(feature = "closed-loop")]
 use crate::cli::{discover, drive};
 
-/// What this build has of the parts that a build may leave out.
+/// Optional parts, and true for those in this build.
 const PARTS: [(bool, &str); 5] = [
     (cfg!(feature = "images"), "tags in images"),
     (cfg!(feature = "sim"), "simulator"),
@@ -128,14 +128,14 @@ enum Command {
     Man(completions::ManArgs),
 }
 
-/// The definition of the command line, for those who check quoted command lines.
+/// Definition of the command line, for tests of quoted command lines.
 #[must_use]
 pub fn command() -> clap::Command {
     grouped(with_examples(Cli::command(), EXAMPLES))
 }
 
-/// Parses `words`, the first of which is the program's name, does what they say and returns how that ended; errors go
-/// to stderr once, here.
+/// Parses `words`, the first of which is the program's name, carries the command out and returns its exit. Errors are
+/// written to stderr once, here.
 #[must_use]
 pub fn main(words: impl IntoIterator<Item = OsString>) -> Exit {
     let cli: Cli = match parsed(command(), words) {
@@ -145,16 +145,16 @@ pub fn main(words: impl IntoIterator<Item = OsString>) -> Exit {
     carry_out(&cli.loudness, || cli.command.carry_out())
 }
 
-/// The words of a command line as `command` understands them.
+/// Parses the words of a command line by `command`.
 ///
 /// # Errors
-/// The end of the program, where help was asked for and printed, or where they are wrong, which was said.
+/// Exit of the program, if help was requested and printed, or if the words are wrong, which was reported.
 pub fn parsed<C: FromArgMatches>(command: clap::Command, words: impl IntoIterator<Item = OsString>) -> Result<C, Exit> {
     let matches = command.try_get_matches_from(words).and_then(|matches| C::from_arg_matches(&matches));
     matches.map_err(|answer| clap_answer(&answer))
 }
 
-/// Does a command's work, as loud as was asked for; says what failed, and returns how it ended.
+/// Carries a command out with the requested loudness; reports an error, and returns the exit.
 pub fn carry_out(loudness: &Loudness, work: impl FnOnce() -> Result<Exit>) -> Exit {
     if loudness.quiet {
         be_quiet();
@@ -196,14 +196,14 @@ impl Command {
     }
 }
 
-/// Words of the libraries go to stderr, but for what the middleware says of every long message, and of no ROS on this
-/// machine.
+/// Sends messages of the libraries to stderr. It omits the middleware's messages about every long message and about a
+/// missing ROS installation.
 fn begin_log(level: tracing::Level) {
     let of_use = Targets::new()
         .with_default(LevelFilter::from_level(level))
         .with_target("rustdds::network", LevelFilter::ERROR)
         .with_target("ros2_client::distributions", LevelFilter::ERROR);
-    // The first command of a process decides.
+    // Only the first command of a process has an effect.
     let _ = tracing_subscriber::fmt()
         .with_writer(LogLines::new(level, std::io::stderr))
         .with_ansi(false)
@@ -223,7 +223,7 @@ fn ended(result: Result<Exit>) -> Exit {
     })
 }
 
-/// The help that was asked for, on stdout; or, on stderr, what is wrong with the command line.
+/// Prints requested help on stdout, or the error of the command line on stderr.
 fn clap_answer(answer: &clap::Error) -> Exit {
     if answer.use_stderr() {
         let styled = answer.render();

@@ -1,4 +1,4 @@
-//! `armcal completions` and `armcal man`: what shells and `man` know of the commands.
+//! `armcal completions` and `armcal man`: descriptions of the commands for shells and `man`.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! `--confirm`: the operator is asked on stdin before each motion.
+//! `--confirm`: the operator confirms each motion on stdin.
 
 use std::io::BufRead;
 
@@ -6,7 +6,7 @@ use crate::cli::progress::Bar;
 use armcal_belief::session::{Approval, MotionAhead, Progress};
 use armcal_core::streams::Phase;
 
-/// A progress bar that asks.
+/// A progress bar that asks for confirmation.
 pub(super) struct Confirm<'a, R> {
     bar: &'a mut Bar,
     answers: R,
@@ -17,7 +17,7 @@ impl<'a, R: BufRead> Confirm<'a, R> {
         Self { bar, answers }
     }
 
-    /// One line of the operator's; `None` when there are no more.
+    /// Reads one line of the operator; `None` at the end of the input.
     fn line(&mut self) -> Option<String> {
         let mut line = String::new();
         match self.answers.read_line(&mut line) {
@@ -27,7 +27,7 @@ impl<'a, R: BufRead> Confirm<'a, R> {
     }
 }
 
-/// What a line means; `None`: nothing that was asked for.
+/// Meaning of a line; `None` for no valid answer.
 fn meant(line: &str) -> Option<Approval> {
     match line {
         "" | "y" | "yes" | "approve" => Some(Approval::Approve),

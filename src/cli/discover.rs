@@ -1,4 +1,4 @@
-//! `armcal discover`: what a ROS 2 domain has, as a proposed connection map.
+//! `armcal discover`: the topics of a ROS 2 domain as a proposed connection map.
 
 use std::net::Ipv4Addr;
 use std::path::PathBuf;

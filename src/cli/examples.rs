@@ -2,7 +2,7 @@
 
 use clap::Command;
 
-/// By the names of command and subcommand.
+/// Examples by the names of command and subcommand.
 pub(super) const EXAMPLES: &[(&str, &[&str])] = &[
     (
         "run",
@@ -100,7 +100,7 @@ pub(super) const EXAMPLES: &[(&str, &[&str])] = &[
     ("man", &["armcal man share/man/man1"]),
 ];
 
-/// `command` with the examples in its help and in that of all below it.
+/// Adds the examples to the help of `command` and of all its subcommands.
 #[must_use]
 pub fn with_examples(command: Command, examples: &[(&str, &[&str])]) -> Command {
     let mut command = command;

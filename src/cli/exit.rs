@@ -1,4 +1,4 @@
-//! Exit codes, as scripts rely on them.
+//! Exit codes, on which scripts depend.
 
 use std::process::ExitCode;
 
@@ -20,7 +20,7 @@ use armcal_core::routine::RoutineError;
 use armcal_core::streams::ArmError;
 use armcal_core::text::printable;
 
-/// How a command ended.
+/// Ending of a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Exit {
     Ok,
@@ -34,7 +34,7 @@ pub enum Exit {
 }
 
 impl Exit {
-    /// As the system gets it.
+    /// Exit code for the system.
     #[must_use]
     pub fn code(self) -> u8 {
         match self {
@@ -53,13 +53,13 @@ impl From<Exit> for ExitCode {
     }
 }
 
-/// A run that came to its end: accepted and every limit held, or not.
+/// Exit of a finished run: `Ok` if it is accepted and every limit holds.
 #[cfg(feature = "closed-loop")]
 pub(super) fn of_summary(summary: &RunSummary) -> Exit {
     if summary.is_good() { Exit::Ok } else { Exit::Refused }
 }
 
-/// Something is wrong with the command line, or with a file that it names.
+/// An error of the command line, or of a file that it names.
 #[derive(Debug, thiserror::Error)]
 #[error("{text}")]
 pub struct UsageError {
@@ -68,7 +68,7 @@ pub struct UsageError {
 }
 
 impl UsageError {
-    /// With the code of what is wrong.
+    /// An error with its code.
     pub fn new(code: Code, text: impl Into<String>) -> Self {
         Self { code, text: text.into() }
     }
@@ -80,19 +80,19 @@ impl Coded for UsageError {
     }
 }
 
-/// This build has no such part.
+/// Error for a command whose part this build lacks.
 #[cfg(all(feature = "closed-loop", not(feature = "live")))]
 pub(super) fn not_built(command: &str) -> anyhow::Error {
     let problem = "this build of armcal knows no live arms; build it with `--features live`";
     UsageError::new(Code::BuildFeatureMissing, format!("{command}: {problem}")).into()
 }
 
-/// Input that cannot be used gives 2, recordings with nothing to fit too; all else 1.
+/// Exit for an error: 2 for unusable input, and for recordings with nothing to fit; otherwise 1.
 pub(super) fn of_error(error: &anyhow::Error) -> Exit {
     of_cause(error.as_ref())
 }
 
-/// The same for an error as the library gives it.
+/// Exit for an error in the form that the library returns.
 pub(super) fn of_cause(error: &(dyn std::error::Error + 'static)) -> Exit {
     let invalid = std::iter::successors(Some(error), |error| error.source()).any(|cause| {
         cause.is::<UsageError>()
@@ -140,7 +140,7 @@ fn is_invalid_campaign(_: &(dyn std::error::Error + 'static)) -> bool {
     false
 }
 
-/// A connection map; an arm that is not there is no fault of the files.
+/// True for an invalid connection map; a missing arm is no error of the files.
 #[cfg(feature = "live")]
 fn is_invalid_connection(cause: &(dyn std::error::Error + 'static)) -> bool {
     matches!(cause.downcast_ref::<armcal_live::LiveError>(), Some(armcal_live::LiveError::File(_)))
@@ -160,7 +160,7 @@ pub(super) fn explain(error: &anyhow::Error) -> String {
     format!("{} [{}]", message_of(error), code_of(error))
 }
 
-/// The chain of causes, printable, each said once: many messages already hold that of their source.
+/// The chain of causes, printable, without repetitions: many messages already include that of their source.
 #[must_use]
 pub fn message_of(error: &anyhow::Error) -> String {
     let mut text = error.to_string();

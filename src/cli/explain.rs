@@ -49,7 +49,7 @@ fn known(text: &str) -> Result<Code, UsageError> {
     })
 }
 
-/// Codes by kind, each with its cause.
+/// List of the codes by kind, each with its cause.
 fn listed(explained: &[Explained]) -> String {
     let kinds = [CodeKind::Error, CodeKind::Refusal, CodeKind::Finding, CodeKind::Warning];
     let of_kind = |kind: CodeKind| {

@@ -98,7 +98,7 @@ enum Input {
 }
 
 impl Input {
-    /// Why the calibration may not be used; `None` for an accepted one.
+    /// Reason that the calibration must not be used; `None` for an accepted one.
     fn refusal(&self) -> Option<String> {
         let (status, why) = match self {
             Self::Full(calibration) => (calibration.status, &calibration.refusal),
@@ -142,11 +142,11 @@ pub(super) fn export(args: &ExportArgs) -> Result<Exit> {
     Ok(Exit::Ok)
 }
 
-/// A calibration in the form of that name, and what such a form cannot hold; `input` is the input map that `lerobot`
+/// The calibration in the named form, and the parts that this form cannot hold; `input` is the input map that `lerobot`
 /// needs.
 ///
 /// # Errors
-/// Another name, or a calibration of another robot.
+/// An unknown name, or a calibration of another robot.
 pub fn export_text(
     calibration: &Calibration,
     robot: &Robot,
@@ -209,7 +209,7 @@ fn of_full(
     })
 }
 
-/// LeRobot's JSON that the input map names, with new homing offsets.
+/// LeRobot's JSON, which the input map names, with new homing offsets.
 fn of_lerobot(
     calibration: &Calibration,
     robot: &Robot,
@@ -227,7 +227,7 @@ fn of_lerobot(
 
 const NO_MAP: &str = "--as lerobot needs the input map that names LeRobot's JSON: add --input MAP";
 
-/// Adds a sentence for each thing that a form cannot hold.
+/// Adds a sentence for each part that a form cannot hold.
 fn lacking(form: &str, lacks: &[String], left_out: &mut Vec<String>) {
     left_out.extend(lacks.iter().map(|what| format!("left out, for {form} cannot hold it: {what}")));
 }
@@ -274,7 +274,7 @@ fn of_compact(
     })
 }
 
-/// The forms that need no more than sensors. Terms that a transmission cannot hold are named.
+/// Text of the forms that need only sensors. Adds terms that a transmission cannot hold to `left_out`.
 fn of_sensors(robot: &Robot, sensors: &ArmSensors, args: &ExportArgs, left_out: &mut Vec<String>) -> String {
     if args.form == Form::Table {
         return SensorTable::new(robot, sensors, args.points.map(usize::from)).to_csv(robot);
@@ -298,7 +298,7 @@ fn to_yaml<T: Serialize>(value: &T) -> Result<String> {
     serde_saphyr::to_string(value).context("the calibration has no YAML form")
 }
 
-/// A calibration, its covariance where that is at hand, and its terms as tables.
+/// A calibration, its covariance if it has one, and its terms as tables.
 #[derive(Serialize)]
 struct FullView<'a> {
     #[serde(flatten)]
@@ -315,7 +315,7 @@ impl<'a> FullView<'a> {
         Self { calibration, lookup: calibration.lookup(), covariance }
     }
 
-    /// With the keys of slides in metres, as in calibration.toml.
+    /// Converts the view to JSON, with the keys of slides in metres, as in calibration.toml.
     fn in_own_units(&self) -> Result<Value> {
         let mut view = serde_json::to_value(self).context("the calibration has no JSON form")?;
         let is_slide = |name: Option<&str>| {
@@ -338,19 +338,19 @@ fn in_metres(value: &Value) -> Value {
     Value::Object(table.iter().map(|(key, value)| (metric(key), in_metres(value))).collect())
 }
 
-/// A compact calibration, and with its robot at hand the same corrections under the keys of calibration.toml.
+/// A compact calibration. With its robot given, it has the same corrections under the keys of calibration.toml.
 #[derive(Serialize)]
 struct CompactView<'a> {
     #[serde(flatten)]
     compact: &'a CompactCalibration,
     #[serde(skip_serializing_if = "Option::is_none")]
     joint_of_robot: Option<Vec<JointOfRobot>>,
-    /// Of the joints with terms.
+    /// Tables of the joints with terms.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     lookup: Vec<LookupTable>,
 }
 
-/// As in calibration.toml.
+/// One joint's correction with the keys of calibration.toml.
 #[derive(Serialize)]
 struct JointOfRobot {
     name: String,

@@ -1,4 +1,4 @@
-//! Kinds of files by their first bytes or their key `kind`. Errors name the command that takes a file.
+//! Kinds of files by their first bytes or their key `kind`. Errors name the command for a file.
 
 use armcal_core::codes::Code;
 use std::io::Read;
@@ -24,11 +24,11 @@ pub(super) enum FileKind {
     Toml(Kind),
 }
 
-/// So much of a file's start tells a recording.
+/// Number of bytes at a file's start that identify a recording.
 const START_BYTES: usize = 16;
 
 impl FileKind {
-    /// `None` for what is not there, cannot be read or is nothing of these.
+    /// Kind of the file at `path`; `None` for a missing, unreadable or unknown file.
     pub fn of(path: &Path) -> Option<Self> {
         if path.is_dir() {
             let has = |name: &str| path.join(name).is_file();
@@ -57,7 +57,7 @@ impl FileKind {
         stated_kind(path, &table, None).ok().map(Self::Toml)
     }
 
-    /// With its article.
+    /// Name with its article.
     pub fn name(self) -> &'static str {
         match self {
             Self::Recording => "a recording (.mcap)",
@@ -69,7 +69,7 @@ impl FileKind {
         }
     }
 
-    /// Where it belongs.
+    /// Commands that take the file, in words.
     fn takers(self) -> &'static str {
         match self {
             Self::Recording => "`armcal calibrate`, `inspect`, `tagmap`, `watch` and `replay` take it",
@@ -82,7 +82,7 @@ impl FileKind {
     }
 }
 
-/// Refuses a file that is known to be none of `wanted`; one that is not known is left to its reader.
+/// Refuses a file of a known kind that is not in `wanted`; an unknown kind is left to its reader.
 pub(super) fn expect_kind(path: &Path, wanted: &[FileKind]) -> Result<()> {
     match FileKind::of(path).filter(|kind| !wanted.contains(kind)) {
         Some(kind) => {
@@ -94,20 +94,20 @@ pub(super) fn expect_kind(path: &Path, wanted: &[FileKind]) -> Result<()> {
     }
 }
 
-/// The same for a routine.
+/// Refuses a file that is known to be no routine.
 ///
 /// # Errors
-/// What the file is instead, and which command takes it.
+/// Error with the file's actual kind, and the command that takes it.
 pub fn expect_routine(path: &Path) -> Result<()> {
     expect_kind(path, &[FileKind::Toml(Kind::Routine)])
 }
 
-/// The same for recordings, of armcal or of others.
+/// Refuses a file that is known to be no recording, of armcal or of other programs.
 pub(super) fn expect_recording(path: &Path) -> Result<()> {
     expect_kind(path, &[FileKind::Recording, FileKind::Bag])
 }
 
-/// The same for a file that an option names, if it is given.
+/// Refuses a file that an option names if it is known to be of another kind.
 pub(super) fn expect_option(path: Option<&Path>, wanted: Kind) -> Result<()> {
     path.map_or(Ok(()), |path| expect_kind(path, &[FileKind::Toml(wanted)]))
 }

@@ -1,21 +1,21 @@
-//! The commands in three groups, as `armcal --help` shows them; clap has one list.
+//! The commands in groups for `armcal --help`; clap has only one list.
 
 use std::fmt::Write as _;
 
 use clap::Command;
 
-/// Heading, and the names of its commands.
+/// Headings, and the names of their commands.
 const GROUPS: [(&str, &[&str]); 4] = [
     ("Calibrate", &["calibrate", "plan", "inspect", "check", "export", "replay", "tagmap", "new-robot"]),
     ("Real arm", &["drive", "discover", "watch"]),
     ("Test", &["run", "campaign", "regress", "serve"]),
     ("Help", &["schema", "explain", "help"]),
 ];
-/// Columns of the names, and of a line.
+/// Width of the names in columns; `WIDTH` is that of a line.
 const NAMES: usize = 12;
 const WIDTH: usize = 80;
 
-/// `command` with a help that lists its commands by group.
+/// Replaces the command's help by one with its commands in groups.
 pub(super) fn grouped(command: Command) -> Command {
     let mut list = String::new();
     for (heading, names) in GROUPS {
@@ -24,7 +24,7 @@ pub(super) fn grouped(command: Command) -> Command {
             let about = match command.find_subcommand(name).and_then(Command::get_about) {
                 Some(about) => about.to_string(),
                 None if *name == "help" => "Print the help of a command".to_owned(),
-                // Of a part that this build lacks.
+                // A command of a part that this build lacks.
                 None => continue,
             };
             let indent = " ".repeat(NAMES + 2);
@@ -47,7 +47,7 @@ mod tests {
         command.get_subcommands().filter(|below| !below.is_hide_set())
     }
 
-    /// A new one takes the place of an old one.
+    /// The limits keep the numbers small: a new command or flag must replace an old one.
     #[test]
     fn commands_and_flags_stay_few() {
         let command = crate::cli::command();

@@ -76,7 +76,7 @@ pub(super) fn inspect(args: &InspectArgs) -> Result<Exit> {
     })
 }
 
-/// A table by the ending of its name; `None` for another file.
+/// A table, recognised by the extension of its name; `None` for another file.
 fn looked_at(path: &Path) -> Result<Option<LookedAt>> {
     let contents = read_table_contents(path).transpose()?;
     Ok(contents.map(|contents| LookedAt { path: path.to_owned(), contents }))
@@ -89,7 +89,7 @@ fn expect_no_other(args: &InspectArgs) -> Result<()> {
     Err(UsageError::new(Code::UsageInvalid, problem).into())
 }
 
-/// Looks at a table of poses, or at two of which one has the joints and the other the tags.
+/// Inspects a table of poses, or two tables of which one has the joints and the other the tags.
 fn inspect_columns(args: &InspectArgs, table: &LookedAt, robot: Option<&Robot>) -> Result<Exit> {
     let given = match &args.other {
         Some(path) => Some(looked_at(path)?.with_context(|| format!("{}: is no table", path.display()))?),
@@ -120,7 +120,7 @@ fn inspect_columns(args: &InspectArgs, table: &LookedAt, robot: Option<&Robot>) 
     Ok(Exit::Ok)
 }
 
-/// The one table next to `table` that has what this lacks.
+/// The only table next to `table` with the columns that it lacks.
 fn the_neighbour(table: &LookedAt, robot: Option<&Robot>, args: &InspectArgs) -> Result<Option<LookedAt>> {
     let mut found = neighbours(table, robot);
     let names: Vec<String> = found.iter().map(|other| other.path.display().to_string()).collect();
@@ -142,7 +142,7 @@ fn the_neighbour(table: &LookedAt, robot: Option<&Robot>, args: &InspectArgs) ->
     }
 }
 
-/// The robot as attached to the recording; `None` where that is missing or cannot be used, for it is a help, no more.
+/// The robot from the recording's attachments; `None` where it is missing or unusable, because it is optional.
 fn attached_robot(recording: &Path) -> Result<Option<Robot>, LogError> {
     let attachments = read_attachments(recording)?;
     if !attachments.iter().any(|(name, _)| name == "robot.toml") {
@@ -150,7 +150,7 @@ fn attached_robot(recording: &Path) -> Result<Option<Robot>, LogError> {
     }
     let Ok(folder) = tempfile::tempdir() else { return Ok(None) };
     for (name, bytes) in attachments {
-        // Only plain names: an attachment must not choose where it is written.
+        // Only plain names: an attachment must not choose its path on disk.
         let is_plain = Path::new(&name).file_name().is_some_and(|plain| plain.to_str() == Some(&name));
         if is_plain && std::fs::write(folder.path().join(&name), bytes).is_err() {
             return Ok(None);

@@ -1,4 +1,4 @@
-//! `--live`: what happens, in a Rerun viewer that is open already.
+//! `--live`: shows the run in a Rerun viewer that is already open.
 
 use anyhow::Result;
 use clap::Args;
@@ -21,7 +21,7 @@ pub(super) struct LiveViewArgs {
     pub live: Option<String>,
 }
 
-/// What is drawn around the messages.
+/// Objects that the view draws in addition to the messages.
 #[cfg_attr(not(feature = "viewer"), expect(dead_code, reason = "nothing is drawn"))]
 pub(super) struct ViewOf<'a> {
     pub robot: &'a Robot,
@@ -30,13 +30,13 @@ pub(super) struct ViewOf<'a> {
 }
 
 impl LiveViewArgs {
-    /// Begins to look for the viewer, where one is asked for.
+    /// Begins to search for the viewer, if one was requested.
     pub fn open(&self, of: &ViewOf<'_>) -> Result<Option<OpenView>> {
         self.live.as_deref().map(|address| OpenView::open(address, of)).transpose()
     }
 }
 
-/// This build has no such part.
+/// Replacement in builds without the viewer.
 #[cfg(not(feature = "viewer"))]
 mod unopened {
     use std::time::Duration;
@@ -46,7 +46,7 @@ mod unopened {
     use armcal_belief::session::MessageListener;
     use armcal_core::codes::Code;
 
-    /// There is none.
+    /// A view that cannot exist.
     pub enum OpenView {}
 
     impl OpenView {

@@ -1,4 +1,4 @@
-//! What of a recording could not be used, said on stderr.
+//! Warnings on stderr about unusable data of a recording.
 
 use armcal_core::codes::Code;
 use std::path::Path;
@@ -18,7 +18,7 @@ pub(super) fn describe(completeness: &Completeness) -> String {
     }
 }
 
-/// Says on stderr what a recording has lost; `true` if it has lost anything.
+/// Warns about a recording's lost data; returns true if there is any.
 pub(super) fn warn_of_losses(recording: &Recording) -> bool {
     let file = recording.path.display();
     let whole = recording.completeness == Completeness::Whole;
@@ -38,7 +38,7 @@ pub(super) fn warn_of_losses(recording: &Recording) -> bool {
     !whole || !recording.rejected.is_empty()
 }
 
-/// Says on stderr what was put right in the order of a file's chunks.
+/// Warns about corrections to the order of a file's chunks.
 fn warn_of_order(file: &Path, order: ChunkOrder) {
     let file = file.display();
     if order.moved > 0 {
@@ -52,7 +52,7 @@ fn warn_of_order(file: &Path, order: ChunkOrder) {
     }
 }
 
-/// Says on stderr what of a real arm's recording is not used; `true` if something was lost.
+/// Warns about the unused data of a real arm's recording; returns true if data was lost.
 pub(super) fn warn_of_external(recording: &ExternalRecording, robot: &Robot) -> bool {
     let file = recording.path.display();
     let is_whole = recording.completeness == Completeness::Whole;

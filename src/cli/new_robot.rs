@@ -59,10 +59,10 @@ pub(super) fn new_robot(args: &NewRobotArgs) -> Result<Exit> {
     }
 }
 
-/// Random configurations; pairs that only rarer ones bring together are missed.
+/// Number of random configurations; pairs that are near each other only in rarer ones are missed.
 const N_CONFIGURATIONS: u64 = 200_000;
 
-/// Finds which links can come near each other, and stores it in the robot's folder.
+/// Finds the links that can come near each other, and stores the pairs in the robot's folder.
 fn self_collision(folder: &Path) -> Result<Exit> {
     let robot = robot::load_without_pairs(folder)?;
     let found = sample_self_pairs(&robot, N_CONFIGURATIONS, 1);
@@ -110,7 +110,7 @@ fn new_folder(args: &NewRobotArgs, urdf: &Path, out: &Path) -> Result<Exit> {
     Ok(Exit::Ok)
 }
 
-/// The named camera of a file, or its only one, and where it is from, in words.
+/// The named camera of a file, or its only one, and its source in words.
 fn lens(file: &Path, wanted: Option<&str>) -> Result<(String, CameraModel)> {
     let cameras = read_cameras(file)?;
     let names: Vec<&str> = cameras.iter().map(|camera| camera.name.as_str()).collect();
@@ -135,15 +135,16 @@ fn with_link_poses(urdf: &Path, file: &Path) -> Result<String, RobotError> {
     poses.written_into(file, (urdf, &robot::read_text(urdf)?))
 }
 
-/// Random poses for links that are near each other at nearly all of them, and for one at which none are.
+/// Number of random poses for two searches: links that are near each other at nearly all of them, and a pose without
+/// near links.
 const N_POSES: u32 = 500;
-/// What planning keeps free by default, m: links that never are so far apart would leave it no way.
+/// Margin of planning by default, m: a pair of links that always is nearer would leave no path.
 const NEAR_M: f64 = 0.05;
-/// Distance that the arm keeps from itself where it is stowed, m.
+/// Distance between links of the stowed arm, m.
 const STOWED_MARGIN_M: f64 = 0.03;
 
-/// The same with what the arm's shapes tell: links that are near each other at nearly every pose, and a pose
-/// where no others are.
+/// Drafts the robot again with results from the arm's shapes: links that are near each other at nearly every pose, and
+/// a pose with no other near links.
 fn with_shapes(wanted: &NewRobot<'_>, robot: Robot, out: &Path) -> Result<(Vec<NewFile>, Robot)> {
     let read = |wanted: &NewRobot<'_>| -> Result<(Vec<NewFile>, Robot)> {
         let files = draft_robot(wanted, DraftedMeshes::Read)?.files;
@@ -158,7 +159,7 @@ fn with_shapes(wanted: &NewRobot<'_>, robot: Robot, out: &Path) -> Result<(Vec<N
     read(&NewRobot { clear_rad: clear.as_deref(), ..wanted })
 }
 
-/// Nothing that is there is ever overwritten.
+/// Refuses a folder that is not empty, because existing files are never overwritten.
 fn refuse_full(folder: &Path) -> Result<()> {
     let is_free = !folder.exists() || folder.read_dir().is_ok_and(|mut entries| entries.next().is_none());
     if is_free {
@@ -171,7 +172,7 @@ fn refuse_full(folder: &Path) -> Result<()> {
     .into())
 }
 
-/// The robot as it reads from a folder of these files, or why it does not.
+/// The robot as it loads from a folder of these files, or the error.
 fn trial(files: &[NewFile], out: &Path) -> Result<Result<Robot, UsageError>> {
     let folder = tempfile::tempdir().context("no temporary folder can be made")?;
     write(files, folder.path())?;

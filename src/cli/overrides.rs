@@ -19,7 +19,7 @@ pub struct OverrideArgs {
 }
 
 impl OverrideArgs {
-    /// As a routine is read with. A vehicle that is set is a file in the working directory's terms, as the robot is.
+    /// Overrides for the routine's reader. Paths of vehicle and robot are relative to the working directory.
     #[must_use]
     pub fn overrides(&self) -> Overrides {
         let mut overrides = Overrides { robot: self.robot.clone(), ..Overrides::default() };

@@ -48,7 +48,7 @@ pub(super) struct PlanArgs {
     overrides: OverrideArgs,
 }
 
-/// A new meaning of the file gets a new version.
+/// Version of the hash; a new meaning of the file needs a new version.
 const DOMAIN: &[u8] = b"armcal plan 1";
 
 pub(super) fn plan(args: &PlanArgs) -> Result<Exit> {
@@ -90,7 +90,7 @@ fn read(path: &Path) -> Result<Vec<u8>> {
 /// The plan of a routine's first capture; `prior` is a calibration and the bytes of its file.
 ///
 /// # Errors
-/// A routine that cannot be read, and targets or views that no certified path leads to.
+/// A routine that cannot be read, and targets or views that no certified path reaches.
 pub fn plan_routine(routine_file: &Path, prior: Option<Calibration>) -> Result<PlanFile> {
     let routine = routine::load(routine_file)?;
     let (robot, vehicle) = routine.load_arm()?;
@@ -157,7 +157,7 @@ fn planned(
     Ok(PlanFile::new(header, &itinerary, belief, robot))
 }
 
-/// The plan's .rrd, to be put in place with the rest.
+/// The plan as .rrd, to be put in place with the other files.
 #[cfg(feature = "viewer")]
 fn picture(
     routine: &Routine,
@@ -172,7 +172,7 @@ fn picture(
     std::fs::read(&path).context("plan.rrd cannot be read back")
 }
 
-/// BLAKE3 over all that the plan depends on; 64 hexadecimal digits. Comments and the places of files are left out.
+/// BLAKE3 over all inputs of the plan; 64 hexadecimal digits. Comments and paths of files are omitted.
 fn inputs_hash(
     routine: &Path,
     overrides: &Overrides,
@@ -200,7 +200,7 @@ fn inputs_hash(
     Ok(hasher.finalize().to_hex().to_string())
 }
 
-/// Degrees, millimetres: people read it.
+/// Table of the plan for people, in degrees and millimetres.
 fn table(file: &PlanFile, preset: &str, width: Option<usize>) -> String {
     let mut table = Table::new();
     table.load_preset(preset);

@@ -10,17 +10,17 @@ use crate::cli::waiting::bar_style;
 use armcal_belief::session::Progress;
 use armcal_core::streams::Phase;
 
-/// One line that says what the arm is doing.
+/// One line with the arm's current activity.
 pub(super) struct Bar {
     bar: ProgressBar,
     started: Instant,
     interrupt: Interrupt,
-    /// Time left is told of the present one.
+    /// Current phase, to which the remaining time applies.
     phase: &'static str,
 }
 
 impl Bar {
-    /// `started`: when the command began. Stops the run when `interrupt` says so.
+    /// Makes the bar; `started` is the start of the command. The bar stops the run when `interrupt` asks for it.
     pub fn new(started: Instant, interrupt: Interrupt) -> Self {
         let bar = if is_quiet() { ProgressBar::hidden() } else { ProgressBar::new(1) };
         if let Some(style) = bar_style("{elapsed_precise} {msg:<46} {wide_bar} {pos}/{len}{left}") {
@@ -29,7 +29,7 @@ impl Bar {
         Self { bar, started, interrupt, phase: "" }
     }
 
-    /// A line above the bar, on stderr, whether that is a terminal or not: a question.
+    /// Prints a question above the bar, on stderr, whether that is a terminal or not.
     pub fn say(&self, line: &str) {
         self.bar.suspend(|| complain(format_args!("{line}")));
     }

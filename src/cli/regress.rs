@@ -1,4 +1,4 @@
-//! `armcal regress`: is it worse than it was?
+//! `armcal regress`: comparison of a routine's runs with a baseline.
 
 use armcal_core::codes::Code;
 use std::path::{Path, PathBuf};
@@ -62,7 +62,7 @@ pub(super) struct RegressArgs {
     overrides: OverrideArgs,
 }
 
-/// What a report's name ends with.
+/// Form of a report, by the extension of its name.
 enum Form {
     JUnit,
     Page,
@@ -113,7 +113,7 @@ pub(super) fn regress(args: &RegressArgs) -> Result<Exit> {
     }
 }
 
-/// Puts the runs down as a baseline.
+/// Writes the runs as a baseline.
 fn written(out: &Path, prepared: &Prepared, now: &Table) -> Result<Exit> {
     output::write_whole(out, baseline_text(prepared, now)?.as_bytes())?;
     let summary = statistics(now, &prepared.routine.name, &prepared.fingerprint);
@@ -121,7 +121,7 @@ fn written(out: &Path, prepared: &Prepared, now: &Table) -> Result<Exit> {
     Ok(crate::cli::batch::exit_of(&summary))
 }
 
-/// Holds the runs against the baseline, and puts down what came out.
+/// Compares the runs with the baseline, and writes the result.
 fn compared(args: &RegressArgs, prepared: &Prepared, baseline: &Table, now: &Table) -> Result<Exit> {
     if let Some(out) = &args.out {
         output::write_whole(out, table_text(now).as_bytes())?;
@@ -158,7 +158,7 @@ fn json(comparison: &Comparison, args: &RegressArgs) -> Result<String> {
     serde_json::to_string_pretty(&value).context("the comparison has no JSON form")
 }
 
-/// What a run is usually faster than the arm, with tags as corners. Rendered images take tens of times as long.
+/// Usual speed of a run over the arm's time, with tags as corners. Rendered images take tens of times as long.
 const USUAL_SPEED: f64 = 50.0;
 
 fn n_threads(args: &RegressArgs) -> usize {
@@ -166,7 +166,7 @@ fn n_threads(args: &RegressArgs) -> usize {
     args.threads.map_or_else(cores, usize::from)
 }
 
-/// How many runs there are, and how long they may take.
+/// Text with the number of runs, and their estimated time.
 fn foretold(baseline: Option<&Table>, n_jobs: usize, n_threads: usize) -> String {
     let times_s: Vec<f64> = baseline
         .and_then(|table| Some((table, table.place(Metric::SimulatedTime)?)))
@@ -182,7 +182,7 @@ fn foretold(baseline: Option<&Table>, n_jobs: usize, n_threads: usize) -> String
     }
 }
 
-/// The runs of the baseline, as the routine makes them today.
+/// Jobs that repeat the baseline's runs with the current routine.
 fn jobs_of(baseline: &Table, args: &RegressArgs, prepared: &Prepared) -> Result<Vec<Job>> {
     let file = args.baseline.as_deref().unwrap_or(&args.routine).display();
     let wanted = |row: &&Row| args.seeds.is_none_or(|seeds| seeds.contains(row.seed));
@@ -204,7 +204,7 @@ fn jobs_of(baseline: &Table, args: &RegressArgs, prepared: &Prepared) -> Result<
     Ok(jobs)
 }
 
-/// The new rows, sorted; `None` when stopped. Nothing is taken over from earlier runs: the program may have changed.
+/// The new rows, sorted; `None` when stopped. Rows of earlier runs are not used, because the program may have changed.
 fn run(args: &RegressArgs, prepared: &Prepared, jobs: &[Job]) -> Result<Option<Table>> {
     let stop = Interrupt::install()?;
     let folder = tempfile::tempdir().context("no temporary folder can be made")?;

@@ -86,7 +86,8 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<Exit> {
     Ok(if lost { Exit::DataLost } else { Exit::Ok })
 }
 
-/// A long recording is shown at a lower rate: how much of which streams. Images are never among the messages.
+/// Warns that a long recording is shown at a lower rate, with the omitted numbers by stream. Images are never among the
+/// messages.
 fn say_what_is_left_out(recording: &Recording) {
     let left_out = recording.left_in_file.iter().filter(|(stream, _)| **stream != Stream::Images);
     let left_out: Vec<String> = left_out.map(|(stream, n)| format!("{n} of {}", stream.topic())).collect();
@@ -97,7 +98,7 @@ fn say_what_is_left_out(recording: &Recording) {
     }
 }
 
-/// The truth of the same run: truth-cut-2.mcap beside run-cut-2.mcap, else truth.mcap.
+/// The truth of the same run: truth-cut-2.mcap next to run-cut-2.mcap, else truth.mcap.
 fn truth_beside(recording: &Path) -> PathBuf {
     let unfinished = recording
         .file_name()
@@ -106,13 +107,13 @@ fn truth_beside(recording: &Path) -> PathBuf {
     recording.with_file_name(format!("truth{}", unfinished.unwrap_or(".mcap")))
 }
 
-/// The accepted calibration beside a recording of the same arm, which counts from its last view on.
+/// The accepted calibration next to a recording of the same arm; it applies from the recording's last view on.
 fn calibration_beside(recording: &Path, robot: &Robot) -> Option<Calibration> {
     let file = recording.with_file_name("calibration.toml");
     if !file.is_file() {
         return None;
     }
-    // Without its covariance, too: links are in the table.
+    // A calibration without its covariance is sufficient: the link corrections are in the table.
     let without = || {
         let text = files::read_text(&file, Size::Text).map_err(|error| error.to_string())?;
         Calibration::parse(&file, &text).map_err(|error| error.to_string())
@@ -133,7 +134,7 @@ fn calibration_beside(recording: &Path, robot: &Robot) -> Option<Calibration> {
     }
 }
 
-/// What was believed online, by a belief.jsonl of the same arm beside the recording.
+/// The online estimates in a belief.jsonl of the same arm next to the recording.
 fn belief_beside(recording: &Path, robot: &Robot) -> Option<BeliefLog> {
     let file = recording.with_file_name("belief.jsonl");
     if !file.is_file() {
@@ -150,7 +151,7 @@ fn belief_beside(recording: &Path, robot: &Robot) -> Option<BeliefLog> {
     }
 }
 
-/// The arm and its surroundings as drawn, from the recording's own attachments or a robot folder.
+/// The nominal arm and its surroundings, from the recording's own attachments or a robot folder.
 struct Drawings {
     robot: Robot,
     vehicle: Option<Vehicle>,
@@ -162,7 +163,7 @@ impl Drawings {
         let folder = tempfile::tempdir().context("no temporary folder can be made")?;
         let mut names = Vec::new();
         for (name, bytes) in read_attachments(&args.recording)? {
-            // Only plain names: an attachment must not choose where it is written.
+            // Only plain names: an attachment must not choose its path on disk.
             if Path::new(&name).file_name().is_some_and(|plain| plain.to_str() == Some(&name)) {
                 std::fs::write(folder.path().join(&name), bytes).context("an attachment cannot be unpacked")?;
                 names.push(name);

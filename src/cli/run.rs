@@ -44,17 +44,17 @@ pub(super) fn run(args: &RunArgs) -> Result<Exit> {
         .carry_out(&inputs, (started, interrupt), asking, |output, progress| execute(&inputs, seed, output, progress))
 }
 
-/// Images while the arm stands for a view, over those in all: as many come while it is on its way. Measured.
+/// Ratio of all images to those while the arm stands for a view: as many images come while it moves. Measured.
 const IMAGES_PER_VIEW_IMAGE: f64 = 2.0;
-/// Frames of a view beside those of its dwell: the arm settles. Measured.
+/// Number of frames of a view beyond those of its dwell, while the arm settles. Measured.
 const SETTLING_FRAMES: f64 = 2.0;
-/// Processor time to search and to render an image of this many pixels. One thread searches, all cores render the next
-/// image meanwhile. Measured.
+/// Number of pixels of an image to which the processor times for searching and rendering apply. One thread searches
+/// while all cores render the next image. Measured.
 const USUAL_PIXELS: f64 = 1224.0 * 1024.0;
 const SEARCHED_S: f64 = 0.05;
 const RENDERED_S: f64 = 0.11;
 
-/// How long a run takes that renders its images; `None` for one that renders none.
+/// Estimated time of a run that renders its images; `None` for one that renders none.
 fn rendering_foretold(inputs: &RunInputs) -> Option<String> {
     let camera = &inputs.spec.camera;
     if camera.mode != CameraMode::Rendered {

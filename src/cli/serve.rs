@@ -1,4 +1,4 @@
-//! `armcal serve`: the simulated arm behind the topics of a real one.
+//! `armcal serve`: the simulated arm on the topics of a real one.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! `armcal tagmap`: where the tags are, from camera views alone.
+//! `armcal tagmap`: poses of tags from camera views only.
 
 use armcal_core::codes::{Code, Warning};
 use armcal_core::kind::Kind;
@@ -76,12 +76,12 @@ impl From<Mode> for MapMode {
     }
 }
 
-/// Above so many a map may take longer than people wait without a word. Assumed.
+/// Number of detections above which a map may take long enough to need a progress line. Assumed.
 const MANY_DETECTIONS: usize = 1000;
 
-/// Share of the detections that may be rejected before the map counts as made of bad data. Assumed.
+/// Share of rejected detections above which the data of a map count as bad. Assumed.
 const MAX_REJECTED_SHARE: f64 = 0.2;
-/// Corner noise over the stated one from which a lens or size is doubtful: as `calibrate` warns.
+/// Ratio of corner noise to the stated one above which a lens or size is doubtful, as in the warning of `calibrate`.
 const NOISY: f64 = 2.0;
 
 pub(super) fn tagmap(args: &TagmapArgs) -> Result<Exit> {
@@ -132,7 +132,7 @@ pub(super) fn tagmap(args: &TagmapArgs) -> Result<Exit> {
 
 type Known = (Vec<NamedCamera>, TagFile, MapSettings);
 
-/// The camera and the tags around an arm; those that the recording says were there, where it does.
+/// The camera and the tags around an arm; the tags are the recording's survey, where it has one.
 fn of_robot(recording: &Path, robot: &Robot) -> Result<Known> {
     let is_survey = |_, message: &Message| matches!(message, Message::Survey(_));
     let (read, _) = scan_recording(recording, &TopicMap::default(), |_| {}, is_survey)?;
@@ -169,7 +169,7 @@ fn of_robot(recording: &Path, robot: &Robot) -> Result<Known> {
 fn of_files(camera: &Path, tags: &Path) -> Result<Known> {
     let cameras = read_cameras(camera)?;
     let tags = read_tags(tags)?;
-    // The attitude sensor is the vehicle's: the moving body that carries the base tag.
+    // The attitude sensor is on the vehicle: the moving body that carries the base tag.
     let of_base = tags.tags.iter().find(|tag| Some(tag.id) == tags.base_tag).map(|tag| tag.body);
     let settings = MapSettings {
         base_tag: tags.base_tag,
@@ -180,7 +180,7 @@ fn of_files(camera: &Path, tags: &Path) -> Result<Known> {
     Ok((cameras, tags, settings))
 }
 
-/// Millimetres and degrees: people read it.
+/// Description of the map for people, in millimetres and degrees.
 fn describe(map: &TagMap, sources: &[String]) -> String {
     let mut out = String::new();
     for (idx, group) in map.groups.iter().enumerate() {
@@ -203,7 +203,7 @@ fn describe(map: &TagMap, sources: &[String]) -> String {
     out + &lines.join("\n")
 }
 
-/// The map and how good it is; m, rad and px.
+/// The map and its accuracy as JSON; m, rad and px.
 fn to_json(map: &TagMap) -> Result<String> {
     let group = |group: &MapGroup| match &group.frame {
         GroupFrame::Body(name) => json!({ "body": name, "tags": group.tags, "views": group.n_views }),
@@ -243,7 +243,7 @@ fn to_json(map: &TagMap) -> Result<String> {
     serde_json::to_string_pretty(&all).context("the map has no JSON form")
 }
 
-/// What is wrong with data and map, and whether the map is good nevertheless.
+/// Warnings about data and map, and true if the map is still usable.
 fn warnings(file: &str, map: &TagMap, read: &RecordedViews, tags: &TagFile) -> (Vec<Warning>, bool) {
     let is_whole = read.completeness == Completeness::Whole;
     let mut found = Vec::new();

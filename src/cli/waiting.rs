@@ -1,4 +1,4 @@
-//! Signs of life on a terminal while something takes its time; nothing in a pipe, and nothing with `--quiet`.
+//! Progress display on a terminal during long work; none in a pipe, and none with `--quiet`.
 
 use std::fmt::Write;
 use std::time::Duration;
@@ -7,18 +7,18 @@ use indicatif::{HumanDuration, ProgressBar, ProgressState, ProgressStyle};
 
 use crate::cli::stdout::is_quiet;
 
-/// A line that says what is done, for how long already and, where the amount is known, for how long still. It goes away
-/// with this.
+/// A line with the current work, the elapsed time and, where the amount is known, the remaining time. The line
+/// disappears when the value is dropped.
 pub struct Waiting {
     bar: ProgressBar,
 }
 
-/// The style of a template, which may have `{left}`: the time left, and nothing where nobody knows it yet.
+/// The style of a template, which may have `{left}`: the remaining time, empty while it is unknown.
 pub(super) fn bar_style(template: &str) -> Option<ProgressStyle> {
     let style = ProgressStyle::with_template(template).ok()?;
     Some(style.with_key("left", |state: &ProgressState, out: &mut dyn Write| {
         let left_s = state.eta().as_secs();
-        // What is said here reaches a terminal at most.
+        // This text only reaches a terminal.
         if left_s > 0 {
             let _ = write!(out, ", {:#} left", HumanDuration(Duration::from_secs(left_s)));
         }
@@ -28,13 +28,13 @@ pub(super) fn bar_style(template: &str) -> Option<ProgressStyle> {
 const TICK: Duration = Duration::from_millis(500);
 
 impl Waiting {
-    /// For work whose amount nobody knows beforehand.
+    /// A display for work of unknown amount.
     pub fn on(what: &str) -> Self {
         let bar = if is_quiet() { ProgressBar::hidden() } else { ProgressBar::new_spinner() };
         Self::with(bar, "{elapsed_precise} {msg} {spinner}", what)
     }
 
-    /// For `total` pieces.
+    /// A display for `total` pieces.
     pub fn for_each_of(total: u64, what: &str) -> Self {
         let bar = if is_quiet() { ProgressBar::hidden() } else { ProgressBar::new(total) };
         Self::with(bar, "{elapsed_precise} {msg} {wide_bar} {pos}/{len}{left}", what)
@@ -49,12 +49,12 @@ impl Waiting {
         Self { bar }
     }
 
-    /// One more is done.
+    /// Counts one more piece as done.
     pub fn one_more(&self) {
         self.bar.inc(1);
     }
 
-    /// Whether anybody sees it.
+    /// True if the display is visible.
     pub fn is_seen(&self) -> bool {
         !self.bar.is_hidden()
     }

@@ -1,4 +1,4 @@
-//! `armcal watch`: recordings followed message by message, whole ones or one that another program still writes.
+//! `armcal watch`: recordings followed message by message, complete ones or one that another program is still writing.
 
 mod growing;
 mod stationary;
@@ -30,9 +30,9 @@ use armcal_core::log::TopicMap;
 use armcal_core::robot::Robot;
 use armcal_core::routine::Method;
 
-/// A recording that was there before is read faster than a viewer takes it: it is waited for so long in all.
+/// Total time to wait for the viewer, because an existing recording is read faster than a viewer takes it.
 const VIEWER_PATIENCE: Duration = Duration::from_secs(20);
-/// A recording that was written to its end begins and ends with it.
+/// First and last bytes of a recording that was written to its end.
 const MCAP_MAGIC: &[u8; 8] = b"\x89MCAP0\r\n";
 
 /// Follows a recording from its start and goes on as it grows: a line for each minute of the arm's time and each event.
@@ -111,7 +111,7 @@ pub(super) fn watch(args: &WatchArgs) -> Result<Exit> {
     }
 }
 
-/// Whether its writer ended it.
+/// True if its writer finished the recording.
 fn is_whole(recording: &Path) -> bool {
     let last_bytes = || {
         let mut file = files::open(recording)?;

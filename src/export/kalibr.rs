@@ -1,6 +1,6 @@
-//! The camera as Kalibr's camchain.yaml, with the place that the calibration found for it.
+//! The camera as Kalibr's camchain.yaml, with its calibrated mount.
 //!
-//! `T_cn_cnm1` maps the frame of the camera before to that of the camera: ethz-asl/kalibr 1f60227,
+//! `T_cn_cnm1` maps the frame of the previous camera to that of this camera: ethz-asl/kalibr 1f60227,
 //! kalibr_common/ConfigReader.py, lines 675 to 704.
 
 use armcal_core::codes::Code;
@@ -22,8 +22,8 @@ const HEAD: &str = "\
 # Kalibr's own tools want `rostopic`, the topic of the images, as well.
 ";
 
-/// Writes camchain.yaml with `cam0` and on: lens and `T_link_camera` of the calibration, or of robot.toml where it has
-/// none; `T_cn_cnm1` between cameras of one link. `file`, the calibration's, is named in messages.
+/// Writes camchain.yaml with `cam0` and following: lens and `T_link_camera` of the calibration, or of robot.toml where
+/// it has none. `T_cn_cnm1` is written between cameras of one link. Messages name `file`, the calibration's.
 ///
 /// # Errors
 /// [`FileIssue`]: a mount out of range, or a lens that Kalibr has no model for.
@@ -39,7 +39,7 @@ pub fn camchain(file: &Path, calibration: &Calibration, robot: &Robot) -> Result
         let place = found.map(|found| further_from_camera(file, found)).transpose()?;
         let place = place.unwrap_or(camera.mount.link_from_frame);
         text += &entry(robot, (number + 1, &format!("further_camera[{}]", at + 1)), camera, &place)?;
-        // Between cameras on two links it is no constant.
+        // `T_cn_cnm1` between cameras on two links is not constant.
         if camera.mount.n_joints == last.0 {
             text += &matrix("T_cn_cnm1", &(place.inverse() * last.1));
         }
@@ -48,7 +48,7 @@ pub fn camchain(file: &Path, calibration: &Calibration, robot: &Robot) -> Result
     Ok(text)
 }
 
-/// `cam` of that number, which robot.toml has as `key`, at `place` on its link.
+/// Entry `cam` of that number: the camera that robot.toml has as `key`, with its pose `place` on its link.
 fn entry(
     robot: &Robot,
     (number, key): (usize, &str),

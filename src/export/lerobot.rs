@@ -1,4 +1,4 @@
-//! LeRobot's calibration JSON with the homing offsets as calibrated.
+//! LeRobot's calibration JSON with calibrated homing offsets.
 
 use std::path::Path;
 
@@ -13,17 +13,18 @@ use armcal_core::input::InputMap;
 use armcal_core::robot::{FileIssue, Robot};
 use armcal_core::sensor::{ArmSensors, SensorModel};
 
-/// A calibration JSON of LeRobot, and in words what it cannot hold.
+/// A calibration JSON of LeRobot, and the parts of the calibration that it cannot hold.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LerobotHomings {
-    /// The file's text.
+    /// Text of the file.
     pub text: String,
-    /// Parts of the calibration that are not in it.
+    /// Parts of the calibration that the file does not hold, in words.
     pub left_out: Vec<String>,
 }
 
-/// The JSON that `map`, read from `file`, names, with homing offsets by which the middle of each motor's range reads as
-/// the angle that robot.toml has for it. The offsets are whole ticks; LeRobot's scale is fixed, so gains are left out.
+/// Returns the JSON that `map`, read from `file`, names, with calibrated homing offsets. With them the middle of each
+/// motor's range reads as its angle in robot.toml. The offsets are whole ticks; LeRobot's scale is fixed, so gains are
+/// omitted.
 ///
 /// # Errors
 /// [`FileIssue`]: a map that names no such JSON, a joint without a motor, or an offset that a motor cannot hold.
@@ -52,7 +53,7 @@ pub fn lerobot_homings(
     let mount = calibration.camera_mount.iter().map(|_| "the camera's mount".to_owned());
     not_held.extend(terms.chain(links).chain(mount).chain(left_out(calibration)));
     let mut text = Vec::new();
-    // LeRobot indents by four.
+    // LeRobot indents its JSON by four spaces.
     let written = homed.serialize(&mut Serializer::with_formatter(&mut text, PrettyFormatter::with_indent(b"    ")));
     let text = written.ok().and_then(|()| String::from_utf8(text).ok()).unwrap_or_default();
     Ok(LerobotHomings { text, left_out: not_held })

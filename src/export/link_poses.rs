@@ -1,10 +1,11 @@
 //! Link poses in manufacturers' files: kinematics.yaml of Universal Robots and of Franka, read and written.
 //!
-//! A pose is the `origin` of a joint: m, and roll, pitch, yaw in rad about fixed axes, as URDF has them. So read it
-//! UniversalRobots/Universal_Robots_ROS2_Description 2221ec0, urdf/inc/ur_common.xacro, lines 93 to 133 and 236, into
-//! urdf/ur_macro.xacro, lines 277 to 337, and frankaemika/franka_description b299b39, robots/common/utils.xacro, lines
-//! 263 to 266. `ur_calibration`, which writes such files, has the angles in another order (Universal_Robots_ROS2_Driver
-//! 696e1a7, ur_calibration/src/calibration.cpp, line 230); its files are read as the URDF reads them.
+//! A pose is the `origin` of a joint: m, and roll, pitch, yaw in rad about fixed axes, as in URDF. Sources:
+//! UniversalRobots/Universal_Robots_ROS2_Description 2221ec0, urdf/inc/ur_common.xacro, lines 93 to 133 and 236, used
+//! in urdf/ur_macro.xacro, lines 277 to 337. For Franka, frankaemika/franka_description b299b39,
+//! robots/common/utils.xacro, lines 263 to 266. `ur_calibration`, which writes such files, has the angles in another
+//! order (Universal_Robots_ROS2_Driver 696e1a7, ur_calibration/src/calibration.cpp, line 230). Its files are read as
+//! the URDF reads them.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -22,14 +23,15 @@ use armcal_core::codes::Code;
 use armcal_core::robot::{FileIssue, Robot, RobotError, syntax_code};
 use armcal_core::text::yaml_problem;
 
-/// Allowed numbers: m, rad.
+/// Largest allowed coordinate, m; `MAX_RAD` is that of angles, rad.
 const MAX_M: f64 = 10.0;
 const MAX_RAD: f64 = 7.0;
-/// Farther from the URDF's own pose than this, m and rad, a pose is another arm's. Assumed: links are made to 1 mm.
+/// Largest distance from the URDF's own pose, m; `NEAR_RAD` is that of angles. A pose beyond it is another arm's.
+/// Assumed: links are made to 1 mm.
 const NEAR_M: f64 = 0.05;
 const NEAR_RAD: f64 = 0.3;
 
-/// Maker of the arm that a file is about.
+/// Maker of a file's arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LinkPoseForm {
     /// `kinematics: shoulder: {x, y, z, roll, pitch, yaw}` to `wrist_3`, and a hash.
@@ -54,7 +56,7 @@ impl LinkPoseForm {
         }
     }
 
-    /// The URDF's joint that `key` is about: UR names the child link, Franka the joint, both behind a prefix.
+    /// Index of the URDF's joint for `key`: UR names the child link, Franka the joint, both after a prefix.
     fn joint(self, urdf_file: &Path, urdf: &UrdfText, key: &str) -> Result<usize, FileIssue> {
         let (what, tail) = match self {
             Self::Ur => ("joint to a link", format!("{key}_link")),
@@ -122,10 +124,10 @@ struct FrankaJoint {
     kinematic: PoseYaml,
 }
 
-/// Link poses of a file, in the order of its form's keys.
+/// Link poses from a file, in the order of its form's keys.
 #[derive(Debug, PartialEq)]
 pub struct LinkPoses {
-    /// Maker of the arm that a file is about.
+    /// Maker of the file's arm.
     pub form: LinkPoseForm,
     poses: Vec<Isometry3<f64>>,
 }
@@ -174,10 +176,10 @@ fn pose(file: &Path, place: &str, raw: PoseYaml) -> Result<Isometry3<f64>, FileI
 }
 
 impl LinkPoses {
-    /// The text of a URDF with these poses as its joints' origins; `file` is theirs, for messages.
+    /// The text of a URDF with these poses as its joints' origins; `file` is the poses' file, for messages.
     ///
     /// # Errors
-    /// [`RobotError`] where the URDF lacks a joint, or has it elsewhere: then it is another arm's.
+    /// [`RobotError`] where the URDF lacks a joint, or its pose differs so much that the file is another arm's.
     pub fn written_into(&self, file: &Path, (urdf_file, urdf): (&Path, &str)) -> Result<String, RobotError> {
         let urdf = UrdfText::read(urdf).map_err(|message| RobotError::Syntax {
             code: Code::FileSyntax,
@@ -205,16 +207,16 @@ impl LinkPoses {
     }
 }
 
-/// Link poses as calibrated, in a manufacturer's form, and in words what that form cannot hold.
+/// Calibrated link poses in a manufacturer's form, and the parts of the calibration that it cannot hold.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CalibratedLinkPoses {
-    /// The file's text.
+    /// Text of the file.
     pub text: String,
-    /// Parts of the calibration that are not in it.
+    /// Parts of the calibration that the file does not hold, in words.
     pub left_out: Vec<String>,
 }
 
-/// The link poses of `robot` with the corrections of `calibration`, whose file is `file`, for messages.
+/// The link poses of `robot` with the corrections of `calibration`; `file` is the calibration's file, for messages.
 ///
 /// # Errors
 /// [`RobotError`] naming file and key: a URDF that lacks a joint of the form, or is an exported one.

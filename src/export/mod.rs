@@ -1,12 +1,12 @@
-//! A calibration in the forms that drivers and other programs read.
+//! A calibration in file formats of drivers and other programs.
 //!
-//! `urdf` writes link corrections and the camera's mount into the robot's drawing (`urdf_text` edits its text);
-//! `ros2_control` and `parameters` carry the joints' sensors; `table` is counts to radians; `rows` is one line a joint;
-//! `kalibr` and `tagslam` are the camera and the tags as those programs read them; `link_poses` the links of
-//! manufacturers' files, read as well; `lerobot` the homing offsets of hobby motors.
+//! `urdf` writes link corrections and the camera's mount into the nominal model (URDF); `urdf_text` edits its text.
+//! `ros2_control` and `parameters` carry the joints' sensors; `table` converts counts to radians; `rows` has one line
+//! per joint. `kalibr` and `tagslam` write camera and tags for those programs. `link_poses` writes, and reads, the
+//! links of manufacturers' files; `lerobot` writes the homing offsets of hobby motors.
 //!
-//! Convention: the joints of an exported URDF are at calibrated angles, with the drawing's zeros and limits. Gain,
-//! offset and terms of a sensor are applied once, where counts become radians.
+//! Convention: the joints of an exported URDF are at calibrated angles, with the nominal model's zeros and limits.
+//! Gain, offset and terms of a sensor are applied once, where counts become radians.
 
 mod kalibr;
 mod lerobot;

@@ -20,7 +20,7 @@ const HEAD: &str = "\
 
 const SLIDES: &str = "# Of joints with unit m, which slide, keys have _m in the place of _rad.\n";
 
-/// The parameters of `calibration`, which is one of `robot`'s, under `/**` and the prefix `calibration`.
+/// Parameters of `calibration`, which belongs to `robot`, under `/**` and the prefix `calibration`.
 #[must_use]
 pub fn ros_parameters(robot: &Robot, calibration: &Calibration) -> String {
     let has_slide = calibration.has_slide();
@@ -67,7 +67,7 @@ pub fn ros_parameters(robot: &Robot, calibration: &Calibration) -> String {
 struct Parameters {
     text: String,
     indent: usize,
-    /// Of the joint whose keys are written.
+    /// Kind of the joint whose keys are written.
     moves: JointKind,
 }
 
@@ -101,7 +101,7 @@ impl Parameters {
         self.line(key, &doubles(values));
     }
 
-    /// `counts_per_rad` is what the datasheet says; that which the terms count in may have been measured.
+    /// Writes the terms. `counts_per_rad` is the datasheet's value; the terms may count by a measured one.
     fn terms(&mut self, terms: &TermsTable, joint: &JointResult, counts_per_rad: f64) {
         let gain = joint.gain_over_datasheet.map(|gain| gain * joint.identified_ratio.unwrap_or(1.0));
         self.open("terms");
@@ -118,14 +118,14 @@ impl Parameters {
         self.close();
     }
 
-    /// Of the joint's own parameters, as far as they were estimated and the covariance is at hand.
+    /// Writes the covariance of the joint's own parameters, as far as they were estimated and have one.
     fn covariance(&mut self, calibration: &Calibration, joint: &str) {
         let table = &calibration.covariance;
         let prefix = format!("{joint} ");
         let rows = table.parameters.iter().enumerate();
         let (rows, names): (Vec<usize>, Vec<String>) =
             rows.filter_map(|(row, name)| Some((row, quoted(name.strip_prefix(&prefix)?)))).unzip();
-        // A list of nothing has no type, which ROS refuses.
+        // ROS refuses an empty list because it has no type.
         if rows.is_empty() {
             return;
         }

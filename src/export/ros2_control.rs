@@ -16,10 +16,10 @@ const HEAD: &str = "\
   nor offset itself. Name its plugin below.
 ";
 
-/// The block for `robot` with `sensors`: one `transmission_interface/SimpleTransmission` a joint, whose actuator is the
-/// datasheet's angle (rad). Its equation is `joint = actuator / mechanical_reduction + offset`; with the sensor model
-/// `joint = center + gain (actuator - center) + offset_rad`, that makes `1 / gain` and
-/// `offset_rad + (1 - gain) center`. Terms beyond the straight line are not in it; the head names the joints.
+/// The block for `robot` with `sensors`: one `transmission_interface/SimpleTransmission` per joint, whose actuator is
+/// the datasheet's angle (rad). Its equation is `joint = actuator / mechanical_reduction + offset`. The sensor model is
+/// `joint = center + gain (actuator - center) + offset_rad`, so these are `1 / gain` and `offset_rad + (1 - gain)
+/// center`. The block omits terms beyond the straight line; its head names the joints.
 #[must_use]
 pub fn ros2_control(robot: &Robot, sensors: &ArmSensors) -> String {
     let mut text = HEAD.to_owned();
@@ -53,8 +53,8 @@ const OFFSETS_HEAD: &str = "\
 -->
 ";
 
-/// The joints of a `<ros2_control>` block with their offsets at mid-range as `<param name="offset">`, and in words what
-/// these leave out.
+/// The joints of a `<ros2_control>` block with their offsets at mid-range as `<param name="offset">`, and in words the
+/// parts that it omits.
 #[must_use]
 pub fn ros2_control_offsets(robot: &Robot, sensors: &ArmSensors) -> (String, Vec<String>) {
     let mut text = OFFSETS_HEAD.to_owned();
@@ -68,23 +68,23 @@ pub fn ros2_control_offsets(robot: &Robot, sensors: &ArmSensors) -> (String, Vec
     (text, left_out)
 }
 
-/// Gains closer to the datasheet's than this are its own.
+/// Relative difference below which a gain is the datasheet's.
 const GAIN_WITHIN: f64 = 1e-9;
 
-/// A joint's gain, where it is not the datasheet's.
+/// A joint's gain in words, where it differs from the datasheet's.
 pub(super) fn gain_in_words(robot: &Robot, joint: usize, model: &SensorModel) -> Option<String> {
     let gain = gain_over_datasheet(robot, joint, model);
     let text = || format!("the gain of {}, {:+.3} %", model.spec.joint, 100.0 * (gain - 1.0));
     ((gain - 1.0).abs() > GAIN_WITHIN).then(text)
 }
 
-/// Names of the joints whose sensors are no straight line.
+/// Names of the joints whose sensors are not a straight line.
 pub fn joints_with_terms(sensors: &ArmSensors) -> impl Iterator<Item = &str> {
     let bent = sensors.models.iter().filter(|model| !model.correction.terms.are_zero());
     bent.map(|model| model.spec.joint.as_str())
 }
 
-/// The gain over that of robot.toml, whatever scale the model's own is relative to.
+/// Gain relative to robot.toml, for any scale of the model's own.
 fn gain_over_datasheet(robot: &Robot, joint: usize, model: &SensorModel) -> f64 {
     model.correction.gain * robot.sensors[joint].counts_per_rad / model.spec.counts_per_rad
 }

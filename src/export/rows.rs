@@ -1,17 +1,17 @@
-//! One row a joint, with standard deviations.
+//! One row per joint, with standard deviations.
 
 use armcal_belief::calib::{Calibration, JointResult};
 use armcal_core::sensor::N_SHAPE;
 
 use crate::export::table::csv_field;
 
-/// Terms that are one number each.
+/// Terms that are a single number each.
 const SCALARS: [&str; 5] =
     ["offset_rad_per_k", "gain_per_k", "offset_rad_per_mpa", "drift_rad_per_h", "half_backlash_rad"];
 
-/// CSV with the keys of calibration.toml as columns; a term's column is followed by that of its standard deviation. A
-/// cell is empty where calibration.toml has no such key. Where the arm has slides, names of columns have no `_rad`, and
-/// the last one, `unit`, says rad or m.
+/// CSV with the keys of calibration.toml as columns; the column after a term's is that of its standard deviation. A
+/// cell is empty where calibration.toml has no such key. For an arm with slides, names of columns have no `_rad`, and
+/// the last column, `unit`, says rad or m.
 #[must_use]
 pub fn csv_rows(calibration: &Calibration) -> String {
     let with_std = |key: String| [key.clone(), format!("{key}_std")];
@@ -34,7 +34,7 @@ pub fn csv_rows(calibration: &Calibration) -> String {
     ];
     let head: Vec<String> = fixed.map(str::to_owned).into_iter().chain(nonlinearity).chain(scalars).collect();
     let has_slide = calibration.has_slide();
-    // Columns of several units have it in a column.
+    // With slides the rows have different units, so the last column gives the unit.
     let head = if has_slide { head.iter().map(|key| key.replace("_rad", "")).collect() } else { head };
     let unit = |joint: &JointResult| has_slide.then(|| joint.moves.si().to_owned());
     let head: Vec<String> = head.into_iter().chain(has_slide.then(|| "unit".to_owned())).collect();

@@ -11,17 +11,17 @@ use armcal_core::sensor::{ArmSensors, ConditionChange, SensorModel};
 pub const MIN_POINTS: usize = 2;
 /// The most points of a table.
 pub const MAX_POINTS: usize = 10_000;
-/// What straight lines between points may come to at the tool where the number of points is chosen, m.
+/// Largest tool error of linear interpolation where the number of points is chosen automatically, m.
 const CHOSEN_ERROR_M: f64 = 2e-5;
-/// Places between two points at which the straight line is compared with the sensor.
+/// Number of places between two points at which the straight line is compared with the sensor.
 const PLACES_BETWEEN: usize = 8;
 
-/// Tables of all joints, with equally many points each.
+/// Tables of all joints, each with the same number of points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SensorTable {
-    /// Base first.
+    /// Tables of the joints, base first.
     joints: Vec<JointTable>,
-    /// Bound of what straight lines between points come to at the tool, m.
+    /// Bound on the tool error that linear interpolation between points causes, m.
     pub interpolation_error_m: f64,
     /// The estimated change of each joint with conditions, in words.
     conditions: Vec<String>,
@@ -32,7 +32,7 @@ struct JointTable {
     name: String,
     moves: JointKind,
     wrap_counts: f64,
-    /// Counts, ascending and unwrapped, and the angle there, rad; m of a slide.
+    /// Pairs of counts, ascending and unwrapped, and the joint's position there, rad, or m for a slide.
     points: Vec<(f64, f64)>,
 }
 
@@ -41,14 +41,14 @@ struct JointTable {
 struct TravelRange {
     low_rad: f64,
     high_rad: f64,
-    /// Half of the datasheet's range; beyond it a sensor is a straight line.
+    /// Half of the datasheet's range, rad; the sensor is a straight line beyond it.
     half_rad: f64,
 }
 
 impl SensorTable {
-    /// `points` a joint (2 .. 10000); without a number, as few as keep the error of straight lines between them within
-    /// 0.02 mm at the tool, all joints together: a joint's error times the farthest that the tool can be from its axis.
-    /// Angles hold under the calibration's reference conditions, with backlash in its middle.
+    /// Tables with `points` per joint (2 .. 10000). Without a number, the fewest with at most 0.02 mm of interpolation
+    /// error at the tool, all joints together. A joint counts with its error times the tool's largest distance from its
+    /// axis. Angles hold under the calibration's reference conditions, in the middle of the backlash.
     #[must_use]
     pub fn new(robot: &Robot, sensors: &ArmSensors, points: Option<usize>) -> Self {
         let limits = robot.chain.joints().iter().map(|joint| joint.limits);
@@ -73,7 +73,7 @@ impl SensorTable {
         }
     }
 
-    /// CSV with a head of lines that begin with `#`: joint, counts, angle_rad.
+    /// CSV with head lines that begin with `#`: joint, counts, angle_rad.
     #[must_use]
     pub fn to_csv(&self, robot: &Robot) -> String {
         let points = self.joints.first().map_or(0, |joint| joint.points.len());
@@ -94,7 +94,7 @@ impl SensorTable {
         }
         let has_slide = self.joints.iter().any(|joint| joint.moves.is_slide());
         if has_slide {
-            // What is said of the column above holds of this one.
+            // The head's description of the column applies to the renamed one.
             text = text.replace("# angle_rad: exact", "# position: of joints that turn rad, of slides m; exact");
         }
         text += if has_slide { "joint,counts,position,unit\n" } else { "joint,counts,angle_rad\n" };
@@ -109,14 +109,14 @@ impl SensorTable {
     }
 }
 
-/// A field of a CSV line, in quotes where it needs them.
+/// A field of a CSV line, quoted where necessary.
 pub(super) fn csv_field(text: &str) -> String {
     if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
 }
 
 impl TravelRange {
-    /// The datasheet's range, and beyond it what readings at the joint's limits come to by calibration; at most the
-    /// word, and all of it for a joint without limits.
+    /// The datasheet's range, extended to the calibrated readings at the joint's limits. It is at most the word's
+    /// range, which a joint without limits has.
     fn of(model: &SensorModel, limits: Option<JointLimits>) -> Self {
         let spec = &model.spec;
         let half_rad = spec.half_range_rad;
@@ -129,8 +129,8 @@ impl TravelRange {
         Self { low_rad: low_rad.max(-word_rad), high_rad: high_rad.min(word_rad), half_rad }
     }
 
-    /// Evenly spaced over the datasheet's range, with the ends beyond it as two more; where there are too few points
-    /// for that, over all of it.
+    /// Points evenly spaced over the datasheet's range, plus the two ends beyond it. With too few points for that, they
+    /// are spaced over the whole range.
     fn places_rad(&self, points: usize) -> Vec<f64> {
         let (inner_low, inner_high) = (self.low_rad.max(-self.half_rad), self.high_rad.min(self.half_rad));
         let [before, behind] = [self.low_rad < inner_low, self.high_rad > inner_high].map(usize::from);
@@ -177,26 +177,26 @@ fn angle_rad(model: &SensorModel, travel_rad: f64) -> f64 {
     model.correction.angle_rad(&model.spec, travel_rad, &ConditionChange::default(), 0.0)
 }
 
-/// The farthest that the tool can be from each joint's axis, m: with every link behind it stretched out.
+/// Largest distance of the tool from each joint's axis, m: with every link beyond it stretched out.
 fn levers_m(robot: &Robot) -> Vec<f64> {
     let joints = robot.chain.joints();
     let mut lever_m = robot.tool.mount.link_from_frame.translation.vector.norm();
     let mut levers_m = vec![0.0; joints.len()];
     for joint in (0..joints.len()).rev() {
-        // A metre of a slide is a metre of the tool.
+        // One metre of a slide moves the tool by one metre.
         levers_m[joint] = if joints[joint].kind.is_slide() { 1.0 } else { lever_m };
         lever_m += joints[joint].parent_from_joint.translation.vector.norm() + stroke_m(&joints[joint]);
     }
     levers_m
 }
 
-/// The farthest that a slide puts what it carries from its own place, m.
+/// Largest distance by which a slide moves its load from its own origin, m.
 fn stroke_m(joint: &ChainJoint) -> f64 {
     let limits = joint.limits.filter(|_| joint.kind.is_slide());
     limits.map_or(0.0, |limits| limits.lower_rad.abs().max(limits.upper_rad.abs()))
 }
 
-/// A key of calibration.toml as a joint has it: in m for a slide.
+/// Name of a calibration.toml key for a joint: in m for a slide.
 pub(super) fn own_key(moves: JointKind, key: &str) -> String {
     if moves.is_slide() { metric(key) } else { key.to_owned() }
 }

@@ -10,12 +10,12 @@ use crate::export::yaml_text::{double, quoted};
 use armcal_belief::calib::Calibration;
 use armcal_core::robot::FileIssue;
 
-/// What TagSLAM is given as a standard deviation for a tag that was held.
+/// Standard deviation that TagSLAM gets for a tag that was held, m.
 const HELD_M: f64 = 1e-4;
 const HELD_RAD: f64 = 1e-5;
 
-/// tagslam.yaml with the tags of `[map]`, in the frame of the arm's base: one static body of the base link's name.
-/// `file` is that of the calibration, for messages.
+/// tagslam.yaml with the tags of `[map]` in the base frame of the arm: one static body with the base link's name.
+/// `file` is the calibration's file, for messages.
 ///
 /// # Errors
 /// [`FileIssue`] for a calibration without a map, or a quaternion of length 0.

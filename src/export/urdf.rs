@@ -11,7 +11,7 @@ use crate::export::urdf_text::{UrdfText, comment_text, xyz_rpy};
 use armcal_belief::calib::{Calibration, CameraMount, FurtherCamera};
 use armcal_core::robot::{CameraSpec, FileIssue, Robot, RobotError, parse_toml, read_text};
 
-/// By these words an exported file is known again.
+/// Words by which an exported file is recognised.
 const MARK: &str = "Calibrated by armcal";
 
 const CONVENTION: &str = "  \
@@ -21,18 +21,18 @@ const CONVENTION: &str = "  \
   apply [[link]] and [camera_mount] of calibration.toml again.
 ";
 
-/// A URDF with what was calibrated, and where to find it.
+/// A URDF with the calibrated geometry, and the camera's link in it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CalibratedUrdf {
-    /// The file's text.
+    /// Text of the file.
     pub text: String,
     /// The link whose frame is the camera's optical frame.
     pub camera_link: String,
-    /// What the calibration has and no URDF can hold, in words.
+    /// Parts of the calibration that no URDF can hold, in words.
     pub left_out: Vec<String>,
 }
 
-/// Of robot.toml: the links that camera and tool hang on.
+/// Part of robot.toml: the links that carry camera and tool.
 #[derive(Deserialize)]
 struct RobotToml {
     camera: OnLink,
@@ -44,7 +44,7 @@ struct OnLink {
     link: String,
 }
 
-/// New origins of the text's joints, what is added to it, and both in words.
+/// New origins of the text's joints, elements that are added, and both in words.
 #[derive(Default)]
 struct Changes {
     origins: Vec<(usize, Isometry3<f64>)>,
@@ -53,9 +53,9 @@ struct Changes {
     camera_link: String,
 }
 
-/// The URDF of `robot`, whose sensors `calibration` is about: joint origins with the estimated link corrections, the
-/// camera at its estimated mount. Angles are calibrated ones; nothing of the sensors is in it. `file` is that of the
-/// calibration, for messages.
+/// The URDF of `robot` with joint origins that include the estimated link corrections, and the camera at its estimated
+/// mount. `calibration` is that of the robot's sensors. Angles are calibrated ones; the file contains no sensor
+/// corrections. `file` is the calibration's file, for messages.
 ///
 /// # Errors
 /// [`RobotError`] naming file and key: values out of range, or a URDF that is an exported one already.
@@ -71,7 +71,7 @@ pub fn calibrated_urdf(file: &Path, calibration: &Calibration, robot: &Robot) ->
     Ok(CalibratedUrdf { text, camera_link: changes.camera_link, left_out })
 }
 
-/// The robot's URDF and its file.
+/// Text and path of the robot's URDF.
 ///
 /// # Errors
 /// [`RobotError`] for a URDF that is an exported one already.
@@ -103,8 +103,8 @@ pub(super) fn moved_joints(
     Ok(changes.origins.into_iter().collect())
 }
 
-/// Joints with a link correction. The chain's place of a joint includes fixed joints before it; the joint's own origin
-/// takes the whole correction.
+/// Moves joints by their link corrections. The chain's pose of a joint includes fixed joints before it; the joint's own
+/// origin takes the whole correction.
 fn move_joints(
     file: &Path,
     calibration: &Calibration,
@@ -134,7 +134,7 @@ fn move_joints(
     Ok(())
 }
 
-/// The camera's own joint is moved where it has one that nothing else hangs on; otherwise a link is added.
+/// Moves the camera's own joint, if it has one that carries nothing else; otherwise adds a link.
 fn place_camera(
     file: &Path,
     calibration: &Calibration,
@@ -147,7 +147,7 @@ fn place_camera(
     changes.camera_link.clone_from(&link);
     let Some(mount) = &calibration.camera_mount else { return Ok(()) };
     let estimated = link_from_camera(file, mount)?;
-    // From the frame of `link` by the drawing to where the camera is.
+    // Transform from the nominal frame of `link` to the camera.
     let drawn = robot.links.get(&link).unwrap_or(&robot.camera.mount);
     let shift = drawn.link_from_frame.inverse() * estimated;
     let is_alone =
@@ -166,7 +166,7 @@ fn place_camera(
     Ok(())
 }
 
-/// Each further camera gets a link of its own name, on the moving link that carries it.
+/// Adds a link with its own name for each further camera, on the moving link that carries it.
 fn add_further_cameras(
     file: &Path,
     calibration: &Calibration,
@@ -187,13 +187,13 @@ fn add_further_cameras(
     Ok(())
 }
 
-/// The moving link that carries a camera, or the base's.
+/// Name of the moving link that carries a camera, or of the base link.
 pub(super) fn carrier<'a>(robot: &'a Robot, camera: &CameraSpec) -> &'a str {
     let body = camera.mount.n_joints.checked_sub(1).and_then(|joint| robot.chain.joints().get(joint));
     body.map_or(robot.base_link.as_str(), |joint| joint.child_link.as_str())
 }
 
-/// A link without a shape, and the joint that holds it.
+/// A link without a shape, and its fixed joint.
 fn fixed_link(name: &str, joint: &str, parent: &str, parent_from_link: &Isometry3<f64>) -> String {
     let [name, joint, parent] = [name, joint, parent].map(|text| quick_xml::escape::escape(text).into_owned());
     format!(
@@ -203,18 +203,18 @@ fn fixed_link(name: &str, joint: &str, parent: &str, parent_from_link: &Isometry
     )
 }
 
-/// `name`, or the first of `name_2`, `name_3`, .. that is not taken.
+/// `name`, or the first of `name_2`, `name_3`, .. that is free.
 fn free_name(name: &str, is_taken: impl Fn(&str) -> bool) -> String {
     let others = (2..).map(|n| format!("{name}_{n}"));
     std::iter::once(name.to_owned()).chain(others).find(|name| !is_taken(name)).unwrap_or_default()
 }
 
-/// The calibrated `link_from_camera` on the moving link that carries the camera.
+/// Calibrated pose of the camera on the moving link that carries it, `link_from_camera`.
 pub(super) fn link_from_camera(file: &Path, mount: &CameraMount) -> Result<Isometry3<f64>, FileIssue> {
     place(file, "camera_mount", mount.position_m, mount.quaternion_wxyz)
 }
 
-/// The same of a further camera.
+/// Calibrated pose of a further camera on the moving link that carries it.
 pub(super) fn further_from_camera(file: &Path, found: &FurtherCamera) -> Result<Isometry3<f64>, FileIssue> {
     place(file, "further_camera", found.position_m, found.quaternion_wxyz)
 }

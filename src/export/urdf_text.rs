@@ -1,4 +1,4 @@
-//! Changes to the text of a URDF: origins of joints are replaced, elements are added, all else stays as it was.
+//! Edits to the text of a URDF: origins of joints are replaced, elements are added, and the rest of the text stays.
 
 use std::ops::Range;
 
@@ -7,7 +7,7 @@ use quick_xml::Reader;
 use quick_xml::escape::{escape, unescape};
 use quick_xml::events::{BytesStart, Event};
 
-/// A joint as the text has it.
+/// A joint in the text.
 #[derive(Debug)]
 pub(super) struct JointText {
     pub(super) name: String,
@@ -22,24 +22,24 @@ pub(super) struct JointText {
 /// The `origin` of a joint in the text.
 #[derive(Debug)]
 struct OriginTag {
-    /// Its tag; empty, and where one may be put, for a joint without.
+    /// Bytes of its tag; for a joint without one empty, at the place for a new one.
     range: Range<usize>,
-    /// What it has beside `xyz` and `rpy`, as written.
+    /// Attributes other than `xyz` and `rpy`, as written.
     others: String,
     end: &'static str,
 }
 
-/// The text of a URDF and where its joints are in it.
+/// The text of a URDF and the positions of its joints in it.
 #[derive(Debug, Default)]
 pub(super) struct UrdfText {
     text: String,
     pub(super) joints: Vec<JointText>,
     pub(super) links: Vec<String>,
-    /// From behind the root's start tag to before its end tag.
+    /// Bytes between the root's start tag and its end tag.
     body: Range<usize>,
 }
 
-/// Where the scan is: the depth of open elements, and whether the one at depth 2 is a joint.
+/// State of the scan: the depth of open elements, and whether the one at depth 2 is a joint.
 #[derive(Default)]
 struct Scan {
     depth: usize,
@@ -47,10 +47,10 @@ struct Scan {
 }
 
 impl UrdfText {
-    /// `text` has been read as a URDF before. Its line ends become those of Unix.
+    /// Reads a text that has already been read as a URDF. Its line ends become those of Unix.
     ///
     /// # Errors
-    /// What is wrong with the text, in words.
+    /// The fault of the text, in words.
     pub(super) fn read(text: &str) -> Result<Self, String> {
         let text = text.trim_start_matches('\u{feff}').replace("\r\n", "\n").replace('\r', "\n");
         let mut urdf = Self::default();
@@ -118,8 +118,8 @@ impl UrdfText {
         Ok(())
     }
 
-    /// The text with `origins` for joints of these indices, `first` as the first and `last` as the last lines of the
-    /// root element.
+    /// The text with `origins` for the joints of these indices. `first` becomes the first lines of the root element,
+    /// `last` its last ones.
     pub(super) fn edited(&self, origins: &[(usize, Isometry3<f64>)], first: &str, last: &str) -> String {
         let mut edits: Vec<(Range<usize>, String)> =
             origins.iter().map(|(joint, pose)| self.joints[*joint].tag.replaced(pose)).collect();
@@ -165,15 +165,16 @@ impl OriginTag {
     }
 }
 
-/// The attributes of an `origin`: m, and fixed-axis roll, pitch and yaw in rad.
+/// Attributes of an `origin`: m, and fixed-axis roll, pitch and yaw in rad.
 pub(super) fn xyz_rpy(pose: &Isometry3<f64>) -> String {
-    // Adding 0 takes the sign from a zero.
+    // Adding 0 removes the sign of a zero.
     let [x, y, z] = <[f64; 3]>::from(pose.translation.vector).map(|value| value + 0.0);
     let [roll, pitch, yaw] = roll_pitch_yaw(&pose.rotation).map(|value| value + 0.0);
     format!("xyz=\"{x} {y} {z}\" rpy=\"{roll} {pitch} {yaw}\"")
 }
 
-/// `Rz(yaw) Ry(pitch) Rx(roll)`. At a pitch of a quarter turn roll and yaw are one; then yaw makes up for what roll is.
+/// Angles of `Rz(yaw) Ry(pitch) Rx(roll)`. At a pitch of a quarter turn only a combination of roll and yaw is
+/// determined; yaw then compensates for any roll.
 pub(super) fn roll_pitch_yaw(rotation: &UnitQuaternion<f64>) -> [f64; 3] {
     let turn = rotation.to_rotation_matrix();
     let m = turn.matrix();
@@ -184,7 +185,7 @@ pub(super) fn roll_pitch_yaw(rotation: &UnitQuaternion<f64>) -> [f64; 3] {
     [roll, pitch, yaw]
 }
 
-/// Text within a comment, which must not have two hyphens in a row.
+/// The text for a comment, which must not have two hyphens in a row.
 pub(super) fn comment_text(text: &str) -> String {
     let mut shown = String::with_capacity(text.len());
     for c in text.chars() {

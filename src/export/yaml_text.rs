@@ -1,11 +1,11 @@
-//! Values as all readers of YAML take them.
+//! Values in a form that all YAML readers accept.
 
-/// A string in the double quotes of YAML, which takes JSON's.
+/// A string in YAML's double quotes, which accept JSON's escapes.
 pub(super) fn quoted(text: &str) -> String {
     serde_json::Value::from(text).to_string()
 }
 
-/// A number that every YAML reader takes for a double: with a point, and a sign in its exponent (`1.0e-7`, `.nan`).
+/// A number that every YAML reader accepts as a double: with a point, and a sign in its exponent (`1.0e-7`, `.nan`).
 pub(super) fn double(value: f64) -> String {
     if value.is_nan() {
         return ".nan".to_owned();

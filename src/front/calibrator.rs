@@ -16,7 +16,7 @@ use armcal_core::streams::{Message, ReachTask};
 
 use crate::front::{CalibrateError, Measurements};
 
-/// All that a calibration takes with its measurements.
+/// Inputs of a calibration other than the measurements.
 ///
 /// ```
 /// use std::path::Path;
@@ -46,40 +46,40 @@ pub struct Calibrator<'a> {
 }
 
 impl<'a> Calibrator<'a> {
-    /// Without tags, task and prior: by those of recording and robot, from the datasheet.
+    /// A calibrator without tags, task and prior: it uses those of recording and robot, and begins at the datasheet.
     #[must_use]
     pub fn new(robot: &'a Robot) -> Self {
         Self { robot, tags: None, task: None, prior: None, method: Method::Bundle }
     }
 
-    /// Tags instead of those that the recording or the robot's folder has; `file` names them in messages.
+    /// Sets tags that replace those of the recording or the robot's folder; messages name their `file`.
     #[must_use]
     pub fn tags(self, file: &Path, tags: LandmarkFile) -> Self {
         Self { tags: Some((file.to_owned(), tags)), ..self }
     }
 
-    /// Targets and tolerance, where no recording has them.
+    /// Sets targets and tolerance, for recordings without them.
     #[must_use]
     pub fn task(self, task: ReachTask) -> Self {
         Self { task: Some(task), ..self }
     }
 
-    /// An accepted calibration of this arm to start from.
+    /// Sets an accepted calibration of this arm as prior.
     #[must_use]
     pub fn prior(self, prior: &'a Calibration) -> Self {
         Self { prior: Some(prior), ..self }
     }
 
-    /// Another method than the bundle.
+    /// Sets another method than the bundle.
     #[must_use]
     pub fn method(self, method: Method) -> Self {
         Self { method, ..self }
     }
 
-    /// The calibration of the joint sensors, accepted or refused.
+    /// Calibrates the joint sensors; the result is accepted or refused.
     ///
     /// # Errors
-    /// [`CalibrateError`]: tags or measurements that are of another arm, or too few to be fitted.
+    /// [`CalibrateError`]: tags or measurements of another arm, or too few for a fit.
     pub fn calibrate(&self, measurements: &Measurements) -> Result<Calibration, CalibrateError> {
         if let Some(prior) = self.prior {
             prior.sensors(self.robot)?;
@@ -101,7 +101,7 @@ impl<'a> Calibrator<'a> {
         }
     }
 
-    /// Recordings that armcal made: they mark their views.
+    /// Calibrates from recordings that armcal made: they mark their views.
     pub(crate) fn of_marked(
         &self,
         recordings: &mut [armcal_core::log::Recording],
@@ -110,7 +110,7 @@ impl<'a> Calibrator<'a> {
         let named = self.tags.as_ref().map(|(file, map)| map.survey(file, self.robot, TagUse::Corners)).transpose()?;
         let survey = named.map(|named| named.survey);
         if let ([recording], None) = (&mut *recordings, self.prior) {
-            // Its own marks say which views are for what.
+            // The recording's own marks give the purpose of each view.
             let names_task = recording.messages.iter().any(|(_, message)| matches!(message, Message::Task(_)));
             if let Some(task) = self.task.clone().filter(|_| !names_task) {
                 recording.messages.push((task.stamp, Message::Task(task)));
@@ -124,7 +124,7 @@ impl<'a> Calibrator<'a> {
         Ok(calibrate_data(prepared, self.method, self.prior)?)
     }
 
-    /// The arm with the tags that an input map reads, before recordings are read; `robot` has its lens.
+    /// The arm with the tags that an input map names, before recordings are read; `robot` has its lens.
     pub(crate) fn surveyed(
         &self,
         (map, map_file): (&InputMap, &Path),
@@ -170,7 +170,7 @@ pub(crate) struct SurveyedArm {
     plain: PlainLandmark,
 }
 
-/// The landmark that a plain `child_frame` means: the one of that name, or the only one there is where it has none.
+/// The landmark for a plain `child_frame`: the one of that name, or the only one, if it has no name.
 fn plain_landmark(file: &Path, map: &InputMap, named: &NamedSurvey) -> Result<PlainLandmark, FileIssue> {
     let Some(ChildFrame::Plain(name)) = &map.child_frame else { return Ok(PlainLandmark::default()) };
     if let Some((id, _)) = named.names.iter().find(|(_, known)| *known == name) {

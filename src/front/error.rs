@@ -6,7 +6,7 @@ use armcal_core::input::InputError;
 use armcal_core::log::LogError;
 use armcal_core::robot::{FileIssue, RobotError};
 
-/// Why there is no calibration; one that is not good comes out refused instead.
+/// Reason that there is no calibration; a poor calibration is no error, but is returned as refused.
 #[derive(Debug, thiserror::Error)]
 pub enum CalibrateError {
     /// A recording that cannot be read.
@@ -15,13 +15,13 @@ pub enum CalibrateError {
     /// A recording of another system that cannot be read by its input map.
     #[error(transparent)]
     Input(#[from] InputError),
-    /// A file that goes with the recording.
+    /// A file that accompanies the recording.
     #[error(transparent)]
     File(#[from] FileIssue),
     /// A robot, tag map or task.
     #[error(transparent)]
     Robot(#[from] RobotError),
-    /// A prior that is not of this arm.
+    /// A prior that belongs to another arm.
     #[error(transparent)]
     Prior(#[from] CalibrationFileError),
     /// Views that cannot be fitted.
@@ -30,7 +30,7 @@ pub enum CalibrateError {
     /// A value that was given in memory.
     #[error("{0}")]
     Value(String),
-    /// Measurements that need something else with them.
+    /// Measurements that need further inputs.
     #[error("{0}")]
     Usage(String),
 }

@@ -28,9 +28,9 @@ pub enum Measurements {
     Marked(Vec<Recording>),
     /// Recordings of a real arm, read by an input map, or poses in memory.
     External {
-        /// Each of them.
+        /// Recordings, in the order in which they were given.
         recordings: Vec<ExternalRecording>,
-        /// Input map that they were read by.
+        /// Input map that was used to read them.
         map: Box<InputMap>,
         /// The input map's file, for messages.
         map_file: PathBuf,
@@ -39,21 +39,21 @@ pub enum Measurements {
     },
 }
 
-/// An arm at rest, and what its camera saw.
+/// A resting arm and the tags that its camera saw.
 #[derive(Clone, Debug)]
 pub struct PoseAtRest {
-    /// Time since any moment, s; the same for all poses. Poses without one count as a second apart.
+    /// Time since any moment, s; the same origin for all poses. Poses without a time count as 1 s apart.
     pub t_s: Option<f64>,
     /// Raw reading of each joint, base first.
     pub counts: JointCounts,
     /// Temperature of the oil, deg C.
     pub oil_c: Option<f64>,
-    /// Tags by number, each once.
+    /// Tags by their number, each at most once.
     pub tags: Vec<(u32, RawMeasurement)>,
 }
 
 impl Measurements {
-    /// Reads recordings that armcal made, or, by an input map, those of a real arm.
+    /// Reads recordings that armcal made, or with an input map those of a real arm.
     ///
     /// # Errors
     /// [`CalibrateError`], naming the file and what to do.
@@ -73,7 +73,7 @@ impl Measurements {
         Ok(Self::External { recordings, map: Box::new(map), map_file: map_file.to_owned(), lens })
     }
 
-    /// Poses in memory, in the order of time; all tags are measured in the same way.
+    /// Measurements from poses in memory, in the order of time; all tags have the same kind of measurement.
     ///
     /// # Errors
     /// [`CalibrateError::Value`] for readings of another number of joints, values that are not finite, a tag twice in
@@ -118,14 +118,14 @@ impl Measurements {
     }
 }
 
-/// Input map of poses in memory: raw readings, and tags as the next lines say.
+/// Input map of poses in memory: raw readings, and tags as the following lines define.
 const MAP: &str = "version = 1\nkind = \"input\"\n[table]\n[joint_sensors]\nunit = \"counts\"\n[tags]\n";
 const CORNERS: &str = "use = \"corners\"\n[tags.columns]\nid = \"id\"\n\
                        corners = [\"u0\", \"v0\", \"u1\", \"v1\", \"u2\", \"v2\", \"u3\", \"v3\"]\n";
 const POSE: &str = "[tags.columns]\nid = \"id\"\ndirection = \"camera_from_tag\"\nposition = [\"x\", \"y\", \"z\"]\n";
 const ROTATION: &str = "rotation = [\"qw\", \"qx\", \"qy\", \"qz\"]\nrotation_form = \"quaternion_wxyz\"\n";
 
-/// The input map that reads poses with such tags; `None` for corners of boards, which are read from files only.
+/// The input map for poses with such tags; `None` for corners of boards, which are read only from files.
 fn map_of(seen: &RawMeasurement) -> Option<String> {
     Some(match seen {
         RawMeasurement::Corners(_) => format!("{MAP}{CORNERS}"),
@@ -146,7 +146,7 @@ fn numbers(seen: &RawMeasurement) -> Vec<f64> {
     }
 }
 
-/// Adds the pose `k`, whose tags are measured as `like` is.
+/// Adds the pose `k`; its tags have the kind of measurement of `like`.
 fn add_pose(
     recording: &mut ExternalRecording,
     robot: &Robot,
@@ -161,7 +161,7 @@ fn add_pose(
     if !t_s.is_finite() || t_s.abs() > MAX_TIME_S {
         return Err(format!("its time is {t_s} s; give seconds within {MAX_TIME_S:e}"));
     }
-    // Stamps begin at zero, times may be before.
+    // Stamps begin at zero, but times may be negative.
     let stamp = Stamp::default().plus_s(MAX_TIME_S).plus_s(t_s);
     let apart_s = recording.readings.last().map_or(f64::INFINITY, |last| stamp.since_s(last.stamp));
     if apart_s < MIN_APART_S {
@@ -212,7 +212,7 @@ fn add_pose(
     Ok(())
 }
 
-/// Images are searched for tags where the build can.
+/// Reads a recording, and searches its images for tags where the build has the detector.
 #[cfg(feature = "images")]
 fn read_external(path: &Path, map: &InputMap, robot: &Robot) -> Result<ExternalRecording, InputError> {
     let family = map.tag_family.unwrap_or(robot.tag_family);
@@ -226,7 +226,7 @@ fn read_external(path: &Path, map: &InputMap, robot: &Robot) -> Result<ExternalR
     armcal_core::input::read_external(path, map, robot)
 }
 
-/// A robot without a lens takes that of the recordings, where the input map names it; `hear` gets further notes on
+/// Gives a robot without a lens that of the recordings, where the input map names one. `hear` receives further notes on
 /// these messages, with their file.
 pub(crate) fn add_lens(
     robot: &mut Robot,

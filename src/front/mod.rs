@@ -1,7 +1,7 @@
-//! The front door: measurements in, a calibration out.
+//! The library's interface: from measurements to a calibration.
 //!
 //! `measurements` takes recordings, or readings and tags in memory; `calibrator` holds robot, tags, task and prior, and
-//! calibrates; `error` has all that may be wrong on the way. `shared` finds robots and routines by their names.
+//! calibrates. `error` has all its errors. `shared` finds robots and routines by their names.
 
 mod calibrator;
 mod error;

@@ -1,15 +1,15 @@
 //! Robots and routines that come with the program, by their names.
 //!
-//! `titan4` is the folder `robots/titan4` and `titan4-quickstart` the file `routines/titan4-quickstart.toml`, in the
-//! working directory, else in the shared folder: that which was set, else the program's own.
+//! `titan4` is the folder `robots/titan4` and `titan4-quickstart` the file `routines/titan4-quickstart.toml`. They are
+//! searched in the working directory, then in the shared folder: the one that was set, or else the program's own.
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-/// The folder with `robots` and `routines` that was set.
+/// The shared folder, with `robots` and `routines`, that was set.
 static SHARED: OnceLock<PathBuf> = OnceLock::new();
 
-/// Sets the folder with `robots` and `routines`, for a program in another folder. The first one stays.
+/// Sets the folder with `robots` and `routines`, for a program in another folder. Only the first call has an effect.
 pub fn set_shared_folder(folder: PathBuf) {
     let _ = SHARED.set(folder);
 }

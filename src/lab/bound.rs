@@ -1,10 +1,10 @@
-//! Closed loops against the Bayesian Cramer-Rao bound of the views that they took.
+//! Closed loops against the Bayesian Cramer-Rao bound of their views.
 //!
 //! The bound is the inverse of the priors' information plus that of the views, at the true gains, offsets, mount and
-//! tags (van Trees 1968, 2.4.3). It comes from a twin of the capture: the same tags in the same views, the camera where
-//! the true sensors put it by the readings, exact corners weighted by the true noise, priors about the truth. Nothing
-//! but gains, offsets, mount and tags is unknown to it, so that it holds in worlds that [`AS_MODELLED`] leaves; in
-//! others there is an error but no bound.
+//! tags (van Trees 1968, 2.4.3). It comes from a twin of the capture with the same tags in the same views. The camera
+//! is where the true sensors put it by the readings. Corners are exact, weighted by the true noise; priors are centred
+//! on the truth. Its only unknowns are gains, offsets, mount and tags, so it holds in worlds restricted by
+//! [`AS_MODELLED`]; other worlds have an error but no bound.
 
 use std::fmt::Write as _;
 
@@ -29,7 +29,7 @@ use armcal_core::time::Stamp;
 use armcal_sim::truth::Truth;
 use armcal_sim::{AsBuilt, JointAsBuilt, WorldSpec};
 
-/// Settings of a routine that leave of the sensors' errors gain, offset and noise alone.
+/// Settings of a routine that leave only gain, offset and noise as the sensors' errors.
 pub const AS_MODELLED: [&str; 5] = [
     "world.joint_sensors.nonlinearity_peak=0.0",
     "world.joint_sensors.temperature_offset_std_rad_per_k=0.0",
@@ -38,24 +38,25 @@ pub const AS_MODELLED: [&str; 5] = [
     "world.joint_sensors.backlash_rad=0.0",
 ];
 
-/// The tool at one target, squares of lengths in m^2.
+/// Squared tool errors at one target, m^2.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoundTarget {
     /// Number of the target, from 0.
     pub target_idx: usize,
-    /// Of the tool as believed at rest, against the truth.
+    /// Squared distance of the estimated tool at rest from the true tool.
     pub at_rest_m2: f64,
-    /// What the result predicts of that.
+    /// Prediction of `at_rest_m2` by the calibration's result.
     pub predicted_m2: f64,
-    /// By the parameters alone, the reading without its noise, and its bound; `None` in worlds without a bound.
+    /// Squared error caused by the parameters, with the reading free of noise, and its bound; `None` in worlds without
+    /// a bound.
     pub by_parameters_m2: Option<[f64; 2]>,
 }
 
-/// One run against its bound.
+/// Comparison of one run with its bound.
 #[derive(Clone, Debug)]
 pub struct BoundRun {
     pub seed: u64,
-    /// Whether the calibration was accepted.
+    /// True if the calibration was accepted.
     pub is_accepted: bool,
     /// Contacts of the run.
     pub contacts: usize,
@@ -65,10 +66,10 @@ pub struct BoundRun {
     pub targets: Vec<BoundTarget>,
 }
 
-/// What a run left.
+/// A run's results and truth.
 pub struct BoundInput<'a> {
     pub seed: u64,
-    /// Nominal.
+    /// The robot with its nominal values.
     pub robot: &'a Robot,
     pub world: &'a WorldSpec,
     pub recording: &'a Recording,
@@ -76,7 +77,8 @@ pub struct BoundInput<'a> {
     pub calibration: &'a Calibration,
 }
 
-/// Compares a run with its truth and, where the world has one, with its bound; the reason where it cannot.
+/// Compares a run with its truth and, where the world has a bound, with the bound. Otherwise returns the reason that it
+/// cannot.
 ///
 /// # Errors
 /// In words: a calibration of another robot, views that determine nothing.
@@ -109,7 +111,7 @@ pub fn bound_run(input: &BoundInput<'_>) -> Result<BoundRun, String> {
     Ok(BoundRun { seed: input.seed, is_accepted, contacts: input.truth.contacts.len(), views: views.len(), targets })
 }
 
-/// Whether nothing of the sensors is wrong but gain and offset.
+/// True if gain, offset and noise are the sensors' only errors.
 fn has_bound(world: &WorldSpec) -> bool {
     let sensors = &world.joint_sensors;
     let wrong = [
@@ -127,16 +129,16 @@ fn off_m(rest: &ReachRest, truth: &Truth) -> Option<Vector3<f64>> {
     Some(rest.believed_tool.origin().vector() - state.base_from_tool.origin().vector())
 }
 
-/// The capture without errors, about the truth.
+/// The capture without errors, with priors centred on the truth.
 struct Twin {
-    /// With mount and tags as built.
+    /// The robot with its mount and tags as built.
     robot: Robot,
     sensors: ArmSensors,
     covariance: ParameterCovariance,
 }
 
 impl Twin {
-    /// `robot`: nominal.
+    /// Builds the twin; `robot` has nominal values.
     fn of(robot: &Robot, world: &WorldSpec, built: &AsBuilt, views: &[View]) -> Result<Self, String> {
         let robot = as_built(robot, world, built);
         let parameters = true_parameters(&built.joints);
@@ -148,7 +150,7 @@ impl Twin {
         let blocks = [Block::Mount(0)].into_iter().chain(Block::tags(&robot));
         let joints = (0..robot.n_joints()).map(kinds).collect();
         let model = Model { joints, ..Model::of_blocks(0, blocks) };
-        // Readings err by their noise alone.
+        // Readings have no error but their noise.
         let scales = Hyperparameters { joint_std_rad: [EXACT_RAD; MAX_JOINTS], ..Hyperparameters::datasheet(&robot) };
         let columns: Vec<Parameter> = (0..robot.n_joints())
             .flat_map(|joint| kinds(joint).into_iter().map(move |kind| Parameter { joint, kind }))
@@ -170,8 +172,8 @@ impl Twin {
         Ok(Self { robot, sensors, covariance })
     }
 
-    /// Square of the tool's error at a rest by the parameters alone, and its bound. `drawn`: by the datasheet's
-    /// sensors.
+    /// Squared tool error at a rest caused by the parameters, and its bound. `drawn` has the rest's angles by the
+    /// datasheet's sensors.
     fn at(&self, rest: &ReachRest, drawn: &ReachRest) -> [f64; 2] {
         let angles = JointAngles::from_fn(drawn.believed.len(), |joint| {
             let model = &self.sensors.models[joint];
@@ -184,10 +186,10 @@ impl Twin {
     }
 }
 
-/// What counts as no error of a joint beside its reading's, rad.
+/// Standard deviation that counts as no joint error beyond the reading's noise, rad.
 const EXACT_RAD: f64 = 1e-7;
 
-/// The arm with mount, tags and reading noise as they are; how well they are known stays.
+/// The arm with its true mount, tags and reading noise; the standard deviations of mount and tags stay.
 fn as_built(robot: &Robot, world: &WorldSpec, built: &AsBuilt) -> Robot {
     let mut robot = robot.clone();
     let mount: Pose<Link, Camera> = built.camera_mount.to_pose();
@@ -196,13 +198,14 @@ fn as_built(robot: &Robot, world: &WorldSpec, built: &AsBuilt) -> Robot {
         tag.base_from_tag = built.pose.to_pose();
     }
     let sensors = &world.joint_sensors;
-    // A step's rounding is even over it.
+    // Rounding to a step has a uniform error over the step.
     let noise_counts = sensors.noise_rms_counts.hypot(sensors.resolution_counts / 12.0_f64.sqrt());
     robot.sensors.iter_mut().for_each(|sensor| sensor.noise_std_counts = noise_counts);
     robot
 }
 
-/// A datasheet's travel is `(1 + gain error) travel + offset error`.
+/// Returns the parameters that undo the sensors' errors: a datasheet's travel is `(1 + gain error) travel + offset
+/// error`.
 fn true_parameters(joints: &[JointAsBuilt]) -> JointParameters {
     let mut parameters = JointParameters::default();
     for (joint, built) in joints.iter().enumerate() {
@@ -212,7 +215,7 @@ fn true_parameters(joints: &[JointAsBuilt]) -> JointParameters {
     parameters
 }
 
-/// The view with every tag where the true arm shows it.
+/// The view with every tag where the true arm would see it.
 fn exact_view(robot: &Robot, world: &WorldSpec, parameters: &JointParameters, view: &View) -> View {
     let still = ConditionChange::default();
     let angles = JointAngles::from_fn(robot.n_joints(), |joint| {
@@ -243,32 +246,32 @@ fn exact_corners(
     let center = camera_from_tag.translation.vector;
     let cos_incidence = -(camera_from_tag.rotation * Vector3::z()).dot(&center) / center.norm();
     let std_px = world.camera.corner_noise_px * (0.8 + 0.2 * center.norm()) / cos_incidence.max(0.05).sqrt();
-    // As many degrees of freedom that the stated noise counts for beside it hardly matter.
+    // With this many degrees of freedom the stated noise, which counts too, hardly matters.
     let n_frames = n_frames.max(1);
     let dof = 8.0 * (n_frames - 1) as f64;
     let stated_px2 = STATED_DOF * robot.camera.corner_std_px.powi(2);
     Some(MeanCorners { corners_px, n_frames, scatter_px2: (STATED_DOF + dof) * std_px.powi(2) - stated_px2 })
 }
 
-/// Degrees of freedom that robot.toml's corner noise counts for in `bundle`, taken off again so that the true noise is
-/// what weighs.
+/// Degrees of freedom that robot.toml's corner noise has in `bundle`; subtracted again so that only the true noise
+/// counts.
 const STATED_DOF: f64 = 16.0;
 
 /// Figures of many runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoundFigures {
-    /// Root mean squares over all targets of all runs, m.
+    /// Error of the estimated tool at rest over all targets of all runs, rms, m; `predicted_m` is its prediction.
     pub at_rest_m: f64,
     pub predicted_m: f64,
-    /// By the parameters alone, and the bound, m.
+    /// Error caused by the parameters and its bound, rms, m.
     pub by_parameters_m: Option<[f64; 2]>,
-    /// Error over bound, and where it lies with 95 %; without a bound, error over prediction.
+    /// Error over bound, with its 95 % interval; without a bound, error over prediction.
     pub ratio: f64,
     pub interval: Interval,
 }
 
 impl BoundFigures {
-    /// `None` for no targets.
+    /// Figures of `runs`; `None` if they have no targets.
     #[must_use]
     pub fn of(runs: &[BoundRun]) -> Option<Self> {
         let targets = || runs.iter().flat_map(|run| &run.targets);
@@ -280,14 +283,14 @@ impl BoundFigures {
         let by_parameters_m = has_bound.then(|| [side(0), side(1)]);
         let [error_m, least_m] = by_parameters_m.unwrap_or([at_rest_m, predicted_m]);
         let ratio = (n > 0).then_some(error_m / least_m)?;
-        // The larger part of a bound is what no view tells, a direction or two: a run has one degree of freedom.
+        // Most of a bound comes from one or two unobservable directions, so a run has one degree of freedom.
         let at = |p: f64| ratio * (runs.len() as f64 / chi_square_quantile(p, runs.len())).sqrt();
         let interval = Interval { low: at(0.975), high: at(0.025) };
         Some(Self { at_rest_m, predicted_m, by_parameters_m, ratio, interval })
     }
 }
 
-/// A row a world: its name and its runs.
+/// Table with one row per world: its name and the figures of its runs.
 #[must_use]
 pub fn bound_table(worlds: &[(&str, &[BoundRun])]) -> String {
     let mut text = String::from(
@@ -322,7 +325,7 @@ pub fn bound_table(worlds: &[(&str, &[BoundRun])]) -> String {
     text
 }
 
-/// A row a target of each run.
+/// CSV with one row per target of each run.
 #[must_use]
 pub fn bound_csv(worlds: &[(&str, &[BoundRun])]) -> String {
     let mut text = "world,seed,accepted,target,at_rest_m,predicted_m,by_parameters_m,bound_m\n".to_owned();
@@ -400,7 +403,7 @@ mod tests {
         (0..n).map(view).collect()
     }
 
-    /// The twin's readings are the true sensors': by the sensor's own equation the angle gives the reading back.
+    /// The twin's readings agree with the true sensors': by the sensor's own equation the angle returns the reading.
     #[test]
     fn true_parameters_are_those_of_the_sensors_as_built() {
         let robot = load(&root().join("robots/titan4-watched")).expect("the robot reads");
@@ -414,7 +417,7 @@ mod tests {
         }
     }
 
-    /// A bound falls as views come in and with less noise, and never below what the camera's place leaves open.
+    /// A bound falls with more views and with less noise, but never below the uncertainty of the camera's pose.
     #[test]
     fn the_bound_is_what_views_and_priors_leave() {
         let world = world(&AS_MODELLED);
@@ -429,7 +432,7 @@ mod tests {
         };
         let [few, many, sharp] = [bound_m(6, 1.0), bound_m(40, 1.0), bound_m(40, 0.01)];
         assert!(few > 1.2 * many && many > 1.02 * sharp, "{few} {many} {sharp}");
-        // The camera may have turned about the first joint's axis by 1 mrad, and nobody can tell.
+        // The camera may have turned about the first joint's axis by 1 mrad, which no view can show.
         assert!(sharp > 5e-4, "{sharp}");
     }
 

@@ -1,5 +1,5 @@
-//! A dive followed by the online belief, against the truth: the tool as believed at each task, by the belief that was
-//! made of the messages before it, by the one calibration at the start, and by the datasheet.
+//! Comparison of a dive's tool poses with the truth at each task. The poses are those by the online estimate from the
+//! messages before it, by the one calibration at the start, and by the datasheet.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -15,41 +15,41 @@ use armcal_core::streams::{Mark, MarkKind, Message};
 use armcal_core::time::Stamp;
 use armcal_sim::truth::Truth;
 
-/// The tool at one task.
+/// Tool errors at one task.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DiveTask {
-    /// Since the recording's first reach, s.
+    /// Time since the recording's first reach, s.
     pub at_s: f64,
     /// Number of the target, from 0.
     pub target_idx: usize,
-    /// Distance of the tool as believed from the tool as it was, m, by the belief of that moment.
+    /// Tool error by the online estimate of that moment, m.
     pub online_m: f64,
-    /// By the one calibration at the start.
+    /// Tool error by the one calibration at the start, m.
     pub start_m: f64,
-    /// By the datasheet.
+    /// Tool error by the datasheet, m.
     pub datasheet_m: f64,
-    /// What the belief expected, one sigma in space, m.
+    /// Tool error that the online estimate predicted, one standard deviation in space, m.
     pub predicted_m: f64,
-    /// Square of the error under the predicted covariance.
+    /// Squared online error, normalised by the predicted covariance.
     pub nees: f64,
 }
 
-/// A dive, followed.
+/// Result of following a dive.
 #[derive(Clone, Debug)]
 pub struct DiveStudy {
-    /// In the order of time; those from the first belief on.
+    /// Tasks in the order of time, from the first online estimate on.
     pub tasks: Vec<DiveTask>,
-    /// What the belief told of.
+    /// Events that the online estimate reported.
     pub events: Vec<OnlineEvent>,
-    /// Views that it took in.
+    /// Number of views that the online estimate includes.
     pub views: usize,
-    /// Walk and lag of the sensors over the first guess, at the end.
+    /// Estimated walk and lag of the sensors relative to their initial guess, at the end of the dive.
     pub drift_factors: Option<[f64; 2]>,
     /// Lag of the sensors' temperature that explains the views best, s.
     pub lag_s: f64,
 }
 
-/// The belief at the end of a reach mark.
+/// The online estimate at the end of a reach mark.
 struct Snapshot {
     from: Stamp,
     sensors: ArmSensors,
@@ -60,9 +60,9 @@ struct Snapshot {
 /// The arm as calibrated at the start.
 #[derive(Clone, Copy, Debug)]
 pub struct AtStart<'a> {
-    /// Its sensors.
+    /// Sensors as calibrated.
     pub sensors: &'a ArmSensors,
-    /// Its links.
+    /// Link corrections as calibrated.
     pub links: LinkCorrections,
 }
 
@@ -121,7 +121,7 @@ fn fixed(from: Stamp, sensors: &ArmSensors) -> Belief<'_> {
 
 impl Snapshot {
     fn tool_m2(&self, robot: &Robot, rest: &ReachRest) -> Matrix3<f64> {
-        // What drifts since the last view is in the covariance.
+        // The covariance includes the drift since the last view.
         let at = Conditions { stamp: self.sensors.reference.stamp, ..self.conditions };
         self.covariance.tool_position_under_m2(robot, &self.sensors, &rest.believed, &at)
     }
@@ -132,7 +132,8 @@ fn off_m(rest: &ReachRest, truth: &Truth) -> Option<Vector3<f64>> {
     Some(rest.believed_tool.origin().vector() - state.base_from_tool.origin().vector())
 }
 
-/// By hour of the dive and over all of it: median and 95 % of each belief, consistency of the online one.
+/// Table by hour of the dive and over the whole dive: median and 95 % error of each estimate, consistency of the online
+/// one.
 #[must_use]
 pub fn dive_table(tasks: &[DiveTask]) -> String {
     use std::fmt::Write as _;
@@ -172,7 +173,7 @@ fn hour(task: &DiveTask) -> usize {
     (task.at_s / 3600.0) as usize
 }
 
-/// One row a task.
+/// CSV with one row per task.
 #[must_use]
 pub fn dive_csv(rows: &[(u64, DiveTask)]) -> String {
     use std::fmt::Write as _;

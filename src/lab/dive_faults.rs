@@ -1,6 +1,6 @@
-//! Faults at unknown times in a dive: when the online belief names what happened, against an oracle that knows what may
-//! have happened and when. The oracle says how much the views can tell at all, and which explanations they cannot tell
-//! apart.
+//! Faults at unknown times in a dive: the time until the online estimate names them, against an oracle. The oracle
+//! knows which faults are possible and when. It shows how well the views can determine a fault, and which explanations
+//! they cannot distinguish.
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
@@ -19,43 +19,43 @@ use armcal_core::stats::{chi_square_above, stream_rng};
 use armcal_core::streams::{Mark, MarkKind, Message, Thermometer};
 use armcal_core::time::{SIMULATION_EPOCH, Stamp};
 
-/// The oracle is sure where chance does as well as a normal variable does five sigma, on either side.
+/// Chance of error below which the oracle is sure: that of a normal variable beyond five sigma on either side.
 const FIVE_SIGMA: f64 = 5.733e-7;
-/// Explanations that the oracle holds for this much less probable at most cannot be told apart, nats (odds of twenty).
+/// Largest log-probability difference, nats, at which the oracle cannot distinguish explanations (odds of 20).
 const ALIKE_NATS: f64 = 3.0;
-/// Views after the oracle's within which a fault is named in time.
+/// Views after the oracle's within which naming a fault counts as in time.
 const IN_TIME: usize = 3;
-/// Views that the oracle goes on for after it is sure: what is told later is told too late.
+/// Number of views that the oracle continues for after it is sure; later reports are too late.
 const ORACLE_GOES_ON: usize = 8;
-/// Faults happen between these, s: after the first tasks, before the last ones.
+/// Earliest and latest time of a fault, s: after the first tasks, before the last ones.
 const BETWEEN_S: [f64; 2] = [900.0, 2700.0];
 const DEG: f64 = std::f64::consts::PI / 180.0;
 
-/// What may happen on a dive.
+/// Kind of a fault on a dive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum DiveFaultKind {
     /// A sensor slips by 0.5 to 1.5 deg.
     Slipped,
-    /// A sensor keeps the word that it has.
+    /// A sensor keeps its current word.
     Stuck,
     /// A sensor's wire breaks.
     Dead,
-    /// A sensor's sense turns round.
+    /// A sensor's sense reverses.
     Reversed,
-    /// A wiper loses contact ever more.
+    /// A wiper loses contact more and more often.
     Dying,
     /// A spot of a sensor's track wears where the arm looks at tags: by 0.5 to 1.5 deg, 1.5 to 4 deg wide.
     Worn,
     /// A tag is knocked aside by 10 to 40 mm.
     Tag,
-    /// Every other tag is: they are on one boom.
+    /// Every other tag is knocked aside: those tags are on one boom.
     Boom,
     /// The camera turns on its mount by 0.5 to 2 deg, about any axis.
     Camera,
 }
 
 impl DiveFaultKind {
-    /// All of them.
+    /// All kinds of faults.
     pub const ALL: [Self; 9] = [
         Self::Slipped,
         Self::Stuck,
@@ -68,7 +68,7 @@ impl DiveFaultKind {
         Self::Camera,
     ];
 
-    /// As tables have it.
+    /// Name of the kind in tables.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -88,26 +88,26 @@ impl DiveFaultKind {
 /// One fault of a dive.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DiveFault {
-    /// What happens.
+    /// Kind of the fault.
     pub kind: DiveFaultKind,
-    /// Of the draw and the run.
+    /// Seed of the fault's draw and of the run.
     pub seed: u64,
-    /// Seconds after the start.
+    /// Time of the fault after the start, s.
     pub at_s: f64,
-    /// The joint it happens to.
+    /// The joint that the fault is at.
     joint: usize,
-    /// Where its track is worn, where it is.
+    /// Worn spot of the track, for a worn sensor.
     spot: Option<WornSpot>,
-    /// The tags, as indices.
+    /// Indices of the moved tags.
     tags: Vec<usize>,
-    /// Size, where it has one: rad or m.
+    /// Size of the fault, rad or m, for kinds that have one.
     pub size: Option<f64>,
     /// The value of `world.fault` for `--set`.
     pub setting: String,
 }
 
-/// Draws the fault of one kind and seed for `robot`, which looks at tags from `looks`, rad, base first: the same one
-/// each time.
+/// Draws the fault of one kind and seed for `robot`, which looks at tags from the configurations `looks`, rad, base
+/// first. The same arguments give the same fault.
 #[must_use]
 pub fn drawn_dive_fault(kind: DiveFaultKind, seed: u64, robot: &Robot, looks: &[Vec<f64>]) -> DiveFault {
     use DiveFaultKind as K;
@@ -151,7 +151,7 @@ pub fn drawn_dive_fault(kind: DiveFaultKind, seed: u64, robot: &Robot, looks: &[
         }
         K::Tag | K::Boom => {
             let by_m = rng.random_range(0.01..0.04);
-            // Off the plate that carries it: behind its face nobody sees it.
+            // The tag moves off the plate that carries it: behind the plate's face no camera sees it.
             let [x, y, z] = along(by_m);
             let by = [x, y, z.abs()];
             let moved = |tag: &usize| {
@@ -169,7 +169,7 @@ pub fn drawn_dive_fault(kind: DiveFaultKind, seed: u64, robot: &Robot, looks: &[
     DiveFault { kind, seed, at_s, joint, spot, tags, size, setting: format!("[{setting}]") }
 }
 
-/// A worn spot as drawn, its height without a sign.
+/// A drawn worn spot, its height without a sign.
 struct Wear {
     joint: usize,
     at_rad: f64,
@@ -177,7 +177,7 @@ struct Wear {
     width_rad: f64,
 }
 
-/// About where a joint stands in one of the looks at tags: elsewhere no view tells of it.
+/// Draws a worn spot near the joint's angle in one of the looks at tags: no view constrains it elsewhere.
 fn drawn_wear(rng: &mut impl Rng, robot: &Robot, looks: &[Vec<f64>]) -> Wear {
     let joint = rng.random_range(0..robot.n_seen_joints());
     let look = looks.get(rng.random_range(0..looks.len().max(1))).and_then(|look| look.get(joint));
@@ -187,7 +187,7 @@ fn drawn_wear(rng: &mut impl Rng, robot: &Robot, looks: &[Vec<f64>]) -> Wear {
     Wear { joint, at_rad, by_rad, width_rad }
 }
 
-/// Evenly over the sphere.
+/// Draws a direction, uniform over the sphere.
 fn direction(rng: &mut impl Rng) -> [f64; 3] {
     let (up, around) = (rng.random_range(-1.0..1.0_f64), rng.random_range(0.0..TAU));
     let across = (1.0 - up * up).sqrt();
@@ -207,7 +207,7 @@ impl DiveFault {
         }
     }
 
-    /// Whether it is what was named.
+    /// True if the named fault is this fault.
     fn is(&self, named: Fault) -> bool {
         use DiveFaultKind as K;
         match (self.kind, named) {
@@ -215,7 +215,7 @@ impl DiveFault {
             (K::Worn, Fault::Worn(joint, at)) => {
                 joint == self.joint && self.spot.is_some_and(|spot| !spot.is_far_from(at.at_rad()))
             }
-            // What reads the same everywhere has a slope of zero.
+            // A sensor with a constant reading has a slope of zero.
             (K::Stuck | K::Dead | K::Dying | K::Reversed, Fault::Failed(joint) | Fault::Scale(joint)) => {
                 joint == self.joint
             }
@@ -227,7 +227,7 @@ impl DiveFault {
     }
 }
 
-/// What was told of, and when.
+/// A reported fault, with the number of views until then.
 #[derive(Clone, Debug, PartialEq)]
 struct Told {
     fault: Fault,
@@ -237,35 +237,37 @@ struct Told {
     nats_of_truth: f64,
 }
 
-/// A dive with a fault, followed.
+/// Result of following a dive with a fault.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DiveFaultRow {
-    /// What happened.
+    /// The fault of the dive.
     pub fault: DiveFault,
-    /// Views after it until an oracle is sure that knows kind, time, and which joint or tag, and where; `None`: they
-    /// never tell it.
+    /// Views after the fault until an oracle is sure that knows its kind, time and place (joint or tag, and spot).
+    /// `None`: the views never determine it.
     pub oracle_views: Option<usize>,
-    /// The same of an oracle that knows kind and time alone, and has as many ways to be fooled as there are joints,
-    /// tags or places.
+    /// Views after the fault until an oracle is sure that knows only kind and time. It must exclude chance for every
+    /// joint, tag or place.
     pub kind_oracle_views: Option<usize>,
-    /// Views after it until it was named; `None`: it was not.
+    /// Views after the fault until it was named; `None` if it never was.
     pub named_views: Option<usize>,
-    /// Of what was told since, each that is neither what happened nor what the views cannot tell from it.
+    /// Later reports that are neither the fault nor an explanation that the views cannot distinguish from it.
     pub wrong: Vec<String>,
-    /// What the views cannot tell from what happened, and was named in its place.
+    /// Later reports that are not the fault but that the views cannot distinguish from it.
     pub alike: Vec<String>,
-    /// What was told before it.
+    /// Reports before the fault.
     pub false_alarms: Vec<String>,
 }
 
 impl DiveFaultRow {
-    /// Whether it was named within three views after the oracle that knows all; `None` where the views do not tell it.
+    /// True if the fault was named within three views after the oracle that knows its place; `None` where the views do
+    /// not determine it.
     #[must_use]
     pub fn is_in_time(&self) -> Option<bool> {
         self.oracle_views.map(|sure| self.is_named_soon_after(sure))
     }
 
-    /// The same of the oracle that knows kind and time alone.
+    /// True if the fault was named within three views after the oracle that knows only kind and time; `None` as for
+    /// `is_in_time`.
     #[must_use]
     pub fn is_in_time_by_kind(&self) -> Option<bool> {
         self.kind_oracle_views.map(|sure| self.is_named_soon_after(sure))
@@ -276,7 +278,7 @@ impl DiveFaultRow {
     }
 }
 
-/// What a run is followed with.
+/// State of following one run.
 struct Followed<'a> {
     fault: &'a DiveFault,
     follower: Follower,
@@ -286,7 +288,7 @@ struct Followed<'a> {
     n_views: usize,
     oracle_views: Option<usize>,
     kind_oracle_views: Option<usize>,
-    /// Of each joint, where the views since stood, far from each other.
+    /// Places of each joint in the views since the fault, far from each other.
     places: Vec<Vec<WornSpot>>,
     told: Vec<Told>,
     false_alarms: Vec<String>,
@@ -332,7 +334,7 @@ impl<'a> Followed<'a> {
                 oracle.hear_temperature(sample.stamp, sample.temperature_c);
             }
             (Message::Survey(_), None) if self.follower.estimator().n_views() == 0 => {
-                // The follower takes the recorded survey; so does this.
+                // The follower takes the recorded survey, so the oracle's stream of views does too.
                 self.follower.push(log_time, message);
                 self.stream = ViewStream::new(self.follower.estimator().robot().clone());
                 return;
@@ -348,7 +350,7 @@ impl<'a> Followed<'a> {
         self.hear(events);
     }
 
-    /// A view: the oracle is first, so that it begins with what was believed before.
+    /// Takes a view. The oracle takes it first, so that it begins with the estimate before the view.
     fn see(&mut self, view: &View) {
         let robot = self.follower.estimator().robot();
         let is_blind = view.tags.iter().all(|seen| !robot.tags[seen.tag_idx].is_known());
@@ -385,7 +387,7 @@ impl<'a> Followed<'a> {
         }
     }
 
-    /// What a fault of the kind may have happened to, as far as the views since may tell: joints, tags, or places of
+    /// Number of candidates for a fault of this kind that the views since then could name: joints, tags, or places of
     /// joints.
     fn n_candidates(&self) -> usize {
         use DiveFaultKind as K;
@@ -395,7 +397,7 @@ impl<'a> Followed<'a> {
             K::Slipped | K::Stuck | K::Dead | K::Dying | K::Reversed => seen_joints,
             K::Worn => self.places[..seen_joints].iter().map(Vec::len).sum(),
             K::Tag => robot.tags.len(),
-            // The even or the odd ones.
+            // The boom carries either the even or the odd tags.
             K::Boom => 2,
             K::Camera => 1,
         }
@@ -445,13 +447,13 @@ impl<'a> Followed<'a> {
     }
 }
 
-/// 25.0 of the sum of squares by one number, 39.5 by six. Of `n_candidates` that it might have been, each may be taken
-/// for it by chance (Bonferroni's bound): 28.5 by one number of six joints.
+/// True if the oracle excludes chance: a sum of squares of 25.0 for one number, 39.5 for six. Each of the
+/// `n_candidates` may fit by chance (Bonferroni's bound): 28.5 for one number of six joints.
 fn is_sure(gain: &OracleGain, n_candidates: usize) -> bool {
     chi_square_above(gain.chi2, gain.numbers) * (n_candidates as f64) < FIVE_SIGMA
 }
 
-/// What happened first, then all single faults.
+/// Explanations: first the true one, then all single faults.
 fn explanations(robot: &Robot, fault: &DiveFault) -> Vec<Vec<Fault>> {
     let joints = (0..robot.n_joints()).flat_map(|j| [Fault::Slip(j), Fault::Scale(j), Fault::Failed(j)]);
     let tags = (0..robot.tags.len()).map(Fault::Tag);
@@ -488,7 +490,7 @@ fn fault_of(robot: &Robot, event: &OnlineEvent) -> Option<Fault> {
     }
 }
 
-/// By kind, one line each, and what was named wrongly.
+/// Table with one line per kind, and the wrong reports.
 #[must_use]
 pub fn dive_faults_table(rows: &[DiveFaultRow]) -> String {
     let mut text = String::from(
@@ -523,7 +525,7 @@ pub fn dive_faults_table(rows: &[DiveFaultRow]) -> String {
     text
 }
 
-/// One row a run.
+/// CSV with one row per run.
 #[must_use]
 pub fn dive_faults_csv(rows: &[DiveFaultRow]) -> String {
     let quoted = |lines: &[String]| format!("\"{}\"", lines.join("; ").replace('"', "'"));
@@ -553,7 +555,7 @@ pub fn dive_faults_csv(rows: &[DiveFaultRow]) -> String {
 mod tests {
     use super::*;
 
-    /// The same seed draws the same fault; each names what it happens to, and the oracle is told the same.
+    /// The same seed draws the same fault; each fault names its place, and the oracle gets the same fault.
     #[test]
     fn faults_are_drawn_with_what_explains_them() {
         let folder = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots/titan4");

@@ -1,9 +1,9 @@
 //! Certified edges against brute force.
 //!
-//! Random edges of the believed arm alone, over the whole of its joint ranges, in a scene. Each is certified, and each
-//! is scanned by distance queries at joint steps of [`SCAN_RAD`]: an edge called free along all of it, an edge called
-//! blocked until an arm is too near. What the certificate calls free and the scan does not is missed; what it calls
-//! blocked and the scan does not is refused though free.
+//! Random edges of the nominal arm with exact joints, over the whole of its joint ranges, in a scene. Each edge is
+//! certified, then scanned by distance queries at joint steps of [`SCAN_RAD`]. The scan covers all of an edge that is
+//! certified free, and a blocked edge until an arm is too near. A violation on an edge certified free is missed. An
+//! edge that is called blocked but has no violation is refused though free.
 
 use rand::RngExt;
 use rayon::prelude::*;
@@ -14,22 +14,22 @@ use armcal_core::robot::Robot;
 use armcal_core::stats::{quantile, stream_rng};
 use armcal_core::streams::JointAngles;
 
-/// Largest joint step between two arms of a scan, rad.
+/// Largest joint step between two configurations of a scan, rad.
 pub const SCAN_RAD: f64 = 0.0005;
 /// Supports and distances are exact to rounding, m.
 const ROUNDING_M: f64 = 1e-9;
-/// Places that a blocked edge is scanned at first: a violation is wide more often than not.
+/// Number of places at which a blocked edge is scanned first: a violation is usually wide.
 const COARSE: u32 = 64;
 
-/// Straight, between two believed poses.
+/// A straight edge between two configurations.
 pub type Edge = [JointAngles; 2];
 
-/// What certificate and scan said of one edge.
+/// Results of certificate and scan for one edge.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EdgeRow {
     pub longest_step_rad: f64,
     pub is_certified: bool,
-    /// Share of the way of an arm that is too near; `None`: the scan found none.
+    /// Share of the edge at which an arm is too near; `None` if the scan found none.
     pub violation_at: Option<f64>,
 }
 
@@ -41,7 +41,7 @@ pub struct EdgeStudy {
     pub certify_s: Vec<f64>,
 }
 
-/// Edge `k` has the random numbers of its own name. Ends are drawn evenly over the joint ranges.
+/// Draws `n` edges, with ends uniform over the joint ranges. Edge `k` has its own stream of random numbers.
 #[must_use]
 pub fn random_edges(robot: &Robot, n: usize, seed: u64) -> Vec<Edge> {
     let edge = |k: usize| {
@@ -59,7 +59,7 @@ pub fn random_edges(robot: &Robot, n: usize, seed: u64) -> Vec<Edge> {
     (0..n).map(edge).collect()
 }
 
-/// Certifies the edges one by one, then scans them on all cores. `clock`: seconds.
+/// Certifies the edges one by one, then scans them on all cores. `clock` returns seconds.
 #[must_use]
 pub fn edge_study(
     robot: &Robot,
@@ -85,7 +85,7 @@ pub fn edge_study(
     EdgeStudy { arm: robot.name.clone(), rows: judged.collect(), certify_s }
 }
 
-/// The mean time to certify the edges for every arm within the bounds, s.
+/// Mean time to certify an edge for every arm within the bounds, s.
 #[must_use]
 pub fn mean_time_under_s(
     clearance: &ClearanceModel<'_>,
@@ -103,7 +103,7 @@ pub fn mean_time_under_s(
     (clock() - start_s) / edges.len().max(1) as f64
 }
 
-/// The first of `n_steps` equal steps of the edge at which the arm is nearer than the margin, as a share of the edge.
+/// Share of the edge at the first of `n_steps` equal steps where the arm is nearer than the margin; `None` if nowhere.
 fn scan(clearance: &ClearanceModel<'_>, [from, to]: &Edge, margin_m: f64, n_steps: u32) -> Option<f64> {
     let is_too_near = |share: &f64| {
         let at = JointAngles::from_fn(from.len(), |j| from[j] + share * (to[j] - from[j]));
@@ -117,13 +117,13 @@ impl EdgeStudy {
         self.rows.iter().filter(|row| holds(row)).count()
     }
 
-    /// Edges called free on which an arm is too near.
+    /// Number of edges certified free on which the scan finds an arm too near.
     #[must_use]
     pub fn n_missed(&self) -> usize {
         self.count(|row| row.is_certified && row.violation_at.is_some())
     }
 
-    /// Edges called blocked on which the scan finds no arm too near.
+    /// Number of edges called blocked on which the scan finds no arm too near.
     #[must_use]
     pub fn n_refused_though_free(&self) -> usize {
         self.count(|row| !row.is_certified && row.violation_at.is_none())
@@ -152,7 +152,7 @@ impl EdgeStudy {
         )
     }
 
-    /// The columns of [`EdgeStudy::summary`].
+    /// Column heads of [`EdgeStudy::summary`].
     #[must_use]
     pub fn heading() -> String {
         format!(
@@ -162,7 +162,7 @@ impl EdgeStudy {
     }
 }
 
-/// edges.csv: no times, so that the same seed gives the same bytes.
+/// edges.csv without times, so the same seed gives the same bytes.
 #[must_use]
 pub fn edges_csv(studies: &[EdgeStudy]) -> String {
     let mut text = "arm,edge,longest_step_rad,certified,scanned,too_near_at_share\n".to_owned();
@@ -177,7 +177,7 @@ pub fn edges_csv(studies: &[EdgeStudy]) -> String {
     text
 }
 
-/// Edges with what certificate and scan said of them, for other checkers.
+/// Edges with the results of certificate and scan, for other checkers.
 #[must_use]
 pub fn edges_json(edges: &[Edge], study: &EdgeStudy) -> Vec<Value> {
     let edge = |(([from, to], row), certify_s): ((&Edge, &EdgeRow), &f64)| {

@@ -1,13 +1,13 @@
-//! Studies of parts on their own, against known truth.
+//! Studies of single parts against known truth.
 //!
 //! `detection`: tags at set ranges and incidences in three kinds of water, at rest and in motion (`scenes`), rendered,
-//! detected and compared with the projection (`trials`). From that: rates and errors by condition (`tables`), and the
-//! model of corner noise and detection that the geometric camera may draw from (`noise_fit`).
-//! tests/oracle/compare_detectors.py runs other detectors on the same images. `poses`: error over poses and the arm's
-//! time, by how the poses are chosen; armcal-charts draws it. The paper's study is armcal-paper's. `falsified`: the
-//! verdict where drawing, survey or a sensor is wrong. `edges`: certified edges against brute force; `paths`: planning
-//! between random poses; `worlds`: closed loops in any world allowed; `bound`: closed loops against the Bayesian bound
-//! of their views; `dive`: the online belief over a dive, `dive_faults`: when it names what happens there.
+//! detected and compared with the projection (`trials`). Results are rates and errors by condition (`tables`), and the
+//! model of corner noise and detection for the geometric camera (`noise_fit`). tests/oracle/compare_detectors.py runs
+//! other detectors on the same images. `poses`: error against the number of poses and the arm's time, by the choice of
+//! poses; armcal-charts draws it. The paper's study is in armcal-paper. `falsified`: the verdict where nominal model,
+//! survey or a sensor is wrong. `edges`: certified edges against brute force; `paths`: planning between random poses.
+//! `worlds`: closed loops in any allowed world; `bound`: closed loops against the Bayesian bound of their views.
+//! `dive`: the online estimate over a dive; `dive_faults`: the time until it names a fault.
 
 mod bound;
 mod dive;

@@ -1,4 +1,4 @@
-//! `armcal-lab`: armcal's parts measured against known truth. Everything is in `commands`.
+//! `armcal-lab`: measures armcal's parts against known truth. All code is in `commands`.
 
 mod commands;
 

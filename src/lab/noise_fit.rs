@@ -1,4 +1,4 @@
-//! The constants of `optics::CornerNoise` from trials: by maximum likelihood, for each kind of water.
+//! Constants of `optics::CornerNoise` fitted to trials by maximum likelihood, for each kind of water.
 
 use nalgebra::Vector2;
 
@@ -6,7 +6,7 @@ use crate::trials::{DetectionStudy, Outcome, TagTrial};
 use armcal_core::optics::{CornerNoise, DetectionChance};
 use armcal_sim::WaterKind;
 
-/// Squared normalised errors beyond this pull no stronger: chi-square of 2 degrees, one in 300 000.
+/// Limit of a squared normalised error in the fit: chi-square of 2 degrees of freedom, one in 300 000.
 const CLIP: f64 = 25.0;
 
 /// A fitted model and how well it agrees with its trials.
@@ -42,12 +42,12 @@ pub fn fit_noise(study: &DetectionStudy, water: WaterKind) -> FittedNoise {
     FittedNoise { water, noise, n_corners, mean_chi_square }
 }
 
-/// Twice the negative log likelihood, clipped.
+/// Twice the negative log likelihood with clipped errors.
 fn misfit(noise: &CornerNoise, trials: &[&TagTrial]) -> f64 {
     corners(noise, trials).map(|(log_determinant, chi_square)| log_determinant + chi_square.min(CLIP)).sum()
 }
 
-/// Logarithm of the covariance's determinant and squared normalised error of every corner found.
+/// Pairs for every detected corner: logarithm of the covariance's determinant, and squared normalised error.
 fn corners<'a>(noise: &'a CornerNoise, trials: &'a [&TagTrial]) -> impl Iterator<Item = (f64, f64)> + 'a {
     trials.iter().flat_map(|trial| {
         let Outcome::Found { corners_px, .. } = &trial.outcome else { return Vec::new() };
@@ -62,7 +62,7 @@ fn corners<'a>(noise: &'a CornerNoise, trials: &'a [&TagTrial]) -> impl Iterator
     })
 }
 
-/// Logistic regression in shortest side and range.
+/// Fits the chance of detection by logistic regression in shortest side and range.
 fn fit_chance(trials: &[&TagTrial]) -> DetectionChance {
     let with = |x: &[f64; 4]| DetectionChance {
         half_side_px: x[0],
@@ -85,7 +85,7 @@ fn fit_chance(trials: &[&TagTrial]) -> DetectionChance {
     with(&best)
 }
 
-/// Coordinate search with shrinking steps (Hooke and Jeeves 1961 without pattern moves).
+/// Minimises `cost` by coordinate search with shrinking steps (Hooke and Jeeves 1961 without pattern moves).
 fn search<const N: usize>(start: [f64; N], mut steps: [f64; N], cost: impl Fn(&[f64; N]) -> f64) -> [f64; N] {
     let (mut best, mut lowest) = (start, cost(&start));
     for _ in 0..200 {
@@ -119,7 +119,7 @@ mod tests {
     fn the_search_finds_the_bottom_of_a_bowl() {
         let best =
             search([0.0, 0.0], [0.5, 0.5], |x| (x[0] - 1.3).powi(2) + 2.0 * (x[1] + 0.7).powi(2) + 0.5 * x[0] * x[1]);
-        // Where the gradient vanishes: 2x + y/2 = 2.6, x/2 + 4y = -2.8.
+        // The gradient vanishes at 2x + y/2 = 2.6, x/2 + 4y = -2.8.
         assert!((best[0] - 1.522_58).abs() < 1e-3 && (best[1] + 0.890_32).abs() < 1e-3, "{best:?}");
     }
 }

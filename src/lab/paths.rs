@@ -1,8 +1,8 @@
 //! Planning between random poses in the vehicles' sites.
 //!
-//! Queries are pairs of random poses that are free under the belief planned with, and nothing else is known of them.
-//! Three beliefs: the believed arm alone on a vehicle at rest (which other planners can be compared on), calibrated
-//! joints, and the datasheet's. [`problem_json`] writes shapes and queries of the first for
+//! Queries are pairs of random poses that are free under the assumed joint errors; the planner knows nothing else of
+//! them. There are three assumptions: exact joints on a vehicle at rest (for comparison with other planners),
+//! calibrated joints, and the datasheet's joints. [`problem_json`] writes shapes and queries of the first for
 //! tests/oracle/compare_ompl.py.
 
 use nalgebra::Isometry3;
@@ -14,12 +14,12 @@ use armcal_core::routine::Scene;
 use armcal_core::stats::{quantile, stream_rng};
 use armcal_core::streams::JointAngles;
 
-/// What the planner believes of the joints.
+/// The planner's assumption on joint and motion errors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Belief {
-    /// The believed arm alone; it strays from no line, and the vehicle stands still.
+    /// No errors: the arm follows every line exactly, and the vehicle stands still.
     Alone,
-    /// As after a calibration: gains to 0.4 %, offsets to 0.014 rad. Assumed.
+    /// Errors after a calibration: gains to 0.4 %, offsets to 0.014 rad. Assumed.
     Calibrated,
     Datasheet,
 }
@@ -37,7 +37,7 @@ impl Belief {
     }
 }
 
-/// An arm on a vehicle somewhere.
+/// An arm on a vehicle in a scene.
 #[derive(Clone, Debug)]
 pub struct PathSite {
     pub name: String,
@@ -46,20 +46,20 @@ pub struct PathSite {
     pub scene: Scene,
 }
 
-/// What became of one query.
+/// Result of one query.
 #[derive(Clone, Debug)]
 pub struct PathRow {
     pub from: JointAngles,
     pub to: JointAngles,
     pub path: Option<Path>,
-    /// Largest joint steps of its edges together.
+    /// Sum over the path's edges of the largest joint step, rad.
     pub length_rad: f64,
     pub duration_s: f64,
-    /// Of planning, by the caller's clock.
+    /// Planning time by the caller's clock, s.
     pub plan_s: f64,
 }
 
-/// All queries at one site under one belief.
+/// All queries at one site under one assumption.
 #[derive(Clone, Debug)]
 pub struct PathStudy {
     pub site: String,
@@ -68,7 +68,7 @@ pub struct PathStudy {
 }
 
 impl PathSite {
-    /// The same as one belief has it, with the bounds on the joints.
+    /// The site under one assumption, with the bounds on the joint errors.
     #[must_use]
     pub fn believed(&self, belief: Belief) -> (Self, JointErrorBounds) {
         let mut site = self.clone();
@@ -94,7 +94,7 @@ impl PathSite {
     }
 }
 
-/// The random queries of a study.
+/// Random queries of a study.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathQueries {
     pub n: usize,
@@ -102,7 +102,7 @@ pub struct PathQueries {
     pub seed: u64,
 }
 
-/// Plans random queries. `clock`: seconds.
+/// Plans random queries. `clock` returns seconds.
 #[must_use]
 pub fn path_study(site: &PathSite, belief: Belief, queries: PathQueries, clock: &dyn Fn() -> f64) -> PathStudy {
     let PathQueries { n, margin_m, seed } = queries;
@@ -160,7 +160,7 @@ impl PathStudy {
         )
     }
 
-    /// The columns of [`PathStudy::summary`].
+    /// Column heads of [`PathStudy::summary`].
     #[must_use]
     pub fn heading() -> String {
         format!(
@@ -170,7 +170,7 @@ impl PathStudy {
     }
 }
 
-/// paths.csv: no times, so that the same seed gives the same bytes.
+/// paths.csv without times, so the same seed gives the same bytes.
 #[must_use]
 pub fn paths_csv(studies: &[PathStudy]) -> String {
     let mut text = "site,belief,query,found,waypoints,length_rad,duration_s\n".to_owned();
@@ -184,7 +184,7 @@ pub fn paths_csv(studies: &[PathStudy]) -> String {
     text
 }
 
-/// Shapes, joints and queries for planners that are not ours: everything in the base frame, quaternions as w, x, y, z.
+/// Shapes, joints and queries for third-party planners: everything in the base frame, quaternions as w, x, y, z.
 #[must_use]
 pub fn problem_json(site: &PathSite, queries: &[Value], margin_m: f64) -> Value {
     let (robot, vehicle) = (&site.robot, &site.vehicle);
@@ -202,7 +202,7 @@ pub fn problem_json(site: &PathSite, queries: &[Value], margin_m: f64) -> Value 
     });
     json!({
         "site": site.name, "arm": robot.name, "margin_m": margin_m,
-        // Links against links need less: they neither sway nor are surveyed. Neighbours are not tested.
+        // Links against links need less margin: they neither sway nor are surveyed. Neighbours are not tested.
         "self_margin_m": margin_m - armcal_belief::plan::SELF_MARGIN_REDUCTION_M,
         "seafloor_z_m": site.scene.seafloor_z_m, "base_from_world": place(&base_from_vehicle),
         "joints": joints.collect::<Vec<_>>(), "bodies": bodies.collect::<Vec<_>>(),
@@ -211,7 +211,7 @@ pub fn problem_json(site: &PathSite, queries: &[Value], margin_m: f64) -> Value 
     })
 }
 
-/// The queries of a study, and how they went.
+/// Queries of a study with their results.
 #[must_use]
 pub fn queries_json(study: &PathStudy) -> Vec<Value> {
     let query = |row: &PathRow| {

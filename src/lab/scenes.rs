@@ -13,32 +13,32 @@ use armcal_sim::{ImageSpec, WaterKind};
 /// Side of a tag's black square, m.
 pub const TAG_SIZE_M: f64 = 0.15;
 const WATERS: [WaterKind; 3] = [WaterKind::Clear, WaterKind::Coastal, WaterKind::Turbid];
-/// How far the image moves while the shutter is open, px.
+/// Motion of the image while the shutter is open, px.
 const BLURS_PX: [f64; 2] = [0.0, 3.0];
 const RANGES_M: [f64; 10] = [0.4, 0.6, 0.8, 1.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0];
 /// Angle between a tag's normal and the line of sight, deg; each once in an image.
 const INCIDENCES_DEG: [f64; 7] = [0.0, 20.0, 40.0, 55.0, 65.0, 72.0, 78.0];
-/// Six tags stand about the one in the middle at angles from the axis in this range, rad.
+/// Angles from the axis, rad, between which six tags stand about the one in the middle.
 const RING_RAD: [f64; 2] = [0.55, 0.95];
-/// Marine snow by kind of water, flakes a m3. Assumed.
+/// Marine snow by kind of water, flakes per m^3. Assumed.
 const SNOW_PER_M3: [f64; 3] = [100.0, 500.0, 2000.0];
-/// A textured wall stands so far behind the range, m, in every second image; open water in the others.
+/// Distance of a textured wall behind the range, m, in every second image; the others show open water.
 const WALL_BEHIND_M: f64 = 0.4;
-/// Two lamps of this flux, of a work-class vehicle. Assumed.
+/// Flux of each of two lamps, of a work-class vehicle, lm. Assumed.
 const FLUX_LM: f64 = 10_000.0;
 const LAMP_HALF_ANGLE_RAD: f64 = 1.0;
 
-/// What images of one kind have in common.
+/// Condition that all its images share.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Condition {
     pub water: WaterKind,
     pub blur_px: f64,
     pub range_m: f64,
-    /// Which of the images under this condition.
+    /// Number of the image under this condition.
     pub repeat: u32,
 }
 
-/// A tag that stands before the camera.
+/// A tag placed before the camera.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PlacedTag {
     pub id: u32,
@@ -49,7 +49,7 @@ pub(super) struct PlacedTag {
 #[derive(Clone, Debug)]
 pub(super) struct Scene {
     pub tags: Vec<PlacedTag>,
-    /// When the shutter opens, halfway, and when it closes; the frame of the tags is the camera's halfway.
+    /// Tag frame from the camera when the shutter opens, halfway, and when it closes; halfway the two frames coincide.
     pub from_camera: [Isometry3<f64>; 3],
     pub has_wall: bool,
 }
@@ -68,7 +68,7 @@ pub fn conditions(n_repeats: u32) -> Vec<Condition> {
     all
 }
 
-/// As the routine spells it.
+/// Name of the water in a routine.
 #[must_use]
 pub fn water_name(water: WaterKind) -> &'static str {
     match water {
@@ -82,7 +82,7 @@ pub(super) fn image_spec(water: WaterKind) -> ImageSpec {
     ImageSpec { water, snow_per_m3: SNOW_PER_M3[water as usize], ..ImageSpec::default() }
 }
 
-/// On a bar above the camera, to its left and right.
+/// Lamps on a bar above the camera, to its left and right.
 pub(super) fn lights() -> Vec<Light> {
     let ahead = Unit::new_normalize(Vector3::new(0.0, 0.2, 1.0));
     let light = |x: f64| Light {
@@ -121,7 +121,7 @@ impl Scene {
             PlacedTag { id: first_id + 12 * k as u32, incidence_rad: *incidence, camera_from_tag }
         });
         let tags = tags.collect();
-        // A sideways motion that moves the image of the middle by the blur.
+        // A sideways motion that moves the centre of the image by the blur.
         let way: f64 = rng.random_range(0.0..std::f64::consts::TAU);
         let half_m = 0.5 * blur_px * range_m / lens.focal_px()[0];
         let moved = |share: f64| Isometry3::translation(share * half_m * way.cos(), share * half_m * way.sin(), 0.0);
@@ -132,7 +132,7 @@ impl Scene {
         self.tags.iter().map(|tag| TagPlane::fixed(tag.id, TAG_SIZE_M, tag.camera_from_tag)).collect()
     }
 
-    /// A tag's corners, means over the exposure (Simpson's rule); `None` unless all are in the image.
+    /// A tag's corners, px, averaged over the exposure (Simpson's rule); `None` unless all are in the image.
     pub(super) fn corners_px(&self, lens: &CameraModel, tag: &PlacedTag) -> Option<[[f64; 2]; 4]> {
         let mut mean = [[0.0; 2]; 4];
         for (from_camera, weight) in self.from_camera.iter().zip([1.0, 4.0, 1.0]) {
@@ -156,7 +156,7 @@ fn placed(center_m: Vector3<f64>, incidence_rad: f64, azimuth_rad: f64, spin_rad
     Isometry3::from_parts(Translation3::from(center_m), facing * lean * spin)
 }
 
-/// Fisher and Yates.
+/// Shuffles by the method of Fisher and Yates.
 fn shuffle(values: &mut [f64], rng: &mut ChaCha8Rng) {
     for k in (1..values.len()).rev() {
         values.swap(k, rng.random_range(0..=k));

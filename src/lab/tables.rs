@@ -34,7 +34,7 @@ fn deg(rad: f64) -> f64 {
     rad.to_degrees()
 }
 
-/// One line a tag: condition, outcome, error of each corner, the standard deviation that the detector gave it.
+/// CSV with one line per tag: condition, outcome, error of each corner, and the detector's standard deviation.
 #[must_use]
 pub fn trials_csv(study: &DetectionStudy) -> String {
     let mut out = String::from("image,water,blur_px,range_m,incidence_deg,view_angle_deg,id,shortest_side_px,outcome");
@@ -69,7 +69,7 @@ pub fn trials_csv(study: &DetectionStudy) -> String {
     out
 }
 
-/// What other detectors' results are compared with: image, condition, id, corners.
+/// CSV for other detectors to compare with: image, condition, id, corners.
 #[must_use]
 pub fn truth_csv(study: &DetectionStudy) -> String {
     let mut out = String::from(
@@ -128,7 +128,7 @@ impl Sums {
         self.n_found as f64 / self.n.max(1) as f64
     }
 
-    /// Per coordinate: measured, and as the detector's covariances have it.
+    /// Error per coordinate, rms, px: measured, and by the detector's covariances.
     fn rms_px(&self) -> [f64; 2] {
         let corners = 4.0 * self.n_found.max(1) as f64;
         [(self.squares / corners / 2.0).sqrt(), (self.variances / corners).sqrt()]
@@ -139,8 +139,8 @@ impl Sums {
     }
 }
 
-/// One line a condition: detection rate, rms error of a corner coordinate, what the detector's covariances say it is,
-/// and the mean squared normalised error of a corner (2 where they are right).
+/// CSV with one line per condition: detection rate, rms error of a corner coordinate, its value by the detector's
+/// covariances. The last figure is the mean squared normalised error of a corner (2 where the covariances are right).
 #[must_use]
 pub fn conditions_csv(study: &DetectionStudy) -> String {
     let mut by_condition = BTreeMap::<[i64; 4], (&TagTrial, Sums)>::new();
@@ -166,7 +166,7 @@ pub fn conditions_csv(study: &DetectionStudy) -> String {
     out
 }
 
-/// Rates and errors by water and range, the fitted models, and the time an image took.
+/// Report of rates and errors by water and range, the fitted models, and the time per image.
 #[must_use]
 pub fn report(study: &DetectionStudy, fitted: &[FittedNoise]) -> String {
     let mut by_range = BTreeMap::<(usize, i64), (&TagTrial, Sums)>::new();

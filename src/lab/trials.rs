@@ -1,4 +1,4 @@
-//! Rendered, detected, compared.
+//! Trials of the detector: images are rendered, detected in, and compared with the truth.
 
 use nalgebra::{Isometry3, Matrix2, Unit, Vector3};
 
@@ -9,7 +9,7 @@ use armcal_detect::{DetectError, DetectorSettings, GreyImage, ImageDetections, T
 use armcal_sim::WaterKind;
 use armcal_sim::imaging::{Imager, Shot};
 
-/// A detection further from the truth than this share of the shortest side, at any corner, is of something else.
+/// Largest error of a corner, as a share of the tag's shortest side, at which a detection counts as this tag.
 const MATCH_SHARE: f64 = 0.3;
 
 #[derive(Debug, thiserror::Error)]
@@ -20,18 +20,18 @@ pub enum StudyError {
     Watcher(String),
 }
 
-/// Who watches a study: it has the only clock.
+/// Observer of a study; it has the only clock.
 pub trait Watcher {
     fn wall_s(&self) -> f64;
 
-    /// After each image; grey, as it was detected in.
+    /// Takes each image after its detection, in the grey levels that were searched.
     ///
     /// # Errors
-    /// Whatever keeps the watcher from its work; the study ends with it.
+    /// Any failure of the observer; it ends the study.
     fn image(&mut self, name: &str, image: GreyImage, n_done: usize, n_all: usize) -> Result<(), StudyError>;
 }
 
-/// What became of a tag.
+/// Outcome for one tag.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
     Missed,
@@ -46,7 +46,7 @@ pub struct TagTrial {
     pub condition: Condition,
     pub id: u32,
     pub incidence_rad: f64,
-    /// From the optical axis.
+    /// Angle from the optical axis, rad.
     pub view_angle_rad: f64,
     pub shortest_side_px: f64,
     pub truth_px: [[f64; 2]; 4],
@@ -55,12 +55,12 @@ pub struct TagTrial {
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct DetectionStudy {
-    /// Tags that lie in the image with all corners.
+    /// Tags whose corners all lie in the image.
     pub trials: Vec<TagTrial>,
-    /// Detections that are of no tag: a wrong id or a wrong place.
+    /// Number of detections that match no tag: a wrong id or a wrong place.
     pub n_false: usize,
     pub n_images: usize,
-    /// Of each image, by the watcher's clock.
+    /// Rendering time of each image by the watcher's clock, s.
     pub render_s: Vec<f64>,
     pub detect_s: Vec<f64>,
 }
@@ -107,7 +107,7 @@ pub fn detection_study(
 }
 
 fn shoot(imager: &mut Imager, scene: &Scene, condition: &Condition, number: u64, grey: &mut Vec<u8>) {
-    // Far behind everything, where the scene has none.
+    // A wall far behind everything, in scenes that have none.
     let far = Isometry3::translation(0.0, 0.0, 1e3);
     let place = if scene.has_wall { wall_place(condition.range_m) } else { far };
     let planes = scene.planes();
@@ -136,7 +136,7 @@ impl DetectionStudy {
         let mut n_matched = 0;
         for tag in &trial.scene.tags {
             let Some(truth_px) = trial.scene.corners_px(trial.lens, tag) else {
-                // Cut off by the image's rim: what is found of it is no error.
+                // The image's edge cuts this tag off, so a detection of it counts as no error.
                 n_matched += detected.tags.iter().filter(|found| found.detection.id == tag.id).count();
                 continue;
             };

@@ -1,20 +1,20 @@
-//! Worlds drawn from all that `[world]` allows: what a closed loop makes of any of them.
+//! Worlds drawn from all that `[world]` allows, for closed loops in any of them.
 //!
-//! Each key is drawn with a chance of its world's own, at most `MOST`; most of them about the standard world's figure
-//! (by a factor of up to 4 each way), the rest anywhere in the allowed range (evenly over its powers of ten where it
-//! has no zero).
+//! Each key is drawn with a chance that is fixed per world, at most `MOST`. Most drawn values lie about the standard
+//! world's figure, by a factor of up to 4 each way. The rest are anywhere in the allowed range, uniform over its powers
+//! of ten where it excludes zero.
 
 use rand::{Rng, RngExt};
 
 use armcal_core::stats::stream_rng;
 use armcal_sim::{Figure, WorldSpec};
 
-/// Of the keys, how many differ from the standard world at most.
+/// Largest share of the keys that differ from the standard world.
 const MOST: f64 = 0.06;
-/// Of what differs and has a figure in the standard world, how much is anywhere in its range.
+/// Share of the differing keys with a standard figure that are drawn from their whole range.
 const ANYWHERE: f64 = 0.3;
 
-/// Keys with several values, or of tables that are not numbers throughout, with what is allowed.
+/// Keys with a choice of values, or of tables that are not purely numeric, with the allowed values.
 const CHOICES: [(&str, &[&str]); 10] = [
     ("world.physics.engine", &["\"rapier\"", "\"featherstone\""]),
     ("world.vehicle.motion", &["\"swell\"", "\"free\"", "\"parked\""]),
@@ -25,24 +25,24 @@ const CHOICES: [(&str, &[&str]); 10] = [
     ("world.structure.payload_kg", &["5.0", "60.0", "10000.0"]),
     ("world.structure.mount_compliance_rad_per_nm", &["[1e-5, 1e-5, 1e-5]", "[1e-2, 1e-2, 1e-2]"]),
     ("capture.margins", &["\"belief\""]),
-    // Among these, so that it does not shift what is drawn for the other keys.
+    // This key is among the choices so that it does not shift the draws of the other keys.
     ("world.geometry.error_ratio", &["1.0", "3.0"]),
 ];
 
-/// One world: what to set beside the routine.
+/// One world: the settings that it adds to the routine.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DrawnWorld {
     /// Number of the draw, and seed of the run.
     pub number: u64,
-    /// Index of the arm, of those given.
+    /// Index of the arm among the given ones.
     pub arm: usize,
-    /// Index of the routine.
+    /// Index of the routine among the given ones.
     pub routine: usize,
-    /// `KEY=VALUE` each, for `--set`.
+    /// Settings as `KEY=VALUE`, for `--set`.
     pub settings: Vec<String>,
 }
 
-/// Draws world `number`, for as many arms and routines as there are: the same one each time.
+/// Draws world `number` for the given numbers of arms and routines; the same arguments give the same world.
 #[must_use]
 pub fn drawn_world(number: u64, n_arms: usize, n_routines: usize) -> DrawnWorld {
     let mut rng = stream_rng(number, "any world");
@@ -77,7 +77,7 @@ fn drawn(figure: &Figure, rng: &mut impl Rng) -> f64 {
 mod tests {
     use super::*;
 
-    /// Over many draws each number is drawn, never beyond its range, and the same draw is the same world.
+    /// Many draws cover each number, never beyond its range, and the same draw gives the same world.
     #[test]
     fn worlds_cover_every_key_within_its_range() {
         let worlds: Vec<DrawnWorld> = (0..600).map(|number| drawn_world(number, 3, 4)).collect();

@@ -1,12 +1,12 @@
-//! An accepted calibration that stays in place: a refused or less certain result goes next to it.
+//! Protection of an accepted calibration: a refused or less certain result is written next to it.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
 
 use armcal_belief::calib::{Calibration, Status};
 
-/// A result is worse than the one in place if its U95 is larger by more than this factor. Assumed: views of another day
-/// change U95 by a few percent.
+/// Factor on the U95 of the result in place above which a new result is worse. Assumed: views of another day change U95
+/// by a few percent.
 const WORSE: f64 = 1.1;
 
 /// Place of a result that does not replace the accepted one.
@@ -24,7 +24,7 @@ impl fmt::Display for AcceptedKept {
     }
 }
 
-/// Decides if the accepted calibration in `out` stays; `None` where `new` takes its place.
+/// Returns the place of the new result if the accepted calibration in `out` stays; `None` if `new` replaces it.
 pub fn accepted_kept(out: &Path, new: &Calibration) -> Option<AcceptedKept> {
     let old = Calibration::read(&out.join("calibration.toml")).ok()?;
     let is_accepted = old.status == Status::Accepted && old.robot == new.robot;

@@ -1,7 +1,7 @@
-//! A file that grows beside its place under a name of its own, and takes the place once it is whole.
+//! A file that is written next to its final path under a temporary name, and renamed once it is complete.
 //!
-//! It is `.NAME.RANDOM.partial`, new and no link, locked as long as it grows. What a killed command left of one is
-//! removed by the next that writes to the same place.
+//! The temporary file is `.NAME.RANDOM.partial`, new and no link, locked while it is written. A killed command's
+//! leftovers are removed by the next command that writes to the same path.
 
 use std::fs::{self, File};
 use std::path::Path;
@@ -13,7 +13,7 @@ use crate::output::{OutputError, as_written, check_replaceable, make_folder, par
 
 const SUFFIX: &str = ".partial";
 
-/// A growing file; dropped, it is removed.
+/// A file that is being written; removed if dropped.
 #[derive(Debug)]
 pub(crate) struct Beside<'a> {
     path: &'a Path,
@@ -21,10 +21,10 @@ pub(crate) struct Beside<'a> {
 }
 
 impl<'a> Beside<'a> {
-    /// Begins the file that is to take the place `path`.
+    /// Begins the file that is to replace `path`.
     ///
     /// # Errors
-    /// When the folder takes no files, or what is at `path` cannot be replaced by one.
+    /// When the folder takes no files, or the object at `path` cannot be replaced by a file.
     pub fn begin(path: &'a Path) -> Result<Self, OutputError> {
         check_replaceable(path)?;
         let folder = parent(path);
@@ -33,39 +33,39 @@ impl<'a> Beside<'a> {
         loop {
             let mut builder = Builder::new();
             builder.prefix(&prefix).suffix(SUFFIX);
-            // As the umask lets it: temporary files are private otherwise, and results are for others, too.
+            // Permissions follow the umask: temporary files are private otherwise, and results are for others, too.
             #[cfg(unix)]
             builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
             let file = builder.tempfile_in(folder).map_err(OutputError::of(folder, "cannot write into this folder"))?;
-            // A file system without locks leaves leftovers where they are.
+            // On a file system without locks, leftovers stay.
             let _ = file.as_file().try_lock();
-            // Somebody who removes leftovers may have been quicker than the lock.
+            // Another process that removes leftovers may have been quicker than the lock.
             if is_at(file.as_file(), file.path()) {
                 return Ok(Self { path, file });
             }
         }
     }
 
-    /// Where it grows.
+    /// Temporary path of the file.
     #[cfg(feature = "viewer")]
     pub fn grows_at(&self) -> &Path {
         self.file.path()
     }
 
-    /// Writes all of it, to disk.
+    /// Writes all bytes and syncs them to disk.
     pub fn write(mut self, bytes: &[u8]) -> Result<Self, OutputError> {
         use std::io::Write;
         self.file.write_all(&as_written(self.path, bytes)).map_err(OutputError::of(self.path, "cannot be written"))?;
         self.synced()
     }
 
-    /// On disk before it takes a name that promises so.
+    /// Syncs the file to disk before it takes its final name.
     fn synced(self) -> Result<Self, OutputError> {
         self.file.as_file().sync_all().map_err(OutputError::of(self.path, "cannot be written"))?;
         Ok(self)
     }
 
-    /// Takes its place.
+    /// Renames the file to its final path.
     pub fn put_in_place(self) -> Result<(), OutputError> {
         let path = self.path;
         let written = self.synced()?.file.persist(path);
@@ -73,14 +73,14 @@ impl<'a> Beside<'a> {
     }
 }
 
-/// Writes `bytes` beside `path` and puts them in its place in one step.
+/// Writes `bytes` to a temporary file and replaces `path` with it in one step.
 #[cfg(feature = "sim")]
 pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     write_together(&[(path, bytes)])
 }
 
-/// Writes all of `files` beside their places and then puts each in its place in one step; if one cannot be written,
-/// none is replaced. The old last file goes first and the new one comes last: it vouches for the others.
+/// Writes all of `files` to temporary files and then replaces each in one step; if one cannot be written, none is
+/// replaced. The old last file is removed first and the new one comes last, because it vouches for the others.
 pub fn write_together(files: &[(&Path, &[u8])]) -> Result<(), OutputError> {
     let written = files.iter().map(|(path, bytes)| Beside::begin(path)?.write(bytes)).collect::<Result<Vec<_>, _>>()?;
     if let [_, .., (last, _)] = files
@@ -91,19 +91,19 @@ pub fn write_together(files: &[(&Path, &[u8])]) -> Result<(), OutputError> {
     written.into_iter().try_for_each(Beside::put_in_place)
 }
 
-/// That `path` can be written: its folder is there, made if need be, and takes files.
+/// Checks that `path` can be written: its folder exists, is made if necessary, and takes files.
 pub(crate) fn check_writable(path: &Path) -> Result<(), OutputError> {
     make_folder(parent(path))?;
     Beside::begin(path).map(drop)
 }
 
-/// That a folder takes files, before the work that fills it. One that is made for this goes again: what comes to
-/// nothing leaves nothing.
+/// Checks that a folder takes files, before the work that fills it. A folder that is made for this check is removed
+/// again.
 pub fn check_takes_files(folder: &Path) -> Result<(), OutputError> {
     let is_new = !folder.exists();
     check_writable(&folder.join("file"))?;
     if is_new {
-        // Whatever came into it meanwhile keeps it.
+        // A folder that is no longer empty stays.
         let _ = fs::remove_dir(folder);
     }
     Ok(())
@@ -113,7 +113,7 @@ fn prefix(path: &Path) -> String {
     format!(".{}.", path.file_name().unwrap_or_default().to_string_lossy())
 }
 
-/// Removes growing files that nobody holds any more. What cannot be looked at does no harm.
+/// Removes temporary files that no process holds any more. Files that cannot be examined do no harm.
 fn remove_leftovers(folder: &Path, prefix: &str) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = entry.file_name();

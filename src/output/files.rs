@@ -1,4 +1,4 @@
-//! Files put in place when they are whole.
+//! Files that are put in place once they are complete.
 
 use armcal_core::codes::{Code, Coded};
 use armcal_core::text::printable;
@@ -6,10 +6,10 @@ use std::borrow::Cow;
 use std::io::Error;
 use std::path::{Path, PathBuf};
 
-/// Endings of the files that people and their terminals read. Others, a URDF among them, keep their bytes.
+/// Extensions of text files that people read in terminals. Other files, a URDF among them, keep their bytes.
 const TEXTS: [&str; 10] = ["csv", "html", "json", "jsonl", "md", "toml", "txt", "xml", "yaml", "yml"];
 
-/// Why a file or folder could not be written; the source, if there is one, says what the system thinks of it.
+/// Reason that a file or folder could not be written; the source, if there is one, has the system's error.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {problem}", path.display())]
 pub struct OutputError {
@@ -29,7 +29,8 @@ impl OutputError {
     }
 }
 
-/// The bytes of a file as it is written: names in a text, which others may have chosen, steer no terminal.
+/// The bytes that are written for a file: in texts, control characters in third-party names are made harmless for
+/// terminals.
 pub(crate) fn as_written<'a>(path: &Path, bytes: &'a [u8]) -> Cow<'a, [u8]> {
     let ending = path.extension().and_then(|ending| ending.to_str());
     match std::str::from_utf8(bytes) {
@@ -41,7 +42,7 @@ pub(crate) fn as_written<'a>(path: &Path, bytes: &'a [u8]) -> Cow<'a, [u8]> {
     }
 }
 
-/// That `path` can be replaced by a file: a folder or a device such as /dev/full cannot.
+/// Checks that `path` can be replaced by a file: a folder or a device such as /dev/full cannot.
 pub(crate) fn check_replaceable(path: &Path) -> Result<(), OutputError> {
     match std::fs::metadata(path) {
         Ok(found) if !found.is_file() => {
@@ -51,7 +52,7 @@ pub(crate) fn check_replaceable(path: &Path) -> Result<(), OutputError> {
     }
 }
 
-/// Files that grow under a name that others can foretell are never reached through a link.
+/// Refuses a link at `path`: files with predictable names must never be written through a link.
 pub(crate) fn refuse_link(path: &Path) -> Result<(), OutputError> {
     match std::fs::symlink_metadata(path) {
         Ok(found) if found.is_symlink() => Err(OutputError::new(path, "is a link, and is not followed: remove it")),
@@ -64,7 +65,7 @@ pub(crate) fn parent(path: &Path) -> &Path {
     path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// `path` with `.partial` added: where a stream grows until it is whole.
+/// `path` with `.partial` added: the name of a stream until it is complete.
 #[cfg(feature = "closed-loop")]
 pub(crate) fn partial(path: &Path) -> PathBuf {
     with_suffix(path, ".partial")
@@ -78,14 +79,14 @@ pub(crate) fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
     PathBuf::from(name)
 }
 
-/// Puts the finished file `from` in the place `path`.
+/// Renames the finished file `from` to `path`.
 #[cfg(feature = "closed-loop")]
 pub(crate) fn complete(from: &Path, path: &Path) -> Result<(), OutputError> {
     check_replaceable(path)?;
     std::fs::rename(from, path).map_err(OutputError::of(path, "cannot be put in place"))
 }
 
-/// That nothing is at `path`: a file that is there goes.
+/// Removes the file at `path`, if there is one.
 #[cfg(any(feature = "closed-loop", feature = "viewer"))]
 pub fn remove(path: &Path) -> Result<(), OutputError> {
     match std::fs::remove_file(path) {

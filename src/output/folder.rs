@@ -1,8 +1,8 @@
-//! The folder that a run writes to: one run at a time, all results at once or none, and no recording lost.
+//! Output folder of a run: one run at a time, all results at once or none, and no recording lost.
 //!
-//! Everything grows in `NAME.partial`. [`OutputFolder::commit`] puts all of it in place at the end: the old
-//! summary.json goes first and the new one comes last, so a folder with a summary.json holds the files of one run. What
-//! a killed or broken run leaves is moved to `run-cut-N.mcap` and `truth-cut-N.mcap`.
+//! All files are written to `NAME.partial`. [`OutputFolder::commit`] puts all of them in place at the end. The old
+//! summary.json is removed first and the new one comes last, so a folder with a summary.json holds the files of one
+//! run. Recordings of a killed or failed run are moved to `run-cut-N.mcap` and `truth-cut-N.mcap`.
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use crate::output::{FolderLock, OutputError, as_written, check_replaceable, complete, make_folder, partial, remove};
 use armcal_core::log::{LogError, for_each_raw, topics};
 
-/// What a run leaves, in the order in which it is put in place.
+/// Result files of a run, in the order in which they are put in place.
 const RESULTS: [&str; 9] = [
     "truth.mcap",
     "run.rrd",
@@ -22,11 +22,11 @@ const RESULTS: [&str; 9] = [
     "run.mcap",
     SUMMARY,
 ];
-/// Its presence says that the files beside it are those of one run.
+/// File whose presence shows that the files next to it belong to one run.
 const SUMMARY: &str = "summary.json";
 const RECORDINGS: [&str; 2] = ["run", "truth"];
 
-/// An output folder that belongs to this run as long as the value lives.
+/// An output folder that is locked for this run while the value lives.
 #[derive(Debug)]
 pub struct OutputFolder {
     folder: PathBuf,
@@ -34,11 +34,10 @@ pub struct OutputFolder {
 }
 
 impl OutputFolder {
-    /// Makes the folder, keeps other runs out, and moves aside what a killed run left in it: gives where its recording
-    /// is now.
+    /// Makes the folder, locks it, and moves aside the recordings that a killed run left in it; returns their new path.
     ///
     /// # Errors
-    /// When the folder cannot be made or written to, belongs to another run, or something is in the way of a result.
+    /// When the folder cannot be made or written to, belongs to another run, or an obstacle is at the path of a result.
     pub fn open(folder: &Path) -> Result<(Self, Option<PathBuf>), OutputError> {
         let output = Self { folder: folder.to_owned(), _lock: FolderLock::take(folder)? };
         for name in RESULTS {
@@ -49,7 +48,7 @@ impl OutputFolder {
         Ok((output, kept))
     }
 
-    /// Where the result `name` grows.
+    /// Path at which the result `name` is written until it is complete.
     pub fn partial(&self, name: &str) -> PathBuf {
         partial(&self.folder.join(name))
     }
@@ -64,7 +63,7 @@ impl OutputFolder {
         fs::write(&path, bytes).map_err(OutputError::of(&path, "cannot be written"))
     }
 
-    /// Removes what there is of a result that could not be written.
+    /// Removes the parts of a result that could not be written.
     ///
     /// # Errors
     /// When it cannot be removed.
@@ -72,7 +71,7 @@ impl OutputFolder {
         remove(&self.partial(name))
     }
 
-    /// The error that names the folder, where somebody has removed it meanwhile.
+    /// Error that names the folder, if it was removed during the run.
     #[must_use]
     pub fn is_gone(&self) -> Option<OutputError> {
         let problem = "the output folder was removed while the run was going on";
@@ -100,7 +99,7 @@ impl OutputFolder {
         make_folder(folder)?;
         let has: Vec<bool> = RESULTS.iter().map(|name| self.partial(name).is_file()).collect();
         for (name, _) in RESULTS.iter().zip(&has).filter(|(_, has)| **has) {
-            // On disk before it takes a name that promises so.
+            // The data must be on disk before the file takes a name that promises so.
             let path = self.partial(name);
             File::open(&path)
                 .and_then(|file| file.sync_all())
@@ -117,12 +116,13 @@ impl OutputFolder {
     /// Removes all that this run wrote.
     pub fn discard(&self) {
         for name in RESULTS {
-            // Nothing of value is in them; if they cannot be removed they do no harm.
+            // The files have no value; if they cannot be removed they do no harm.
             let _ = fs::remove_file(self.partial(name));
         }
     }
 
-    /// Moves unfinished recordings to names of their own and removes unfinished results; gives the belief's recordings.
+    /// Moves unfinished recordings to names of their own and removes unfinished results; returns the new path of the
+    /// run's recording.
     ///
     /// # Errors
     /// When a file cannot be renamed or removed.
@@ -153,7 +153,7 @@ impl OutputFolder {
     }
 }
 
-/// A recording with any reading of the arm, or one that cannot be read and might hold some.
+/// True for a recording with any reading of the arm, and for one that cannot be read and might hold some.
 fn is_worth_keeping(path: &Path) -> bool {
     let mut readings = 0_u64;
     match for_each_raw(path, |message| readings += u64::from(message.topic() == topics::JOINT_SENSORS)) {
@@ -202,7 +202,7 @@ mod tests {
         fs::write(dir.path().join("truth.mcap.partial"), "").unwrap();
         drop(OutputFolder::open(dir.path()).unwrap().0);
         assert_eq!(names(dir.path()).len(), 4);
-        // What cannot be read might be worth something.
+        // An unreadable file might be valuable.
         fs::write(dir.path().join("run.mcap.partial"), "scribble").unwrap();
         drop(OutputFolder::open(dir.path()).unwrap().0);
         assert_eq!(fs::read(dir.path().join("run-cut-3.mcap")).unwrap(), b"scribble");
@@ -219,7 +219,7 @@ mod tests {
         assert!(names(dir.path()).is_empty());
     }
 
-    /// The lock of the first is taken away under the second while it waits between opening and locking.
+    /// The lock file of the first is removed under the second while it waits between opening and locking.
     #[test]
     fn locks_hold_while_many_come_and_go() {
         let dir = tempfile::tempdir().unwrap();
@@ -230,7 +230,7 @@ mod tests {
         std::thread::scope(|scope| {
             for _ in 0..4 {
                 scope.spawn(|| {
-                    // A lock that stays behind would keep everyone out.
+                    // A lock that stayed would keep all others out.
                     for _ in 0..1_000_000 {
                         if entered.load(SeqCst) >= ENTRIES {
                             break;
@@ -266,7 +266,7 @@ mod tests {
         assert_eq!(fs::read(dir.path().join("summary.json")).unwrap(), b"new");
     }
 
-    /// Wherever putting in place breaks off, no summary stands beside a mixture.
+    /// A commit interrupted at any point leaves no summary next to a mixture of files.
     #[test]
     fn a_broken_commit_leaves_no_summary() {
         for blocked in ["truth.mcap", "report.html", "run.mcap"] {

@@ -1,4 +1,4 @@
-//! A folder that one command at a time writes to.
+//! A lock on a folder, so that one command at a time writes to it.
 
 use std::fs::{self, File, TryLockError};
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use crate::output::{OutputError, make_folder, refuse_link};
 
 const LOCK: &str = "armcal.lock";
 
-/// Keeps others out of a folder as long as the value lives; the system gives the lock back however the program ends.
+/// Lock that keeps others out of a folder while the value lives; the system releases it however the program ends.
 #[derive(Debug)]
 pub(crate) struct FolderLock {
     folder: PathBuf,
@@ -16,10 +16,10 @@ pub(crate) struct FolderLock {
 }
 
 impl FolderLock {
-    /// Makes the folder, if need be, and keeps others out of it.
+    /// Makes the folder, if necessary, and locks it.
     ///
     /// # Errors
-    /// When the folder cannot be made or written to, or somebody else is writing into it.
+    /// When the folder cannot be made or written to, or another process is writing into it.
     pub fn take(folder: &Path) -> Result<Self, OutputError> {
         let is_new = !folder.exists();
         make_folder(folder)?;
@@ -32,11 +32,11 @@ impl FolderLock {
 impl Drop for FolderLock {
     fn drop(&mut self) {
         if self.file.is_some() {
-            // Removed while it is held: whoever opens it after this makes a new one.
+            // The file is removed while the lock is held: a process that opens it later makes a new one.
             let _ = fs::remove_file(self.folder.join(LOCK));
         }
         if self.is_new {
-            // Only if nothing is in it.
+            // This succeeds only if the folder is empty.
             let _ = fs::remove_dir(&self.folder);
         }
     }
@@ -57,20 +57,20 @@ fn lock(folder: &Path) -> Result<File, OutputError> {
                 let problem = "another run or calibration is writing into this folder; choose another with --out";
                 return Err(OutputError::new(folder, problem));
             }
-            // A file system without locks keeps nobody out, but it can hold a run.
+            // A file system without locks cannot lock the folder, but it can hold a run.
             Err(TryLockError::Error(error)) if error.kind() != std::io::ErrorKind::Unsupported => {
                 return Err(OutputError::of(&path, "cannot be locked")(error));
             }
             _ => {}
         }
-        // The run before may have removed the file between our opening and locking it.
+        // The previous run may have removed the file between our opening and locking it.
         if is_at(&file, &path) {
             return Ok(file);
         }
     }
 }
 
-/// Whether the open file is still the one that has this name.
+/// True if the open file is still the one at `path`.
 #[cfg(unix)]
 pub(crate) fn is_at(file: &File, path: &Path) -> bool {
     use std::os::unix::fs::MetadataExt;

@@ -1,4 +1,4 @@
-//! Files that replace others only once they are whole, and the folder of a run.
+//! Files that replace others only once they are complete, and the folder of a run.
 
 mod accepted;
 mod beside;

@@ -1,4 +1,4 @@
-//! The paper's methods as the estimator calls them.
+//! The paper's methods in the form that the estimator calls.
 
 use armcal_belief::calib::{CalibrationMethod, CommonErrors, ParameterCovariance, PositionProblem, PositionSolution};
 use armcal_belief::model::{JointParameters, Parameter};
@@ -9,7 +9,7 @@ use crate::minimum_variance::{determined_by_variance, variance_covariance};
 use crate::position_method::PositionMethod;
 use crate::search::SearchOptions;
 
-/// How a calibration by `method` is made.
+/// Returns the calibration method that solves by `method`.
 #[must_use]
 pub fn calibration_method(method: Method) -> CalibrationMethod {
     match method {

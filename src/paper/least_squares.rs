@@ -1,4 +1,4 @@
-//! Least squares on landmark positions: what isotropic Gaussian noise asks for, and the reference for the paper's
+//! Least squares on landmark positions: the optimum for isotropic Gaussian noise, and the reference for the paper's
 //! methods.
 //!
 //! Levenberg-Marquardt in prior-scaled parameters (no prior enters), with the analytic Jacobians of
@@ -12,10 +12,10 @@ use armcal_belief::model::{JointParameters, Parameter};
 use armcal_core::numeric::{Damping, LeastSquares, Proposal, StopRule, minimize};
 
 const DAMPING: Damping = Damping { first: 1e-6, min: 1e-15, max: 1e12, down: 0.1, up: 10.0, min_after_rejection: 0.0 };
-/// A step of this length in prior sigma is the end.
+/// Stop rule: the solver ends at a step of this length in prior sigma.
 const STOP: StopRule = StopRule { step_length: 1e-9, ..StopRule::after(200) };
 
-/// Sum of squared distances between seen and surveyed landmarks, m^2.
+/// Sum of squared distances between observed and surveyed landmarks, m^2.
 pub(crate) fn sum_of_squares_m2(problem: &PositionProblem<'_>, at: &JointParameters) -> f64 {
     let mut sum = 0.0;
     problem.each(at, |o| sum += o.residual_m.norm_squared());

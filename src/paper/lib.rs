@@ -1,8 +1,8 @@
-//! The methods that the paper names: positions of landmarks in, gain and offset of each joint out.
+//! The methods that the paper names: they estimate gain and offset of each joint from positions of landmarks.
 //!
-//! `minimum_distance` and `minimum_variance` are the paper's equations, `search` how both are minimized: BOBYQA in a
-//! box, from one start or several. `least_squares` is the reference that Gaussian noise asks for. Their interface is
-//! [`PositionMethod::solve`]; [`calibration_method`] gives them to the estimator. `study` is the paper's study again.
+//! `minimum_distance` and `minimum_variance` are the paper's equations; `search` minimizes both by BOBYQA in a box,
+//! from one start or several. `least_squares` is the reference for Gaussian noise. Their interface is
+//! [`PositionMethod::solve`]; [`calibration_method`] gives them to the estimator. `study` repeats the paper's study.
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 

@@ -1,4 +1,4 @@
-//! The paper's proposed method: least sum of distances between seen and surveyed landmarks, over all landmarks, by
+//! The paper's proposed method: least sum of distances between observed and surveyed landmarks, over all landmarks, by
 //! BOBYQA.
 
 use crate::position_method::PositionMethod;

@@ -1,11 +1,11 @@
-//! The paper's first method, after Kim et al. (2010): the same landmark, seen from many poses, must lie in one place.
+//! The paper's first method, after Kim et al. (2010): one landmark, seen from many poses, must have one position.
 //!
-//! Objective: `sum_j tr(C_j)`, `C_j` the covariance (divisor m - 1) of the m positions of landmark j in the base frame,
-//! over the landmarks seen at least twice. No map is needed, and so the objective knows nothing of what turns all
-//! positions together: an offset of the first joint (of the last, where the arm carries the landmarks and they are in
-//! its hand's frame) turns them about its axis and changes no distance between any two of them. That is no weak
-//! direction but an exact freedom of gauge, which noise has nothing to do with. The offset is held,
-//! and so is everything else that the views leave without any effect.
+//! Objective: `sum_j tr(C_j)`, over the landmarks seen at least twice. `C_j` is the covariance (divisor m - 1) of the m
+//! positions of landmark j in the base frame. It needs no map, so motions that turn all positions together do not
+//! change it. An offset of the first joint turns them about its axis and changes no distance between any two of them.
+//! Where the arm carries the landmarks and they are in its hand's frame, that is the last joint. This is an exact gauge
+//! freedom, not a weak direction, and noise does not affect it. The offset is held, and so are all parameters that the
+//! views leave without any effect.
 
 use crate::constants::minimum_variance::{NULL_SHARE, PART_OF_NULL};
 use nalgebra::{Const, DMatrix, DVector, Dyn, OMatrix, Vector3};
@@ -16,10 +16,10 @@ use armcal_belief::calib::{PositionProblem, TagResidual};
 use armcal_belief::model::{JointParameters, Parameter, ParameterKind};
 use armcal_core::robot::Robot;
 
-/// What becomes of the first joint's offset under minimum variance.
+/// Treatment of the first joint's offset under minimum variance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Gauge {
-    /// Searched for like the others; it ends anywhere.
+    /// Estimated like the others; its result is arbitrary.
     Free,
     /// Held at the guess.
     Fixed,
@@ -54,7 +54,7 @@ impl Cloud {
     }
 }
 
-/// The objective, with its memory.
+/// The objective, with its working memory.
 #[derive(Clone, Debug)]
 pub struct VarianceObjective<'a> {
     problem: &'a PositionProblem<'a>,
@@ -79,11 +79,11 @@ impl<'a> VarianceObjective<'a> {
 
 /// Square roots of the objective's terms, `(z_ij - mean_j) / sqrt(m_j - 1)`, and their derivatives.
 struct Centered {
-    /// Of each observation: its view.
+    /// View of each observation.
     view_idx: Vec<usize>,
     residuals: DVector<f64>,
     by_parameters: DMatrix<f64>,
-    /// By the camera's mount: translation m, rotation rad, on the right.
+    /// Derivatives by the camera's mount: translation m, rotation rad, on the right.
     by_mount: DMatrix<f64>,
 }
 
@@ -92,7 +92,7 @@ impl Centered {
         let (n, rows) = (columns.len(), 3 * problem.n_observations());
         let mut tags = Vec::with_capacity(rows / 3);
         let mut view_idx = Vec::with_capacity(rows / 3);
-        // Position, derivatives by parameters, derivatives by the mount.
+        // Columns: position, derivatives by parameters, derivatives by the mount.
         let mut all = DMatrix::zeros(rows, 1 + n + 6);
         problem.each(at, |o| {
             fill(problem, columns, o, &mut all, 3 * tags.len());
@@ -123,7 +123,8 @@ fn fill(problem: &PositionProblem<'_>, columns: &[Parameter], o: &TagResidual<'_
     all.fixed_view_mut::<3, 3>(row, 4 + n).copy_from(&by_rotation);
 }
 
-/// Takes the mean over one landmark's observations from each, divided by `sqrt(m - 1)`; zero where it was seen once.
+/// Subtracts the mean over one landmark's observations from each, and divides by `sqrt(m - 1)`; zero for a single
+/// observation.
 fn center(all: &mut DMatrix<f64>, observations: &[usize]) {
     let m = observations.len() as f64;
     let weight = if observations.len() < 2 { 0.0 } else { (m - 1.0).sqrt().recip() };
@@ -145,7 +146,8 @@ fn gauge_joint(robot: &Robot) -> usize {
     if robot.is_watched() { robot.tag_frame.n_joints - 1 } else { 0 }
 }
 
-/// Of `free`, what minimum variance can determine, and what it is exactly blind to; linearized at `guess`.
+/// Parameters of `free` that minimum variance can determine, and those to which it is exactly blind; linearized at
+/// `guess`.
 #[must_use]
 pub fn determined_by_variance(
     problem: &PositionProblem<'_>,
@@ -174,7 +176,7 @@ pub fn determined_by_variance(
     (left, blind)
 }
 
-/// The parameter with the largest part in the directions that change nothing.
+/// The parameter with the largest part in the directions that do not change the objective.
 fn largest_in_null_space(problem: &PositionProblem<'_>, free: &[Parameter], guess: &JointParameters) -> Option<usize> {
     if free.is_empty() {
         return None;
@@ -194,9 +196,9 @@ fn largest_in_null_space(problem: &PositionProblem<'_>, free: &[Parameter], gues
     (share > PART_OF_NULL).then_some(worst)
 }
 
-/// Covariance of what minimum variance determined, as the sandwich `A^-1 B A^-1` over views, and d(parameter)/d(mount),
-/// six columns; see [`ParameterCovariance::estimate`], whose objective is the other. The landmarks' means are
-/// eliminated, so that no survey enters; the mount's error does. What is held keeps its prior.
+/// Covariance of the parameters that minimum variance determined, as the sandwich `A^-1 B A^-1` over views, and
+/// d(parameter)/d(mount), six columns. See [`ParameterCovariance::estimate`] for the other objective. The landmarks'
+/// means are marginalised, so no survey enters; the mount's error does. Held parameters keep their prior.
 #[must_use]
 pub fn variance_covariance(
     problem: &PositionProblem<'_>,

@@ -1,4 +1,4 @@
-//! The interface of the paper's methods: which equation, and what its solver found.
+//! The interface of the paper's methods: the choice of equation, and the solver's result.
 
 use crate::least_squares::{least_squares, sum_of_squares_m2};
 use crate::minimum_variance::VarianceObjective;
@@ -19,7 +19,8 @@ pub enum PositionMethod {
 }
 
 impl PositionMethod {
-    /// Minimizes the method's objective over `free` (gains and offsets) from `guess`; all else stays there.
+    /// Minimizes the method's objective over `free` (gains and offsets) from `guess`; the other parameters keep their
+    /// value.
     #[must_use]
     pub fn solve(
         self,
@@ -31,7 +32,7 @@ impl PositionMethod {
         self.solve_watched(&PositionSearch { problem, free, guess, options }, &mut |_| {})
     }
 
-    /// The same, telling `watch` the objective of every evaluation in order.
+    /// Solves like [`Self::solve`], and passes the objective of every evaluation to `watch`, in order.
     #[must_use]
     pub fn solve_watched(self, search: &PositionSearch<'_>, watch: &mut dyn FnMut(f64)) -> Solution {
         let PositionSearch { problem, free, guess, .. } = *search;

@@ -1,8 +1,8 @@
 //! BOBYQA in a box about the datasheet: Powell (2009), port of PRIMA.
 //!
 //! Parameters are rescaled by their initial uncertainty (the paper's preconditioning), so that all need steps of about
-//! one; bounds keep them within what a sensor of that datasheet can be. Without it the search runs on the numbers of
-//! the paper's equation 1, `theta = k1 eta + k2`, as they are: rad per count and rad.
+//! one; bounds keep them within the range of a working sensor. Without it the search uses the numbers of the paper's
+//! equation 1, `theta = k1 eta + k2`, directly: rad per count and rad.
 
 use crate::constants::search::{BOUND_SIGMAS, ON_BOUND};
 use rand_chacha::ChaCha8Rng;
@@ -16,41 +16,41 @@ use armcal_core::robot::Robot;
 use armcal_core::sensor::wrap_symmetric;
 use armcal_core::stats::stream_rng;
 
-/// In which numbers the search moves.
+/// Units of the search's variables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scaling {
     /// Preconditioned: every parameter in units of its prior sigma.
     PriorSigma,
     /// `k1` in rad per count and `k2` in rad, the angle where the signed reading is zero. Radii of the trust region are
-    /// in units of the narrowest sigma, for no larger one fits into the box.
+    /// in units of the narrowest sigma, because no larger one fits into the box.
     Raw,
 }
 
-/// How many points BOBYQA's quadratic model goes through, for `n` parameters.
+/// Number of interpolation points of BOBYQA's quadratic model, for `n` parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interpolation {
     /// `2 n + 1`, as Powell advises.
     TwiceAndOne,
-    /// `n + 2`, the fewest; the paper's.
+    /// `n + 2`, the minimum, as in the paper.
     AndTwo,
 }
 
-/// How the box is searched.
+/// Settings of the search in the box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SearchOptions {
-    /// In which numbers the search moves.
+    /// Units of the search's variables.
     pub scaling: Scaling,
-    /// The first is the guess, the others are drawn from the prior; the lowest cost wins.
+    /// Number of starts: the first is the guess, the others are drawn from the prior; the lowest cost wins.
     pub n_starts: usize,
-    /// Of those draws.
+    /// Seed of the drawn starts.
     pub seed: u64,
-    /// First and last trust-region radius, in prior sigma.
+    /// First trust-region radius, in prior sigma.
     pub rho_begin: f64,
-    /// See `rho_begin`.
+    /// Last trust-region radius, in prior sigma.
     pub rho_end: f64,
-    /// Of each start.
+    /// Largest number of evaluations per start.
     pub max_evaluations: usize,
-    /// Points of the quadratic model.
+    /// Number of points of the quadratic model.
     pub interpolation: Interpolation,
 }
 
@@ -69,28 +69,28 @@ impl Default for SearchOptions {
 }
 
 impl SearchOptions {
-    /// What the paper's authors set, as far as a box allows: rho to 1e-6, n + 2 points, 10 000 evaluations. Their first
-    /// radius of 10 sigma is wider than the box; the largest that fits is 6.
+    /// The settings of the paper's authors, as far as a box allows: rho to 1e-6, n + 2 points, 10 000 evaluations.
+    /// Their first radius of 10 sigma is wider than the box; the largest that fits is 6.
     #[must_use]
     pub fn of_the_paper() -> Self {
         Self { rho_begin: BOUND_SIGMAS, rho_end: 1e-6, interpolation: Interpolation::AndTwo, ..Self::default() }
     }
 }
 
-/// What to search, and how.
+/// Problem and settings of a search.
 #[derive(Clone, Copy, Debug)]
 pub struct PositionSearch<'a> {
     /// Views and landmarks.
     pub problem: &'a PositionProblem<'a>,
-    /// Gains and offsets that are searched for; all else stays at `guess`.
+    /// Gains and offsets that are estimated; the other parameters keep the value in `guess`.
     pub free: &'a [Parameter],
     /// Start of the first search, and the middle of the box.
     pub guess: &'a JointParameters,
-    /// How the box is searched.
+    /// Settings of the search.
     pub options: &'a SearchOptions,
 }
 
-/// Minimizes `objective` over `free`. `watch` hears the objective of every evaluation.
+/// Minimizes `objective` over `free`. `watch` receives the objective of every evaluation.
 pub(crate) fn minimize(
     search: &PositionSearch<'_>,
     mut objective: impl FnMut(&JointParameters) -> f64,
@@ -132,7 +132,7 @@ pub(crate) fn minimize(
     Solution { evaluations, ..best.unwrap_or(nothing) }
 }
 
-/// The search's numbers: `x = 0` is the guess.
+/// Variables of the search: `x = 0` is the guess.
 struct Space<'a> {
     robot: &'a Robot,
     free: &'a [Parameter],
@@ -175,7 +175,7 @@ impl<'a> Space<'a> {
                             let gain_step = step * self.robot.sensors[joint].counts_per_rad;
                             parameters.gain[joint] += gain_step;
                             if is_free(self.free, joint, ParameterKind::Offset) {
-                                // k2 stays: the offset about the middle of the range does not.
+                                // k2 stays constant, so a gain step changes the offset about the middle of the range.
                                 parameters.offset_rad[joint] += gain_step * middle_rad(self.robot, joint);
                             }
                         }

@@ -1,4 +1,5 @@
-//! Known arms in, their sensors out: an arm, its landmarks and its readings made here, by forward kinematics alone.
+//! Tests on known arms: an arm, its landmarks and its readings come from forward kinematics only, and the methods must
+//! return its sensors.
 
 use std::path::Path;
 
@@ -73,7 +74,7 @@ fn views(robot: &Robot, truth: &JointParameters, n: u32, noise_m: f64, rng: &mut
     (0..n).map(view).collect()
 }
 
-/// Root mean square over random poses of the distance between the tool as believed and as it is, m.
+/// Distance between the estimated and the true tool, root mean square over random poses, m.
 fn tool_error_m(robot: &Robot, truth: &JointParameters, believed: &JointParameters, seed: u64) -> f64 {
     let mut rng = stream_rng(seed, "poses of the tool");
     let n = 200;
@@ -121,7 +122,7 @@ fn without_noise_every_method_finds_the_sensors() {
     assert!(worst_m[0] < 1e-5 && worst_m[1] < 1e-8 && worst_m[2] < 1e-5, "{worst_m:?}");
 }
 
-/// The objectives, from the paper's text and nothing else: `E[..]` with the divisor m - 1, and plain distances.
+/// The objectives as the paper's text defines them: `E[..]` with the divisor m - 1, and plain distances.
 #[test]
 fn objectives_are_the_papers_equations() {
     let robot = titan();
@@ -187,8 +188,8 @@ fn minimum_variance_is_exactly_blind_to_the_first_offset_and_to_nothing_else() {
     }
 }
 
-/// One joint that never moved: its gain is as good as an offset, and of the two one is left; the camera's one view of a
-/// landmark says nothing at all.
+/// One joint never moved: its gain is equivalent to an offset, and one of the two remains. A landmark in only one view
+/// adds no information.
 #[test]
 fn what_the_views_leave_without_effect_is_held_and_named() {
     let robot = titan();
@@ -208,7 +209,7 @@ fn what_the_views_leave_without_effect_is_held_and_named() {
     assert_eq!(names(&views[..1]).len(), 10);
 }
 
-/// The scatter over many draws is what the sandwich says: the mean squared normalised error of each parameter is 1.
+/// The scatter over many draws agrees with the sandwich: the mean squared normalised error of each parameter is 1.
 #[test]
 fn covariances_of_minimum_variance_are_those_of_many_draws() {
     let robot = titan();
@@ -252,7 +253,7 @@ fn several_starts_are_the_same_draws_each_time_and_never_worse() {
     assert_eq!((four.parameters, four.cost_final), (again.parameters, again.cost_final));
 }
 
-/// The search in raw numbers runs over the same sensors: `k1` in rad per count, `k2` at the reading zero.
+/// The search in raw numbers has the same sensors: `k1` in rad per count, `k2` at the reading zero.
 #[test]
 fn raw_units_reach_less_in_more_evaluations() {
     let robot = titan();

@@ -1,4 +1,4 @@
-//! The detector behind the reader of recordings.
+//! The tag detector that the reader of recordings uses.
 
 use armcal_core::input::{ImageDetector, ImageProblem, RecordedImage, TagCorners};
 use armcal_core::optics::{CameraModel, TagFamily};
@@ -10,7 +10,7 @@ use super::grey::grey;
 #[derive(Debug)]
 pub struct RecordedImageDetector {
     family: TagFamily,
-    /// By the camera's number; a detector is made for its first image: most recordings have none.
+    /// Lenses by the camera's number; a detector is made for a camera's first image, because most recordings have none.
     cameras: Vec<(CameraModel, Option<TagDetector>)>,
 }
 

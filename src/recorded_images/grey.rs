@@ -10,19 +10,20 @@ use image::{ImageFormat, ImageReader, Limits};
 
 /// Encodings of `sensor_msgs/msg/Image` that are read.
 const ENCODINGS: &str = "mono8, 8UC1, rgb8, bgr8, rgba8, bgra8 and bayer_*8";
-/// Bytes that decoding one picture may take: the largest that a lens has, in 16 bits of four channels.
+/// Largest memory for decoding one picture, bytes: the largest picture that a lens allows, in 16 bits of four channels.
 const MAX_DECODED_BYTES: u64 = 1 << 30;
-/// Pixels that every compressed image may have, and pixels of each byte beyond that. JPEGs of dark water have 30 a
+/// Number of pixels that every compressed image may have; `MAX_PIXELS_PER_BYTE` is the number per byte beyond that.
+/// JPEGs of dark water have 30 pixels per byte; the search for tags takes 13 bytes of memory for each pixel.
 /// byte; the search for tags takes 13 bytes of memory for each pixel.
 const ALWAYS_ALLOWED_PIXELS: u64 = 3_000_000;
 const MAX_PIXELS_PER_BYTE: u64 = 32;
 /// First bytes of a PNG; bytes of a chunk next to its data: length, name and checksum.
 const PNG_MAGIC_BYTES: usize = 8;
 const PNG_CHUNK_BYTES: usize = 12;
-/// Chunks that pixels come from. Texts and profiles may unpack to any size.
+/// PNG chunks that affect pixels. Texts and profiles may unpack to any size.
 const PNG_CHUNKS: [&[u8]; 5] = [b"IHDR", b"PLTE", b"tRNS", b"IDAT", b"IEND"];
 
-/// Grey values row by row, as many as the camera's resolution has pixels.
+/// Grey values row by row, one for each pixel of the camera's resolution.
 pub(super) fn grey(image: &RecordedImage, resolution_px: [u32; 2]) -> Result<Vec<u8>, ImageProblem> {
     match image {
         RecordedImage::Raw(image) => raw(image, resolution_px),
@@ -51,7 +52,7 @@ fn check_resolution(found: [u32; 2], wanted: [u32; 2]) -> Result<(), ImageProble
 /// The factor between two sizes of the same shape.
 fn factor(found: [u32; 2], wanted: [u32; 2]) -> Option<f64> {
     let [a, b]: [f64; 2] = std::array::from_fn(|k| f64::from(found[k]) / f64::from(wanted[k].max(1)));
-    // Rounded sizes differ by a pixel.
+    // Rounded sizes may differ by a pixel.
     let rounding = 1.0 / f64::from(wanted[0].min(wanted[1]).max(1));
     ((a - b).abs() <= rounding).then(|| (1e4 * a).round() / 1e4)
 }
@@ -59,7 +60,7 @@ fn factor(found: [u32; 2], wanted: [u32; 2]) -> Option<f64> {
 fn raw(image: &Image, resolution_px: [u32; 2]) -> Result<Vec<u8>, ImageProblem> {
     check_resolution([image.width, image.height], resolution_px)?;
     let (width, height, step) = (image.width as usize, image.height as usize, image.step as usize);
-    // Weights of the channels in 1/1000, as OpenCV's cvtColor has them.
+    // Weights of the channels in 1/1000, as in OpenCV's cvtColor.
     let (n_channels, weights): (usize, &[u32]) = match image.encoding.as_str() {
         "rgb8" | "8UC3" => (3, &[299, 587, 114]),
         "bgr8" => (3, &[114, 587, 299]),
@@ -82,8 +83,8 @@ fn raw(image: &Image, resolution_px: [u32; 2]) -> Result<Vec<u8>, ImageProblem> 
     Ok(if image.encoding.starts_with("bayer") { without_mosaic(&grey, width) } else { grey })
 }
 
-/// A Bayer mosaic as grey: the binomial mean over 3 x 3 pixels has each colour with the same weight at every place, one
-/// red, two green, one blue, and moves no edge. Rows and columns beyond the rim are those before it, mirrored.
+/// A Bayer mosaic as grey, by the binomial mean over 3 x 3 pixels. It has each colour with the same weight at every
+/// place, one red, two green, one blue, and moves no edge. Rows and columns beyond the edge are mirrored.
 fn without_mosaic(mosaic: &[u8], width: usize) -> Vec<u8> {
     let height = mosaic.len() / width;
     let mirrored = |at: isize, n: usize| {
@@ -110,7 +111,7 @@ fn without_mosaic(mosaic: &[u8], width: usize) -> Vec<u8> {
     (0..mosaic.len()).map(|k| mean(k % width, k / width)).collect()
 }
 
-/// The bytes say whether it is PNG or JPEG; `format` is written in many ways.
+/// Decodes a compressed image. Its bytes show whether it is PNG or JPEG, because `format` has many spellings.
 fn compressed(image: &CompressedImage, resolution_px: [u32; 2]) -> Result<Vec<u8>, ImageProblem> {
     let format = match image::guess_format(&image.data) {
         Ok(format @ (ImageFormat::Png | ImageFormat::Jpeg)) => format,
@@ -126,7 +127,7 @@ fn compressed(image: &CompressedImage, resolution_px: [u32; 2]) -> Result<Vec<u8
     let (width, height) = reader().into_dimensions().map_err(|_| ImageProblem::Damaged)?;
     check_resolution([width, height], resolution_px)?;
     check_compression([width, height], bytes.len())?;
-    // As the simulator's camera has it; else (RGB, CMYK) by its colours.
+    // Grey as the simulator's camera has it; else (RGB, CMYK) from the colours.
     if format == ImageFormat::Jpeg
         && let Ok(picture) = grey_of_jpeg(&bytes, resolution_px)
     {
@@ -140,7 +141,8 @@ fn compressed(image: &CompressedImage, resolution_px: [u32; 2]) -> Result<Vec<u8
     Ok(reader.decode().map_err(|_| ImageProblem::Damaged)?.into_luma8().into_raw())
 }
 
-/// A picture of nothing is as small: skipped like one that is damaged, it costs no tag.
+/// Rejects an image with too many pixels per byte. Only an image without content compresses so well, so skipping it
+/// costs no tag.
 fn check_compression([width, height]: [u32; 2], bytes: usize) -> Result<(), ImageProblem> {
     let allowed = (bytes as u64).saturating_mul(MAX_PIXELS_PER_BYTE).saturating_add(ALWAYS_ALLOWED_PIXELS);
     if u64::from(width) * u64::from(height) <= allowed { Ok(()) } else { Err(ImageProblem::TooFewBytes) }
@@ -168,7 +170,7 @@ mod tests {
     const SIZE: [u32; 2] = [6, 4];
 
     fn image(encoding: &str, n_channels: usize, fill: impl Fn(usize, usize) -> Vec<u8>) -> RecordedImage {
-        // Rows are padded, as some drivers do.
+        // Rows are padded, as by some drivers.
         let step = 6 * n_channels + 2;
         let row = |y: usize| (0..6).flat_map(|x| fill(x, y)).chain([7, 7]).collect::<Vec<u8>>();
         let data = (0..4).flat_map(row).collect();
@@ -191,7 +193,7 @@ mod tests {
 
     #[test]
     fn a_mosaic_of_one_colour_is_even_and_an_edge_stays_where_it_is() {
-        // Red 200, green 100, blue 40: a mean of (200 + 2 * 100 + 40) / 4.
+        // Red 200, green 100, blue 40: the mean is (200 + 2 * 100 + 40) / 4.
         let colour = |x: usize, y: usize| match (x % 2, y % 2) {
             (0, 0) => 200,
             (1, 1) => 40,
@@ -246,7 +248,7 @@ mod tests {
     #[test]
     fn an_image_of_more_pixels_than_its_bytes_hold_is_not_decoded() {
         let mut image = CompressedImage { data: flat_png(2000), ..CompressedImage::default() };
-        // Decoded it would be damaged.
+        // A truncated image would fail to decode.
         image.data.truncate(200);
         assert_eq!(compressed(&image, [2000; 2]), Err(ImageProblem::TooFewBytes));
     }
@@ -255,7 +257,7 @@ mod tests {
     fn chunks_without_pixels_are_not_read() {
         let whole = flat_png(6);
         let head = PNG_MAGIC_BYTES + PNG_CHUNK_BYTES + 13;
-        // Neither the checksum nor the data of these would pass.
+        // Neither the checksum nor the data of these chunks would pass.
         let chunks = [b"iCCP", b"zTXt", b"iTXt", b"eXIf"].map(|name| [&[0, 0, 0, 3], &name[..], &[9; 7]].concat());
         let data = [&whole[..head], &chunks.concat(), &whole[head..]].concat();
         assert_eq!(png_pixels(&data), whole);

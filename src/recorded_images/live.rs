@@ -1,4 +1,4 @@
-//! The detector behind the images of a live camera.
+//! The tag detector for the images of a live camera.
 
 use armcal_core::input::{ImageProblem, RecordedImage};
 use armcal_core::log::ros::CompressedImage;
@@ -14,7 +14,7 @@ use super::grey::grey;
 pub struct LiveTagFinder {
     lens: CameraModel,
     family: TagFamily,
-    /// Made for the first image.
+    /// Detector, made for the first image.
     detector: Option<TagDetector>,
 }
 

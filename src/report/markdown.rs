@@ -1,4 +1,4 @@
-//! The same figures as Markdown, for the replay's summary panel, which is narrow.
+//! A summary as Markdown, for the replay's summary panel, which is narrow.
 
 use crate::report::summary::RunSummary;
 use crate::report::table::{check_lines, labelled, score_rows};
@@ -16,7 +16,7 @@ pub fn markdown(summary: &RunSummary) -> String {
         }
         text.push('\n');
     }
-    // The first of them is the verdict.
+    // The first check line is the verdict, which is already in the text.
     for line in check_lines(summary).iter().skip(1).filter(|line| !line.starts_with("time ")) {
         let (label, rest) = labelled(line);
         text.push_str(&format!("- **{label}** {rest}\n"));
@@ -24,7 +24,7 @@ pub fn markdown(summary: &RunSummary) -> String {
     text
 }
 
-/// As the kind of quotation that the viewer draws in green, amber or red.
+/// Markdown quotation of the kind that the viewer draws in green, amber or red, by the verdict's grade.
 fn colored(Verdict { grade, headline, reasons, next, .. }: &Verdict) -> String {
     let kind = match grade {
         Grade::Green => "TIP",

@@ -1,10 +1,10 @@
-//! What people and programs get to see; computes nothing new.
+//! Reports for people and programs; computes nothing new.
 //!
 //! `RunSummary` is summary.json; `table` the closing table on the terminal; `html` report.html, one file that needs no
 //! network. `markdown` the replay's panel.
-//! All show the same figures. `inspection` is what a recording holds and what could be calibrated from it,
-//! `proposed_map` an input map for it, `pose_table` both for tables of poses.
-//! `verdict` is how a result is judged, in words. `tag_map` is a tag map as table and page.
+//! All show the same figures. `inspection` describes a recording's contents and what could be calibrated from it.
+//! `proposed_map` proposes an input map for it, `pose_table` does both for tables of poses. `verdict` puts the
+//! judgement of a result in words. `tag_map` shows a tag map as table and page.
 
 mod html;
 pub mod inspection;

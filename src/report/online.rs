@@ -1,4 +1,4 @@
-//! The online belief: its lines of the table, and its curve over time in report.html.
+//! The online estimate: its lines of the table, and its curve over time in report.html.
 
 use maud::{Markup, html as markup};
 
@@ -7,11 +7,11 @@ use armcal_belief::calib::online::{BeliefLog, BeliefRow};
 use armcal_core::stats::quantile;
 use armcal_core::units::Unit;
 
-/// Of the curve, in its own units.
+/// Width of the curve's picture, in its own units.
 const WIDTH: f64 = 640.0;
 const HEIGHT: f64 = 180.0;
 const LEFT: f64 = 60.0;
-/// The scale ends here at most: a joint whose sensor failed leaves the tool unknown for a while, m.
+/// Upper limit of the error scale, m: a joint whose sensor failed leaves the tool unknown for a while.
 const TOP_M: f64 = 0.02;
 
 /// Lines of the closing table.
@@ -47,7 +47,7 @@ pub(super) fn online_lines(summary: &RunSummary) -> Vec<String> {
     lines
 }
 
-/// The curve over time; nothing without beliefs.
+/// Curve of the tool error over time; empty if the log holds no online estimate.
 pub(super) fn online_section(log: &BeliefLog, summary: &RunSummary) -> Markup {
     let rows: Vec<&BeliefRow> = log.beliefs().collect();
     let (Some(first), Some(last)) = (rows.first(), rows.last()) else { return Markup::default() };

@@ -1,7 +1,7 @@
-//! Tables of poses before an input map says what their columns are: what `inspect` prints of them, and a proposed map.
+//! Tables of poses that have no input map yet: their description by `inspect`, and a proposed map.
 //!
-//! `roles` takes each column's meaning from its name, `winding` the order of corners from the cells, `pair` finds what
-//! joins a table of the joints and one of the tags. `text` is what is printed, `proposal` the map.
+//! `roles` takes each column's meaning from its name, `winding` the order of corners from the cells. `pair` finds the
+//! columns that join a table of the joints and one of the tags. `text` is the printed description, `proposal` the map.
 
 mod pair;
 mod proposal;

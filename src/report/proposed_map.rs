@@ -1,5 +1,5 @@
-//! A proposed input map: which topics of a recording are joint readings, tags and slow sensors, with comments on what
-//! was chosen and what else is there.
+//! A proposed input map: the topics of a recording that hold joint readings, tags and slow sensors. Comments in it give
+//! the reason of each choice and the alternatives.
 
 use armcal_core::codes::{Code, Coded};
 use std::path::Path;
@@ -18,11 +18,11 @@ use contents::{Contents, Kind};
 use joints::choose_joints;
 use tags::choose_tags;
 
-/// Topics that `[tags]` may name.
+/// Message types of topics that `[tags]` may name.
 const TAG_TYPES: &str = "tags (tf2_msgs/msg/TFMessage, AprilTagDetectionArray of apriltag_msgs or \
     isaac_ros_apriltag_interfaces, sensor_msgs images)";
 
-/// Why no input map can be proposed.
+/// Reason that no input map can be proposed.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum ProposalError {
@@ -75,7 +75,7 @@ pub fn propose_input_map(recording: &Path, robot: Option<&Robot>) -> Result<Stri
     Ok(text)
 }
 
-/// Lines about clocks that differ: above the tables, and in `[tags]`.
+/// Comment lines about clocks that differ: above the tables, and in `[tags]`.
 fn clocks(contents: &Contents, joint_topic: &str, tag_topic: &str) -> (String, String) {
     let times = |name: &str| contents.topics.get(name).map(|topic| topic.times(name));
     let doubt = times(joint_topic)
@@ -90,7 +90,7 @@ fn clocks(contents: &Contents, joint_topic: &str, tag_topic: &str) -> (String, S
     }
 }
 
-/// The slow sensors. A thermometer that is not called after oil may measure anything, so it is only named.
+/// Lines of the slow sensors. A thermometer without "oil" in its name may measure anything, so it is only named.
 fn conditions(contents: &Contents) -> String {
     let temperatures: Vec<&String> = contents.of_kind(Kind::Temperature).map(|(topic, _)| topic).collect();
     let pressures: Vec<&String> = contents.of_kind(Kind::Pressure).map(|(topic, _)| topic).collect();
@@ -103,7 +103,7 @@ fn conditions(contents: &Contents) -> String {
     let mut text = "\n[conditions]\n".to_owned();
     text += &line("oil_temperature", oil, "sensor_msgs/msg/Temperature, deg C");
     text += &line("pressure", pressures.first().copied(), "sensor_msgs/msg/FluidPressure, Pa");
-    // Where it sits, and how it is turned, no recording tells: one on a link of the arm would do harm.
+    // No recording gives the sensor's link and rotation, and a wrong mount on a link of the arm would do harm.
     if let Some(attitude) = attitudes.first() {
         text += &format!(
             "# attitude = {}   # sensor_msgs/msg/Imu, if it sits on what carries the arm\n\
@@ -121,7 +121,7 @@ fn line(key: &str, topic: Option<&String>, what: &str) -> String {
     topic.map_or_else(String::new, |topic| format!("{key} = {}   # {what}\n", quoted(topic)))
 }
 
-/// A comment that names what else might have been chosen.
+/// A comment that names the alternatives to a choice.
 fn others<'a>(what: &str, names: impl Iterator<Item = &'a String>) -> String {
     const MOST: usize = 12;
     let names: Vec<&String> = names.collect();
@@ -133,12 +133,12 @@ fn others<'a>(what: &str, names: impl Iterator<Item = &'a String>) -> String {
     format!("# {what}: {}{more}\n", told.join(", "))
 }
 
-/// As TOML writes a text.
+/// The text as a quoted TOML string.
 pub(in crate::report) fn quoted(text: &str) -> String {
     toml::Value::String(text.to_owned()).to_string()
 }
 
-/// One line without control characters.
+/// The text in one line without control characters.
 pub(in crate::report) fn comment(text: &str) -> String {
     printable(text).replace(['\n', '\r', '\t'], " ")
 }

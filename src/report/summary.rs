@@ -29,46 +29,46 @@ pub struct RunSummary {
     pub seed: Option<u64>,
     pub method: String,
     pub status: Status,
-    /// May the result be used, and by what rule; filled in once the summary is whole.
+    /// Decision on the use of the result, and its rule; filled in once the summary is complete.
     #[serde(default)]
     pub verdict: VerdictSummary,
     /// Radius that contains the tool error with 95 % probability, m.
     #[serde(default)]
     pub u95_m: U95Summary,
-    /// All reasons in words.
+    /// All reasons of the refusal in words.
     pub refusal: Option<String>,
-    /// The same as data, the most telling first.
+    /// The reasons of the refusal as data, the most telling first.
     #[serde(default, skip_serializing_if = "Vec::is_empty", with = "armcal_belief::calib::refusals_in_files")]
     pub refusals: Vec<Refusal>,
-    /// By the arm's clock, first to last step.
+    /// Duration from the first step to the last by the arm's clock, s.
     pub simulated_s: Option<f64>,
-    /// Of that, the time in which the arm was on its way.
+    /// Part of `simulated_s` in which the arm moved, s.
     pub motion_s: Option<f64>,
-    /// And in which the script only waited.
+    /// Part of `simulated_s` in which the script only waited, s.
     pub waited_s: Option<f64>,
     pub wall_s: f64,
-    /// Why the script ended before its last step.
+    /// Reason that the script ended before its last step.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stopped: Option<String>,
-    /// Joints that were given up on the way, in the order of time.
+    /// Joints that were abandoned during the run, in the order of time.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub held_joints: Vec<HeldJointSummary>,
-    /// What they leave within reach.
+    /// Targets that remain reachable with the held joints.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub still_reachable: Option<StillReachable>,
-    /// Of a simulated arm.
+    /// Simulation settings; absent for a real arm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub world: Option<WorldSummary>,
     pub capture: CaptureSummary,
     pub calibration: CalibrationSummary,
     pub held_out: HeldOutSummary,
-    /// From truth; absent for a real recording.
+    /// Errors from the simulator's truth; absent for a real recording.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub score: Option<Score>,
-    /// The script's `assert` steps.
+    /// Limits of the script's `assert` steps.
     #[serde(default)]
     pub asserts: Vec<AssertSummary>,
-    /// Of `work` steps that follow the online belief.
+    /// Online estimate during `work` steps that follow it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub online: Option<OnlineSummary>,
 }
@@ -81,9 +81,9 @@ pub struct VerdictSummary {
     /// Reasons of the grade, the most telling first.
     pub codes: Vec<Code>,
     pub rule: String,
-    /// `None` without a task.
+    /// Tolerance of the task for the tool error, m; `None` without a task.
     pub tolerance_m: Option<f64>,
-    /// Largest probability over the targets.
+    /// Largest probability over the targets that the tool error exceeds the tolerance.
     pub p_beyond_tolerance: Option<f64>,
     /// Unobservable parameters that U95 includes by their stated sigmas.
     pub conditions: Vec<Condition>,
@@ -92,45 +92,45 @@ pub struct VerdictSummary {
 /// Stated sigma that the result depends on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Condition {
-    /// Kind of the element, or `not_included`.
+    /// Kind of the unobservable parameter, or `not_included`.
     pub code: Code,
     pub what: String,
-    /// One stated sigma, in `unit`.
+    /// Stated standard deviation, in `unit`.
     pub std: f64,
     pub unit: FindingUnit,
     /// Tool motion by one sigma, root mean square over the task, m.
     pub tool_error_m: f64,
-    /// U95 includes it.
+    /// True if U95 includes this parameter.
     pub included: bool,
 }
 
 /// U95 over the task.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct U95Summary {
-    /// Largest of the targets, or of the recorded configurations without a task; `None` where it is not known.
+    /// Largest U95 of the targets, m, or of the recorded configurations without a task; `None` if it is unknown.
     pub max: Option<f64>,
     pub targets: Vec<TargetU95>,
 }
 
-/// What was believed online at the end, and what happened until then; over time it is in belief.jsonl.
+/// The online estimate at the end, and the events until then; its values over time are in belief.jsonl.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct OnlineSummary {
-    /// Taken in.
+    /// Views that the estimate includes.
     pub views: usize,
-    /// Expected error of the tool over the task, one sigma in space: now.
+    /// Predicted tool error over the task at the end, one standard deviation in space, m.
     pub tool_error_m: Summary,
-    /// The same in an hour without any view.
+    /// Predicted tool error over the task one hour later without any further view, m.
     pub tool_error_in_an_hour_m: Summary,
-    /// Whether that of now is within the task's tolerance.
+    /// True if the predicted tool error at the end is within the task's tolerance.
     pub is_good_enough: Option<bool>,
-    /// What happened.
+    /// Events of the online estimate, in the order of time.
     pub events: Vec<OnlineEvent>,
-    /// Calibration poses that it asked for between tasks.
+    /// Calibration poses that the estimate requested between tasks.
     pub asked: Vec<AskedPoses>,
 }
 
 impl OnlineSummary {
-    /// `None` where there was no belief.
+    /// Summary of the last estimate; `None` if there was no online estimate.
     #[must_use]
     pub fn of(online: &OnlineOutcome) -> Option<Self> {
         let last = online.log.beliefs().last()?;
@@ -145,10 +145,10 @@ impl OnlineSummary {
     }
 }
 
-/// What simulated the arm.
+/// Simulation of the arm.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WorldSummary {
-    /// `featherstone` or `rapier`.
+    /// Physics engine: `featherstone` or `rapier`.
     pub engine: String,
 }
 
@@ -156,9 +156,9 @@ pub struct WorldSummary {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HeldJointSummary {
     pub joint: String,
-    /// What was seen of it.
+    /// Kind of failure that was observed.
     pub kind: FailedKind,
-    /// Where it was last believed to stand, and how far that may be off.
+    /// Last estimate of the joint angle, rad. `bound_rad` is the largest error that it may have, rad.
     pub angle_rad: f64,
     pub bound_rad: f64,
 }
@@ -168,7 +168,7 @@ pub struct CaptureSummary {
     pub poses: usize,
     pub poses_skipped: usize,
     pub targets_skipped: usize,
-    /// Which, and why.
+    /// The skipped targets with reasons.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub skipped_targets: Vec<SkippedTarget>,
     /// Views with tags that the fit used.
@@ -178,7 +178,7 @@ pub struct CaptureSummary {
     /// Single corners that the fit rejected; the others of their tags are in use.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rejected_corners: Option<usize>,
-    /// The same by reason.
+    /// Rejected observations by reason.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub rejected_by_reason: BTreeMap<String, usize>,
     /// Contacts of the arm with anything, from truth.
@@ -186,24 +186,24 @@ pub struct CaptureSummary {
     pub collisions: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub min_clearance_m: Option<f64>,
-    /// From truth: the links at the captured views, against the belief of that moment.
+    /// Errors of the links at the captured views against the estimate of that moment, from the simulator's truth.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub margins: Option<MarginSummary>,
-    /// Views after which belief and poses were renewed, with what was predicted then.
+    /// Views after which estimate and poses were updated, with the tool error predicted then.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub renewals: Vec<RenewalSummary>,
-    /// Why there were no more views.
+    /// Reason that the capture ended.
     #[serde(default, alias = "ended", skip_serializing_if = "Option::is_none")]
     pub stop_reason: Option<String>,
 }
 
-/// One renewal of the belief while views were captured.
+/// One update of the estimate while views were captured.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RenewalSummary {
     pub views: usize,
-    /// Since the capture began.
+    /// Time since the capture began, s.
     pub elapsed_s: f64,
-    /// Root mean square over the task.
+    /// Predicted tool error over the task, root mean square, m.
     pub predicted_tool_error_m: f64,
 }
 
@@ -212,63 +212,66 @@ pub struct CalibrationSummary {
     pub outcome: Outcome,
     pub evaluations: usize,
     pub wall_s: f64,
-    /// Absent where the recording has positions or poses of the tags and no corners.
+    /// Residual of the tags' corners, rms, px; absent where the recording has positions or poses of the tags and no
+    /// corners.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub residual_rms_px: Option<f64>,
-    /// Distance between seen and surveyed landmarks over the fitted views, m.
+    /// Distance between observed and surveyed landmarks over the fitted views, rms, m.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub residual_rms_m: Option<f64>,
     pub cost_initial: f64,
     pub cost_final: f64,
     pub unobservable: Vec<String>,
-    /// The joint whose gain changed most, of those that were estimated.
+    /// Largest change of an estimated gain, with its joint.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub largest_gain_change: Option<GainChange>,
-    /// One sigma; what people read is U95.
+    /// Predicted tool error over the task, one standard deviation, m; reports for people state U95.
     pub predicted_tool_error_m: Option<Summary>,
-    /// The same with what the drawing leaves open.
+    /// Predicted tool error over the task with the uncertainty of the nominal model included, one standard deviation,
+    /// m.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub predicted_tool_error_with_priors_m: Option<Summary>,
-    /// U95 and the decision by it, as calibration.toml has them; summary.json has them as `u95_m` and `verdict`.
+    /// U95 and the decision by it, as in calibration.toml; summary.json has them as `u95_m` and `verdict`.
     #[serde(skip)]
     pub u95: U95Table,
-    /// By the tag on the gripper, where the robot has one.
+    /// Camera mount as determined by the tag on the gripper, where the robot has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera_mount: Option<CameraMount>,
-    /// The further cameras whose mounts were estimated.
+    /// Further cameras whose mounts were estimated.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub further_camera: Vec<FurtherCamera>,
-    /// How much later the joint sensors' stamps are than the camera's, and one sigma, where moving joints tell it.
+    /// Delay of the joint sensors' stamps behind the camera's and its standard deviation, s; `None` where no joint
+    /// moved enough to determine it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time_offset_s: Option<[f64; 2]>,
-    /// What rests on priors alone, the largest at the tool first.
+    /// Parameters that only their priors determine, the largest at the tool first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub reservations: Vec<Reservation>,
-    /// What is other than robot.toml, survey and drawing say, the most telling first.
+    /// Deviations from robot.toml, survey and nominal model (URDF), the most telling first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub findings: Vec<Finding>,
-    /// Joints that failed, or whose sensors did.
+    /// Failed joints, and joints whose sensors failed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub failed_joint: Vec<FailedJointTable>,
-    /// What a warm calibration started from.
+    /// Earlier calibration that served as prior.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub prior: Option<PriorTable>,
-    /// Where no survey says where the tags are.
+    /// Estimated tag map, where no survey gives the tags' poses.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub map: Option<MapResult>,
-    /// Of `bundle`: what the data determine, before solving.
+    /// Parameters that the data determine, computed before solving; only for `bundle`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub observability: Option<ObservabilityTable>,
-    /// Of `bundle`: what the verdict rests on.
+    /// Figures that the verdict depends on; only for `bundle`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub verdict: Option<VerdictTable>,
 }
 
-/// A gain against its datasheet, both relative.
+/// Gain relative to its datasheet value; `change` and `std` are relative.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GainChange {
     pub joint: String,
-    /// Of either sign.
+    /// Gain over its datasheet value, less one; of either sign.
     pub change: f64,
     pub std: f64,
 }
@@ -288,23 +291,25 @@ impl GainChange {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HeldOutSummary {
     pub views: usize,
-    /// By cross-validation: each view was held out of one fold, and the answer is fitted to all of them.
+    /// True if the views are cross-validated: each view was held out of one fold, and the answer is fitted to all
+    /// views.
     #[serde(default, alias = "in_turn")]
     pub cross_validated: bool,
     pub rms_px: Option<f64>,
     pub rms_m: Option<f64>,
-    /// The mean of the same distances, where views were cross-validated.
+    /// Mean distance over the cross-validated views, m.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mean_m: Option<f64>,
-    /// Mean distance of the camera from where the landmarks' measured poses have it, where the recording has poses.
+    /// Mean distance of the camera from its position by the landmarks' measured poses, m; only where the recording has
+    /// poses.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera_mean_m: Option<f64>,
-    /// The same views with the datasheet's sensors.
+    /// Distance for the same views with the datasheet's sensors, rms, m.
     pub nominal_rms_m: Option<f64>,
-    /// The same by mount and map alone, and whether the calibration beats that.
+    /// Comparison with a baseline of mount and map only, and whether the calibration has the smaller distances.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub baseline: Option<BaselineComparison>,
-    /// Views within the 95 % regions of what they measured.
+    /// Count of the views within the 95 % regions of their measurements.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub within_95: Option<ViewContainment>,
 }
@@ -316,7 +321,7 @@ pub struct AssertSummary {
     pub step: usize,
     pub key: AssertFigure,
     pub limit: f64,
-    /// `None` when the script did not come to it, or there is no such figure.
+    /// Value of the figure; `None` if the script did not reach the step, or the figure does not exist.
     pub value: Option<f64>,
     pub holds: bool,
 }
@@ -351,7 +356,7 @@ impl CalibrationSummary {
 }
 
 impl RunSummary {
-    /// The part that a calibration alone can fill.
+    /// The part of the summary that a calibration can fill without a run.
     #[must_use]
     pub fn of_calibration(calibration: &Calibration, calibration_wall_s: f64) -> Self {
         Self {
@@ -408,14 +413,15 @@ impl RunSummary {
         }
     }
 
-    /// Accepted, every `assert` of the script holds, and what is believed online is good enough at the end.
+    /// True if the calibration is accepted, every `assert` of the script holds, and the online estimate is good enough
+    /// at the end.
     #[must_use]
     pub fn is_good(&self) -> bool {
         let is_known = self.online.as_ref().is_none_or(|online| online.is_good_enough != Some(false));
         self.status == Status::Accepted && self.asserts_hold() && is_known
     }
 
-    /// Whether every `assert` of the script holds.
+    /// True if every `assert` of the script holds.
     #[must_use]
     pub fn asserts_hold(&self) -> bool {
         self.asserts.iter().all(|limit| limit.holds)

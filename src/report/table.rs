@@ -17,7 +17,7 @@ use armcal_core::stats::Summary;
 use armcal_core::text::counted;
 use armcal_core::units::Unit;
 
-/// A table that a terminal of so many columns takes: words go to a further line.
+/// Fits a table to the given number of terminal columns; words that do not fit go to a further line.
 pub(crate) fn fit_columns(table: &mut Table, width: Option<usize>) {
     if let Some(width) = width.and_then(|width| u16::try_from(width).ok()) {
         table.set_content_arrangement(ContentArrangement::Dynamic).set_width(width);
@@ -37,21 +37,21 @@ pub fn table(summary: &RunSummary) -> String {
     text
 }
 
-/// Verdict, three figures, and what cannot wait: failed sensors, joints that were given up, limits of the script, the
-/// first warning.
+/// Verdict, three figures and the urgent lines: failed sensors, abandoned joints, limits of the script, the first
+/// warning.
 #[must_use]
 pub fn closing(summary: &RunSummary) -> String {
     let mut accuracy = accuracy_lines(summary).into_iter();
     let mut lines: Vec<String> = accuracy.by_ref().take(1).collect();
     lines.extend(summary.asserts.iter().map(assert_line));
     lines.extend(summary.stopped.iter().map(|why| format!("stopped      {why}")));
-    // The first line has the first of an accepted result.
+    // The first line already names the first failed joint of an accepted result.
     let n_told = if summary.status == Status::Accepted { 1 } else { 0 };
     lines.extend(summary.calibration.failed_joint.iter().skip(n_told).map(failed_line));
     lines.extend(summary.held_joints.iter().map(held_line));
     lines.extend(summary.still_reachable.iter().map(|still| format!("reachable    {still}")));
     lines.extend(score_line(summary));
-    // Of a real arm nobody knows the truth: the held-out views stand for it.
+    // The truth of a real arm is unknown: the held-out views stand for it.
     let n_figures = if summary.score.is_some() { 2 } else { 3 };
     let held_out = usize::from(summary.score.is_some());
     lines.extend(accuracy.skip(held_out).take(n_figures));
@@ -59,7 +59,7 @@ pub fn closing(summary: &RunSummary) -> String {
     lines.join("\n")
 }
 
-/// What the truth says of the targets.
+/// Tool error of the targets from the simulator's truth.
 fn score_line(summary: &RunSummary) -> Option<String> {
     let score = summary.score.as_ref()?;
     let median = |side: &ScoreSide| Unit::Metres.shown_if(side.tool_error_m.map(|error| error.median), 2);
@@ -75,8 +75,8 @@ fn score_line(summary: &RunSummary) -> Option<String> {
     })
 }
 
-/// The first warning, and how many more there are, if any says more than that what no view shows rests on the drawing:
-/// the figures with priors say so.
+/// The first warning and the number of all others. A warning that only names unobservable parameters is never the
+/// first: the figures with priors include those.
 fn first_warning(summary: &RunSummary) -> Option<String> {
     let warnings = &summary.calibration.verdict.as_ref()?.warnings;
     let is_known = |warning: &&Warning| warning.code == Code::LinksUnobservable;
@@ -87,7 +87,7 @@ fn first_warning(summary: &RunSummary) -> Option<String> {
     })
 }
 
-/// One line of the score: which statistic, which figure of it, and in what unit people read it.
+/// One line of the score: statistic, its value, and the unit for people.
 struct Figure {
     name: &'static str,
     pick: fn(&ScoreSide) -> Option<Summary>,
@@ -176,7 +176,7 @@ pub(super) fn labelled(line: &str) -> (&str, &str) {
     (label.trim_end(), text)
 }
 
-/// What the arm itself knows, and what was lost on the way; shared with the HTML report.
+/// Checks that need no truth, and losses during the run; shared with the HTML report.
 pub(super) fn check_lines(summary: &RunSummary) -> Vec<String> {
     let mut lines = accuracy_lines(summary);
     lines.extend(capture_lines(&summary.capture));
@@ -194,7 +194,7 @@ pub(super) fn check_lines(summary: &RunSummary) -> Vec<String> {
     lines
 }
 
-/// The verdict and the errors that it rests on.
+/// The verdict and the errors that it depends on.
 fn accuracy_lines(summary: &RunSummary) -> Vec<String> {
     let mut lines = vec![match (summary.status, &summary.refusal) {
         (Status::Accepted, _) => format!("calibration  ACCEPTED{}", repaired(summary)),
@@ -235,12 +235,12 @@ pub(super) fn u95_in_words(summary: &RunSummary) -> Option<String> {
     })
 }
 
-/// A small probability in percent; below what a normal distribution can promise it is only called small.
+/// A small probability in percent; below the accuracy of a normal distribution it is only called small.
 pub(super) fn risk_in_words(risk: f64) -> String {
     if risk < 1e-4 { "below 0.01 %".to_owned() } else { format!("at most {:.2} %", 100.0 * risk) }
 }
 
-/// What was found wrong and is taken as it is: the first of it, and what to do.
+/// Faults that the calibration corrects: the first one, and its remedy.
 fn repaired(summary: &RunSummary) -> String {
     let repairs = repairs(summary);
     let points = attention(summary);
@@ -256,13 +256,13 @@ fn repaired(summary: &RunSummary) -> String {
     format!(", repaired: {}; {} [{}]{more}", first.cause, first.remedy_and_result(), first.code)
 }
 
-/// The first of what else is wrong and may be the cause of a refusal.
+/// The first further fault that may be the cause of a refusal.
 fn beside(summary: &RunSummary) -> String {
     let first = beside_refusal(summary).into_iter().next();
     first.map_or_else(String::new, |repair| format!("; also: {}; {} [{}]", repair.cause, repair.remedy, repair.code))
 }
 
-/// How many views there were, what of them was left out, and why the capture ended.
+/// Number of views, counts of what was rejected, and the reason that the capture ended.
 fn capture_lines(capture: &CaptureSummary) -> Vec<String> {
     let mut lines = vec![format!(
         "captured     {} poses ({} skipped); {} tag observations in {} fitted views, {} rejected{}; {} targets skipped",
@@ -283,7 +283,7 @@ fn capture_lines(capture: &CaptureSummary) -> Vec<String> {
     lines
 }
 
-/// What was found beside joint angles.
+/// Results other than joint angles.
 fn calibration_lines(calibration: &CalibrationSummary) -> Vec<String> {
     let mut lines: Vec<String> = calibration.largest_gain_change.as_ref().map(gain_line).into_iter().collect();
     lines.extend(calibration.camera_mount.as_ref().map(mount_line));
@@ -302,7 +302,7 @@ fn contact_line(capture: &CaptureSummary) -> Option<String> {
     Some(format!("contacts     {collisions}; minimum clearance to vehicle, obstacles, seafloor: {clearance}"))
 }
 
-/// What the result does not hold for.
+/// Targets and ranges that the result does not hold for.
 fn coverage_lines(calibration: &CalibrationSummary) -> Vec<String> {
     let mut lines: Vec<String> =
         calibration.reservations.iter().map(|reservation| format!("reservation  {reservation}")).collect();
@@ -331,7 +331,7 @@ fn time_line(summary: &RunSummary) -> Option<String> {
     ))
 }
 
-/// Why the last capture ended, and what was predicted on its way.
+/// Reason that the last capture ended, and the tool errors predicted during it.
 fn stop_reason_line(why: &str, renewals: &[RenewalSummary]) -> String {
     let last = renewals.chunk_by(|before, after| before.views < after.views).last().unwrap_or_default();
     if last.is_empty() {
@@ -345,7 +345,7 @@ fn stop_reason_line(why: &str, renewals: &[RenewalSummary]) -> String {
     )
 }
 
-/// Below this, relative, a gain is that of an encoder: its scale is its line count.
+/// Relative change below which a gain counts as almost unchanged: that of an encoder, whose scale is its line count.
 const LITTLE: f64 = 0.005;
 
 fn gain_line(largest: &GainChange) -> String {
@@ -354,7 +354,7 @@ fn gain_line(largest: &GainChange) -> String {
     format!("gains        {how} {:+.2} % ({joint}), sigma {:.2} %", 100.0 * change, 100.0 * std)
 }
 
-/// Of how much later the joint sensors' stamps are than the camera's, and one sigma.
+/// Delay of the joint sensors' stamps behind the camera's and its standard deviation, both in s.
 fn clock_line([offset_s, std_s]: [f64; 2]) -> String {
     let which = if offset_s < 0.0 {
         "the camera's stamps are later than the joints'"
@@ -383,7 +383,7 @@ fn further_camera_line(camera: &FurtherCamera) -> String {
     format!("camera {name}: {}, mount {}", counted(*views, "view"), known_to(*position_std_m, *rotation_std_rad))
 }
 
-/// The axis that is known least: the others say nothing for it.
+/// Largest standard deviations of position and rotation, which bound those of the other axes.
 fn known_to(position_std_m: [f64; 3], rotation_std_rad: [f64; 3]) -> String {
     let worst = |v: [f64; 3]| v.into_iter().fold(0.0, f64::max);
     let (std_mm, std_deg) = (worst(position_std_m) * 1e3, worst(rotation_std_rad).to_degrees());
@@ -434,7 +434,7 @@ fn map_lines(map: &MapResult) -> Vec<String> {
     lines
 }
 
-/// Which targets errors before and after are compared over, where those are not all.
+/// The targets over which errors before and after are compared, where those are not all.
 fn compared_line(summary: &RunSummary) -> Option<String> {
     let score = summary.score.as_ref()?;
     let after = score.after.as_ref()?;

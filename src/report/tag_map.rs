@@ -1,4 +1,4 @@
-//! A tag map for people: its table on the terminal, and the same as a page with the tags drawn.
+//! A tag map for people: its table on the terminal, and a page with the same table and drawings of the tags.
 
 use armcal_charts::{Color, Panel, Style};
 use armcal_core::codes::Warning;
@@ -13,17 +13,17 @@ use armcal_core::text::counted;
 pub const TAG_COLUMNS: [&str; 11] =
     ["tag", "size mm", "x m", "y m", "z m", "std x mm", "std y mm", "std z mm", "std rot deg", "views", "rms px"];
 
-/// What the page says beside the map itself.
+/// Contents of the page in addition to the map itself.
 #[derive(Clone, Copy, Debug)]
 pub struct TagMapPage<'a> {
     pub map: &'a TagMap,
-    /// The recording.
+    /// Name of the recording.
     pub file: &'a str,
-    /// Which topic of which camera was read.
+    /// Topics that were read, with their cameras.
     pub sources: &'a [String],
-    /// What is wrong with data and map, a sentence each.
+    /// Faults of data and map, a sentence each.
     pub warnings: &'a [Warning],
-    /// Whether the map can be used as it is.
+    /// True if the map can be used as it is.
     pub is_sound: bool,
 }
 
@@ -32,7 +32,7 @@ fn tags_of(map: &TagMap, idx: usize) -> impl Iterator<Item = &MappedTag> {
     map.tags.iter().filter(move |tag| tag.group == idx)
 }
 
-/// A line a tag.
+/// Table rows of a group, one row per tag.
 #[must_use]
 pub fn tag_rows(map: &TagMap, group: usize) -> Vec<[String; TAG_COLUMNS.len()]> {
     let row = |tag: &MappedTag| {
@@ -56,7 +56,7 @@ pub fn tag_rows(map: &TagMap, group: usize) -> Vec<[String; TAG_COLUMNS.len()]> 
     tags_of(map, group).map(row).collect()
 }
 
-/// In which frame a group's tags are, how many they are, and how often they were seen.
+/// Frame of a group's tags, their number, and the number of their observations.
 #[must_use]
 pub fn group_title(group: &MapGroup) -> String {
     let frame = match &group.frame {
@@ -91,7 +91,7 @@ pub fn fit_lines(map: &TagMap, sources: &[String]) -> [(&'static str, String); 4
     ]
 }
 
-/// One file, no network.
+/// The page: one file that needs no network.
 #[must_use]
 pub fn tag_map_html(given: &TagMapPage<'_>) -> String {
     let map = given.map;
@@ -158,7 +158,7 @@ fn seen_along(map: &TagMap, group: usize, title: &str, names: [&str; 2], axes: [
     chart(&Panel { is_map: true, ..panel(title, &x, &y, shown) }, "")
 }
 
-/// The largest standard deviation of each tag's place.
+/// Chart of the largest standard deviation of each tag's position.
 fn deviations(map: &TagMap, group: usize) -> Markup {
     let point = |tag: &MappedTag| [f64::from(tag.id), 1e3 * tag.position_std_m().into_iter().fold(0.0, f64::max)];
     let shown = vec![series("", Color::Blue, Style::Dots, tags_of(map, group).map(point).collect())];

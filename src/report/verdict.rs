@@ -1,4 +1,4 @@
-//! May the result be used, why, and what to do next: the same words for report.html, the replay and the terminal.
+//! The verdict, its reasons and the next step: the same words for report.html, the replay and the terminal.
 
 use crate::report::summary::{Condition, RunSummary, VerdictSummary};
 use armcal_belief::calib::{FailedJointTable, PriorTable, Refusal, Reservation, Status, with_advice};
@@ -6,7 +6,7 @@ use armcal_belief::judge::RULE;
 use armcal_belief::say::{self, FailedJoint, Repair, sentence};
 use armcal_core::codes::{Code, Coded};
 
-/// How a verdict reads at a glance.
+/// Grade of a result, for a reader's first glance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Grade {
     Green,
@@ -15,7 +15,7 @@ pub(super) enum Grade {
 }
 
 impl Grade {
-    /// As summary.json has it.
+    /// Name of the grade in summary.json.
     pub fn name(self) -> &'static str {
         match self {
             Self::Green | Self::Amber => self.class(),
@@ -42,7 +42,7 @@ pub(super) struct Verdict {
     pub codes: Vec<Code>,
 }
 
-/// Of a run, or of a calibration alone.
+/// Verdict of a run, or of a calibration without a run.
 pub(super) fn verdict(summary: &RunSummary) -> Verdict {
     if summary.status == Status::Refused {
         let mut reasons: Vec<String> = summary.refusals.iter().map(|refusal| sentence(&refusal.cause())).collect();
@@ -80,7 +80,7 @@ pub(super) fn verdict(summary: &RunSummary) -> Verdict {
 }
 
 impl RunSummary {
-    /// States the verdict, once all else is known.
+    /// Fills in the verdict, once all other fields are known.
     #[must_use]
     pub fn judged(mut self) -> Self {
         let found = verdict(&self);
@@ -106,7 +106,7 @@ impl RunSummary {
     }
 }
 
-/// Of this result.
+/// Repairs that this result's findings and failed joints ask for.
 pub(super) fn repairs(summary: &RunSummary) -> Vec<Repair> {
     let calibration = &summary.calibration;
     let since = if calibration.prior.is_some() { " since the earlier calibration" } else { "" };
@@ -114,8 +114,7 @@ pub(super) fn repairs(summary: &RunSummary) -> Vec<Repair> {
     say::repairs(&calibration.findings, &failed, since)
 }
 
-/// What survey, lens and drawing have wrong, where a calibration is refused for its accuracy alone: the cause of that,
-/// as likely as not.
+/// Faults of survey, lens and nominal model, where accuracy is the only reason of a refusal. They are its likely cause.
 pub(super) fn beside_refusal(summary: &RunSummary) -> Vec<Repair> {
     let is_of_accuracy =
         |refusal: &Refusal| matches!(refusal, Refusal::BeyondTolerance { .. } | Refusal::PriorsBeyondTolerance { .. });
@@ -127,10 +126,10 @@ pub(super) fn beside_refusal(summary: &RunSummary) -> Vec<Repair> {
     found
 }
 
-/// Of what is said beside a refusal.
+/// Largest number of faults that are named with a refusal.
 const MAX_BESIDE: usize = 3;
 
-/// What else an accepted calibration leaves to be looked at.
+/// Points of an accepted calibration that still need attention.
 pub(super) fn attention(summary: &RunSummary) -> Vec<String> {
     let mut points: Vec<String> = Vec::new();
     if summary.calibration.u95.tolerance_m.is_none() {

@@ -1,4 +1,5 @@
-//! What viewers need to show the arm: its URDF with vehicle and tags, the camera's lens, the frames that never move.
+//! Descriptions that viewers need to show the arm: its URDF with vehicle and tags, the camera's lens, the static
+//! frames.
 
 use crate::run::RunInputs;
 use crate::run::scene::scene;

@@ -1,4 +1,4 @@
-//! Where a run failed, and of what.
+//! Failure of a run: its stage and its error.
 
 use armcal_core::codes::{Code, Coded};
 use std::path::PathBuf;
@@ -11,7 +11,7 @@ use armcal_core::routine::RoutineError;
 #[cfg(feature = "sim")]
 use armcal_sim::SimError;
 
-/// How far a run came.
+/// Stage that a run reached.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
     /// Reading routine, robot, vehicle, world.
@@ -19,10 +19,10 @@ pub enum Stage {
     /// Building the world and opening the streams.
     World,
     Plan,
-    /// The arm was on its way.
+    /// Moving the arm.
     Motion,
     Calibrate,
-    /// The recording is whole; it is compared with the truth and written out.
+    /// Comparing the finished recording with the truth, and writing the results.
     Results,
 }
 
@@ -40,7 +40,8 @@ impl Stage {
     }
 }
 
-/// Why a run gave no result. Sources stand behind the message, not in its place: the exit code depends on their type.
+/// Reason that a run gave no result. Sources are kept as sources, not only as text: the exit code depends on their
+/// type.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
     #[error("{0}")]
@@ -61,7 +62,7 @@ pub enum RunError {
 }
 
 impl RunError {
-    /// Whether the machine is at fault, such as a full disk or a folder that was removed: the next try may go well.
+    /// True if the machine is at fault, such as a full disk or a folder that was removed: the next try may succeed.
     #[must_use]
     pub fn is_of_machine(&self) -> bool {
         let mut causes =
@@ -74,26 +75,26 @@ impl RunError {
 #[derive(Debug)]
 pub struct Failure {
     pub stage: Stage,
-    /// Boxed: results are handed on by value.
+    /// The error, boxed because results are passed by value.
     pub error: Box<RunError>,
-    /// The recording up to the failure, where one is worth a look.
+    /// The recording up to the failure, where one is worth keeping.
     pub kept: Option<PathBuf>,
 }
 
 impl Failure {
-    /// For errors at `stage`.
+    /// Returns a conversion of errors at `stage`.
     pub(super) fn at<E: Into<RunError>>(stage: Stage) -> impl FnOnce(E) -> Self {
         move |error| Self { stage, error: Box::new(error.into()), kept: None }
     }
 
-    /// A folder for the run that could not be made.
+    /// Failure of making the run's folder.
     #[cfg(feature = "sim")]
     #[must_use]
     pub fn of_output(error: OutputError) -> Self {
         Self { stage: Stage::World, error: Box::new(error.into()), kept: None }
     }
 
-    /// A loop that broke off.
+    /// Failure of an interrupted loop.
     pub(super) fn of_session(error: SessionError) -> Self {
         let stage = match error {
             SessionError::Plan(_) => Stage::Plan,

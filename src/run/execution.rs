@@ -1,4 +1,4 @@
-//! One run from start to end: world, loop, streams, score, what is kept.
+//! One run from start to end: world, loop, streams, score, and the files that are kept.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -20,7 +20,7 @@ use armcal_core::robot::FrameTree;
 use armcal_core::streams::Arm;
 use armcal_core::time::Stamp;
 
-/// What a run leaves in its folder.
+/// Files that a run leaves in its folder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Keep {
     /// Recording, truth, replay, calibration, summary, report.
@@ -29,33 +29,34 @@ pub enum Keep {
     StreamsAlone,
 }
 
-/// Where a run goes.
+/// Destination of a run.
 pub struct RunOutput<'a> {
     pub folder: &'a OutputFolder,
     pub keep: Keep,
-    /// Hears every message as it is recorded.
+    /// Listener that receives every message when it is recorded.
     pub listener: Option<MessageListener>,
 }
 
-/// What a run gave.
+/// Results of a run.
 #[derive(Debug)]
 pub struct Finished {
     pub summary: RunSummary,
     pub calibration: Calibration,
-    /// See [`corner_scatter_px`].
+    /// Scatter of the tags' corners, px; see [`corner_scatter_px`].
     pub corner_scatter_px: Option<f64>,
-    /// Why there is no replay, though there should be one.
+    /// Reason that a requested replay is missing.
     pub replay_failure: Option<String>,
-    /// Where the results are, if the accepted ones in the run's folder stay.
+    /// Place of the results, if the accepted ones in the run's folder stay.
     pub kept: Option<AcceptedKept>,
 }
 
-/// Runs the closed loop on an arm of which nobody knows the truth: there is no score. The watcher's clock is
-/// taken to have started with the command: its reading at the end is the summary's `wall_s`. Results come into place
+/// Runs the closed loop on an arm whose truth is unknown: there is no score. The watcher's clock must start with the
+/// command: its reading at the end is the summary's `wall_s`. Results come into place all at once at the end, if they
+/// are kept.
 /// all at once at the end, if they are kept.
 ///
 /// # Errors
-/// [`Failure`] with the stage, and where the recording is now. It stays readable if the loop breaks off.
+/// [`Failure`] with the stage, and the current path of the recording. It stays readable if the loop is interrupted.
 pub fn execute_on(
     arm: &mut dyn Arm,
     inputs: &RunInputs,
@@ -77,10 +78,10 @@ pub(super) struct Run<'a> {
     pub(super) source: Source,
 }
 
-/// Where the streams come from.
+/// Source of the streams.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Source {
-    /// Simulated: the truth is known.
+    /// Simulation: the truth is known.
     #[cfg(feature = "sim")]
     World,
     Arm,
@@ -114,7 +115,7 @@ impl Run<'_> {
         Ok(finished)
     }
 
-    /// The truth of a simulated run.
+    /// Path of the truth of a simulated run.
     #[cfg(feature = "viewer")]
     fn truth(&self) -> Option<PathBuf> {
         match self.source {
@@ -124,7 +125,7 @@ impl Run<'_> {
         }
     }
 
-    /// Where the result `name` grows.
+    /// Path at which the result `name` is written until it is complete.
     pub(super) fn partial(&self, name: &str) -> PathBuf {
         self.output.partial(name)
     }
@@ -148,8 +149,8 @@ impl Run<'_> {
         match session::run(&setup, arm, &mut recorder, progress) {
             Ok(outcome) => Ok((outcome, recorder)),
             Err(error) => {
-                // Whole up to here: what happened before the failure can be looked at. If the recording itself failed,
-                // this fails too, and `error` says why.
+                // The recording is valid up to here, so the time before the failure can be examined. If the recording
+                // itself failed, this fails too, and `error` gives the reason.
                 let _ = recorder.into_writer().finish();
                 Err(Failure::of_session(error))
             }
@@ -166,7 +167,8 @@ impl Run<'_> {
         Ok(Recorder::new(writer).with_frames(BelievedFrames::new(robot, tree, &camera_frame)))
     }
 
-    /// Keeps and names the recording that a broken run leaves; one in which nothing moved yet is removed.
+    /// Keeps the recording of an interrupted run and names it in the failure; removes a recording in which nothing
+    /// moved yet.
     pub(super) fn broken_off(&self, failure: Failure) -> Failure {
         if let Some(error) = self.output.is_gone() {
             return Failure { stage: failure.stage, error: Box::new(error.into()), kept: None };
@@ -175,11 +177,11 @@ impl Run<'_> {
             self.output.discard();
             return failure;
         }
-        // If it cannot be renamed it stays where it was, which the next run into this folder will say.
+        // A recording that cannot be renamed stays at its place; the next run into this folder will report it.
         Failure { kept: self.output.set_aside().unwrap_or_default(), ..failure }
     }
 
-    /// Attaches the drawings (never the world or the seed) and closes the recording.
+    /// Attaches the files of robot, vehicle and scene (never the world or the seed) and closes the recording.
     fn finish_recording(&self, recorder: Recorder) -> Result<(), RunError> {
         let mut writer = recorder.into_writer();
         let (robot, routine) = (&self.inputs.robot, &self.inputs.routine);
@@ -204,12 +206,13 @@ impl Run<'_> {
         summary = summary.judged();
         let mut replay_failure = None;
         if self.keep == Keep::Everything {
-            // The calibration is worth more than its picture; a full disk has room again for the small files.
+            // A failed replay must not cost the calibration; on a full disk there may still be room for the small
+            // files.
             replay_failure = self.mirror(&recording, &summary, &outcome).err().map(|error| error.to_string());
             if replay_failure.is_some() {
                 self.output.leave_out("run.rrd")?;
             }
-            // Taken last: the replay is part of what a user waits for.
+            // The time is taken last, because the user also waits for the replay.
             summary.wall_s = progress.wall_s();
             self.write_texts(&outcome, &summary)?;
         }
@@ -311,7 +314,7 @@ fn renewal_summary(renewal: &EstimateUpdate) -> RenewalSummary {
     RenewalSummary { views, elapsed_s, predicted_tool_error_m: expected_tool_error_m }
 }
 
-/// A limit without a figure does not hold: nobody saw that it does.
+/// A limit without a figure does not hold, because nothing shows that it does.
 pub(super) fn assert_summary(limit: &AssertResult) -> AssertSummary {
     let holds = limit.holds().unwrap_or(false);
     AssertSummary { step: limit.step, key: limit.figure, limit: limit.limit, value: limit.value, holds }

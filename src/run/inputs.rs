@@ -1,4 +1,4 @@
-//! What a run starts from, read and checked before anything moves.
+//! Inputs of a run, read and checked before anything moves.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use armcal_core::routine::{self, Overrides, Routine};
 #[cfg(feature = "sim")]
 use armcal_sim::WorldSpec;
 
-/// Everything read and checked before anything moves.
+/// All inputs of a run, read and checked before anything moves.
 #[derive(Clone, Debug)]
 pub struct RunInputs {
     pub routine: Routine,
@@ -19,7 +19,7 @@ pub struct RunInputs {
 }
 
 impl RunInputs {
-    /// Reads a routine and all that it names.
+    /// Reads a routine and all files that it names.
     ///
     /// # Errors
     /// [`RunError`] naming file, key and allowed range.

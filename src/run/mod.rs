@@ -1,8 +1,8 @@
 //! One run of a routine, from checked files to figures.
 //!
-//! `RunInputs` is everything read beforehand; `execute` drives the closed loop in simulation, writes the streams,
-//! scores, and leaves in the output folder what `Keep` says; `execute_on` does so with an arm whose truth nobody
-//! knows. There is no clock in here: seconds come from the watcher.
+//! `RunInputs` holds everything that is read beforehand. `execute` drives the closed loop in simulation, writes the
+//! streams, scores, and leaves the files of `Keep` in the output folder. `execute_on` does so with an arm whose truth
+//! is unknown. This module has no clock: seconds come from the watcher.
 
 mod describe;
 mod error;

@@ -1,4 +1,4 @@
-//! How much a tag's corners jump from image to image while the arm stands: the camera's noise, seen without truth.
+//! Scatter of a tag's corners from image to image while the arm stands: the camera's noise, measured without truth.
 
 use std::collections::BTreeMap;
 
@@ -15,7 +15,7 @@ struct Moments {
 }
 
 impl Moments {
-    /// Welford's update: no small difference of large sums.
+    /// Adds an image by Welford's update, which avoids small differences of large sums.
     fn add(&mut self, corners_px: &[[f64; 2]; 4]) {
         self.n += 1;
         for (k, value) in corners_px.as_flattened().iter().enumerate() {
@@ -81,7 +81,7 @@ mod tests {
             let kind = MarkKind::Capture { set: CaptureSet::Fit, pose_idx };
             (at(end), Message::Mark(Mark { start: at(start), end: at(end), kind }))
         };
-        // Two captures far apart in the image, each +-1 px about its mean; what lies between them does not count.
+        // Two captures far apart in the image, each +-1 px about its mean; the distance between them does not count.
         let messages = vec![
             image(11, -1.0),
             image(12, 1.0),

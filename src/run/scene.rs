@@ -9,7 +9,7 @@ use armcal_core::robot::{PlacedShape, Robot, Shape, tag_frame_name};
 
 /// Height of a tag's name, m.
 const LETTERS_M: f64 = 0.05;
-/// Of targets.
+/// Color of targets.
 const TARGET: Color = Color { r: 0.95, g: 0.6, b: 0.1, a: 0.8 };
 const LETTERS: Color = Color { r: 0.9, g: 0.9, b: 0.9, a: 1.0 };
 

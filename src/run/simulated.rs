@@ -9,11 +9,11 @@ use armcal_core::log::Recording;
 use armcal_sim::truth::TruthRecorder;
 use armcal_sim::{World, WorldInput};
 
-/// Runs the closed loop with `seed` and scores it. The watcher's clock is taken to have started with the command: its
-/// reading at the end is the summary's `wall_s`. Results come into place all at once at the end, if they are kept.
+/// Runs the closed loop with `seed` and scores it. The watcher's clock must start with the command: its reading at the
+/// end is the summary's `wall_s`. Results come into place all at once at the end, if they are kept.
 ///
 /// # Errors
-/// [`Failure`] with the stage, and where the recording is now. It stays readable if the loop breaks off.
+/// [`Failure`] with the stage, and the current path of the recording. It stays readable if the loop is interrupted.
 pub fn execute(
     inputs: &RunInputs,
     seed: u64,
@@ -49,7 +49,7 @@ impl Run<'_> {
         Ok(world)
     }
 
-    /// What only the truth knows.
+    /// Adds the figures that need the truth.
     pub(super) fn add_score(
         &self,
         summary: &mut RunSummary,

@@ -1,4 +1,4 @@
-//! How far the links truly were from where they were believed to be, against what the belief allowed.
+//! True distances of the links from their estimated positions, against the predicted quantiles.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use armcal_belief::session::Visit;
 use armcal_core::robot::Robot;
 use armcal_sim::truth::Truth;
 
-/// Over all captured views and links; `None` without any.
+/// Summary over all captured views and links; `None` without any.
 pub(super) fn margins(visits: &[Visit], robot: &Robot, truth: &Truth) -> Option<MarginSummary> {
     let mut summary =
         MarginSummary { links: 0, exceeded_q99: 0, largest_m: 0.0, first_largest_m: None, by_views: Vec::new() };

@@ -1,7 +1,7 @@
-//! Truth against belief: the only place that opens truth.mcap, after belief has finished.
+//! Comparison of estimates with the truth: the only place that opens truth.mcap, after the estimation has finished.
 //!
-//! At each reach mark the tool as believed (from the recording, under the sensors of that moment) is compared with the
-//! tool as it was, and the target with where the tool came to rest. `figures` is what comes out of it, for programs.
+//! At each reach mark the estimated tool is compared with the true tool, and the target with the resting tool. The
+//! estimate comes from the recording, with the sensors of that moment. `figures` holds the results for programs.
 
 mod figures;
 #[cfg(feature = "sim")]

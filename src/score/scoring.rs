@@ -1,4 +1,4 @@
-//! The figures of a run: truth against belief.
+//! Figures of a run: estimates against the truth.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -17,18 +17,18 @@ use armcal_core::streams::ReachAttempt;
 use armcal_sim::SimError;
 use armcal_sim::truth::{Truth, read_truth};
 
-/// What truth adds to a run's figures.
+/// Figures of a run that need the truth.
 #[derive(Clone, Debug)]
 pub struct Scored {
     pub score: Score,
     pub collisions: usize,
     pub min_clearance_m: Option<f64>,
     pub margins: Option<MarginSummary>,
-    /// The script's limits, with the figures that only the truth knows.
+    /// Limits of the script, including figures that need the truth.
     pub asserts: Vec<AssertResult>,
 }
 
-/// What is compared.
+/// Inputs of the comparison.
 pub struct ScoreInput<'a> {
     pub recording: &'a Recording,
     pub truth: &'a Path,
@@ -76,7 +76,7 @@ pub fn score(input: &ScoreInput<'_>) -> Result<Scored, SimError> {
     Ok(Scored { score, collisions: truth.contacts.len(), min_clearance_m: truth.min_clearance_m(), margins, asserts })
 }
 
-/// The limit with its figure, if the truth has it.
+/// The limit with its value, if the truth provides it.
 fn completed(limit: &AssertResult, score: &Score, truth: &Truth) -> AssertResult {
     let reach = limit.last_reach.and_then(|reach| score.reaches.get(reach)).map(|reach| &reach.side);
     let value = limit.at.and_then(|at| match limit.figure {
@@ -120,7 +120,7 @@ impl<'a> Side<'a> {
         self.rests.iter().map(|c| c.rest.target_idx).collect()
     }
 
-    /// The rests at these targets; all of them where none are named.
+    /// The rests at these targets; all rests for an empty set.
     fn at(&self, targets: &BTreeSet<usize>) -> Vec<&'a Compared<'a>> {
         let is_wanted = |c: &&&Compared<'_>| targets.is_empty() || targets.contains(&c.rest.target_idx);
         self.rests.iter().filter(is_wanted).copied().collect()
@@ -131,8 +131,7 @@ impl<'a> Side<'a> {
     }
 }
 
-/// Targets at which the arm came to rest on both sides: a target that one side skipped would make the other look worse
-/// or better than it is.
+/// Targets at which the arm came to rest on both sides. A target that one side skipped would bias the comparison.
 fn common_targets(first: Option<&Side<'_>>, last: Option<&Side<'_>>) -> BTreeSet<usize> {
     let targets = |side: Option<&Side<'_>>| side.map(Side::targets).unwrap_or_default();
     targets(first).intersection(&targets(last)).copied().collect()
@@ -187,7 +186,7 @@ fn task_scores(input: &ScoreInput<'_>, side: &Side<'_>) -> Vec<TaskScore> {
     side.rests.iter().map(task_score).collect()
 }
 
-/// One rest, believed and true.
+/// One rest: estimated and true tool.
 struct Compared<'a> {
     rest: &'a ReachRest,
     tool_error_m: Vector3<f64>,
@@ -197,7 +196,7 @@ struct Compared<'a> {
 }
 
 fn compare<'a>(rest: &'a ReachRest, truth: &Truth) -> Option<Compared<'a>> {
-    // The middle of the mark: the arm stands over all of it.
+    // The middle of the mark; the arm stands during all of it.
     let stamp = rest.start.plus_s(0.5 * rest.end.since_s(rest.start));
     let state = truth.state_at(stamp)?;
     let true_tool = state.base_from_tool;
@@ -210,7 +209,7 @@ fn compare<'a>(rest: &'a ReachRest, truth: &Truth) -> Option<Compared<'a>> {
     })
 }
 
-/// To -pi .. pi: a continuous joint may have turned once more.
+/// The angle wrapped to -pi .. pi, because a continuous joint may have turned once more.
 fn wrapped(angle_rad: f64) -> f64 {
     use std::f64::consts::{PI, TAU};
     (angle_rad + PI).rem_euclid(TAU) - PI
@@ -241,7 +240,7 @@ fn joint_scores(input: &ScoreInput<'_>, before: &[&Compared<'_>], after: &[&Comp
     input.outcome.calibration.joint.iter().enumerate().map(joint_score).collect()
 }
 
-/// The calibration that the arm believed in at these rests.
+/// The calibration that the arm used at these rests.
 fn calibration_at<'a>(input: &ScoreInput<'a>, after: &[&Compared<'_>]) -> Option<&'a Calibration> {
     let first = after.first()?;
     let epoch = input.outcome.epochs.iter().rev().find(|epoch| epoch.from <= first.rest.start)?;

@@ -1,4 +1,4 @@
-//! What the jaws closed on, by the truth.
+//! Touches of targets by the jaws, from the truth.
 
 use nalgebra::Vector3;
 
@@ -10,11 +10,12 @@ use armcal_core::streams::{Mark, MarkKind, Message, ToolTouch};
 use armcal_core::time::Stamp;
 use armcal_sim::truth::Truth;
 
-/// Before and after a recorded touch of a surface, contacts of tool and surface are meant, s.
+/// Time before a recorded touch of a surface in which contacts of tool and surface are intended, s; `AFTER_TOUCH_S` is
+/// that after it.
 const BEFORE_TOUCH_S: f64 = 100.0;
 const AFTER_TOUCH_S: f64 = 40.0;
 
-/// Leaves the contacts and clearances out that steps `touch` came for.
+/// Removes the contacts and clearances that steps `touch` intend.
 pub(super) fn leave_out_meant(truth: &mut Truth, recording: &Recording, robot: &Robot) {
     let tool = &robot.bodies[robot.tool.mount.n_joints].name;
     let touches: Vec<&ToolTouch> = recording
@@ -37,9 +38,9 @@ pub(super) fn leave_out_meant(truth: &mut Truth, recording: &Recording, robot: &
 
 /// The touches of one `reach` step; `None` where none was asked for.
 ///
-/// A target was touched if it lay between the jaws when they began to close: across, in the direction in which they
-/// close, nearer to the tool point than half the gap as measured, and along the jaws' faces not farther than the task's
-/// tolerance.
+/// A target was touched if it lay between the jaws when they began to close. Across, in the direction in which they
+/// close, it must be nearer to the tool point than half the measured gap. Along the jaws' faces it must be within the
+/// task's tolerance.
 pub(super) fn touches(
     recording: &Recording,
     truth: &Truth,
@@ -77,7 +78,8 @@ pub(super) fn touches(
     (score.tried > 0).then_some(score)
 }
 
-/// `error_m` is the target from the tool point, in the axes in which the jaws open along `across`.
+/// True if the target is between the jaws. `error_m` is the target from the tool point, in the axes in which the jaws
+/// open along `across`.
 fn is_between(error_m: &Vector3<f64>, across: &Vector3<f64>, gap_m: f64, tolerance_m: f64) -> bool {
     let across_m = error_m.dot(across);
     let along_m = (error_m - across_m * across).norm();

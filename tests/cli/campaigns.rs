@@ -1,4 +1,4 @@
-//! Campaigns: one result on any number of threads, however often broken off; failures are rows.
+//! Campaigns: one result on any number of threads and with any number of interruptions; failures are rows.
 
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -7,7 +7,8 @@ use std::time::Duration;
 use crate::support::texts::Texts;
 use crate::support::{Answer, ShortRoutine, answer, edit, program, read, robot_copy, root, temp, write};
 
-/// Least runs: three views are too few, so the calibration is refused. With nine tags of eight nothing can be planned.
+/// The smallest runs: three views are too few, so the calibration is refused. With nine tags of eight no plan is
+/// possible.
 const MATRIX: &str = "[world.physics]\ntruth_rate_hz = 5.0\n\
     [campaign]\nseeds = \"1..3\"\n[campaign.matrix]\n\"capture.min_tags\" = [3, 9]\n";
 const RESULTS: &[&str] = &[
@@ -35,7 +36,7 @@ fn results(folder: &Path) -> Vec<Vec<u8>> {
     RESULTS.iter().map(|name| std::fs::read(folder.join(name)).expect("a result")).collect()
 }
 
-/// Waits until the campaign has kept `n` rows; they follow two lines.
+/// Waits until the campaign has kept `n` rows; they follow two lines in the file.
 fn wait_for_rows(partial: &Path, n: usize, child: &mut Child) {
     for _ in 0..6000 {
         let lines = std::fs::read(partial).unwrap_or_default().iter().filter(|byte| **byte == b'\n').count();
@@ -89,7 +90,7 @@ fn threads_interrupts_and_kills_leave_the_same_files() {
     wait_for_rows(&partial, before - 1, &mut child);
     child.kill().expect("killed");
     child.wait().expect("it ends");
-    // As if the kill had come in the middle of a line.
+    // The last line is cut, as by a kill during its write.
     let mut torn = std::fs::read(&partial).expect("rows");
     let there = torn.iter().filter(|byte| **byte == b'\n').count() - 2;
     torn.extend(b"1,capture.min_ta");
@@ -110,7 +111,7 @@ fn threads_interrupts_and_kills_leave_the_same_files() {
     merged_shards_are_the_whole(&rows, folder.path(), &whole);
 }
 
-/// Every second row in another file.
+/// Checks the merge of two shards, each with every second row.
 fn merged_shards_are_the_whole(rows: &str, folder: &Path, whole: &Path) {
     let (header, lines) = rows.split_once('\n').expect("lines");
     let shard = |odd: usize| -> PathBuf {
@@ -175,8 +176,8 @@ fn overrides_pass_the_checks_of_the_file() {
     answer(&mut check).expect("check", 0, &["17 poses"]);
 }
 
-/// What the machine was at fault for is no row: the same command makes the run again. A limit on the size of files
-/// stands for the full disk.
+/// A fault of the machine gives no row: the same command repeats the run. A limit on the size of files imitates a full
+/// disk.
 #[cfg(unix)]
 #[test]
 fn a_full_disk_is_no_row_and_the_run_is_made_again() {
@@ -213,13 +214,13 @@ impl Gate {
     }
 }
 
-/// The gate shuts when the camera is worse; that it stands open for the same program is of the second tier.
+/// The comparison fails when the camera is worse; that it passes for the same program is tested in the second tier.
 #[test]
 fn a_regression_is_found() {
     let _texts = Texts::of("a_regression_is_found");
     let gate = Gate::new();
     let noise = gate.regress(&["--set", "world.camera.corner_noise_px=0.45", "--baseline"]);
-    // Half as much again in each pixel; the poses differ, for what is seen steers the choice.
+    // Noise is half as much again in each pixel; the poses differ, because detections affect their choice.
     noise.expect("noise", 4, &["┆ x 1.4", "--seed 1 --set world.camera.corner_noise_px=0.45"]);
     gate.regress(&["--seeds", "3", "--baseline"]).expect("no such seed", 2, &["baseline.csv", "seeds"]);
 }
@@ -229,12 +230,13 @@ fn a_regression_is_found() {
 fn a_worse_controller_is_found_and_nothing_where_nothing_is() {
     let gate = Gate::new();
     gate.regress(&["--baseline"]).expect("itself", 0, &[]);
-    // 0.2 degrees.
+    // The bias is 0.2 degrees.
     let bias = gate.regress(&["--set", "world.hydraulics.controller_bias_rad=0.0034907", "--baseline"]);
     bias.expect("bias", 4, &["--set world.hydraulics.controller_bias_rad=0.0034907"]);
 }
 
-/// Pairs with another routine, robot or format say nothing; what a build reads is there, and how long it takes is said.
+/// Baselines of another routine, robot or format are refused; a build's files are written, and the duration is
+/// estimated.
 #[test]
 fn a_baseline_of_something_else_is_refused_and_builds_get_their_files() {
     let _texts = Texts::of("a_baseline_of_something_else_is_refused_and_builds_get_their_files");
@@ -273,7 +275,7 @@ fn a_baseline_of_something_else_is_refused_and_builds_get_their_files() {
     refused("routine", &[]);
 }
 
-/// What the project itself is held against: the stored baseline, in small. The whole of it:
+/// A small part of the project's own check against the stored baseline. The whole check is
 /// `armcal regress routines/regression.toml --baseline routines/regression-baseline.csv`.
 #[test]
 fn the_routine_of_the_project_is_not_worse_than_its_baseline() {
@@ -281,7 +283,8 @@ fn the_routine_of_the_project_is_not_worse_than_its_baseline() {
         ["regression.toml", "regression-baseline.csv"].map(|name| root().join("routines").join(name));
     let mut regress = program();
     regress.arg("regress").arg(routine).arg("--baseline").arg(baseline).args(["--seeds", "1"]);
-    // One seed cannot tell 10 % where another processor's sines draw other poses; half as much again they can.
+    // One seed cannot show a change of 10 % where another processor's sines lead to other poses; it can show one of 50
+    // %.
     for figure in ["tool_error", "reach_error", "residual", "held_out"] {
         regress.args(["--set", &format!("regress.{figure}_ratio=1.5")]);
     }

@@ -1,10 +1,10 @@
-//! What `--help` says of the program and of each command.
+//! The help texts of the program and of each command.
 
 use armcal::cli::command;
 
 use crate::support::texts::{Texts, note};
 
-/// As wide as a terminal of a person who reads it.
+/// Width of a usual terminal, in columns.
 const WIDTH: usize = 100;
 
 #[test]

@@ -1,4 +1,4 @@
-//! Wrong input files: exit code 2 and a message that names the file and the place in it.
+//! Wrong input files: exit code 2 and a message that names the file and the place of the error.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +11,7 @@ fn check(file: &Path) -> Answer {
     answer(program().arg("check").arg(file))
 }
 
-/// A routine with everything it names in one folder, to be spoilt.
+/// A routine with all files that it names in one folder, for a test to falsify.
 struct Kit {
     folder: tempfile::TempDir,
     robot: PathBuf,
@@ -43,7 +43,7 @@ impl Kit {
     }
 }
 
-/// What to replace in a file, and what the message must name.
+/// Text to replace in a file, its replacement, and the words that the message must have.
 type Spoilt<'a> = (&'a str, &'a str, &'a [&'a str]);
 
 const ROUTINE: &[Spoilt] = &[
@@ -146,13 +146,13 @@ const VEHICLE: &[Spoilt] = &[
 ];
 
 const URDF: &[Spoilt] = &[
-    // The upper arm hangs on the link that it carries.
+    // The parent of the upper arm is the link that it carries.
     (
         "<parent link=\"trunk_link\"/><child link=\"upperarm_link\"/>",
         "<parent link=\"forearm_link\"/><child link=\"upperarm_link\"/>",
         &["titan4.urdf", "loop"],
     ),
-    // One link on two joints.
+    // One link is the child of two joints.
     ("<child link=\"fisheye\"/>", "<child link=\"trunk_link\"/>", &["titan4.urdf", "loop", "trunk_link"]),
     ("<parent link=\"trunk_link\"/>", "<parent link=\"trunk\"/>", &["titan4.urdf", "shoulder_pitch", "`trunk`"]),
     (
@@ -191,7 +191,7 @@ fn a_wrong_world_or_scene_is_refused_with_file_and_key() {
     }
 }
 
-/// A motion with gaps, numbers that are none, or jumps: the line is named.
+/// For a motion with gaps, invalid numbers or jumps the message names the line.
 #[test]
 fn a_wrong_motion_is_refused_with_file_and_line() {
     const HEADER: &str = "time_s,x_m,y_m,z_m,roll_rad,pitch_rad,yaw_rad";
@@ -310,7 +310,7 @@ fn check_passes_good_files_and_says_what_they_are() {
     answer(&mut all).expect("good files", 0, &words);
 }
 
-/// One bad file does not keep the others from being looked at.
+/// An error in one file does not prevent the check of the others.
 #[test]
 fn check_looks_at_every_file() {
     let _texts = Texts::of("check_looks_at_every_file");

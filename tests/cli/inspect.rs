@@ -1,4 +1,4 @@
-//! `inspect`: what is told of recordings, whole, broken and foreign.
+//! The output of `inspect` for recordings: complete, broken and of other programs.
 
 use std::fs;
 use std::path::Path;
@@ -53,7 +53,7 @@ fn the_sample_is_described() {
     assert!((rate_hz - 100.0).abs() < 0.5, "{rate_hz}");
 }
 
-/// What the views determine is what the estimator then estimates.
+/// The parameters in the output are those that the estimator then estimates.
 #[test]
 fn the_parameters_named_are_those_that_calibrate_estimates() {
     let inspection = look(&sample(), Some(&titan())).expect("it reads");
@@ -102,7 +102,7 @@ fn what_is_no_recording_is_named_with_what_to_do() {
     inspect(&folder.path().join("absent.mcap"), &[]).expect("absent", 2, &["absent.mcap"]);
 }
 
-/// Topics of other arms are described, with what they may be good for.
+/// Topics of other arms are described with their possible uses.
 #[test]
 fn foreign_recordings_come_with_hints() {
     let _texts = Texts::of("foreign_recordings_come_with_hints");
@@ -127,7 +127,7 @@ fn foreign_recordings_come_with_hints() {
     assert!(!told.stdout.contains('\u{1b}'), "names of a file must not steer the terminal");
 }
 
-/// A copy with its chunks intact never tells less, and a broken one always tells that it is.
+/// A copy with intact chunks loses no information, and a broken one is always reported as broken.
 #[test]
 fn cut_at_every_percent() {
     let _texts = Texts::of("cut_at_every_percent");
@@ -181,7 +181,7 @@ fn three_hundred_flipped_bits_are_told_of_where_they_matter() {
     expect_flipped_bits_to_be_told_of(300);
 }
 
-/// One change of the kinds that disks, copies and hands make.
+/// One change of the kinds that disks, copies and people cause.
 fn mutate(bytes: &mut Vec<u8>, rng: &mut impl RngExt) {
     let n = bytes.len();
     let at = rng.random_range(0..n);
@@ -201,7 +201,7 @@ fn mutate(bytes: &mut Vec<u8>, rng: &mut impl RngExt) {
             let at = at.min(n - 8);
             bytes[at..at + 8].copy_from_slice(&huge.to_le_bytes());
         }
-        // Heads of records, where lengths are.
+        // Heads of records, which have the lengths.
         _ => {
             let heads = records(&bytes.clone());
             if let Some((at, _, _)) = heads.get(rng.random_range(0..heads.len().max(1))) {
@@ -211,7 +211,7 @@ fn mutate(bytes: &mut Vec<u8>, rng: &mut impl RngExt) {
     }
 }
 
-/// `ARMCAL_MUTATIONS=5000` for more of them.
+/// The variable `ARMCAL_MUTATIONS=5000` makes more of them.
 #[test]
 fn mutated_recordings_never_panic_and_never_pass_for_whole() {
     let rounds: u32 = std::env::var("ARMCAL_MUTATIONS").ok().and_then(|n| n.parse().ok()).unwrap_or(60);
@@ -228,7 +228,7 @@ fn mutated_recordings_never_panic_and_never_pass_for_whole() {
             mutate(&mut mutated, &mut rng);
         }
         fs::write(&path, &mutated).expect("written");
-        // The robot costs a second pass, so not always.
+        // The robot costs a second pass, so only some rounds have it.
         let Ok(found) = look(&path, (round % 10 == 0).then_some(&robot)) else {
             states[3] += 1;
             assert!(mutated[..8] != bytes[..8], "round {round}: only what does not begin like one is no recording");
@@ -246,7 +246,7 @@ fn mutated_recordings_never_panic_and_never_pass_for_whole() {
     assert!(states[1] > 0 && states[2] > 0, "{states:?}");
 }
 
-/// Where the records of a finished file begin, with opcode and length.
+/// Begin of each record in a finished file, with opcode and length.
 fn records(bytes: &[u8]) -> Vec<(usize, u8, usize)> {
     let mut at = 8;
     let mut records = Vec::new();
@@ -280,7 +280,7 @@ fn wrong_structure_is_survived() {
     let twice = [&bytes[..chunk.0 + chunk.2], &bytes[chunk.0..]].concat();
     let said = check("twice", &twice, 3, &["damaged"]);
     assert!(!said.stdout.contains("backwards"), "{said:#?}");
-    // Lengths of records: of the chunk, of the attachment, of a schema at the end.
+    // Lengths of three records: the chunk, the attachment, and a schema at the end.
     for (at, _, _) in [chunk, *attachment, all[all.len() - 3]] {
         for len in [u64::MAX, u64::MAX / 2, 1 << 40, bytes.len() as u64, 0] {
             let mut wrong = bytes.clone();
@@ -292,7 +292,7 @@ fn wrong_structure_is_survived() {
             assert_ne!(found.completeness.state, State::Whole, "byte {at}, length {len}");
         }
     }
-    // A summary that claims to begin anywhere.
+    // A summary that is said to begin at any offset.
     for start in [0, 8, 9, u64::MAX, bytes.len() as u64] {
         let mut wrong = bytes.clone();
         let at = bytes.len() - 28;
@@ -303,7 +303,7 @@ fn wrong_structure_is_survived() {
     }
 }
 
-/// A cut recording with enough views calibrates; `inspect` said so before.
+/// A cut recording with enough views calibrates, as `inspect` predicts.
 #[test]
 fn inspect_says_beforehand_whether_calibrate_will_work() {
     let bytes = fs::read(sample()).expect("the sample");

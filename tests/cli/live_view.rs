@@ -1,11 +1,11 @@
-//! `--live`: a viewer that is absent or stuck changes nothing of a run.
+//! `--live`: a viewer that is absent or stuck does not change a run.
 
 use std::net::TcpListener;
 
 use crate::determinism::elsewhere;
 use crate::support::{answer, program, robot_folder, shared_run, temp};
 
-/// A port of the loopback where nobody listens.
+/// Address of a loopback port without a listener.
 fn closed_address() -> String {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
     listener.local_addr().expect("an address").to_string()
@@ -17,7 +17,7 @@ fn a_run_without_a_viewer_and_one_with_a_stuck_viewer_give_the_same_recording() 
     let note = format!(" {}", absent.viewer);
     assert_eq!(absent.said.stderr.matches(&note).count(), 1, "{}", absent.said.stderr);
 
-    // It takes the connection and reads nothing.
+    // This viewer accepts the connection and reads nothing.
     let out = temp();
     let stuck = TcpListener::bind("127.0.0.1:0").expect("a port");
     let live = format!("--live={}", stuck.local_addr().expect("an address"));

@@ -1,4 +1,4 @@
-//! Recordings of many hours: memory grows with the views, not with the hours.
+//! Recordings of many hours: memory grows with the number of views, not with the hours.
 
 use std::fs;
 use std::path::Path;
@@ -19,8 +19,7 @@ use crate::support::{answer, program, read, robot_folder, temp, titan};
 /// Period of the joint sensors; other streams come every few of them.
 const PERIOD_S: f64 = 0.01;
 
-/// Writes a recording of `hours` in which views lie far apart: an arm that otherwise stands about, with all its
-/// streams.
+/// Writes a recording of `hours` with few views: an arm that mostly stands still, with all its streams.
 fn write_long(path: &Path, hours: f64) {
     let robot = titan();
     let mut rng = stream_rng(3, "long");
@@ -41,7 +40,7 @@ fn write_long(path: &Path, hours: f64) {
                 writer.record(start.plus_s(f64::from(step) * PERIOD_S), &message).expect("recorded");
             }
         }
-        // A view's span is half a second; it ends with the last reading.
+        // The span of a view is half a second; it ends with the last reading.
         let (_, Message::Mark(mark)) = &view[2] else { panic!("no mark") };
         let end = start.plus_s(f64::from(steps_per_shot - 1) * PERIOD_S);
         writer.record(end, &Message::Mark(Mark { start: end.plus_s(-0.5), end, kind: mark.kind })).expect("recorded");
@@ -85,7 +84,7 @@ fn standing(arm: &TrueArm<'_>, shot: &Shot, step: u32, stamp: Stamp, noise: &[f6
     messages
 }
 
-/// Most memory that a program held, kB, its time and its exit code.
+/// Peak memory of a program, kB, its time and its exit code.
 fn measured(command: &mut Command, said: &Path) -> (u64, Duration, i32) {
     let started = Instant::now();
     let said = fs::File::create(said).expect("a file");

@@ -1,4 +1,4 @@
-//! What the program says first, last and where something is wrong: verdict, figures, next step; one clear error.
+//! First and last lines of the output, and its errors: verdict, figures, next step; one clear error.
 
 use std::path::Path;
 
@@ -46,7 +46,7 @@ fn json_is_summary_json_alone_and_quiet_says_the_verdict_alone() {
     answer(program().args(["check", "--quiet", "-v", "x.toml"])).expect("both", 2, &[]);
 }
 
-/// The lines of belief.jsonl alone; of a stationary belief a last line of the batch.
+/// Only the lines of belief.jsonl; a stationary estimate has a last line with its batch.
 #[test]
 fn a_belief_that_is_followed_has_a_json_form() {
     let _texts = Texts::of("a_belief_that_is_followed_has_a_json_form");
@@ -123,7 +123,7 @@ fn a_wrong_kind_of_file_is_named_with_the_command_that_takes_it() {
     answer(&mut command).expect("a file for a folder", 2, &[]);
 }
 
-/// Joint readings on a topic of another program, and nothing that armcal records.
+/// Writes joint readings on a topic of another program, and none of armcal's topics.
 fn recording_of_others(file: &Path) {
     let mut writer = RecordingWriter::create(file, RecordingHeader::new(Vec::new())).expect("a file");
     for n in 0..5 {
@@ -170,7 +170,7 @@ fn a_rendered_run_says_at_its_start_how_long_it_takes() {
         tail: "[camera]\nmode = \"rendered\"\n[world.vehicle]\nmotion = \"adrift\"\n".to_owned(),
         ..crate::support::ShortRoutine::default()
     };
-    // Refused before anything moves: nothing is foretold.
+    // The run is refused before anything moves, so there is no prediction.
     let said = crate::support::run(&routine.write(folder.path()), &folder.path().join("out"));
     assert!(said.code == 2 && !said.stderr.contains("rendered"), "{said:#?}");
     let routine = crate::support::ShortRoutine {

@@ -1,4 +1,4 @@
-//! Where the text goes: whatever becomes of stdout and stderr, the work is done and its files are kept.
+//! Output streams: if stdout or stderr fail, the work is still done and its files are kept.
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 
 use crate::support::{ShortRoutine, program, robot_copy, robot_folder, root, shared_run, temp};
 
-/// A command line, what it exits with where it can say everything, and the file that it leaves.
+/// A command line, its exit code where all output succeeds, and the file that it writes.
 struct Case {
     command: Command,
     code: i32,
@@ -25,7 +25,7 @@ impl Case {
         self
     }
 
-    /// `file`: within the folder `path`; empty where `path` is the file.
+    /// Adds the file that the command leaves: `file` within the folder `path`, or `path` itself if `file` is empty.
     fn leaves(mut self, option: &str, path: PathBuf, file: &str) -> Self {
         self.command.arg(option).arg(&path);
         self.leaves = Some(if file.is_empty() { path } else { path.join(file) });
@@ -60,13 +60,13 @@ fn every_subcommand(folder: &Path) -> Vec<Case> {
     ]
 }
 
-/// A pipe that nobody reads.
+/// A pipe without a reader.
 fn closed_pipe() -> Stdio {
     let (_, writer) = std::io::pipe().expect("a pipe");
     writer.into()
 }
 
-/// Ends the command, looks for its file and takes that away; gives exit code and stderr.
+/// Ends the command, checks its file and removes it; returns exit code and stderr.
 fn ended(case: &mut Case) -> (i32, String) {
     let output = case.command.spawn().expect("the program starts").wait_with_output().expect("it ends");
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -88,7 +88,7 @@ fn expect_work_without_readers(is_wanted: fn(&Case) -> bool) {
     }
 }
 
-/// Commands that simulate or plan; with a full stdout they are of the first tier.
+/// True for commands that simulate or plan; with a full stdout they are in the first tier.
 fn is_long(case: &Case) -> bool {
     let first = case.command.get_args().next().and_then(|word| word.to_str()).expect("a subcommand");
     ["run", "campaign", "regress", "plan", "new-robot"].contains(&first)
@@ -120,7 +120,7 @@ fn a_full_stdout_is_one_error_after_the_work() {
     }
 }
 
-/// Errors that nobody can be told of are in the exit code.
+/// With a closed stderr, errors are still in the exit code.
 #[test]
 fn a_closed_stderr_hides_words_and_no_exit_code() {
     for (words, code) in [(&["dance"][..], 2), (&[], 2), (&["inspect", "nothing.mcap"], 2), (&["check", "x.toml"], 2)] {

@@ -1,4 +1,4 @@
-//! Recordings that are foreign, cut or damaged: what can be read is used, what was lost is said.
+//! Recordings that are of other programs, cut or damaged: readable data is used, and losses are reported.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -47,7 +47,7 @@ fn a_recording_without_any_message_is_refused() {
     calibrate(&path, &robot_folder(), &folder.path().join("out")).expect("silent", 2, &["silent.mcap"]);
 }
 
-/// A recording of an arm that stood about, with no view marked.
+/// A recording of an arm that stood still, without marks of views.
 #[test]
 fn a_recording_without_captures_is_refused_with_the_reason() {
     let _texts = Texts::of("a_recording_without_captures_is_refused_with_the_reason");
@@ -93,7 +93,7 @@ fn a_recording_of_another_arm_is_refused_with_both_joint_lists() {
     calibrate(&recording, &robot, &folder.path().join("out")).expect("another arm", 2, &words);
 }
 
-/// The first byte behind the last captured view, if the file is cut anywhere later.
+/// Number of capture marks in the recording at `path`.
 fn marks_in(path: &Path) -> usize {
     let recording = read_recording(path).expect("it reads");
     let is_capture = |m: &Message| matches!(m, Message::Mark(mark) if matches!(mark.kind, MarkKind::Capture { .. }));
@@ -112,7 +112,8 @@ fn a_recording_cut_after_the_captures_calibrates_as_if_whole() {
     assert!(read(&folder.path().join("out/calibration.toml")) == read(&run.file("calibration.toml")));
 }
 
-/// Wherever it is cut: calibrated with a warning, refused by the verdict, or nothing to fit; each says so.
+/// Any cut gives one of three results, each reported: calibrated with a warning, refused by the verdict, or nothing to
+/// fit.
 #[test]
 fn a_recording_cut_anywhere_is_read_as_far_as_it_goes() {
     let run = shared_run();
@@ -149,7 +150,7 @@ fn data_records(bytes: &[u8]) -> (Vec<&[u8]>, &[u8]) {
     (records, &bytes[at..])
 }
 
-/// Sorted and read once, so that nothing of the result changes; told of, so that nobody takes the file for whole.
+/// Chunks are sorted and read once, so the result does not change. A warning says that the file is not in order.
 #[test]
 fn chunks_swapped_or_doubled_calibrate_as_if_whole() {
     let run = shared_run();
@@ -183,7 +184,7 @@ fn flipped_bits_never_panic_and_never_change_the_result_silently() {
     let (mut damaged, mut changed) = (0, 0);
     for round in 0..40 {
         let mut bytes = whole.clone();
-        // One bit in even rounds, a burst in odd ones; every fifth near an end, where the structure is.
+        // One bit in even rounds, a burst in odd ones; every fifth near an end, which holds the structure.
         let span = if round % 5 == 0 { 4096 } else { bytes.len() };
         let at = if round % 10 == 0 { bytes.len() - 1 - rng.random_range(0..span) } else { rng.random_range(0..span) };
         for k in 0..if round % 2 == 0 { 1 } else { 300 } {
@@ -210,7 +211,7 @@ fn flipped_bits_never_panic_and_never_change_the_result_silently() {
 fn a_damaged_recording_says_so_at_the_command_line() {
     let mut bytes = shared_run().bytes("run.mcap");
     let folder = temp();
-    // In three places: one may lie in an index of a chunk, which nobody needs.
+    // Three places are tried, because one may lie in an index of a chunk, which no reader needs.
     for at in [3, 4, 5].map(|eighths| bytes.len() / 8 * eighths) {
         bytes[at..at + 64].fill(0x55);
     }
@@ -225,7 +226,7 @@ fn replayed(recording: &Path, save: &Path) -> Answer {
 
 #[test]
 fn replay_writes_a_file_for_the_viewer() {
-    /// The magic of Rerun's files.
+    /// First bytes of Rerun's files.
     const MAGIC: &[u8] = b"RRF2";
     let run = shared_run();
     let folder = temp();
@@ -235,7 +236,7 @@ fn replay_writes_a_file_for_the_viewer() {
     assert!(written.starts_with(MAGIC) && written.len() > 100_000, "{} bytes", written.len());
     assert!(fs::metadata(run.file("run.rrd")).expect("made by the run").len() > 100_000);
 
-    // Without the truth beside it, and cut.
+    // The recording is cut, and has no truth next to it.
     let cut: PathBuf = folder.path().join("cut.mcap");
     let bytes = run.bytes("run.mcap");
     fs::write(&cut, &bytes[..bytes.len() / 2]).expect("written");

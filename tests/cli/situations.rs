@@ -1,4 +1,4 @@
-//! Good files that ask for what cannot be: refused before anything moves, with the place.
+//! Valid files with impossible requests: refused before anything moves, with the place of the error.
 
 use std::path::{Path, PathBuf};
 
@@ -15,7 +15,7 @@ fn run_short(routine: &ShortRoutine, folder: &Path) -> Answer {
     run(&routine.write(folder), &folder.join("out"))
 }
 
-/// Nothing moved, so nothing is worth keeping: neither results nor half a recording lie in the folder.
+/// Nothing moved, so no file is worth keeping: neither results nor part of a recording are in the folder.
 #[track_caller]
 fn assert_nothing_left(folder: &Path) {
     let left: Vec<_> = std::fs::read_dir(folder.join("out")).into_iter().flatten().flatten().collect();
@@ -36,7 +36,7 @@ fn a_target_out_of_reach_is_named_with_its_place() {
 fn a_target_within_the_vehicle_is_named_with_what_is_in_the_way() {
     let folder = temp();
     let mut routine = ShortRoutine::default();
-    // The face of the starboard toe plate.
+    // The target lies on the face of the starboard toe plate.
     routine.targets_m[1] = [1.34, -0.1, -0.99];
     run_short(&routine, folder.path()).expect("inside", 2, &["target 2", "clearance", "toe_plate_starboard"]);
     assert_nothing_left(folder.path());
@@ -46,7 +46,7 @@ fn a_target_within_the_vehicle_is_named_with_what_is_in_the_way() {
 fn a_start_in_collision_is_refused_and_names_the_obstacle() {
     let _texts = Texts::of("a_start_in_collision_is_refused_and_names_the_obstacle");
     let folder = temp();
-    // Round the forearm of the stowed arm: the vehicle frame's origin is 1.7 m behind the base.
+    // The box is around the forearm of the stowed arm: the vehicle frame's origin is 1.7 m behind the base.
     let tail =
         "[[obstacle]]\nname = \"crate\"\nshape = \"box\"\nsize_m = [1.2, 1.2, 1.2]\nposition_m = [2.3, -0.6, 0.6]\n";
     let routine = ShortRoutine { tail: tail.to_owned(), ..ShortRoutine::default() };
@@ -95,7 +95,7 @@ fn a_robot_without_tags_is_refused() {
     run_short(&routine, folder.path()).expect("no tags", 2, &[]);
 }
 
-/// A number that arithmetic does not survive is wrong input, not a crash.
+/// A number that causes overflow is wrong input, not a crash.
 #[test]
 fn absurd_lengths_are_refused() {
     let folder = temp();
@@ -119,7 +119,7 @@ fn absurd_lengths_are_refused() {
     );
 }
 
-/// A datasheet without any uncertainty leaves nothing to calibrate.
+/// A datasheet without any uncertainty leaves no parameter to calibrate.
 #[test]
 fn sensors_that_cannot_be_wrong_leave_nothing_to_fit() {
     let _texts = Texts::of("sensors_that_cannot_be_wrong_leave_nothing_to_fit");
@@ -134,7 +134,7 @@ fn sensors_that_cannot_be_wrong_leave_nothing_to_fit() {
     calibrate(&recording, &robot, &folder.path().join("out")).expect("exact sensors", 2, &["run.mcap"]);
 }
 
-/// An arm that never comes to rest is told apart from a recording that lacks its marks.
+/// An arm that never comes to rest is distinguished from a recording without marks.
 #[test]
 fn an_arm_that_never_settles_leaves_nothing_to_calibrate() {
     let _texts = Texts::of("an_arm_that_never_settles_leaves_nothing_to_calibrate");
@@ -144,7 +144,7 @@ fn an_arm_that_never_settles_leaves_nothing_to_calibrate() {
     routine.targets_m.truncate(1);
     let answer = run_short(&routine, folder.path());
     assert_eq!(answer.code, 1, "{answer:#?}");
-    // Sixteen might be tried; after six in a row it is no use to go on.
+    // Sixteen poses might be tried; after six consecutive failures the run ends.
     assert!(answer.stderr.contains("run-cut-1.mcap"), "{answer:#?}");
     assert!(!folder.path().join("out/calibration.toml").exists());
     let kept = read_recording(folder.path().join("out/run-cut-1.mcap")).expect("the kept recording reads");
@@ -179,7 +179,7 @@ fn seven_joints(folder: &Path, allowed_pairs: &str) -> PathBuf {
     robot
 }
 
-/// A continuous middle joint, and neighbours but one that touch by design.
+/// A continuous middle joint, and adjacent links of which one pair touches by design.
 #[test]
 fn a_short_roll_link_needs_its_neighbours_allowed() {
     let folder = temp();

@@ -1,4 +1,4 @@
-//! Small results: `export`.
+//! The short forms of `export`.
 
 use std::io::Write;
 use std::path::Path;
@@ -35,7 +35,7 @@ fn export_stdin(text: &str, more: &[&str]) -> (i32, String, String) {
     (output.status.code().expect("a code"), text(output.stdout), text(output.stderr))
 }
 
-/// The compact line of a recording calibrated into `out`, refused or not.
+/// Compact line of a recording that is calibrated into `out`, accepted or refused.
 fn compact_of(recording: &Path, out: &Path) -> Answer {
     answer(
         program()
@@ -51,7 +51,7 @@ fn compact_of(recording: &Path, out: &Path) -> Answer {
     export(file.to_str().expect("UTF-8"), &["--as", "compact", "--refused"])
 }
 
-/// From the recording to the line, and from the line to the same tool positions.
+/// The recording is calibrated, and the compact line gives the same tool positions.
 #[test]
 fn the_compact_line_is_short_and_moves_the_tool_no_less_than_the_full_calibration() {
     let folder = temp();
@@ -76,7 +76,7 @@ fn the_compact_line_is_short_and_moves_the_tool_no_less_than_the_full_calibratio
     assert!(worst_m < 1e-4 && worst_m > 0.0, "{worst_m}");
 }
 
-/// A refused calibration is sent as one, with the reason's code.
+/// The compact line of a refused calibration has the refusal and its code.
 #[test]
 fn a_refused_calibration_says_so_in_the_compact_line() {
     let folder = temp();
@@ -196,7 +196,7 @@ fn with_terms(folder: &std::path::Path) -> std::path::PathBuf {
     file
 }
 
-/// A sensor that is no straight line is exported as a table, in YAML and from the compact line alike.
+/// A sensor that is not a straight line is exported as a table, both in YAML and from the compact line.
 #[test]
 fn terms_are_exported_as_tables_and_never_dropped() {
     let folder = temp();

@@ -1,4 +1,4 @@
-//! Files made to harm: the program ends at once with one clear error and within little memory.
+//! Malicious files: the program ends at once with one clear error and little memory.
 
 use std::path::{Path, PathBuf};
 
@@ -10,7 +10,7 @@ use crate::support::{
     Answer, ShortRoutine, answer, calibrate, edit, program, robot_copy, root, run, temp, titan, write,
 };
 
-/// Deep enough to overflow the stack of a parser that recurs.
+/// Text deep enough to overflow the stack of a recursive parser.
 fn deep_urdf() -> String {
     format!("<robot name=\"a\">{}{}</robot>", "<a>".repeat(15_000), "</a>".repeat(15_000))
 }
@@ -62,7 +62,7 @@ fn a_deep_urdf_attached_to_a_recording_is_refused() {
     answer(&mut replay).expect("replay", 2, &["titan4.urdf"]);
 }
 
-/// All that a routine names, in one folder, each to be replaced by something that never ends.
+/// All files that a routine names, in one folder; each is replaced in turn by an endless one.
 #[test]
 fn devices_and_pipes_in_place_of_files_are_refused_at_once() {
     let _texts = Texts::of("devices_and_pipes_in_place_of_files_are_refused_at_once");
@@ -102,7 +102,7 @@ fn devices_and_pipes_in_place_of_files_are_refused_at_once() {
     }
 }
 
-/// What has no end, or no beginning, in the place of what is there.
+/// Replacements of a file that have no end or no beginning.
 const NEVER_ENDING: [fn(&Path); 2] = [link_to_zeros, pipe_without_writer];
 
 fn link_to_zeros(file: &Path) {
@@ -150,7 +150,7 @@ fn long_files_and_many_entries_are_refused() {
     check(&file).expect("200,000 tags", 2, &["map.toml"]);
 }
 
-/// Nor do marks that turn the direction of writing; read again, the files have the name as it was.
+/// Marks that change the direction of writing do not either; read again, the files have the original name.
 #[test]
 fn names_steer_no_reader_of_the_files() {
     let folder = temp();

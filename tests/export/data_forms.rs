@@ -1,4 +1,4 @@
-//! Parameters, rows, JSON, camchain and tagslam.yaml: what programs read, read back.
+//! Parameters, rows, JSON, camchain and tagslam.yaml: exported files are read back.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -96,7 +96,7 @@ fn rows_hold_each_joint_with_its_deviations() {
     }
 }
 
-/// The reader of JSON may be off in a number's last digit.
+/// Compares values; the JSON reader may differ in a number's last digit.
 fn expect_same(a: &Value, b: &Value, key: &str) {
     match (a, b) {
         (Value::Object(a), Value::Object(b)) => {
@@ -155,7 +155,7 @@ fn the_camchain_is_the_robots_camera_at_its_calibrated_place() {
     assert!((x + 0.124).abs() < 1e-12, "the drawing's, where the calibration has none");
 }
 
-/// Of several cameras in a file the user names one; each arm has another.
+/// The user names one of several cameras in a file; each arm has another one.
 #[test]
 fn a_camera_of_a_camchain_is_chosen_by_its_name() {
     let folder = temp();
@@ -245,7 +245,7 @@ fn tags_of_a_map_are_read_back_from_tagslams_file() {
         let q = pose.rotation.coords;
         let turned = nalgebra::Vector4::from([0.5, -0.5, 0.5, 0.5]);
         assert!((q - turned).norm().min((q + turned).norm()) < 1e-12, "{q}");
-        // What was held has the least that TagSLAM is given.
+        // A tag that was held has the smallest standard deviation for TagSLAM.
         assert_eq!(found.std, Some([0.001, 0.002, 1e-4, 0.01, 1e-5, 0.02]));
     }
     export(&calibration_file(), None, "tagslam").expect("no map", 2, &["calibration.toml", "map", "missing"]);

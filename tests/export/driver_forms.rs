@@ -1,4 +1,4 @@
-//! URDF, transmissions and tables: what moves an arm.
+//! URDF, transmissions and tables: forms for drivers.
 
 use armcal::calib::{Calibration, Status};
 use armcal::sensor::{ArmSensors, SensorModel};
@@ -13,7 +13,8 @@ use crate::support::{answer, program, read, robot_folder, root, temp, titan, wri
 /// Rounding errors of a chain, m and rad.
 const ROUNDING: f64 = 1e-12;
 
-/// The camera's own joint is moved, or a link is added where it has none; either way it hangs where it was found.
+/// The camera's own joint is moved, or a link is added where it has none. In both cases the camera has its calibrated
+/// pose.
 #[test]
 fn the_exported_urdf_is_the_calibrated_arm() {
     let _texts = Texts::of("the_exported_urdf_is_the_calibrated_arm");
@@ -54,7 +55,7 @@ fn all_else_of_the_urdf_stays_as_it_was() {
     assert!(kept.clone().all(|line| lines.any(|other| other == line)), "in their order");
 }
 
-/// Link corrections are relative to the drawing, so that a second time they would count twice.
+/// Link corrections are relative to the nominal model, so a second export would count them twice.
 #[test]
 fn an_exported_urdf_is_not_exported_again() {
     let _texts = Texts::of("an_exported_urdf_is_not_exported_again");
@@ -65,7 +66,7 @@ fn an_exported_urdf_is_not_exported_again() {
     assert_eq!(told.stdout, "");
 }
 
-/// A sample without link corrections and mount leaves all but the comment.
+/// For a sample without link corrections and mount, only the comment changes.
 #[test]
 fn a_calibration_of_sensors_alone_changes_no_number_of_the_urdf() {
     let _texts = Texts::of("a_calibration_of_sensors_alone_changes_no_number_of_the_urdf");
@@ -91,7 +92,7 @@ fn rows(csv: &str) -> Vec<Row> {
     cells.map(|c| Row { joint: c[0].to_owned(), counts: number(c[1]), angle_rad: number(c[2]) }).collect()
 }
 
-/// The angle at a reading by a driver that draws straight lines between the rows.
+/// Angle at a reading for a driver that interpolates linearly between the rows.
 fn by_table(rows: &[&Row], wrap_counts: f64, reading: f64) -> f64 {
     let first = rows[0].counts;
     let reading = first + (reading - first).rem_euclid(wrap_counts);
@@ -133,7 +134,7 @@ fn the_table_is_exact_at_its_points_and_covers_each_joints_range() {
 
 #[test]
 fn straight_lines_between_the_chosen_points_are_within_the_stated_error_at_the_tool() {
-    /// m.
+    /// Stated interpolation error, m.
     const STATED: f64 = 2e-5;
     let (sensors, robot) = (sensors(), titan());
     let chosen = rows(&exported("table"));
@@ -159,7 +160,7 @@ fn straight_lines_between_the_chosen_points_are_within_the_stated_error_at_the_t
     let n = chosen.len() / 6;
     eprintln!("{n} points a joint: straight lines are off by {:.4} mm at the tool at most", 1e3 * worst);
     assert!(worst < STATED, "{worst}");
-    // A table of half as many points would not do, and says so.
+    // A table with half as many points has a larger error, and states it.
     let coarse = answer(
         program()
             .arg("export")
@@ -172,7 +173,7 @@ fn straight_lines_between_the_chosen_points_are_within_the_stated_error_at_the_t
     assert!(n > 9, "{n}");
 }
 
-/// The line that goes over an acoustic link is enough for a table and for transmissions.
+/// The line for an acoustic link is enough for a table and for transmissions.
 #[test]
 fn a_compact_line_gives_table_and_transmissions_and_names_what_it_lacks() {
     let _texts = Texts::of("a_compact_line_gives_table_and_transmissions_and_names_what_it_lacks");
@@ -205,7 +206,7 @@ fn forms_that_need_the_drawing_ask_for_it() {
     told.expect("points", 2, &["--points", "table"]);
 }
 
-/// A refused calibration leaves in no form unless somebody says so.
+/// A refused calibration is not exported in any form without the option.
 #[test]
 fn refused_calibrations_are_exported_on_demand_only() {
     let _texts = Texts::of("refused_calibrations_are_exported_on_demand_only");

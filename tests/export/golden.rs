@@ -1,4 +1,4 @@
-//! What Pinocchio and yourdfpy make of the exported files (tests/oracle/make_export_golden.py), beside ours.
+//! Exported files as read by Pinocchio and yourdfpy (tests/oracle/make_export_golden.py), compared with ours.
 
 use armcal::sensor::ArmSensors;
 use armcal::streams::JointCounts;
@@ -42,7 +42,7 @@ fn golden() -> Golden {
     serde_json::from_str(&read(&root().join("tests/golden/export/poses.json"))).expect("the golden file")
 }
 
-/// Sums of rounding errors of a chain of six joints.
+/// Tolerance for the rounding errors of a chain of six joints.
 const TOLERANCE: f64 = 1e-9;
 
 #[test]
@@ -73,7 +73,7 @@ fn values(text: &str, open: &str) -> Vec<f64> {
     parts.map(|value| value.parse().expect("a number")).collect()
 }
 
-/// Of the datasheet's angle, `SimpleTransmission` makes gain and offset; what is missing are the terms.
+/// From the datasheet's angle, `SimpleTransmission` computes gain and offset; only the terms are missing.
 #[test]
 fn transmissions_make_the_angle_without_terms() {
     let text = exported("ros2-control");

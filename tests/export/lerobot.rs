@@ -1,4 +1,4 @@
-//! LeRobot's calibration JSON: recordings read by it, and the homing offsets that come back.
+//! LeRobot's calibration JSON: recordings read by it, and the exported homing offsets.
 
 use std::path::{Path, PathBuf};
 
@@ -10,7 +10,7 @@ use armcal::sensor::{ArmSensors, SensorModel};
 use super::{calibration, calibration_file, export};
 use crate::support::{answer, program, read, robot_folder, temp, titan, write};
 
-/// The Titan 4 on motors of 4096 ticks a turn.
+/// The Titan 4 on motors of 4096 ticks per turn.
 fn on_motors() -> Robot {
     let mut robot = titan();
     for spec in &mut robot.sensors {
@@ -20,7 +20,7 @@ fn on_motors() -> Robot {
     robot
 }
 
-/// Input map and JSON in a folder: every joint's motor, and a gripper's.
+/// Writes input map and JSON into a folder: every joint's motor, and a gripper's.
 fn files(folder: &Path, robot: &Robot, motors: &str, values: &str) -> PathBuf {
     let motor = |id: usize, name: &str| {
         format!(
@@ -56,7 +56,7 @@ fn numbers_of_lerobot_are_read_as_ticks() {
     let folder = temp();
     let head: Vec<String> = robot.joint_names().iter().map(|name| format!("{name}.pos")).collect();
     let table = folder.path().join("poses.csv");
-    // Degrees of the middle of 700 + id to 3400; percents of its half.
+    // Degrees count from the middle of 700 + id to 3400; percents are of its half.
     for (values, number, tick_of) in [
         ("degrees", 9.0, (|id: f64| 0.5 * (4100.0 + id) + 9.0 * 4095.0 / 360.0) as fn(f64) -> f64),
         ("range_m100_100", 25.0, |id| 0.5 * (4100.0 + id) + 0.125 * (2700.0 - id)),
@@ -107,7 +107,7 @@ fn homing_offsets_put_the_middle_of_the_range_at_its_angle() {
             let motor = |json: &serde_json::Value, key: &str| json[&spec.joint][key].as_f64().expect("a number");
             let middle = 0.5 * (motor(&after, "range_min") + motor(&after, "range_max"));
             assert!(middle > 2000.0 && motor(&before, "range_min") == motor(&after, "range_min"));
-            // The motor's own angle at which it now reads the middle, and its reading there under the old offset.
+            // The motor's own angle at the new middle, and its reading there with the old offset.
             let actual = middle - sign * motor(&after, "homing_offset");
             let reading = actual + sign * motor(&before, "homing_offset");
             let angle_off = model.angle_rad(reading) - SensorModel::nominal(spec).angle_rad(middle);

@@ -1,4 +1,5 @@
-//! Link poses as Universal Robots and Franka write them: the arm is that of the exported URDF, and bad files are named.
+//! Link poses in the files of Universal Robots and Franka: the arm is that of the exported URDF, and errors name bad
+//! files.
 
 use std::path::Path;
 
@@ -18,7 +19,7 @@ const UR: [[&str; 2]; 6] = [
     ["wrist_yaw_link", "l_wrist_2_link"],
     ["manipulator_link", "l_wrist_3_link"],
 ];
-/// Its joints, and Franka's; two fixed ones are the seventh and the flange's.
+/// The Titan 4's joints, and Franka's; two fixed ones are the seventh and the flange's.
 const FRANKA: [[&str; 2]; 8] = [
     ["shoulder_yaw", "fr_joint1"],
     ["shoulder_pitch", "fr_joint2"],
@@ -35,7 +36,7 @@ fn renamed(path: &Path, names: &[[&str; 2]]) -> String {
     names.iter().fold(read(path), |text, [from, to]| text.replace(&format!("\"{from}\""), &format!("\"{to}\"")))
 }
 
-/// Robot folder and calibration of a Titan 4 whose parts are called otherwise.
+/// Writes robot folder and calibration of a Titan 4 with other names.
 fn arm_of(folder: &Path, names: &[[&str; 2]]) {
     write(&folder.join("robot.toml"), &renamed(&robot_folder().join("robot.toml"), names));
     write(&folder.join("titan4.urdf"), &renamed(&robot_folder().join("titan4.urdf"), names));

@@ -1,4 +1,5 @@
-//! Commands that are killed at any moment, or kept from their folder: a result is the old one or the new one, whole.
+//! Commands that are killed at any moment, or cannot use their folder: a result is the old one or the new one,
+//! complete.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,7 +13,7 @@ use super::{names, reference};
 use crate::support::texts::Texts;
 use crate::support::{ShortRoutine, answer, calibrate, program, read, robot_folder, shared_run, temp};
 
-/// A command that writes into `out`, and what it leaves there, the one that vouches for the others last.
+/// A command that writes into `out`, and its files; the last one vouches for the others.
 struct Case {
     command: fn(&Path) -> Command,
     leaves: &'static [&'static str],
@@ -52,7 +53,7 @@ fn whole(command: &mut Command) {
     assert_eq!(said.code, 0, "{said:#?}");
 }
 
-/// What the wall clock says is in the summary alone.
+/// The summary without its times, the only values of the wall clock.
 fn without_times(text: &str) -> String {
     text.lines().filter(|line| !line.contains("wall_s")).collect()
 }
@@ -62,7 +63,7 @@ fn results(out: &Path, case: &Case) -> Vec<Option<String>> {
     case.leaves.iter().map(text).map(|text| text.map(|text| without_times(&text))).collect()
 }
 
-/// kill -9 at random moments, reading, working, writing and renaming: `ARMCAL_KILLS` of each.
+/// Sends kill -9 at random moments while the commands read, work, write and rename: `ARMCAL_KILLS` of each.
 fn expect_old_results_or_new_ones(cases: &[Case], kills: u32) {
     let mut rng = stream_rng(2, "kills");
     for case in cases {
@@ -77,7 +78,7 @@ fn expect_old_results_or_new_ones(cases: &[Case], kills: u32) {
                 fs::write(out.join(name), "earlier").expect("written");
             }
             let mut child = (case.command)(&out).stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("started");
-            // Two of three near the end, where files are put in place.
+            // Two of three kills come near the end, when files are put in place.
             let share = if kill % 3 == 0 { rng.random_range(0.0..1.0) } else { rng.random_range(0.9..1.1) };
             std::thread::sleep(took.mul_f64(share));
             child.kill().expect("killed");
@@ -150,12 +151,12 @@ fn results_have_the_rights_that_the_umask_leaves() {
     }
 }
 
-/// Not after an hour of runs.
+/// The error comes before the work, not after an hour of runs.
 #[cfg(target_os = "linux")]
 #[test]
 fn where_nothing_can_be_written_is_found_before_the_work() {
     let (reference, took) = reference();
-    // Nobody can make files there, not even root.
+    // Not even root can make files there.
     let nowhere = PathBuf::from("/proc/self/a.csv");
     let baseline = ["regress", "--seeds=1", "--write-baseline"];
     for words in [&baseline[..], &["campaign", "--seeds=1", "--out"]] {
@@ -164,7 +165,7 @@ fn where_nothing_can_be_written_is_found_before_the_work() {
         said.expect(words[0], 1, &["/proc/self"]);
         assert!(began.elapsed() < took.mul_f64(0.5), "{words:?}");
     }
-    // What comes first of a place that cannot be written and a task that cannot be done is the place.
+    // With an unwritable folder and an impossible task, the error names the folder first.
     let folder = temp();
     let unreachable = ShortRoutine { targets_m: vec![[0.0, 0.0, 2.2]], ..ShortRoutine::default() }.write(folder.path());
     let said = answer(program().arg("plan").arg(&unreachable).args(["--out", "/proc/self"]));
@@ -188,7 +189,7 @@ fn a_link_in_the_place_of_a_growing_file_is_not_followed() {
     assert_eq!(read(&target), "precious");
 }
 
-/// kill -9 at random moments, again and again into the same campaign: `ARMCAL_KILLS` of them.
+/// Sends kill -9 at random moments to repeated runs of the same campaign: `ARMCAL_KILLS` of them.
 fn expect_a_killed_campaign_to_go_on(kills: u32) {
     let folder = temp();
     let campaign = |name: &str, seeds: u32| {
@@ -197,7 +198,7 @@ fn expect_a_killed_campaign_to_go_on(kills: u32) {
         command.arg(format!("1..{seeds}")).arg("--out").arg(folder.path().join(name));
         command
     };
-    // A kill in the middle of each run or so, whatever the machine does beside.
+    // With this number of seeds about one kill comes in the middle of each run, for any load of the machine.
     let seeds = kills.div_ceil(2).max(2);
     let began = Instant::now();
     whole(&mut campaign("whole.csv", seeds));
@@ -211,7 +212,7 @@ fn expect_a_killed_campaign_to_go_on(kills: u32) {
         child.wait().expect("gone");
         let rows = ["killed.csv", "killed.csv.partial"].map(|name| fs::read_to_string(folder.path().join(name)));
         let rows = rows.iter().flatten().map(|text| text.lines().count()).max().unwrap_or(0);
-        // The last may be cut, and goes when the campaign goes on.
+        // The last row may be cut, and is removed when the campaign continues.
         assert!(rows + 1 >= n_rows, "{rows} rows after {n_rows}");
         n_rows = rows;
     }
@@ -260,7 +261,7 @@ fn that_write(out: &Path) -> Vec<Command> {
     ]
 }
 
-/// A mount in a namespace of its own: root, too, cannot write there. Where none can be made, this is skipped.
+/// A mount in a separate namespace, in which root cannot write either. The test is skipped where none can be made.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_read_only_mount_is_named_and_nothing_is_left() {

@@ -1,13 +1,13 @@
-//! `armcal discover` proposes maps that connect, against our own middleware and another one.
+//! `armcal discover` proposes maps that connect to an arm, with our own middleware and another one.
 
 use super::in_namespace;
 use crate::support::{ShortRoutine, read, robot_folder, temp, titan, write};
 
-/// Looks around and listens to the arm by the map that was proposed.
+/// Discovers the arm, and listens to it by the proposed map.
 const LOOK: &str = "$ARMCAL discover --network 127.0.0.1 --for 4 --robot $ROBOT --out arm.toml && \
                     $ARMCAL drive $ROUTINE --arm arm.toml --no-motion; CODE=$?;";
 
-/// Topics and joints with names of its own, and the type of set-points that is not the first choice.
+/// The arm has other names for topics and joints, and the second type of set-points.
 #[test]
 #[ignore = "needs user namespaces"]
 fn a_served_arm_is_discovered_and_heard() {
@@ -45,7 +45,7 @@ fn a_served_arm_is_discovered_and_heard() {
     }
 }
 
-/// The arm of another make: it has no camera, and that is said.
+/// The arm uses another middleware; it has no camera, which the output says.
 #[test]
 #[ignore = "needs user namespaces and Python's cyclonedds"]
 fn an_arm_of_another_make_is_discovered_and_heard() {

@@ -1,5 +1,5 @@
-//! What goes wrong between an arm and armcal: a relay that is none of ours stands between them, does one fault, and
-//! keeps what armcal sent.
+//! Faults between an arm and armcal: a separate relay between them causes one fault, and records the messages from
+//! armcal.
 
 use std::path::Path;
 
@@ -14,30 +14,30 @@ use armcal::streams::{Message, ReachAttempt};
 
 use crate::support::{Answer, ShortRoutine, calibrate, read, robot_folder, temp, titan, write};
 
-/// Arm's time over ours: two arms at once, each behind a relay in Python, must keep pace on a slow machine.
+/// Ratio of the arm's time to ours: two arms at once, each behind a relay in Python, must keep pace on a slow machine.
 const FACTOR: f64 = 4.0;
 /// A period of set-points, by the arm's clock, s.
 const PERIOD_S: f64 = 0.02;
-/// Readings may be missing for so long, by our clock, s.
+/// Longest time without readings, by our clock, s.
 const STALE_S: f64 = 1.0;
-/// Readings may repeat themselves for so long, and be astray for so long, by the arm's clock, s.
+/// Longest time of repeated readings, and of wrong ones, by the arm's clock, s.
 const FROZEN_S: f64 = 1.0;
 const TRACKING_S: f64 = 1.0;
-/// What a busy machine may add to a promise, s.
+/// Delay that a busy machine may add to a guaranteed time, s.
 const BUSY_S: f64 = 0.15;
-/// Set-points move no joint faster than the robot's rates, times this;
+/// Largest ratio of a set-point's rate to the robot's joint rate; `STAY_RAD` allows an exception.
 const RATE_SLACK: f64 = 1.2;
-/// but one that is told to stay so near to where it lately read to be, rad, may be told so at once:
+/// Distance from a recent reading, rad, within which a set-point is safe at any rate: it tells the joint to stay.
 const STAY_RAD: f64 = 0.006;
-/// by one of so many readings.
+/// Number of readings that count as recent.
 const LATELY: usize = 50;
 
-/// The views come first, so that there are some when the fault begins.
+/// The capture comes first, so there are views when the fault begins.
 const STEPS: &str = "[[step]]\ndo = \"capture\"\n[[step]]\ndo = \"calibrate\"\n[[step]]\ndo = \"reach\"\n";
 
-/// What the relay saw, in Unix seconds.
+/// Messages that the relay recorded, with Unix seconds.
 struct Seen {
-    /// Time at which it was sent, counts, and how many readings had been passed on.
+    /// Set-points: time of sending, counts, and number of readings passed on until then.
     set_points: Vec<(f64, Vec<f64>, usize)>,
     readings: Vec<Vec<f64>>,
     stops_s: Vec<f64>,
@@ -68,7 +68,7 @@ impl Seen {
         seen
     }
 
-    /// Nothing that the arm was told was unsafe: no joint is led faster than it may go, and nothing comes after a stop.
+    /// Asserts that every command to the arm was safe: no joint exceeds its rate, and nothing follows a stop.
     fn assert_safe(&self, name: &str) {
         for (joint, sensor) in titan().sensors.iter().enumerate() {
             let most = 1.01 * RATE_SLACK * sensor.max_rate_rad_s * PERIOD_S;
@@ -85,7 +85,7 @@ impl Seen {
         assert_eq!(later, 0, "{name}: set-points after the stop");
     }
 
-    /// When a joint was first asked to move so far from where it was led when the fault began.
+    /// Time at which a joint was first commanded this far from its set-point at the beginning of the fault, s.
     fn asked_s(&self, deg: f64) -> f64 {
         let before = self.set_points.iter().rfind(|(at_s, ..)| *at_s <= self.fault_s).expect("a set-point");
         let robot = titan();
@@ -97,13 +97,13 @@ impl Seen {
     }
 }
 
-/// The short way round.
+/// Angle between two readings the shorter way round, rad.
 fn way_rad(sensor: &JointSensorSpec, from: f64, to: f64) -> f64 {
     let wrap = sensor.wrap_counts;
     ((to - from + wrap / 2.0).rem_euclid(wrap) - wrap / 2.0).abs() / sensor.counts_per_rad.abs()
 }
 
-/// A run through the relay; the script goes on with `ends` while it runs as $RUN, and $SERVER serves.
+/// A run through the relay; the script continues with `ends` while it runs as $RUN, and $SERVER serves.
 fn relayed(folder: &Path, fault: &str, steps: &str, ends: &str) -> (Answer, Seen) {
     let routine = ShortRoutine { tail: steps.to_owned(), ..ShortRoutine::default() }.write(folder);
     write(&folder.join("served.toml"), "version = 1\nkind = \"arm\"\ndomain = 1\nnetworks = [\"127.0.0.1\"]\n");
@@ -120,20 +120,20 @@ fn relayed(folder: &Path, fault: &str, steps: &str, ends: &str) -> (Answer, Seen
     (said, Seen::read(&folder.join("relay.jsonl")))
 }
 
-/// Ends the run some seconds after the fault, if it has not ended of itself.
+/// Ends the run some seconds after the fault, if it has not ended by itself.
 const END_LATER: &str = "is_on() { kill -0 $RUN 2>/dev/null; }; \
                          until grep -qs fault relay.jsonl || ! is_on; do sleep 0.05; \
                          done; for i in $(seq 30); do is_on || break; sleep 0.1; done; kill -INT $RUN 2>/dev/null;";
 
-/// A fault, and what was promised.
+/// A fault, and the guaranteed reaction.
 struct Case {
-    /// As the relay knows it.
+    /// The fault in the relay's terms.
     fault: String,
-    /// Code of the reason; `None` where the run goes on.
+    /// Code of the reason; `None` where the run continues.
     stops_with: Option<&'static str>,
-    /// By our clock, and by the arm's, s,
+    /// Guaranteed times by our clock, and by the arm's, s; they count from the command in `asked_deg`.
     within_s: [f64; 2],
-    /// once a joint was asked to move so far, deg.
+    /// Angle of a joint's command, deg, from whose first set-point the guaranteed times count.
     asked_deg: f64,
 }
 
@@ -153,7 +153,7 @@ fn cases() -> Vec<Case> {
         stops("repeat", "[readings_stale]", [STALE_S, PERIOD_S], 0.0),
         stops("step s=0.8", "[clock_jumped]", [0.0, PERIOD_S], 0.0),
         stops("step s=-30", "[clock_jumped]", [0.0, PERIOD_S], 0.0),
-        // The session may hold a joint meanwhile that seems not to follow: what it asked before counts.
+        // The session may meanwhile hold a joint that seems not to follow, so earlier commands count.
         stops("freeze", "[readings_frozen]", [0.0, FROZEN_S + PERIOD_S], 1.2),
         stops(&jump, "[reading_jumped]", [0.0, TRACKING_S + PERIOD_S], 0.0),
         goes_on("cut s=0.15"),
@@ -162,7 +162,7 @@ fn cases() -> Vec<Case> {
     ]
 }
 
-/// Each fault by itself; what the relay saw is safe, and the recording whole, with the reason in it.
+/// Each fault by itself: the commands at the relay are safe, and the recording is complete, with the reason in it.
 #[test]
 #[ignore = "needs user namespaces and Python's cyclonedds"]
 fn faults_between_arm_and_armcal_stop_it_in_time_or_not_at_all() {
@@ -175,8 +175,8 @@ fn faults_between_arm_and_armcal_stop_it_in_time_or_not_at_all() {
     }
 }
 
-/// Set-points that do not arrive: the guard stops, or the session takes it for something in the way and gives up after
-/// some poses in vain.
+/// Set-points that do not arrive: either the guard stops, or the session assumes an obstacle and ends after some failed
+/// poses.
 #[test]
 #[ignore = "needs user namespaces and Python's cyclonedds"]
 fn set_points_that_do_not_arrive_end_the_run() {
@@ -201,7 +201,7 @@ fn judge(case: &Case) {
     let n_later = seen.set_points.iter().filter(|(at_s, ..)| *at_s > seen.fault_s).count();
     match case.stops_with {
         Some(word) => {
-            // A jump may first show as a set-point beyond the joint's range.
+            // A jump may first appear as a set-point beyond the joint's range.
             let is_seen = |word: &str| said.stderr.contains(word);
             assert!(is_seen(word) || name.starts_with("jump") && is_seen("[joint_limit]"), "{name}: {}", said.stderr);
             let promised_s = case.within_s[0] + case.within_s[1] / FACTOR;
@@ -218,17 +218,18 @@ fn judge(case: &Case) {
     let messages = read_recording(&recording).expect("it reads").messages;
     let is_told = |(_, message): &(_, Message)| matches!(message, Message::Log(line) if line.name == "guard");
     assert_eq!(messages.iter().any(is_told), case.stops_with.is_some(), "{name}: does the recording say why it ends?");
-    // Some views are too few to be believed, but there they are.
+    // The views are too few for an accepted result, but the recording has them.
     let calibrated = calibrate(&recording, &robot_folder(), &out.path().join("calibrated"));
     assert!([0, 4].contains(&calibrated.code), "{name}: {calibrated:?}");
 }
 
-/// Messages that are lost, or late, both ways and all the time: the arm is calibrated, and reaches what it missed.
+/// Messages are lost or late, both ways and all the time: the arm is calibrated, and reaches the targets that it missed
+/// before.
 #[test]
 #[ignore = "needs user namespaces and Python's cyclonedds"]
 fn an_arm_behind_a_poor_line_is_calibrated_all_the_same() {
     std::thread::scope(|scope| {
-        // 200 ms of the arm's time.
+        // The delay is 200 ms of the arm's time.
         for fault in ["lose share=0.05 after=1".to_owned(), format!("delay s={} after=1", 0.2 / FACTOR)] {
             scope.spawn(move || judge_whole(&fault));
         }
@@ -256,13 +257,13 @@ fn judge_whole(fault: &str) {
     );
 }
 
-/// In the way of a target, by the vehicle's frame, and drawn nowhere.
+/// An obstacle in the way of a target, in the vehicle's frame, and in no description.
 const ROCK: &str = "[[world.obstacle]]\nname = \"undrawn\"\nshape = \"sphere\"\nradius_m = 0.2\n\
                     position_m = [3.306, -0.735, 0.585]\n";
-/// From the touch until it is noticed, by the arm's clock, s.
+/// Longest time from the touch until it is noticed, by the arm's clock, s.
 const NOTICED_S: f64 = 1.0;
 
-/// An obstacle that nobody drew: it is felt, backed away from and left alone, and the arm is calibrated.
+/// The arm notices an unknown obstacle by touch, backs away and avoids it, and is calibrated.
 #[test]
 #[ignore = "needs user namespaces and Python's cyclonedds"]
 fn an_obstacle_is_felt_over_the_wire_and_left_alone() {

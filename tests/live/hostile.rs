@@ -1,4 +1,4 @@
-//! Peers and servers made to harm: each costs what the budget allows, or ends the program with its cause.
+//! Malicious peers and servers: each costs at most its budget, or ends the program with the cause.
 
 use std::process::Command;
 
@@ -14,7 +14,7 @@ struct Row {
     said: String,
 }
 
-/// Rows of the table of a script, for the attacks whose names have these in them.
+/// Rows of a script's table, for the attacks with one of `names` in theirs.
 fn attacked(script: &str, names: &[&str]) -> Vec<Row> {
     let out = temp();
     let file = out.path().join("table.csv");
@@ -51,7 +51,7 @@ fn peers_that_make_the_program_grow_end_it_with_the_cause() {
     }
 }
 
-/// The stop goes out although the threads that would send it are busy with a sample of 3 GB, or with endless numbers.
+/// The stop is sent although the threads for it are busy with a sample of 3 GB, or with endless numbers.
 #[test]
 #[ignore = "needs user namespaces"]
 fn an_arm_in_motion_is_stopped_before_the_program_ends() {

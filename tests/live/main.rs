@@ -1,8 +1,8 @@
-//! Arms behind ROS 2 topics: the program on both ends, in a network namespace of its own.
+//! Arms behind ROS 2 topics: the program on both ends, in a separate network namespace.
 //!
-//! `cargo test --release --features live --test live -- --ignored`; user namespaces must be allowed, and `python3`
-//! must have cyclonedds, websockets and rerun-sdk (tests/oracle/requirements.txt) for arm, relay, rosbridge and viewer
-//! that are none of ours.
+//! Run `cargo test --release --features live --test live -- --ignored`; user namespaces must be allowed. `python3` must
+//! have cyclonedds, websockets and rerun-sdk (tests/oracle/requirements.txt) for independent implementations of arm,
+//! relay, rosbridge and viewer.
 
 #![allow(clippy::print_stderr, reason = "figures of a test, for whoever reads its output")]
 
@@ -27,7 +27,7 @@ mod viewer;
 
 use crate::support::{Answer, ShortRoutine, answer, read, root, temp, titan, write};
 
-/// Joins nothing but the loopback of its own namespace.
+/// Command that enters a namespace with only its own loopback.
 const NAMESPACE: &str = "ip link set lo up multicast on && ip route add 239.0.0.0/8 dev lo && exec bash -c \"$@\"";
 const CYCLONE: &str = "<CycloneDDS><Domain><General><Interfaces><NetworkInterface name=\"lo\" multicast=\"true\"/>\
                        </Interfaces></General></Domain></CycloneDDS>";
@@ -51,7 +51,7 @@ fn connection(out: &Path, more: &str) -> PathBuf {
     file
 }
 
-/// How far the tool truly was from the target at each reach of this kind, m.
+/// Distances of the true tool from the target at each reach of this kind, m.
 fn reach_errors_m(recording: &Path, truth: &Truth, wanted: ReachAttempt) -> Vec<f64> {
     let recording = read_recording(recording).expect("the recording reads");
     let task = recording.messages.iter().find_map(|(_, message)| match message {
@@ -74,8 +74,8 @@ fn reach_errors_m(recording: &Path, truth: &Truth, wanted: ReachAttempt) -> Vec<
     reaches.map(error).collect()
 }
 
-/// The whole loop over the wire at eight times real time: accepted, it reaches what it missed before, and `calibrate`
-/// on the recording gives the same bytes.
+/// The whole loop over the wire at eight times real time: it is accepted, and reaches the targets that it missed
+/// before. `calibrate` on the recording gives the same bytes.
 #[test]
 #[ignore = "needs user namespaces"]
 fn a_served_arm_is_calibrated_and_reaches_its_targets() {
@@ -108,7 +108,7 @@ fn a_served_arm_is_calibrated_and_reaches_its_targets() {
     assert!(worst < 4.5, "served and direct calibrations differ by {worst} sigma");
 }
 
-/// Of gain and offset, between two independent calibrations of the same sensors.
+/// Largest difference of gain and offset, in sigmas, between two independent calibrations of the same sensors.
 fn largest_difference_sigma(a: &Path, b: &Path) -> f64 {
     let joints = |folder: &Path| {
         let table: toml::Table = read(&folder.join("calibration.toml")).parse().expect("TOML");
@@ -127,8 +127,8 @@ fn largest_difference_sigma(a: &Path, b: &Path) -> f64 {
     worst
 }
 
-/// A driver that dies in mid-motion: the run ends soon after the last reading, what there is can be read, and the
-/// driver that comes back is heard again.
+/// The driver ends during a motion: the run ends soon after the last reading, and the recording is readable. A
+/// restarted driver is received again.
 #[test]
 #[ignore = "needs user namespaces"]
 fn a_run_whose_arm_dies_stops_and_keeps_its_recording() {
@@ -153,7 +153,7 @@ fn a_run_whose_arm_dies_stops_and_keeps_its_recording() {
     assert!(recording.messages.iter().any(|(_, message)| is_told(message)), "the recording does not say why it ends");
 }
 
-/// Each joint by one degree over the wire, with an operator who says yes to that and no to the first motion.
+/// The operator confirms the steps of one degree per joint, and refuses the first motion.
 #[test]
 #[ignore = "needs user namespaces"]
 fn a_served_arm_follows_one_degree_at_a_time() {
@@ -165,7 +165,7 @@ fn a_served_arm_follows_one_degree_at_a_time() {
                   kill -INT $SERVER; wait $SERVER; exit $CODE";
     let said = in_namespace(out.path(), &routine, script);
     said.expect("run --nudge", 1, &["[interrupted]"]);
-    // Said, read and left over.
+    // The lines have the commanded, the read and the remaining angle.
     let told = said.stderr.lines().filter(|line| line.matches(" deg").count() == 3);
     assert_eq!(told.count(), titan().n_joints(), "{}", said.stderr);
 }
@@ -176,7 +176,7 @@ fn a_served_arm_follows_one_degree_at_a_time() {
 fn images_of_a_served_camera_are_searched_for_tags() {
     let out = temp();
     let routine = root().join("routines/titan4-rendered.toml");
-    // Rendering on a busy machine holds up the readings.
+    // Rendering on a busy machine delays the readings.
     connection(out.path(), "detections = \"\"\n[guard]\nready_s = 10.0\nstale_s = 5.0\n");
     let script = "$ARMCAL serve $ROUTINE --arm arm.toml 2>serve.log & SERVER=$!; \
                   $ARMCAL drive $ROUTINE --arm arm.toml --no-motion; CODE=$?; \
@@ -191,7 +191,7 @@ fn images_of_a_served_camera_are_searched_for_tags() {
     assert!(!said.stderr.contains("[messages_rejected]"), "{}", said.stderr);
 }
 
-/// Where the arm of another make begins and how fast it goes, counts: stowed, and half as fast again as it may.
+/// Writes start and rate of an arm of another make, counts: the stowed pose, and one and a half times its allowed rate.
 fn write_peer_start(out: &Path) -> (Vec<f64>, Vec<f64>) {
     let robot = titan();
     let counts = ArmSensors::nominal(&robot).counts(&robot.stowed).to_vec();
@@ -204,7 +204,7 @@ fn write_peer_start(out: &Path) -> (Vec<f64>, Vec<f64>) {
     (counts, rates)
 }
 
-/// An arm by another middleware, in another language: it is read, it moves no faster than it may, and Ctrl-C stops it.
+/// An arm with another middleware, in another language: it is read, it does not exceed its rate, and Ctrl-C stops it.
 #[test]
 #[ignore = "needs user namespaces and Python's cyclonedds"]
 fn an_arm_of_another_make_is_read_moved_and_stopped() {
@@ -227,7 +227,7 @@ fn an_arm_of_another_make_is_read_moved_and_stopped() {
     assert!(set_points.len() > 200, "{} set-points", set_points.len());
     for (joint, rate) in rates.iter().enumerate() {
         let moved = set_points.windows(2).map(|pair| way(joint, pair[1].1[joint] - pair[0].1[joint]).abs());
-        // Two set-points may come at once, none is further than two periods' way.
+        // Two set-points may arrive at once; each one is within the motion of two periods.
         let most = moved.fold(0.0, f64::max);
         assert!(most <= rate / 1.5 * 1.2 * 0.02 * 1.01, "joint {joint}: {most} counts at once");
     }

@@ -1,4 +1,4 @@
-//! A served arm behind a rosbridge that is none of ours, spelled as ROS 1 does.
+//! A served arm behind an independent rosbridge, with ROS 1 spelling.
 
 use std::path::Path;
 
@@ -12,14 +12,14 @@ use armcal::streams::{Message, ReachAttempt};
 
 use crate::support::{ShortRoutine, calibrate, read, robot_folder, temp};
 
-/// Arm's time over ours.
+/// Ratio of the arm's time to ours.
 const FACTOR: f64 = 8.0;
-/// Readings may be missing for so long, by our clock, s.
+/// Longest time without readings, by our clock, s.
 const STALE_S: f64 = 1.0;
-/// What a busy machine may add to a promise, and the program takes to end, s.
+/// Delay that a busy machine may add to a guaranteed time, and that the end of the program takes, s.
 const BUSY_S: f64 = 1.0;
 
-/// Both sides use one map: the server reads its topics, and nothing of the bridge.
+/// Writes the map of both sides: the server reads its topics, and ignores the bridge.
 fn write_map(out: &Path) {
     let more = format!(
         "images = \"\"\n[rosbridge]\nurl = \"ws://127.0.0.1:9090\"\nros = 1\n[guard]\nstale_s = {STALE_S}\n\
@@ -28,7 +28,7 @@ fn write_map(out: &Path) {
     connection(out, &more);
 }
 
-/// The arm as $SERVER and the bridge as $BRIDGE.
+/// Script with the arm as $SERVER and the bridge as $BRIDGE.
 fn with_bridge(script: &str) -> String {
     format!(
         "$ARMCAL serve $ROUTINE --arm arm.toml --factor {FACTOR} --truth truth.mcap 2>serve.log & SERVER=$!; \
@@ -39,7 +39,7 @@ fn with_bridge(script: &str) -> String {
 
 const END: &str = "CODE=$?; kill -KILL $BRIDGE; kill -INT $SERVER; wait $SERVER; exit $CODE";
 
-/// What the bridge was told, with the time.
+/// Messages to the bridge, with their times.
 fn told(out: &Path) -> Vec<(f64, Value)> {
     let line = |line: &str| {
         let value: Value = serde_json::from_str(line).expect("JSON");
@@ -48,8 +48,8 @@ fn told(out: &Path) -> Vec<(f64, Value)> {
     read(&out.join("bridge.jsonl")).lines().map(line).collect()
 }
 
-/// The whole loop through JSON: accepted, it reaches what it missed before, and `calibrate` on the recording gives the
-/// same bytes.
+/// The whole loop through JSON: it is accepted, and reaches the targets that it missed before. `calibrate` on the
+/// recording gives the same bytes.
 #[test]
 #[ignore = "needs user namespaces, and Python's cyclonedds and websockets"]
 fn an_arm_behind_a_rosbridge_is_calibrated_and_reaches_its_targets() {
@@ -82,8 +82,8 @@ fn an_arm_behind_a_rosbridge_is_calibrated_and_reaches_its_targets() {
     }
 }
 
-/// A bridge that dies ends the run at once; one that hangs, as readings that are missing do; and a run that is stopped
-/// tells the arm so, in both ways.
+/// A bridge that ends also ends the run at once; one that hangs has the effect of missing readings. A stopped run tells
+/// the arm so, in both ways.
 #[test]
 #[ignore = "needs user namespaces, and Python's cyclonedds and websockets"]
 fn a_bridge_that_dies_or_hangs_stops_the_run_and_a_stop_goes_over_it() {
@@ -119,7 +119,7 @@ fn a_bridge_that_dies_or_hangs_stops_the_run_and_a_stop_goes_over_it() {
         if let Some(stop) = stops.first() {
             assert_eq!(n_set_points(*stop), 0, "{signal}: a set-point after the stop");
         }
-        // A bridge that hangs or is gone may hand on nothing.
+        // A bridge that hangs or has ended may pass on nothing.
         if signal == "INT $RUN" {
             assert_eq!(stops.len(), 1, "{signal}");
             assert!(told.iter().any(|(_, line)| line["service"] == "/halt"), "{signal}: no call of the service");

@@ -10,7 +10,7 @@ const VIEWER: &str = "VIEWER_PROGRAM=$(python3 -c 'import sysconfig; print(sysco
                       $VIEWER_PROGRAM --serve-grpc --bind 127.0.0.1 --port 9876 2>viewer.log & VIEWER=$!; \
                       until ss -ltn | grep -q 127.0.0.1:9876 || ! kill -0 $VIEWER; do sleep 0.05; done;";
 
-/// A served arm is calibrated as if nobody had looked.
+/// A served arm is calibrated as without a viewer.
 #[test]
 #[ignore = "needs user namespaces and Python's rerun-sdk"]
 fn a_viewer_that_is_killed_does_not_disturb_the_arm() {

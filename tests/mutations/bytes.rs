@@ -1,11 +1,11 @@
-//! Changes of the kinds that disks, copies, hands and attackers make.
+//! Changes of the kinds that disks, copies, people and attackers cause.
 
 use rand::RngExt;
 
-/// Nothing longer is made of a file.
+/// Largest length of a changed file, bytes.
 const MAX_BYTES: usize = 4 << 20;
 
-/// What parsers take for numbers, structure or the end of a line, or should not take at all.
+/// Words that parsers accept as numbers, structure or ends of lines, or should reject.
 const WORDS: [&[u8]; 40] = [
     b"nan",
     b"inf",
@@ -49,7 +49,7 @@ const WORDS: [&[u8]; 40] = [
     b",",
 ];
 
-/// `seed` with one to four changes.
+/// Returns `seed` with one to four changes.
 pub fn mutated(seed: &[u8], rng: &mut impl RngExt) -> Vec<u8> {
     let mut bytes = seed.to_vec();
     for _ in 0..rng.random_range(1..=4) {
@@ -72,7 +72,7 @@ fn change(bytes: &mut Vec<u8>, rng: &mut impl RngExt) {
         2 => bytes.truncate(at),
         3 => bytes[at..end].fill(0),
         4 => drop(bytes.drain(at..end)),
-        // Twice, or so often that what grows with the number of something shows.
+        // The part is doubled, or repeated so often that costs in its number are visible.
         5 => repeat(bytes, at..end, 1),
         6 => repeat(bytes, line_about(bytes, at), 1 << rng.random_range(0..14)),
         7 => repeat(bytes, at..end.min(at + 8), 1 << rng.random_range(4..18)),
@@ -102,7 +102,7 @@ fn line_about(bytes: &[u8], at: usize) -> Range {
     start..end
 }
 
-/// The next thing that looks like a number; in a binary file, eight bytes.
+/// The next text that looks like a number; in a binary file, eight bytes.
 fn number_after(bytes: &[u8], at: usize) -> Range {
     let is_of_number = |byte: &u8| byte.is_ascii_digit() || b".-+e".contains(byte);
     let Some(start) = bytes[at..].iter().take(400).position(u8::is_ascii_digit) else {

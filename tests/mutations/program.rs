@@ -1,7 +1,7 @@
 //! The program on changed files, under limits of memory and time.
 //!
-//! Each case is a number: it chooses a file and a command and seeds the changes, so that `ARMCAL_MUTATED_FROM=N
-//! ARMCAL_MUTATED_RUNS=1` repeats it. The folder of a case that went wrong is kept.
+//! A case is a number, which chooses a file and a command and seeds the changes. `ARMCAL_MUTATED_FROM=N
+//! ARMCAL_MUTATED_RUNS=1` repeats it. The folder of a failed case is kept.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -16,19 +16,20 @@ use super::bytes::mutated;
 use super::recording::with_changed_messages;
 use crate::support::{program, root, temp, write};
 
-/// Processor time of one run, and the longest that it may wait for more: other work on the machine is no fault of it.
+/// Limit of one run's processor time, and of its waiting time beyond that, because other work on the machine may delay
+/// it.
 const LONGEST: Duration = Duration::from_secs(20);
 const LONGEST_WAIT: Duration = Duration::from_secs(600);
-/// Address space that a run is given, and what it may really use, KiB.
+/// Address space of a run, KiB; `MOST_KIB` limits the memory in use.
 const GIVEN_KIB: u64 = 2 << 20;
 const MOST_KIB: u64 = 500_000;
-/// Runs in every test run; `ARMCAL_MUTATED_RUNS=20000` for a campaign.
+/// Number of runs in every test run; `ARMCAL_MUTATED_RUNS=20000` for a campaign.
 const RUNS: u64 = 51;
 
-/// What is changed, its name in the folder of the case, and the command; `-` in front of a word is kept, a name of the
+/// A file to change, its name in the folder of the case, and the command. A word after `-` is kept; a name of the
 /// folder becomes its path.
 struct Case {
-    /// Below the repository.
+    /// Path of the file below the repository's root.
     seed: &'static str,
     name: &'static str,
     command: &'static str,
@@ -101,7 +102,7 @@ const CASES: [Case; 54] = [
     case(VIEWS, "changed.mcap", "tagmap changed.mcap --robot robot --out out.toml"),
 ];
 
-/// What stands beside the changed file.
+/// Writes the files that accompany the changed one.
 fn lay_out(folder: &Path) {
     std::fs::create_dir(folder.join("robot")).expect("a folder");
     for name in ["robot.toml", "titan4.urdf"] {
@@ -130,7 +131,7 @@ fn lay_out(folder: &Path) {
     write(&folder.join("motion.toml"), &format!("{routine}{moved}"));
 }
 
-/// How one case ended: the exit code, or what was wrong.
+/// Runs one case; returns the exit code, or the fault.
 fn run_case(number: u64) -> Result<i32, String> {
     let case = &CASES[(number % CASES.len() as u64) as usize];
     let folder = temp();
@@ -152,7 +153,7 @@ fn run_case(number: u64) -> Result<i32, String> {
     })
 }
 
-/// Runs the program in `folder` and looks at how it ends, how long it takes and what it uses.
+/// Runs the program in `folder`, and checks its exit, its time and its memory.
 fn watch(folder: &Path, words: &str) -> Result<i32, String> {
     let output = |name: &str| std::fs::File::create(folder.join(name)).expect("a file");
     let limited = format!("ulimit -v {GIVEN_KIB}; exec \"$0\" \"$@\"");
@@ -185,7 +186,7 @@ fn watch(folder: &Path, words: &str) -> Result<i32, String> {
     Ok(code)
 }
 
-/// Exit code and most memory used, KiB.
+/// Exit code and peak memory, KiB.
 fn wait(child: &mut Child) -> Result<(i32, u64), String> {
     let started = Instant::now();
     let status = PathBuf::from(format!("/proc/{}/status", child.id()));
@@ -206,10 +207,10 @@ fn wait(child: &mut Child) -> Result<(i32, u64), String> {
     }
 }
 
-/// Of a process, without its children; zero where it has ended.
+/// Processor time of a process, without its children; zero where it has ended.
 fn processor_time(id: u32) -> Duration {
     let text = std::fs::read_to_string(format!("/proc/{id}/stat")).unwrap_or_default();
-    // After the name in brackets: state, and eleven fields more, then the ticks of user and system, of 10 ms each.
+    // Fields after the name in brackets: state, eleven others, then the ticks of user and system, of 10 ms each.
     let fields = text.rsplit_once(')').map_or("", |(_, rest)| rest).split_whitespace().skip(11).take(2);
     Duration::from_millis(fields.filter_map(|ticks| ticks.parse::<u64>().ok()).sum::<u64>() * 10)
 }
@@ -242,7 +243,7 @@ fn the_program_survives_mutated_files() {
     assert!(problems.is_empty(), "{} cases went wrong:\n{}", problems.len(), problems.join("\n"));
 }
 
-/// A panic, too much memory and too long a time are seen.
+/// The check detects a panic, too much memory and too long a time.
 #[test]
 fn what_goes_wrong_is_seen() {
     let folder = temp();

@@ -1,4 +1,4 @@
-//! Recordings whose file is whole and whose messages are not.
+//! Recordings with a valid file and invalid messages.
 
 use std::collections::BTreeMap;
 use std::io::Cursor;
@@ -9,7 +9,7 @@ use rand::RngExt;
 
 use super::bytes::mutated;
 
-/// The recording with some of its messages changed, others lost, twice or at another time.
+/// The recording with some of its messages changed, lost, doubled or moved to another time.
 pub fn with_changed_messages(seed: &Path, rng: &mut impl RngExt) -> Vec<u8> {
     let mut out = Vec::new();
     let options = mcap::WriteOptions::new().compression(None).compression_threads(0);
@@ -32,7 +32,7 @@ pub fn with_changed_messages(seed: &Path, rng: &mut impl RngExt) -> Vec<u8> {
                 1 => times = 2,
                 2 => log_time = log_time.saturating_add_signed(rng.random_range(-10_000_000_000..10_000_000_000)),
                 3 => data = mutated(&data, rng),
-                // A number of eight bytes, anywhere.
+                // A number of eight bytes, at any offset.
                 _ if data.len() > 20 => {
                     let at = rng.random_range(4..data.len() - 8);
                     let values = [f64::NAN, f64::INFINITY, 0.0, -1.0, 1e300, 1e-300, 1e6];

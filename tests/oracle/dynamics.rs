@@ -82,7 +82,7 @@ pub(super) struct BaseState {
     base_angular_velocity: [f64; 3],
 }
 
-/// Base axes; spatial: the derivative of the velocity's components.
+/// Acceleration of the base in base axes; spatial: the derivative of the velocity's components.
 #[derive(Deserialize)]
 struct BaseAcceleration {
     base_linear_acceleration_classical: [f64; 3],
@@ -160,7 +160,7 @@ struct Head {
     joint_names: Vec<String>,
 }
 
-/// The robots, and what `T` wants of their files.
+/// Robots, with their golden files as `T`.
 pub(super) fn arms<T: DeserializeOwned>() -> impl Iterator<Item = (Robot, T)> {
     ARMS.into_iter().map(|(name, file)| {
         let robot = armcal::robot::load(&root().join("robots").join(name)).expect("the robot reads");
@@ -169,7 +169,7 @@ pub(super) fn arms<T: DeserializeOwned>() -> impl Iterator<Item = (Robot, T)> {
     })
 }
 
-/// The links without water, and with what `vehicle` adds to the base link.
+/// The links without water, and with the mass that `vehicle` adds to the base link.
 pub(super) fn dry(robot: &Robot, vehicle: Option<&VehicleMass>) -> Vec<Body> {
     let mut bodies: Vec<Body> =
         robot.bodies.iter().map(|link| Body::dry(link.mass_kg, link.com_m, &link.inertia_kg_m2)).collect();
@@ -195,7 +195,7 @@ fn in_water<T>(robot: &Robot, wet: &Wet<T>, vehicle: Option<&VehicleMass>) -> Mu
     Multibody::new(robot.chain.clone(), bodies)
 }
 
-/// Linear before angular, as the files have it.
+/// Added inertia from `rows`, linear before angular as in the files.
 fn added(rows: &[[f64; 6]; 6]) -> Inertia {
     let block = |row: usize, column: usize| Matrix3::from_fn(|i, j| rows[row + i][column + j]);
     Inertia { rotational: block(3, 3), coupling: block(3, 0), linear: block(0, 0) }
@@ -216,13 +216,13 @@ pub(super) fn equations(
     arm.equations(&EquationInput { angles, rates, around, base, extra })
 }
 
-/// `M x + bias`.
+/// Generalised forces `M x + bias`.
 fn forces(equations: &Equations, x: &[f64]) -> Vec<f64> {
     let row = |i: usize| (0..x.len()).map(|j| equations.inertia.get(i, j) * x[j]).sum::<f64>() + equations.bias[i];
     (0..x.len()).map(row).collect()
 }
 
-/// Accelerations under `tau` about the joints and nothing on the base.
+/// Accelerations under `tau` about the joints, with no force on the base.
 pub(super) fn accelerations(equations: &Equations, tau: &[f64]) -> Vec<f64> {
     let n = equations.first_joint + tau.len();
     let drive = |i: usize| if i < equations.first_joint { 0.0 } else { tau[i - equations.first_joint] };
@@ -232,14 +232,14 @@ pub(super) fn accelerations(equations: &Equations, tau: &[f64]) -> Vec<f64> {
     inertia.solve(&net)[..n].to_vec()
 }
 
-/// Norm of the difference over the norm of what is expected.
+/// Norm of the difference over the norm of the expected values.
 fn off(found: &[f64], expected: &[f64]) -> f64 {
     assert_eq!(found.len(), expected.len());
     let norm = |values: &mut dyn Iterator<Item = f64>| values.map(|v| v * v).sum::<f64>().sqrt();
     norm(&mut found.iter().zip(expected).map(|(a, b)| a - b)) / norm(&mut expected.iter().copied())
 }
 
-/// Angular, linear, joints: the order of the equations.
+/// Generalised vector in the order of the equations: angular, linear, joints.
 fn joined(base: &Motion, joints: &[f64]) -> Vec<f64> {
     base.to_array().into_iter().chain(joints.iter().copied()).collect()
 }
@@ -247,7 +247,7 @@ fn joined(base: &Motion, joints: &[f64]) -> Vec<f64> {
 pub(super) const AT_REST: BaseCoupling =
     BaseCoupling::Prescribed(Motion { angular: Vector3::new(0.0, 0.0, 0.0), linear: Vector3::new(0.0, 0.0, 0.0) });
 
-/// Of double precision through seven bodies' recursion and a factor of condition 1e5.
+/// Tolerance for double precision through seven bodies' recursion and a factor of condition 1e5.
 const TOLERANCE: f64 = 1e-9;
 
 #[test]
@@ -257,7 +257,7 @@ fn gravity_torques_are_those_of_pinocchio() {
         let gravity = Vector3::new(0.0, 0.0, -file.gravity_m_s2);
         assert_eq!(file.gravity_torques.cases.len(), 20);
         let worst = file.gravity_torques.cases.iter().map(|case| {
-            // What the drives must give is what gravity takes.
+            // The drives' torques are the opposite of gravity's.
             let held: Vec<f64> = arm.static_torques(&of(&case.q), &gravity).iter().map(|torque| -torque).collect();
             off(&held, &case.gravity_torque)
         });
@@ -265,7 +265,7 @@ fn gravity_torques_are_those_of_pinocchio() {
     }
 }
 
-/// The largest of `differences`, shown, against its limit.
+/// Prints the largest of `differences`, and checks it against its limit.
 pub(super) fn report(robot: &Robot, what: &str, differences: impl Iterator<Item = f64>, limit: f64) {
     let worst = differences.fold(0.0, |worst: f64, value| if value.is_nan() { value } else { worst.max(value) });
     eprintln!("{}, {what}: {worst:.1e}", robot.name);
@@ -306,7 +306,7 @@ fn the_joint_space_inertia_is_that_of_pinocchio() {
     }
 }
 
-/// With the base's motion given, and with the force that the base needs for it.
+/// One comparison has the base's motion given, the other the force that the base needs for it.
 #[test]
 fn torques_on_a_moving_base_are_those_of_pinocchios_free_flyer() {
     for (robot, file) in arms::<Dynamics>() {
@@ -316,7 +316,7 @@ fn torques_on_a_moving_base_are_those_of_pinocchios_free_flyer() {
         for case in &file.inverse_dynamics.cases {
             let around = case.base.surroundings(file.gravity_m_s2);
             let base = case.acceleration.spatial();
-            // Both kinds of acceleration in the file say the same.
+            // Both kinds of acceleration in the file agree.
             let turning = around.base_velocity.angular.cross(&around.base_velocity.linear);
             let classical = Vector3::from(case.acceleration.base_linear_acceleration_classical);
             assert!((classical - turning - base.linear).norm() < 1e-12);

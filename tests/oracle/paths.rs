@@ -1,7 +1,7 @@
-//! Whole motions against DOP853 on Pinocchio's dynamics: an arm that falls, one on a shaken base, one that rocks a
-//! light vehicle.
+//! Whole motions against DOP853 on Pinocchio's dynamics: a falling arm, one on a shaken base, one that rocks a light
+//! vehicle.
 //!
-//! The equations of motion are integrated here by Runge-Kutta 4, so that no step of the world's own can be to blame.
+//! The equations of motion are integrated here by Runge-Kutta 4, so the world's own steps have no influence.
 
 use armcal::sim::dynamics::{BaseCoupling, Environment, Motion, Multibody};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -64,9 +64,9 @@ pub(super) struct Shaken {
     pub(super) samples: Vec<JointSample>,
 }
 
-/// Of the integrator below, s: the wrist's damper alone has a time constant of 0.5 ms.
+/// Step of the integrator below, s: the wrist's damper has a time constant of 0.5 ms.
 const STEP_S: f64 = 1e-4;
-/// rad, rad/s, m, m/s: the oracle's own figures are good to 1e-10, Runge-Kutta's to 1e-9 at this step.
+/// Tolerance in rad, rad/s, m, m/s: the oracle's own figures are good to 1e-10, Runge-Kutta's to 1e-9 at this step.
 const PATH_TOLERANCE: f64 = 1e-7;
 
 /// Classical Runge-Kutta 4 from `from_s` to `to_s`.
@@ -126,7 +126,7 @@ fn jet(axis: &[[f64; 3]], t: f64) -> [f64; 3] {
     })
 }
 
-/// Environment and acceleration of the base that moves as the file says.
+/// Environment and acceleration of a base that moves by the file.
 pub(super) fn shaken_base(motion: &[Vec<[f64; 3]>], t: f64, gravity_m_s2: f64) -> (Environment, BaseCoupling) {
     let jets: Vec<[f64; 3]> = motion.iter().map(|axis| jet(axis, t)).collect();
     let part = |order: usize| Vector3::new(jets[0][order], jets[1][order], jets[2][order]);
@@ -159,7 +159,7 @@ fn an_arm_on_a_shaken_base_swings_as_pinocchio_and_dop853_have_it() {
     }
 }
 
-/// Position, quaternion w x y z, angles, then angular and linear velocity in base axes, rates.
+/// State: position, quaternion w x y z, angles, then angular and linear velocity in base axes, rates.
 fn flight_state(sample: &FlightSample) -> Vec<f64> {
     let velocity = sample.base.velocity().to_array();
     let parts: [&[f64]; 5] =
@@ -199,7 +199,7 @@ fn flight_slope(arm: &Multibody, rocking: &Rocking, t: f64, state: &[f64]) -> Ve
     parts.concat()
 }
 
-/// Linear, and angular about the world's origin.
+/// Linear momentum, and angular momentum about the world's origin.
 fn momentum(arm: &Multibody, state: &[f64]) -> [Vector3<f64>; 2] {
     let at = flown(state);
     let found = arm.momentum(&of(&at.q), &of(&at.qd), &at.velocity);
@@ -210,7 +210,7 @@ fn momentum(arm: &Multibody, state: &[f64]) -> [Vector3<f64>; 2] {
 
 #[test]
 fn an_arm_rocks_a_light_vehicle_as_pinocchio_and_dop853_have_it_and_keeps_the_momentum() {
-    /// kg m/s, kg m2/s: of momenta up to 60 under Runge-Kutta's error.
+    /// Tolerance in kg m/s, kg m2/s: momenta are up to 60, with Runge-Kutta's error.
     const MOMENTUM_TOLERANCE: f64 = 1e-6;
     for (robot, file) in arms::<Paths>() {
         let arm = Multibody::new(robot.chain.clone(), dry(&robot, Some(&file.rocking.vehicle)));

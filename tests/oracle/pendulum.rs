@@ -1,7 +1,7 @@
 //! A free rod on a shaken vehicle, simulated by the world, against the equation of motion.
 //!
-//! Two steps, for the world draws its vehicle's motion itself: the integrator below reproduces the golden file, and the
-//! world's rod then follows that integrator under the motion that the truth reports.
+//! The comparison has two steps because the world draws its vehicle's motion itself. The integrator below reproduces
+//! the golden file. The world's rod then follows that integrator under the motion that the truth reports.
 
 use std::path::{Path, PathBuf};
 
@@ -32,7 +32,8 @@ struct Pendulum {
     samples: Vec<[f64; 3]>,
 }
 
-/// Runge-Kutta 4 of `angle'' = f(time, angle)` from `start` (angle, rate); hands (time, angle, rate) to `each`.
+/// Integrates `angle'' = f(time, angle)` by Runge-Kutta 4 from `start` (angle, rate); passes (time, angle, rate) to
+/// `each`.
 fn integrate(
     f: impl Fn(f64, f64) -> f64,
     start: [f64; 2],
@@ -58,7 +59,7 @@ fn integrate(
 
 #[test]
 fn the_integrator_reproduces_the_golden_pendulum() {
-    /// rad. The file itself is good to 1e-13 and its pendulum magnifies an early error sixfold.
+    /// Tolerance, rad: the file itself is good to 1e-13, and its pendulum magnifies an early error sixfold.
     const TOLERANCE_RAD: f64 = 1e-9;
     let file: Pendulum = golden("pendulum.json");
     let w = std::f64::consts::TAU * file.frequency_hz;
@@ -81,8 +82,8 @@ fn the_integrator_reproduces_the_golden_pendulum() {
     assert!(worst < TOLERANCE_RAD && (end - file.end_angle_rad).abs() < TOLERANCE_RAD, "{worst} {end}");
 }
 
-/// A rod of 1 m and 2 kg that swings about -y, so that its angle is counted from straight down towards +x. Its drive is
-/// too weak to be felt.
+/// Writes a rod of 1 m and 2 kg that swings about -y, so its angle counts from straight down towards +x. Its drive is
+/// too weak to have an effect.
 fn write_rod(folder: &Path, stowed_rad: f64) -> (PathBuf, PathBuf) {
     let urdf = r#"<robot name="rod">
         <link name="base_link"/>
@@ -160,7 +161,7 @@ fn shaken_dry_world() -> WorldSpec {
     spec
 }
 
-/// `a sin + b cos` per direction, from the truth's vehicle poses.
+/// Amplitudes of `a sin + b cos` per direction, from the truth's vehicle poses.
 fn fitted_shake(times_s: &[f64], positions_m: &[[f64; 3]]) -> [[f64; 2]; 3] {
     let w = std::f64::consts::TAU / PERIOD_S;
     let basis = DMatrix::from_fn(times_s.len(), 2, |row, column| {
@@ -176,14 +177,14 @@ fn fitted_shake(times_s: &[f64], positions_m: &[[f64; 3]]) -> [[f64; 2]; 3] {
     })
 }
 
-/// What the truth file says of a swing: the rod's angles, and the vehicle's places from which `times_s` are counted.
+/// A swing in the truth file: the rod's angles, and the vehicle's positions from which `times_s` count.
 struct Swing {
     times_s: Vec<f64>,
     angles_rad: Vec<f64>,
     positions_m: Vec<[f64; 3]>,
 }
 
-/// Straight down, for the weak drive is made to carry the rod at the start.
+/// Start straight down, because the weak drive must carry the rod at the start.
 const START_RAD: f64 = 0.0;
 const DURATION_S: f64 = 8.0;
 
@@ -213,7 +214,7 @@ fn expected_rad(swing: &Swing) -> Vec<f64> {
     let [x, _, z] = fitted_shake(&swing.times_s, &swing.positions_m);
     let w = std::f64::consts::TAU / PERIOD_S;
     let acceleration = |[a, b]: [f64; 2], t: f64| -w * w * (a * (w * t).sin() + b * (w * t).cos());
-    // A rod about its end: m l / I = 3/2 per m. Gravity as the world has it.
+    // A rod about its end has m l / I = 3/2 per m. Gravity is the world's.
     let f =
         |t: f64, angle: f64| -1.5 * ((9.806_65 + acceleration(z, t)) * angle.sin() + acceleration(x, t) * angle.cos());
     let mut angles = Vec::new();
@@ -222,9 +223,10 @@ fn expected_rad(swing: &Swing) -> Vec<f64> {
 }
 
 fn expect_a_rod_to_swing_as_its_equation_of_motion_says(seeds: std::ops::RangeInclusive<u64>) {
-    /// s. The engine's step is of first order, so that twice the fine result less the coarse one is free of its error.
+    /// Finer step, s. The engine's step is of first order, so twice the fine result less the coarse one cancels its
+    /// error.
     const STEP_S: f64 = 2e-4;
-    /// rad over 8 s, of what is left then; 5e-5 where the rod goes over the top.
+    /// Tolerance over 8 s of the remaining error, rad; 5e-5 where the rod goes over the top.
     const TOLERANCE_RAD: f64 = 5e-4;
     let folder = temp();
     for seed in seeds {

@@ -1,5 +1,4 @@
-//! The world's own steps against the motions of `paths`: how far off they are, and that a shorter step is better by its
-//! square.
+//! The world's own steps against the motions of `paths`: their error, and its decrease with the square of the step.
 
 use armcal::sim::dynamics::{
     BaseCoupling, Environment, Force, JointLoad, Motion, Multibody, Stage, StepInput, SystemState,
@@ -10,14 +9,14 @@ use nalgebra::{Isometry3, Translation3, Vector3};
 use super::dynamics::{AT_REST, arms, dry, of};
 use super::paths::{FlightSample, JointSample, Paths, Rocking, shaken_base};
 
-/// s, coarsest first; the world's own is the second.
+/// Steps, s, coarsest first; the world's own is the second.
 const STEPS_S: [f64; 4] = [4e-3, 2e-3, 1e-3, 5e-4];
 
-/// What acts on an arm by time.
+/// Forces on an arm by time.
 struct Run<'a> {
     arm: &'a Multibody,
     damping_n_m_s_rad: f64,
-    /// By time and joint.
+    /// Torque by time and joint, N m.
     torque_n_m: &'a dyn Fn(f64, usize) -> f64,
     is_free: bool,
     around: &'a dyn Fn(f64, &SystemState) -> (Environment, BaseCoupling),
@@ -69,7 +68,7 @@ fn start(sample: &JointSample) -> SystemState {
     }
 }
 
-/// Lines that `plot_checks.py` draws.
+/// Prints lines for `plot_checks.py`.
 fn plot_steps(what: &str, off: &[f64; 4]) {
     let name = what.replace(", ", "/").replace(' ', "-");
     for (step_s, off) in STEPS_S.iter().zip(off) {
@@ -77,7 +76,8 @@ fn plot_steps(what: &str, off: &[f64; 4]) {
     }
 }
 
-/// Shown; of second order between all but the coarsest steps; at the world's own step below `limit`.
+/// Prints the errors, and checks them: of second order between all but the coarsest steps, and below `limit` at the
+/// world's own step.
 fn converges(what: &str, off: &[f64; 4], limit: f64) {
     let orders: Vec<f64> = off.windows(2).map(|pair| (pair[0] / pair[1]).log2()).collect();
     let show = |values: &[f64]| values.iter().map(|v| format!("{v:.2e}")).collect::<Vec<_>>().join(", ");

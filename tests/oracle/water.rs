@@ -40,7 +40,7 @@ struct Ball {
     flow_amplitude_m_s: f64,
     #[serde(default)]
     flow_rate_rad_s: f64,
-    /// Time, place, speed; with an oscillating flow the last two without drag and with it.
+    /// Samples of time, position and speed; with an oscillating flow the last two without drag and with it.
     samples: Vec<Vec<f64>>,
 }
 
@@ -50,7 +50,7 @@ struct Hanging {
     center_of_buoyancy_above_com_m: f64,
     roll_inertia_with_added_kg_m2: f64,
     initial_roll_rad: f64,
-    /// Time, roll, roll rate.
+    /// Samples of time, roll and roll rate.
     samples: Vec<[f64; 3]>,
 }
 
@@ -72,7 +72,7 @@ struct Ellipsoid {
     gz: End,
 }
 
-/// World axes.
+/// Final state in world axes.
 #[derive(Deserialize)]
 struct End {
     position_m: [f64; 3],
@@ -107,13 +107,13 @@ struct Float {
     gz_tolerance_m: f64,
 }
 
-/// One body that floats free, and what acts on it beyond the water. It carries an arm without mass, for only drawings
-/// make chains; its dampers hold it.
+/// A free floating body, and the forces on it other than the water's. It carries an arm without mass, held by its
+/// dampers, because a chain needs a URDF.
 struct Swim<'a> {
     body: Body,
     step_s: f64,
     gravity_m_s2: f64,
-    /// The water's velocity and acceleration by time, world axes.
+    /// Velocity and acceleration of the water by time, world axes.
     flow: &'a dyn Fn(f64) -> [Vector3<f64>; 2],
     /// Force and torque about the body's origin by time, world axes.
     push: &'a dyn Fn(f64) -> [Vector3<f64>; 2],
@@ -132,7 +132,8 @@ impl Swim<'_> {
         let h = self.step_s;
         for k in 0..((to_s - from_s) / h).round() as u32 {
             let start_s = from_s + f64::from(k) * h;
-            // A push that keeps its direction in the world turns against the body: that of the middle of the step.
+            // A push with constant direction in the world turns against the body; its direction is that of the middle
+            // of the step.
             let half_turn = UnitQuaternion::from_scaled_axis(state.base_velocity.angular * (0.5 * h));
             let to_body = (state.world_from_base.rotation * half_turn).inverse();
             let [force, torque] = (self.push)(start_s + 0.5 * h);
@@ -164,7 +165,7 @@ fn at_rest() -> SystemState {
     SystemState { angles, rates, world_from_base: Isometry3::identity(), base_velocity: Motion::zero() }
 }
 
-/// A sphere with the file's figures, not those that a drawing would give it.
+/// A sphere with the file's figures instead of those that a URDF would give it.
 fn sphere(ball: &Ball, drag_n_s2_m2: f64) -> Body {
     let mut body = Body::dry(ball.mass_kg, Vector3::zeros(), &(Matrix3::identity() * 0.1));
     body.displaced_kg = ball.displaced_kg;
@@ -174,7 +175,7 @@ fn sphere(ball: &Ball, drag_n_s2_m2: f64) -> Body {
     body
 }
 
-/// Largest difference of place and speed along `direction` from columns `column` and `column + 1` of the samples.
+/// Largest difference of position and speed along `direction` from columns `column` and `column + 1` of the samples.
 fn off(swim: &Swim, ball: &Ball, mut state: SystemState, direction: Vector3<f64>, column: usize) -> f64 {
     let mut worst: f64 = 0.0;
     for pair in ball.samples.windows(2) {
@@ -187,9 +188,9 @@ fn off(swim: &Swim, ball: &Ball, mut state: SystemState, direction: Vector3<f64>
     worst
 }
 
-/// s: the world's.
+/// The world's step, s.
 const STEP_S: f64 = 2e-3;
-/// m, m/s: of a second-order step at seconds of time constant.
+/// Tolerance in m and m/s for a second-order step with time constants of seconds.
 const TOLERANCE: f64 = 1e-5;
 
 #[test]
@@ -227,12 +228,12 @@ fn an_oscillating_flow_takes_a_sphere_along_as_morison_has_it() {
     let flow =
         |t: f64| [Vector3::x() * (amplitude * (rate * t).sin()), Vector3::x() * (amplitude * rate * (rate * t).cos())];
     for (drag, column) in [(0.0, 1), (ball.drag_n_s2_m2, 3)] {
-        // The vehicle's axes are turned: nothing of it may matter.
+        // The vehicle's axes are turned, which must have no effect.
         let mut state = at_rest();
         state.world_from_base.rotation = UnitQuaternion::from_euler_angles(0.4, -0.9, 2.0);
         let swim = Swim { body: sphere(&ball, drag), step_s: STEP_S, gravity_m_s2: 0.0, flow: &flow, push: &no_flow };
         let worst = if drag > 0.0 {
-            // The drag of a surface is by its own axes, so these stay with the flow.
+            // A surface's drag is in its own axes, so these stay with the flow.
             off(&swim, &ball, at_rest(), Vector3::x(), column)
         } else {
             off(&swim, &ball, state, Vector3::x(), column)
@@ -271,7 +272,7 @@ fn a_neutrally_buoyant_body_stays_and_rolls_as_a_pendulum() {
 
 #[test]
 fn spheroids_with_added_mass_end_where_gz_sim_has_them() {
-    /// s. The tolerances are gz-sim's, its own step was 1 ms.
+    /// Step, s. The tolerances are gz-sim's, whose own step was 1 ms.
     const STEP_S: f64 = 1e-3;
     let file: Water = golden("water.json");
     let push = |t: f64| {

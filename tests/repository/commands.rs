@@ -7,7 +7,7 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 
 use super::{expect_none, pages};
 
-/// Where a command line stands.
+/// Place of a command line in a page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Place {
     Block,
@@ -23,7 +23,7 @@ fn quoted(page: &str) -> Vec<(Place, String)> {
         let is_fence = line.trim_start().starts_with("```");
         is_fenced ^= is_fence;
         if is_fenced || is_fence || line.starts_with("    ") {
-            // A prompt or a name of a machine may stand before the program.
+            // A prompt or a host name may come before the program.
             let after = |start: &str| line.split_once(start).map(|(_, rest)| rest);
             let rest = after("cargo run --release -- ").or_else(|| after(" armcal ")).or(line.strip_prefix("armcal "));
             let rest = rest.map(|rest| rest.split(" #").next().unwrap_or_default().trim().to_owned());
@@ -58,12 +58,12 @@ fn words(line: &str) -> Vec<String> {
     words
 }
 
-/// Stands for a value: `N`, `A..B`, `KEY=VALUE`, `...`
+/// True for a placeholder of a value: `N`, `A..B`, `KEY=VALUE`, `...`
 fn is_placeholder(word: &str) -> bool {
     !word.contains(|c: char| c.is_ascii_lowercase() || c.is_ascii_digit())
 }
 
-/// Why a command line does not parse. Placeholders count as values of any type.
+/// Reason that a command line does not parse. Placeholders count as values of any type.
 fn problem(place: Place, line: &str) -> Option<String> {
     let mut args = words(line);
     loop {
@@ -72,7 +72,7 @@ fn problem(place: Place, line: &str) -> Option<String> {
             (ErrorKind::MissingRequiredArgument | ErrorKind::MissingSubcommand, _) if place == Place::Inline => {
                 return None;
             }
-            // A group of commands, named without any of them.
+            // A group of commands, named without one of them.
             (ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand, _) if place == Place::Inline => return None,
             (ErrorKind::ValueValidation | ErrorKind::InvalidValue, Some(ContextValue::String(value))) => value,
             _ => return Some(error.to_string().lines().next().unwrap_or_default().to_owned()),

@@ -60,7 +60,7 @@ fn anchors(page: &str) -> Vec<String> {
     anchors
 }
 
-/// Why a link of `page` leads nowhere.
+/// Reason that a link of `page` is broken.
 fn problem(page: &Path, target: &str) -> Option<String> {
     let (file, anchor) = target.split_once('#').map_or((target, None), |(file, anchor)| (file, Some(anchor)));
     let linked = if file.is_empty() { page.to_owned() } else { page.parent()?.join(file) };

@@ -34,7 +34,7 @@ fn known_words() -> BTreeSet<String> {
     words
 }
 
-/// Whether `word` is known; one that ends in `..` is the beginning of a name.
+/// True if `word` is known; a word that ends in `..` is the beginning of a name.
 fn is_known(words: &BTreeSet<String>, word: &str) -> bool {
     match word.strip_suffix("..") {
         Some(start) => words.range(start.to_owned()..).next().is_some_and(|next| next.starts_with(start)),
@@ -42,7 +42,7 @@ fn is_known(words: &BTreeSet<String>, word: &str) -> bool {
     }
 }
 
-/// `a::b::c`, of which the last may end in `..`.
+/// True for `a::b::c`, whose last part may end in `..`.
 fn is_path_of_items(piece: &str) -> bool {
     let is_word = |word: &str| {
         !word.is_empty() && word.trim_end_matches("..").chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
@@ -58,7 +58,7 @@ fn is_path_of_file(piece: &str) -> bool {
 
 #[test]
 fn quoted_files_and_items_exist() {
-    /// Items of other crates.
+    /// Crates whose items are not ours.
     const EXTERNAL: [&str; 3] = ["std", "rand", "rapier3d"];
     let words = known_words();
     let (mut violations, mut n_checked) = (Vec::new(), 0);

@@ -6,9 +6,10 @@ use std::fs;
 use super::sources;
 use crate::support::root;
 
-/// Tests that may name prose; only ever lowered.
+/// Largest number of tests that may name prose; it may only be lowered.
 const MOST: usize = 23;
-/// Words of a literal that is looked for in a text, and of one that is compared with a whole text.
+/// Least number of words for prose in a literal that is searched in a text; `COMPARED_WORDS` is that of a compared
+/// text.
 const SEARCHED_WORDS: usize = 2;
 const COMPARED_WORDS: usize = 3;
 const SEARCHES: [&str; 6] = ["contains", "starts_with", "ends_with", "strip_prefix", "find", "matches"];
@@ -34,7 +35,7 @@ impl Token {
     }
 }
 
-/// Returns the end of a literal that begins behind `start` and its text; `#` signs of a raw literal are `n_signs`.
+/// Returns the end of a literal that begins after `start`, and its text; `#` signs of a raw literal are `n_signs`.
 fn literal(text: &[char], start: usize, n_signs: Option<usize>) -> (usize, String) {
     let (mut at, mut found) = (start, String::new());
     while at < text.len() {
@@ -44,7 +45,7 @@ fn literal(text: &[char], start: usize, n_signs: Option<usize>) -> (usize, Strin
                 return (at + 1 + n, found);
             }
             ('\\', None) => {
-                // Only a new line is more than the character behind the sign: it ends a row of words.
+                // Only an escaped new line differs from the character after the sign: it ends a row of words.
                 let escaped = text.get(at + 1).copied().unwrap_or(' ');
                 found.push(if escaped == 'n' { '\n' } else { escaped });
                 at += 2;
@@ -82,7 +83,7 @@ fn tokens(source: &str) -> Vec<Token> {
             let n_signs = text[at..].iter().take_while(|c| **c == '#').count();
             if ["r", "b", "br"].contains(&word.as_str()) && text.get(at + n_signs) == Some(&'"') {
                 let (end, literal) = literal(&text, at + n_signs + 1, word.contains('r').then_some(n_signs));
-                // Bytes are no text.
+                // Byte literals are no text.
                 found.push(if word.starts_with('b') { Token::Sign('b') } else { Token::Literal(literal) });
                 at = end;
             } else {
@@ -108,7 +109,7 @@ fn group(tokens: &[Token], start: usize) -> &[Token] {
     &tokens[start..]
 }
 
-/// Something with a name and a body: a function, a closure, a constant.
+/// An item with a name and a body: a function, a closure, a constant.
 struct Item<'a> {
     name: String,
     is_test: bool,
@@ -147,8 +148,8 @@ fn items(tokens: &[Token]) -> Vec<Item<'_>> {
     found
 }
 
-/// Whether `literal` has at least `n` words in a row that a person would read; no code, no path, no key with its value,
-/// no word in capitals such as SQL's and a verdict's.
+/// True if `literal` has at least `n` consecutive words of prose. Code, paths, keys with values, and words in capitals
+/// such as SQL's and a verdict's do not count.
 fn is_prose(literal: &str, n: usize) -> bool {
     let is_code = |word: &str| {
         word.contains(|c: char| "_/=<>\\\n$|{}".contains(c) || c.is_ascii_digit())
@@ -186,18 +187,18 @@ fn calls<'a>(body: &'a [Token], name: &str) -> Vec<Vec<&'a [Token]>> {
     found
 }
 
-/// Whether `body` looks for texts that it has from elsewhere, by itself or by a function that does.
+/// True if `body` searches for texts that come from elsewhere, by itself or by a function that does.
 fn searches_for_variables(body: &[Token], searching: &BTreeSet<String>) -> bool {
     let is_variable = |argument: &&[Token]| matches!(argument, [Token::Word(_)] | [Token::Sign('*'), Token::Word(_)]);
     let by_itself = SEARCHES
         .iter()
         .any(|name| calls(body, name).iter().any(|arguments| arguments.first().is_some_and(is_variable)));
-    // An answer of the program is asked for several texts at once; a result's `expect` has one argument.
+    // An answer's `expect` takes several texts at once; a result's `expect` has one argument.
     let of_answer = calls(body, "expect").iter().any(|arguments| arguments.len() > 2);
     by_itself || of_answer || searching.iter().any(|name| !calls(body, name).is_empty())
 }
 
-/// Literals among tokens, without what a result's `expect` says if there is no result.
+/// Literals among tokens, without the messages of a result's `expect`.
 fn literals(tokens: &[Token]) -> impl Iterator<Item = &String> {
     let is_said = |at: usize| {
         at > 1 && tokens[at - 1] == Token::Sign('(') && (tokens[at - 2].is("expect") || tokens[at - 2].is("expect_err"))
@@ -246,10 +247,10 @@ fn named_prose(test: &Item<'_>, all: &[Item<'_>], searching: &BTreeSet<String>) 
     found.into_iter().cloned().collect()
 }
 
-/// Names of functions and closures that search for what they are given.
+/// Names of functions and closures that search for their arguments.
 fn searching<'a>(items: impl Iterator<Item = &'a Item<'a>> + Clone) -> BTreeSet<String> {
     let mut searching = BTreeSet::new();
-    // Helpers of helpers.
+    // Three rounds find helpers of helpers.
     for _ in 0..3 {
         let is_helper = |item: &&Item<'_>| !item.is_test && item.name != "expect" && item.body.len() > 3;
         let more = items.clone().filter(is_helper).filter(|item| searches_for_variables(item.body, &searching));
@@ -259,7 +260,7 @@ fn searching<'a>(items: impl Iterator<Item = &'a Item<'a>> + Clone) -> BTreeSet<
     searching
 }
 
-/// Tests of a source that name prose, and what they name.
+/// Tests of a source that name prose, with their fragments.
 fn tests_of(source: &str) -> Vec<(String, BTreeSet<String>)> {
     let tokens = tokens(source);
     let items = items(&tokens);

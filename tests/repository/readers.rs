@@ -1,15 +1,15 @@
-//! Files that users name are opened in one place, which limits what is read.
+//! Files that users name are opened in one place, which limits the size that is read.
 
 use super::expect_none;
 use super::structure::without_tests;
 use crate::support::{files_below, read, root};
 
-/// What opens or reads a file without limits.
+/// Calls that open or read a file without limits.
 const UNBOUNDED: [&str; 5] = ["fs::read(", "read_to_string(", "File::open(", "OpenOptions::new(", "toml::from_str"];
-/// Files that may, and why: the bounded reader itself; a run's own files, synced to disk; a campaign's own rows,
-/// locked; a plan's picture, read back; TOML with its entries counted, and read again for what it lacks; a value of the
-/// command line; the truth of the run itself; settings of tests; what the system says of this process; the lock of a
-/// growing file; the explanations of codes, which are in the program.
+/// Files that may use them, with reasons: the bounded reader itself; a run's own files, synced to disk; a campaign's
+/// own rows, locked; a plan's picture, read back. Further: TOML with its entries counted, and read again for missing
+/// ones; a value of the command line; the truth of the run itself; settings of tests. Further: the system's data on
+/// this process; the lock of a growing file; the explanations of codes, which are in the program.
 const ALLOWED: [(&str, &str); 13] = [
     ("core/files.rs", "File::open("),
     ("output/folder.rs", "File::open("),

@@ -1,5 +1,6 @@
-//! JSON Schemas: the committed ones are those of the types that read the files, and every TOML file of the repository
-//! states a kind that has one. `INSTA_UPDATE=always` renews them. That of a connection map is held in `tests/live`.
+//! JSON Schemas: the committed ones are those of the types that read the files. Every TOML file of the repository
+//! states a kind that has one. `INSTA_UPDATE=always` updates them. The schema of a connection map is tested in
+//! `tests/live`.
 
 use std::fs;
 use std::path::Path;
@@ -66,7 +67,7 @@ fn look_below(schema: &Value, place: &str, silent: &mut Vec<String>) {
         if name == "properties" {
             for (key, of_key) in below.as_object().into_iter().flatten() {
                 let is_tag = of_key.get("const").is_some();
-                // A variant's sentence stands beside its one key.
+                // The description of a variant is next to its only key.
                 let is_variant =
                     below.as_object().is_some_and(|keys| keys.len() == 1) && object.contains_key("description");
                 let has_words = is_variant || of_key["description"].as_str().is_some_and(|text| text.ends_with('.'));
@@ -81,7 +82,7 @@ fn look_below(schema: &Value, place: &str, silent: &mut Vec<String>) {
     }
 }
 
-/// Files that an independent validator of the schemas refuses: tests/oracle/schemas.py.
+/// An independent validator refuses these files by the schemas: tests/oracle/schemas.py.
 #[test]
 fn check_refuses_what_the_schemas_refuse() {
     let folder = temp();
@@ -108,7 +109,7 @@ fn check_refuses_what_the_schemas_refuse() {
     expect_none(&accepted);
 }
 
-/// `text` with `value` at the dotted `key`, or without it for none.
+/// The text with `value` at the dotted `key`, or without the key for an empty value.
 fn falsified_text(text: &str, key: &str, value: &str) -> String {
     let mut table = toml::Value::Table(text.parse().expect("TOML"));
     falsify(&mut table, key, value);

@@ -10,10 +10,10 @@ use crate::support::{files_below, root};
 /// Folders of the members below `src/`; the rest of `src/` is the root crate.
 const MEMBERS: [&str; 10] = ["core", "belief", "paper", "detect", "sim", "replay", "charts", "lab", "live", "python"];
 const MAX_LINE: usize = 120;
-/// Lines of a mod.rs or lib.rs beside its documentation.
+/// Largest number of lines of a mod.rs or lib.rs without its documentation.
 const MAX_MODULE_ROOT: usize = 60;
 
-/// Rooms of the estimator, each of which imports the ones before it alone. `calib.rs`, their front, is none.
+/// Rooms of the estimator, each of which imports only the ones before it. `calib.rs`, their front, is none of them.
 const ROOMS: [&str; 17] = [
     "model",
     "measure",
@@ -40,7 +40,7 @@ type Module = Vec<String>;
 /// The files of one crate by module, without tests.
 struct Sources {
     texts: BTreeMap<Module, String>,
-    /// Re-exports of each module: the name there, and the path that it stands for.
+    /// Re-exports of each module: the name there, and its full path.
     exports: BTreeMap<Module, BTreeMap<String, Vec<String>>>,
 }
 
@@ -87,7 +87,7 @@ impl Sources {
         exported.and_then(|path| self.resolve(&found, path, depth + 1)).or(Some(found))
     }
 
-    /// Which modules each module imports, beyond its own ancestors and descendants.
+    /// Modules that each module imports, without its own ancestors and descendants.
     fn edges(&self) -> BTreeMap<&Module, BTreeSet<Module>> {
         let is_fixture = |module: &Module| {
             module.iter().any(|name| name == "tests")
@@ -137,7 +137,7 @@ pub(super) fn without_tests(text: &str) -> String {
     end.map_or(code.clone(), |(at, _)| code[..at].to_owned())
 }
 
-/// The paths of all `use` declarations, and those written out in the code from `crate` or `super` on.
+/// Paths of all `use` declarations, and those in the code that begin with `crate` or `super`.
 fn imports(text: &str) -> Vec<Import> {
     let mut found = Vec::new();
     for (at, _) in text.match_indices("use ") {
@@ -225,7 +225,7 @@ fn rooms_of_the_estimator_import_down_only() {
     assert_eq!(below, ROOMS.into_iter().map(str::to_owned).collect(), "each folder is a room, and has its place");
     let sources = Sources::read(&folder, |_| true);
     expect_none(&imports_upwards(&sources, &ROOMS));
-    // The test can fail: the order turned round has imports up.
+    // The test can fail: the reversed order has imports up.
     let turned: Vec<&str> = ROOMS.into_iter().rev().collect();
     assert!(!imports_upwards(&sources, &turned).is_empty());
 }

@@ -1,5 +1,5 @@
-//! Pages that are made: the keys of files by their schemas, the options of commands by clap. `INSTA_UPDATE=always`
-//! renews them.
+//! Generated pages: the keys of files from their schemas, the options of commands from clap. `INSTA_UPDATE=always`
+//! updates them.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -21,10 +21,10 @@ const TABLE: &str = "table";
 const TABLES: &str = "tables";
 /// Keys that a heading shows.
 const HEADS: [&str; 3] = ["do", "kind", "version"];
-/// Most keys that a person may have to read, without those of the simulated world.
+/// Largest number of keys for users to read, without those of the simulated world.
 const MOST_KEYS: usize = 300;
 
-/// Holds a page against `text`, or renews it.
+/// Compares a page with `text`, or updates it.
 #[track_caller]
 fn hold(page: &str, text: &str) {
     let file = root().join(page);
@@ -44,7 +44,7 @@ struct Tables<'a, 'w> {
 }
 
 impl<'a> Tables<'a, '_> {
-    /// The schema that a reference leads to.
+    /// The schema to which a reference leads.
     fn followed(&self, schema: &'a Value) -> &'a Value {
         let reference = reference(schema);
         reference.and_then(|at| self.root.pointer(at.trim_start_matches('#'))).unwrap_or(schema)
@@ -99,7 +99,7 @@ impl<'a> Tables<'a, '_> {
         }
     }
 
-    /// The row of a key; none for one that its heading has.
+    /// The row of a key; `None` for a key in the heading.
     fn row(&self, key: &str, of_key: &'a Value, owner: &Value) -> Option<String> {
         if of_key.get("const").is_some() && HEADS.contains(&key) {
             return None;
@@ -193,7 +193,7 @@ fn the_page_of_keys_is_that_of_the_schemas() {
     hold(KEYS, &keys_page());
 }
 
-/// Counts keys by kind, tables aside, and those of a table that several kinds have once.
+/// Counts keys by kind, without tables; keys of a table in several kinds count once.
 #[test]
 fn keys_stay_few() {
     let mut counts = BTreeMap::new();
@@ -212,7 +212,7 @@ fn keys_stay_few() {
     assert!(sum <= MOST_KEYS, "{sum} keys: {counts:?}");
 }
 
-/// A row whose keys stand below a heading of their own.
+/// True for a row whose keys are below a heading of their own.
 fn is_nested(row: &str) -> bool {
     row.split('|').nth(2).is_some_and(|kind| [TABLE, TABLES].contains(&kind.trim()))
 }

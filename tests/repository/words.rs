@@ -15,7 +15,8 @@ use super::tables::{KEYS, OPTIONS};
 use crate::support::{files_below, read, root};
 
 const TABLE: &str = "docs/words.toml";
-/// Comments, strings and characters of a source. Characters are here because one of them is a quotation mark.
+/// Pattern of a source's comments, strings and characters. It includes characters because one of them is a quotation
+/// mark.
 static TOKENS: LazyLock<Regex> = LazyLock::new(|| {
     let tokens = r####"(?xs)
         //[^\n]* | /\*.*?\*/
@@ -39,7 +40,7 @@ struct Table {
 struct Total {
     words: usize,
     target: usize,
-    /// Limits the pages above their target, so that no new one is.
+    /// Limits the number of pages above their target, so that no new page exceeds it.
     pages_above_target: usize,
 }
 
@@ -50,7 +51,7 @@ struct Page {
     target: usize,
 }
 
-/// How often a phrase may occur; no number stands for no limit.
+/// Allowed number of a phrase's occurrences; without a number there is no limit.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Phrase {
@@ -66,7 +67,7 @@ struct Today {
     hits: BTreeMap<String, [usize; 3]>,
 }
 
-/// Paragraphs of one source, each on one line. A comment begins with its marker, such as `///`.
+/// Paragraphs of one source, each joined into one line. A comment begins with its marker, such as `///`.
 #[derive(Debug, Default, PartialEq)]
 struct Prose {
     messages: Vec<String>,
@@ -78,12 +79,12 @@ fn regex(pattern: &str) -> Regex {
     RegexBuilder::new(pattern).unicode(false).build().unwrap_or_else(|e| panic!("{TABLE}: {e}"))
 }
 
-/// `text` on one line, so that a phrase is found wherever lines break.
+/// The text on one line, so that a phrase is found across line breaks.
 fn on_one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Every second piece between backticks is code.
+/// Removes code: every second piece between backticks.
 fn without_code(text: &str) -> String {
     text.split('`').step_by(2).collect::<Vec<_>>().join("`")
 }
@@ -91,7 +92,7 @@ fn without_code(text: &str) -> String {
 impl Prose {
     fn of(source: &str) -> Self {
         let mut prose = Self::default();
-        // Where the last line comment ended, and its marker.
+        // End of the last line comment, and its marker.
         let mut last = (0, "");
         for token in TOKENS.find_iter(source) {
             let text = token.as_str();
@@ -120,7 +121,7 @@ fn paragraphs(page: &str) -> Vec<String> {
     TARGETS.replace_all(&text, "]").split("\n\n").map(on_one_line).filter(|paragraph| !paragraph.is_empty()).collect()
 }
 
-/// How often each pattern occurs in `texts`.
+/// Number of each pattern's occurrences in `texts`.
 fn hits(patterns: &[&str], texts: &[String]) -> Vec<usize> {
     let set = RegexSetBuilder::new(patterns).unicode(false).build().unwrap_or_else(|e| panic!("{TABLE}: {e}"));
     let each: Vec<Regex> = patterns.iter().map(|pattern| regex(pattern)).collect();
@@ -135,7 +136,7 @@ impl Today {
     fn count(patterns: &[&str]) -> Self {
         let mut files = files_below(&root().join("docs"), "md");
         files.push(root().join("README.md"));
-        // Their words are those of comments and of `--help`, counted there.
+        // These pages repeat words of comments and of `--help`, which are counted there.
         files.retain(|file| ![KEYS, OPTIONS].iter().any(|made| file.ends_with(made)));
         let (mut pages, mut docs, mut messages, mut comments) = (BTreeMap::new(), vec![], vec![], vec![]);
         for file in files {
@@ -169,7 +170,7 @@ impl Phrase {
 }
 
 impl Table {
-    /// How many pages of `today` are above their target, with `today`'s words.
+    /// Number of pages of `today` that are above their target, with `today`'s words.
     fn n_above_target(&self, today: &Today) -> usize {
         let is_above =
             |(name, words): &(&String, &usize)| self.pages.get(*name).is_some_and(|page| page.target < **words);

@@ -9,7 +9,7 @@ use nalgebra::Isometry3;
 
 use super::{Site, Tape, Witness};
 
-/// Corners fall where the true camera sees the true tags, to within the noise; stamps are late as the clock is.
+/// Corners agree with the true camera and the true tags, within the noise; stamps have the clock's delay.
 #[test]
 fn corners_fall_where_the_truth_puts_them() {
     let site = Site::titan();
@@ -25,7 +25,7 @@ fn corners_fall_where_the_truth_puts_them() {
     for (_, message) in &tape.messages {
         let Message::Detections(detections) = message else { continue };
         image += 1;
-        // Images at 5 Hz fall on every tenth state of 50 Hz.
+        // Images at 5 Hz coincide with every tenth state of 50 Hz.
         let state = &states[image * 10 - 1];
         late.push(detections.stamp.since_s(state.stamp));
         for tag in &detections.tags {
@@ -44,7 +44,7 @@ fn corners_fall_where_the_truth_puts_them() {
     eprintln!("corner rms {rms:.3} px over {n} coordinates, stamps {:.1} ms late", mean_late * 1e3);
     assert!(n > 5000.0, "tags are in view when stowed");
     assert!((0.25..0.5).contains(&rms), "0.3 px, somewhat more for far and oblique tags: {rms}");
-    // 200 images know the mean of 5 ms jitter to 0.35 ms.
+    // The mean of 5 ms jitter over 200 images has a standard deviation of 0.35 ms.
     assert!((mean_late - 0.020).abs() < 0.0015, "{mean_late}");
 }
 
@@ -65,12 +65,12 @@ fn about_two_percent_of_the_tags_are_missed() {
             }
         }
     }
-    // Tags that are in view throughout.
+    // Tags that are visible throughout.
     let steady: Vec<usize> = seen.values().copied().filter(|n| *n > images * 9 / 10).collect();
     assert!(steady.len() >= 3, "{seen:?}");
     let missed = 1.0 - steady.iter().sum::<usize>() as f64 / (steady.len() * images) as f64;
     eprintln!("{:.2} % missed of {steady:?}", missed * 100.0);
-    // Some 1500 views know 2 % to 0.4 %.
+    // A rate of 2 % over about 1500 views has a standard deviation of 0.4 %.
     assert!((missed - 0.02).abs() < 0.013, "{missed}");
 }
 
@@ -82,7 +82,7 @@ fn last_tags(tape: &Tape) -> Vec<u32> {
     last.expect("an image")
 }
 
-/// Driven aside, the camera loses tags behind the arm, the image's edge or their own back.
+/// With the camera driven aside, the arm, the image's edge or their own back hide tags.
 #[test]
 fn tags_behind_the_camera_are_not_seen() {
     let site = Site::titan();
@@ -95,11 +95,11 @@ fn tags_behind_the_camera_are_not_seen() {
     assert!(last_tags(&tape).len() < 4, "{:?}", last_tags(&tape));
 }
 
-/// A plate before the lens hides every tag, though each would be in view.
+/// A plate before the lens hides every tag, although each would be in view.
 #[test]
 fn nothing_is_seen_through_an_obstacle() {
     let mut site = Site::titan();
-    // Exact joint sensors, so that the camera is where the drawings have it, close behind the plate.
+    // With exact joint sensors the camera is at its nominal pose, close behind the plate.
     let mut spec = WorldSpec::default();
     spec.camera.miss_probability = 0.0;
     spec.joint_sensors.gain_error_max = 0.0;
@@ -110,7 +110,7 @@ fn nothing_is_seen_through_an_obstacle() {
 
     let base_from_camera = site.robot.chain.link_poses(&site.robot.stowed).frame(&site.robot.camera.mount);
     let world_from_camera = site.vehicle.vehicle_from_base.isometry() * base_from_camera;
-    // A plate that fits between lens and gripper, as a box and as a mesh.
+    // The plate fits between lens and gripper, as a box and as a mesh.
     let corners = [-0.065, 0.065].map(|x| [-0.065, 0.065].map(|y| [-0.001, 0.001].map(|z| [x, y, z])));
     let hull = Hull::new(corners.as_flattened().as_flattened()).expect("a plate");
     for shape in [Shape::Box { size_m: [0.13, 0.13, 0.002] }, Shape::Hull(hull)] {

@@ -1,4 +1,4 @@
-//! Each fault by what it does to the messages, and when: twins of one seed differ by the fault alone.
+//! Effect of each fault on the messages, with its time: two runs of one seed differ only by the fault.
 
 use armcal::sim::{Fault, ScheduledFault, WorldSpec};
 use armcal::streams::{Arm, ArmError, JointCounts, Message, TagDetection};
@@ -35,7 +35,7 @@ fn tags(tape: &Tape) -> Vec<(Stamp, TagDetection)> {
     tape.messages.iter().flat_map(|(_, message)| seen(message)).collect()
 }
 
-/// What a world with these faults says and truly does within `seconds`, told to go to `shift` from where it is stowed.
+/// Messages and truth of a world with these faults within `seconds`, commanded to `shift` from the stowed pose.
 fn run(faults: Vec<ScheduledFault>, seconds: f64, shift: [f64; 6]) -> (Tape, Witness) {
     let site = Site::titan();
     let mut world = site.world(spec(faults), 1);
@@ -71,7 +71,7 @@ fn a_fault_with_a_time_happens_then_and_the_truth_alone_says_so() {
     let (upset, witness) = run(faults, 3.0, STAY);
     let differing: Vec<_> = readings(&calm).into_iter().zip(readings(&upset)).filter(|(a, b)| a != b).collect();
     let ((stamp, before), (_, after)) = differing[0];
-    // It breaks at the beginning of a period, which ends with a reading.
+    // The fault occurs at the beginning of a period, which ends with a reading.
     assert!((seconds(stamp) - 1.51).abs() < 1e-9, "{stamp:?}");
     let jumped = after[4] - before[4];
     let expected = by_rad * Site::titan().robot.sensors[4].counts_per_rad;
@@ -82,7 +82,7 @@ fn a_fault_with_a_time_happens_then_and_the_truth_alone_says_so() {
     let kinds: Vec<_> = told.iter().map(|fault| (fault.kind.as_str(), seconds(fault.stamp))).collect();
     assert_eq!(kinds, [("tag_lost", 0.0), ("sensor_jump", 1.5)]);
     assert_eq!(told[0].details, "id = 5");
-    // The camera saw it until then, and was told nothing.
+    // The camera saw the tag until then, and no message names the fault.
     let ids = |tape: &Tape| tags(tape).iter().filter(|(_, tag)| tag.id == 5).count();
     assert!(ids(&calm) > 0 && ids(&upset) == 0);
 }
@@ -122,7 +122,7 @@ fn a_fault_in_a_wait_happens_at_its_time_and_the_arm_answers() {
     let words: Vec<(f64, f64)> = readings(&tape).iter().map(|(stamp, counts)| (seconds(*stamp), counts[3])).collect();
     let jumped = words.windows(2).find(|pair| (pair[1].1 - pair[0].1).abs() > 50.0).expect("it jumps");
     assert!((jumped[0].0 - 50.25).abs() < 1e-9 && (jumped[1].0 - 50.26).abs() < 1e-9, "{jumped:?}");
-    // Most of the wait was skipped; the controller drove the joint back to where its sensor reads what it did.
+    // Most of the wait was skipped; the controller drove the joint back to the angle of the same reading.
     assert!(words.len() < 2000, "{}", words.len());
     let states = witness.states.borrow();
     let moved_rad = states[states.len() - 1].angles[3] - states[0].angles[3];
@@ -155,22 +155,22 @@ fn without_pressure_nothing_is_lifted() {
     let (_, of_joint) = run(vec![at(0.0, Fault::PressureLost { joint, ratio: 1.0 })], 6.0, LIFT);
     let (free, of_pump, of_joint) = (travel(&free), travel(&of_pump), travel(&of_joint));
     eprintln!("lifted by {:.3}, without pump {:.3}, without pressure {:.3} rad", free[1], of_pump[1], of_joint[1]);
-    // Without pressure it may sink, but never rise.
+    // Without pressure the joint may sink, but never rise.
     assert!(free[1] > 0.2 && of_pump[1] < 0.02 && of_joint[1] < 0.02, "{free:?} {of_pump:?} {of_joint:?}");
     assert!(of_joint[4] > 0.25 && of_pump[4].abs() < of_joint[4], "{of_joint:?} {of_pump:?}");
-    // A quarter of the pressure less still lifts.
+    // With a quarter less pressure the arm still lifts.
     let (_, weak) = run(vec![at(0.0, Fault::PressureLost { joint: None, ratio: 0.25 })], 6.0, LIFT);
     assert!(travel(&weak)[1] > 0.2, "{:?}", travel(&weak));
 }
 
-/// The corners of a tag that was moved, against the projection of the moved square by the true camera.
+/// Corners of a moved tag, compared with the projection of the moved square by the true camera.
 #[test]
 fn a_moved_tag_is_seen_where_it_is_now() {
     let (calm, _) = run(Vec::new(), 1.0, STAY);
     let by_margin =
         |a: &(Stamp, TagDetection), b: &(Stamp, TagDetection)| a.1.decision_margin.total_cmp(&b.1.decision_margin);
     let id = tags(&calm).into_iter().max_by(by_margin).expect("tags in view").1.id;
-    // Away from what carries it, that a turned corner does not sink into that.
+    // The tag moves away from its carrier, so that a turned corner does not sink into that.
     let (by_m, by_rad) = ([0.02, -0.015, 0.03], [0.1, 0.0, -0.2]);
     let (tape, witness) = run(vec![at(2.0, Fault::TagMoved { id, by_m, by_rad })], 4.0, STAY);
     let motion = Isometry3::from_parts(
@@ -183,8 +183,8 @@ fn a_moved_tag_is_seen_where_it_is_now() {
     let states = witness.states.borrow();
     let (mut squares, mut n) = ([0.0, 0.0], [0.0, 0.0]);
     for (stamp, tag) in tags(&tape).iter().filter(|(_, tag)| tag.id == id) {
-        // Stamps are late by 20 ms; images are taken five times a second, states every 20 ms. That of 2.0 s is taken
-        // before the period at whose beginning the tag is moved.
+        // Stamps are late by 20 ms; images are taken five times per second, states every 20 ms. The image of 2.0 s is
+        // taken before the period at whose beginning the tag is moved.
         let exposed_s = ((seconds(*stamp) - 0.02) * 5.0).round() / 5.0;
         let state = &states[(exposed_s * 50.0).round() as usize - 1];
         let is_moved = usize::from(exposed_s > 2.01);
@@ -212,13 +212,13 @@ fn a_misread_tag_has_another_id_and_the_same_corners() {
         .map(|(stamp, tag)| (stamp, TagDetection { id: if tag.id == id { 77 } else { tag.id }, ..tag }))
         .collect();
     assert!(renamed.iter().any(|(_, tag)| tag.id == 77));
-    // A detector lists by id.
+    // A detector sorts by id.
     renamed.sort_by_key(|(stamp, tag)| (*stamp, tag.id));
     assert_eq!(renamed, tags(&upset));
 }
 
-/// A blow moves what it hits, and the truth says when: the vehicle swings out and comes back, the joints give and come
-/// back.
+/// A blow moves its object, and the truth has its time: the vehicle swings out and comes back, the joints give way and
+/// come back.
 #[test]
 fn blows_move_what_they_hit() {
     let blows = [
@@ -245,7 +245,7 @@ fn blows_move_what_they_hit() {
         let (vehicle_m, joints_rad) = (most(|d| d.0), most(|d| d.1));
         eprintln!("{}: vehicle {vehicle_m:.3} m, joints {joints_rad:.1e} rad", blow.kind());
         match blow {
-            // 800 N s on 4 t: 0.2 m/s for a second or two.
+            // An impulse of 800 N s on 4 t: 0.2 m/s for a second or two.
             Fault::VehicleImpulse { .. } => assert!((0.1..1.0).contains(&vehicle_m), "{vehicle_m}"),
             _ => assert!(vehicle_m == 0.0 && joints_rad > 5e-3, "{joints_rad}"),
         }

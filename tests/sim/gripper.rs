@@ -1,4 +1,4 @@
-//! The gripper by its messages.
+//! The gripper's motion in its messages.
 
 use armcal::sim::{World, WorldInput, WorldSpec};
 use armcal::streams::{Arm, ArmError, Message};
@@ -6,7 +6,7 @@ use armcal::time::SIMULATION_EPOCH;
 
 use super::{Site, Tape};
 
-/// Times (s) and gaps (m) told.
+/// Reported times (s) and gaps (m).
 fn gaps(tape: &Tape) -> Vec<(f64, f64)> {
     let gap = |message: &Message| match message {
         Message::Gripper(sample) => Some((sample.stamp.since_s(SIMULATION_EPOCH), sample.opening_m)),
@@ -39,7 +39,7 @@ fn the_gap_follows_the_command_at_its_rate_and_is_told_on_the_way() {
             assert!(t1 > t0 && way * (b - a) > -1e-9, "it turns back: {pair:?}");
             assert!((b - a).abs() <= rate_m_s * (t1 - t0) + 1.1e-4, "too fast for a rounded gap: {pair:?}");
         }
-        // 25 Hz on the way: at least 0.022 m of 0.05 m/s.
+        // Messages come at 25 Hz during the motion of at least 0.022 m at 0.05 m/s.
         assert!(told.len() >= 12, "{}", told.len());
     }
     assert!(tape.messages.windows(2).all(|pair| pair[0].0 <= pair[1].0), "log times go back");
@@ -54,7 +54,7 @@ fn jaws_told_before_a_wait_are_there_after_it() {
     assert!(gaps(&tape).last().expect("told").1.abs() < 1e-9);
 }
 
-/// The jaws draw no random number and push nothing: all else that the arm says is the same, byte for byte.
+/// The jaws draw no random number and exert no force: all other messages are the same, byte for byte.
 #[test]
 fn jaws_change_nothing_but_themselves() {
     let others = |grips: bool| {

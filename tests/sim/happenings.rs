@@ -1,4 +1,4 @@
-//! What happens to a world on the way: it waits, and things break.
+//! Changes of a world during a run: it waits, and components fail.
 
 use armcal::sim::{Fault, WorldSpec};
 use armcal::streams::{Arm, ArmError, Message};
@@ -40,15 +40,15 @@ fn an_hour_at_rest_passes_with_temperatures_and_drift_and_the_arm_in_its_place()
         let states = witness.states.borrow();
         let (first, last) = (states[20], *states.last().expect("states"));
         assert!(last.water_c < 3.0 && last.oil_c < first.oil_c - 10.0, "{} {}", last.water_c, last.oil_c);
-        // The controller holds its readings, so the joints follow what the cold does to the sensors, and no more.
+        // The controller holds its readings, so the joints only follow the effect of the cold on the sensors.
         for (joint, built) in witness.header.borrow().as_ref().expect("a header").as_built.joints.iter().enumerate() {
             let cold_k = last.oil_c - first.oil_c;
             let travel_rad = first.angles[joint] - built.center_rad;
             let cold_rad =
                 built.temperature_offset_rad_per_k * cold_k + built.temperature_gain_per_k * cold_k * travel_rad;
             let moved_rad = last.angles[joint] - first.angles[joint];
-            // The rest band of the controller twice, the play of the shaft, and the walk of an hour, 0.02 deg one
-            // sigma.
+            // The limit has twice the controller's rest band, the backlash of the shaft, and the walk of an hour, 0.02
+            // deg one sigma.
             assert!((moved_rad + cold_rad).abs() < 0.0025, "seed {seed}, joint {joint}: {moved_rad} {cold_rad}");
             squares += (moved_rad + cold_rad).powi(2);
         }
@@ -100,7 +100,7 @@ fn silt_hides_everything_for_its_time_and_a_lost_tag_stays_lost() {
     world.fault(0).expect("it breaks");
     tape.messages.clear();
     tape.run(&mut world, 2.0);
-    // The first may have been taken before.
+    // The first image may have been taken before.
     assert!(detections(&tape)[1..].iter().all(|n| *n == 0));
     tape.messages.clear();
     tape.run(&mut world, 2.0);

@@ -1,4 +1,4 @@
-//! The simulated world from outside: what it answers, and what its truth says.
+//! The simulated world from outside: its messages, and its truth.
 
 mod camera;
 mod faults;
@@ -47,7 +47,7 @@ impl Site {
     }
 }
 
-/// Keeps every message.
+/// A listener that keeps every message.
 #[derive(Default)]
 struct Tape {
     messages: Vec<(Stamp, Message)>,
@@ -83,7 +83,7 @@ impl Tape {
     }
 }
 
-/// Keeps the truth where the test can see it.
+/// A sink that keeps the truth for the test.
 #[derive(Clone, Default)]
 struct Witness {
     header: Rc<RefCell<Option<TruthHeader>>>,

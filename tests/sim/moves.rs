@@ -1,4 +1,4 @@
-//! Where the arm goes when told.
+//! Motions of the commanded arm.
 
 use armcal::kinematics::{IkGoal, IkSettings, JointLimits, solve_position};
 use armcal::sim::WorldSpec;
@@ -17,7 +17,7 @@ const MOVES: [[f64; 6]; 6] = [
     [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
 ];
 
-/// The controller drives the readings to within 0.05 deg, whatever the arm's true angles are then.
+/// The controller drives the readings to within 0.05 deg of the set-point, for any true angles.
 #[test]
 fn the_controller_comes_to_rest_at_its_set_point() {
     const LIMIT_DEG: f64 = 0.05;
@@ -43,10 +43,10 @@ fn the_controller_comes_to_rest_at_its_set_point() {
     assert!(worst < LIMIT_DEG, "{worst}");
 }
 
-/// At rest the valves are closed most of the time and the joints hardly move.
+/// At rest the valves are closed most of the time, and the joints hardly move.
 #[test]
 fn at_rest_the_arm_is_still() {
-    /// rad/s, rms: what rocking does to the oil, and rare nudges of the valves.
+    /// Limit of the rate, rad/s, rms: it comes from rocking oil and rare valve pulses.
     const LIMIT_RAD_S: f64 = 2e-3;
     let site = Site::titan();
     let mut world = site.world(WorldSpec::default(), 5);
@@ -63,7 +63,7 @@ fn at_rest_the_arm_is_still() {
     assert!(moved < 3e-3, "{moved}");
 }
 
-/// A path of set-points is followed closely: feed-forward makes up for the loop's lag.
+/// The arm follows a path of set-points closely: feed-forward compensates for the loop's lag.
 #[test]
 fn a_path_is_followed() {
     let site = Site::titan();
@@ -85,7 +85,7 @@ fn a_path_is_followed() {
     assert!(worst < 0.03, "{worst}");
 }
 
-/// Drives the tool to `goal_m` (base frame) and tells what the truth saw.
+/// Drives the tool to `goal_m` (base frame); returns the recorded truth.
 fn driven_to(site: &Site, goal_m: [f64; 3]) -> Witness {
     let mut world = site.world(WorldSpec::default(), 1);
     let witness = Witness::default();
@@ -116,7 +116,7 @@ fn assert_touched(witness: &Witness, part: &str) {
 
 #[test]
 fn a_target_in_the_vehicle_ends_in_contact() {
-    // 0.15 m below the face of the starboard toe plate.
+    // The goal is 0.15 m below the face of the starboard toe plate.
     assert_touched(&driven_to(&Site::titan(), [1.34, -0.1, -1.14]), "toe_plate_starboard");
 }
 
@@ -124,7 +124,7 @@ fn a_target_in_the_vehicle_ends_in_contact() {
 fn a_target_in_the_seafloor_ends_in_contact() {
     let mut site = Site::titan();
     site.scene.seafloor_z_m = Some(-1.1);
-    // Twice: through open water, and onto the seafloor, which stops it.
+    // One motion goes through open water, the other onto the seafloor, which stops it.
     let depth = |witness: &Witness| {
         let states = witness.states.borrow();
         let last = &states[states.len() - 1];
@@ -137,7 +137,7 @@ fn a_target_in_the_seafloor_ends_in_contact() {
     assert!(free < -1.2 && depth(&stopped) > -1.12, "{free} {}", depth(&stopped));
 }
 
-/// Whatever the sensors hide, the stowed arm is clear of the vehicle and sees tags.
+/// For any sensor errors, the stowed arm is clear of the vehicle and sees tags.
 #[test]
 fn stowed_is_safe_for_every_seed() {
     let site = Site::titan();

@@ -58,7 +58,7 @@ fn joint_readings_are_whole_counts_of_sixteen_bits() {
     }
 }
 
-/// The time by the joint sensors' clock goes in whole periods.
+/// The joint sensors' clock advances in whole periods.
 #[test]
 fn now_is_the_stamp_of_the_last_reading() {
     let site = Site::titan();
@@ -74,7 +74,7 @@ fn now_is_the_stamp_of_the_last_reading() {
     assert_eq!(world.now(), start.plus_s(1.0));
 }
 
-/// Simulated seconds per second; for the eye, not a test of the machine.
+/// Simulated seconds per second, for information; this does not test the machine.
 #[test]
 fn speed_is_reported() {
     let site = Site::titan();

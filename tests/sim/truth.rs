@@ -1,4 +1,4 @@
-//! truth.mcap: written, read back, and the same each time.
+//! truth.mcap: written, read back, and reproducible.
 
 use armcal::log::Completeness;
 use armcal::sim::WorldSpec;
@@ -31,7 +31,7 @@ fn what_was_written_reads_back() {
     assert_eq!(truth.states.len(), 150);
     for (read, written) in truth.states.iter().zip(witness.states.borrow().iter()) {
         assert_eq!((read.stamp, read.angles, read.oil_c), (written.stamp, written.angles, written.oil_c));
-        // Reading normalises quaternions: the last digit may change.
+        // Reading normalises quaternions, so the last digit may change.
         let apart = read.base_from_tool.inverse() * written.base_from_tool;
         assert!(apart.origin().vector().norm() < 1e-12 && apart.rotation().angle() < 1e-7);
     }

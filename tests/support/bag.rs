@@ -8,7 +8,7 @@ use sqlite::Connection;
 /// Versions of rosbag2's tables: before Humble, Humble, Iron and later.
 pub const VERSIONS: [u32; 3] = [2, 3, 4];
 
-/// Writes those messages of an MCAP file to `bag` whose place in it `is_kept`.
+/// Writes to `bag` those messages of an MCAP file for whose index `is_kept` is true.
 pub fn write_bag(bag: &Path, version: u32, recording: &Path, is_kept: impl Fn(usize) -> bool) {
     let bag = Connection::open(bag).expect("a file");
     let hash = if version >= 4 { ", type_description_hash TEXT NOT NULL" } else { "" };
@@ -54,7 +54,7 @@ pub fn write_bag(bag: &Path, version: u32, recording: &Path, is_kept: impl Fn(us
     bag.execute("COMMIT").expect("written");
 }
 
-/// Numbers and a blob; without numbers, texts.
+/// Inserts numbers and a blob; without numbers, texts.
 fn insert(bag: &Connection, sql: &str, numbers: Option<[i64; 2]>, rest: &[&[u8]]) {
     let mut statement = bag.prepare(sql).expect("sql");
     let mut at = 1;

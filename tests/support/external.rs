@@ -1,5 +1,4 @@
-//! Recordings as a real arm's recorder makes them: raw words that wrap, tags as transforms of the camera's frame,
-//! nothing marked.
+//! Recordings of a real arm's recorder: raw words that wrap, tags as transforms of the camera's frame, and no marks.
 
 use std::path::Path;
 
@@ -13,26 +12,27 @@ use rand_chacha::ChaCha8Rng;
 
 use super::synthetic::{TrueArm, normal};
 
-/// One pose: what its two messages hold. Times in s after the start.
+/// One pose with the contents of its two messages. Times in s after the start.
 #[derive(Clone, Debug)]
 pub struct Pose {
     pub joints_at_s: f64,
     pub tags_at_s: f64,
-    /// As in /joint_states, in any order.
+    /// Joint words as in /joint_states, in any order.
     pub joints: Vec<(String, f64)>,
-    /// (frame, camera_from_tag).
+    /// Tags as (frame, camera_from_tag).
     pub tags: Vec<(String, Isometry3<f64>)>,
 }
 
-/// How a synthetic Titan 4 was recorded.
+/// Noise of a synthetic Titan 4's recording.
 #[derive(Clone, Copy, Debug)]
 pub struct Noise {
     /// Sensors' largest gain error and offset, times the datasheet's bounds (5 %, 5 deg).
     pub sensors: f64,
-    /// Of a view's camera pose, shared by all its tags, one sigma per axis; as the paper's own data have it.
+    /// Rotation noise of a view's camera pose, shared by all its tags, one sigma per axis, rad; as in the paper's own
+    /// data.
     pub camera_rad: f64,
     pub camera_m: f64,
-    /// Of each tag's position by itself.
+    /// Noise of each tag's position by itself, one sigma, m.
     pub tag_m: f64,
 }
 
@@ -53,7 +53,7 @@ fn turned(std_m: f64, std_rad: f64, rng: &mut ChaCha8Rng) -> Isometry3<f64> {
 }
 
 impl RealTitan {
-    /// `n` poses; the readings are whole 16-bit words, the wrist's rotation among them.
+    /// Makes `n` poses; the readings are whole 16-bit words, including the wrist's rotation.
     pub fn new(robot: &Robot, n: usize, noise: Noise, seed: u64) -> Self {
         let mut rng = stream_rng(seed, "real titan");
         let mut arm = TrueArm::with_sensor_errors(robot, &mut rng);
@@ -126,7 +126,7 @@ pub fn joint_state(stamp: Stamp, joints: &[(String, f64)]) -> ros::JointState {
     ros::JointState { header: header(stamp, ""), name, position, ..Default::default() }
 }
 
-/// Writes one message of each topic a pose, in the order given; log times are the stamps.
+/// Writes one message of each topic per pose, in the given order; log times are the stamps.
 pub fn write_poses(path: &Path, poses: &[Pose]) {
     let mut writer = RecordingWriter::create(path, RecordingHeader::new(Vec::new())).expect("a file");
     for pose in poses {
@@ -140,7 +140,7 @@ pub fn write_poses(path: &Path, poses: &[Pose]) {
     writer.finish().expect("finished");
 }
 
-/// Writes 50 readings and 10 images a second: a second at rest at each pose, a second on the way to the next.
+/// Writes 50 readings and 10 images per second: one second at rest at each pose, one second on the way to the next.
 pub fn write_stream(path: &Path, poses: &[Pose], seed: u64) {
     let mut rng = stream_rng(seed, "stream");
     let mut writer = RecordingWriter::create(path, RecordingHeader::new(Vec::new())).expect("a file");
@@ -167,7 +167,7 @@ pub fn write_stream(path: &Path, poses: &[Pose], seed: u64) {
     writer.finish().expect("finished");
 }
 
-/// From one word to another the short way round.
+/// Shortest difference from one word to another.
 pub fn way(from: f64, to: f64) -> f64 {
     (to - from + 32768.0).rem_euclid(65536.0) - 32768.0
 }

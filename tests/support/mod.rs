@@ -1,5 +1,5 @@
-//! What several modules need: a short routine, the program's answers, one run that all share, and edited copies of
-//! files.
+//! Common parts of several modules: a short routine, the program's answers, one run that all share, and edited copies
+//! of files.
 
 pub mod bag;
 pub mod external;
@@ -68,7 +68,7 @@ pub fn files_below(folder: &Path, extension: &str) -> Vec<PathBuf> {
     found
 }
 
-/// A routine of some three simulated minutes: few poses, few targets, the standard world otherwise.
+/// A routine of about three simulated minutes: few poses, few targets, otherwise the standard world.
 #[derive(Clone, Debug)]
 pub struct ShortRoutine {
     pub robot: PathBuf,
@@ -78,7 +78,7 @@ pub struct ShortRoutine {
     pub held_out: u32,
     pub min_tags: u32,
     pub targets_m: Vec<[f64; 3]>,
-    /// Appended as it is: obstacles, `[world]`.
+    /// Text appended unchanged: obstacles, `[world]`.
     pub tail: String,
 }
 
@@ -122,7 +122,7 @@ impl ShortRoutine {
     }
 }
 
-/// What the program said.
+/// Output and exit code of the program.
 #[derive(Debug)]
 pub struct Answer {
     pub code: i32,
@@ -186,7 +186,7 @@ impl FinishedRun {
     }
 }
 
-/// Runs `routine` in `folder`; `run` holds what it wrote.
+/// Runs `routine` in `folder`; `run` has the output files.
 #[track_caller]
 pub fn finished(routine: &ShortRoutine, folder: &Path) -> FinishedRun {
     fs::create_dir_all(folder).expect("a folder");
@@ -195,7 +195,7 @@ pub fn finished(routine: &ShortRoutine, folder: &Path) -> FinishedRun {
     run
 }
 
-/// The finished run of a routine, made once for all tests of this process, to be read only.
+/// The finished run of a routine, made once for all tests of this process and read-only.
 #[track_caller]
 pub fn shared(routine: &ShortRoutine) -> &'static FinishedRun {
     static RUNS: Mutex<BTreeMap<String, &'static OnceLock<FinishedRun>>> = Mutex::new(BTreeMap::new());
@@ -203,8 +203,7 @@ pub fn shared(routine: &ShortRoutine) -> &'static FinishedRun {
     run.get_or_init(|| finished(routine, &lasting_folder()))
 }
 
-/// What a run recorded and found. It is made in this process, without the files that people look at: no replay, no
-/// report.
+/// Recording and results of a run. It is made in this process, without the files for people: no replay, no report.
 pub struct Simulated {
     pub done: Result<Finished, Failure>,
     out: PathBuf,
@@ -226,7 +225,7 @@ impl Simulated {
         Self::new(&routine.write(folder), None, &[], &folder.join("run"))
     }
 
-    /// A stream that was recorded: `run` or `truth`.
+    /// Path of a recorded stream: `run` or `truth`.
     pub fn file(&self, name: &str) -> PathBuf {
         let ending = if self.done.is_ok() { ".mcap.partial" } else { "-cut-1.mcap" };
         self.out.join(format!("{name}{ending}"))
@@ -242,17 +241,17 @@ impl Simulated {
     }
 }
 
-/// Figures that nothing but the truth of [`shared_run`] holds.
+/// A seed whose digits occur only in the truth of [`shared_run`].
 pub const SHARED_SEED: u64 = 7_215_503_169_846_213_077;
 pub const SHARED_PUMP_FLOW_L_MIN: f64 = 12.345_678_901;
 
-/// The run of the closed loop that most tests look at.
+/// The run of the closed loop that most tests use.
 pub fn shared_run() -> &'static FinishedRun {
     let tail = format!("[world.hydraulics]\npump_flow_l_min = {SHARED_PUMP_FLOW_L_MIN}\n");
     shared(&ShortRoutine { seed: SHARED_SEED, tail, ..ShortRoutine::default() })
 }
 
-/// A folder that outlives the tests, for nothing is called when they end; those of an hour ago are removed.
+/// A folder that outlives the tests, because no code is called when they end; those older than an hour are removed.
 pub fn lasting_folder() -> PathBuf {
     let parent = Path::new(env!("CARGO_TARGET_TMPDIR")).join("shared-runs");
     fs::create_dir_all(&parent).expect("a folder in the target directory");
@@ -283,7 +282,7 @@ pub fn edit(file: &Path, from: &str, to: &str) {
     write(file, &text.replacen(from, to, 1));
 }
 
-/// Keeps no message.
+/// A listener that keeps no message.
 pub struct Nowhere;
 
 impl Sink for Nowhere {

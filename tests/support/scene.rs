@@ -14,14 +14,14 @@ use super::external::{at, header};
 use super::synthetic::{TrueArm, add_noise};
 use super::{Answer, answer, program, root, temp, write};
 
-/// Tags as one of the types that armcal reads, or bytes of any other type.
+/// Tags in one of the types that armcal reads, or bytes of any other type.
 #[derive(Clone, Debug)]
 pub enum Payload {
     Joints(ros::JointState),
     Tags(ros::AprilTagDetectionArray),
     Isaac(ros::IsaacDetectionArray),
     Info(Box<ros::CameraInfo>),
-    /// Written as if it were of this type.
+    /// Detections written under the name of this type.
     Named(&'static str, ros::AprilTagDetectionArray),
 }
 
@@ -32,7 +32,7 @@ pub struct Recorded {
     pub payload: Payload,
 }
 
-/// An arm with its recording, one joint reading and one detection array a pose.
+/// An arm with its recording: one joint reading and one detection array per pose.
 pub struct Scene {
     pub folder: TempDir,
     pub robot: PathBuf,
@@ -68,7 +68,7 @@ impl Scene {
         }
     }
 
-    /// One of our robots, 40 random poses `period_s` apart; its tags are its own.
+    /// One of our robots with its own tags, at 40 random poses `period_s` apart.
     pub fn of_robot(name: &str, topics: [&str; 3], period_s: f64, seed: u64) -> Self {
         let folder = root().join("robots").join(name);
         let robot = load(&folder).expect("it reads");
@@ -202,7 +202,7 @@ impl Scene {
         self.calibrate_by(&self.map("", ""))
     }
 
-    /// `inspect --write-input`, and the map that it wrote; what it prints is on no page of texts.
+    /// Runs `inspect --write-input`; returns its answer and the map. Its output is not part of the compared texts.
     pub fn propose(&self) -> (Answer, PathBuf) {
         let map = self.folder.path().join("proposed.toml");
         let mut command = program();

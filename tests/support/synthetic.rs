@@ -1,6 +1,5 @@
-//! Recordings of an arm whose errors are known, made without the estimator's code: readings by the datasheet's formula,
-//! pixels by a projection of its own. Only the forward kinematics is the library's; Pinocchio vouches for it
-//! (`oracle`).
+//! Recordings of an arm with known errors, made without the estimator's code: readings by the datasheet's formula,
+//! pixels by a separate projection. Only the forward kinematics is the library's; Pinocchio verifies it (`oracle`).
 
 use armcal::calib::Calibration;
 use armcal::kinematics::Attachment;
@@ -18,24 +17,24 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-/// The first joints, those that the wrist camera sees.
+/// Number of the first joints, which move the wrist camera.
 pub const N_SEEN: usize = 5;
 
-/// An arm as it really is. `theta = center + gain travel + offset + curve(travel)`, travel by the datasheet.
+/// The true arm: `theta = center + gain travel + offset + curve(travel)`, travel by the datasheet.
 #[derive(Clone, Debug)]
 pub struct TrueArm<'a> {
     pub robot: &'a Robot,
     pub gain: Vec<f64>,
     pub offset_rad: Vec<f64>,
-    /// What is left beyond gain and offset; zero for straight sensors.
+    /// Nonlinearity beyond gain and offset; zero for straight sensors.
     pub curve: Vec<Curve>,
     pub camera: Attachment,
     pub base_from_tag: Vec<Isometry3<f64>>,
-    /// The tag on the gripper, on the last link.
+    /// Pose of the tag on the gripper, on the last link.
     pub link_from_gripper_tag: Option<Isometry3<f64>>,
 }
 
-/// One standing arm and what its camera saw: (id, corners).
+/// One standing arm and the tags that its camera saw, as (id, corners).
 #[derive(Clone, Debug)]
 pub struct Shot {
     pub set: CaptureSet,
@@ -69,7 +68,7 @@ impl Curve {
         }))
     }
 
-    /// At `x` half ranges from the middle; constant beyond the range.
+    /// Value at `x` half ranges from the middle; constant beyond the range.
     fn at(&self, x: f64) -> f64 {
         let turn = std::f64::consts::PI * (x.clamp(-1.0, 1.0) + Self::DOMAIN) / (2.0 * Self::DOMAIN);
         let wave = |(k, by): (usize, &f64)| by * (turn * (k + 1) as f64).sin() / Self::DOMAIN.sqrt();
@@ -78,7 +77,7 @@ impl Curve {
 }
 
 impl<'a> TrueArm<'a> {
-    /// Gains, offsets and curves drawn from what robot.toml says of the sensors.
+    /// An arm with gains, offsets and curves drawn from robot.toml's sensors.
     pub fn as_its_datasheet(robot: &'a Robot, rng: &mut ChaCha8Rng) -> Self {
         let mut arm = Self::with_sensor_errors(robot, rng);
         for (j, spec) in robot.sensors.iter().enumerate() {
@@ -89,7 +88,7 @@ impl<'a> TrueArm<'a> {
         arm
     }
 
-    /// Gains within 5 %, offsets within 5 deg, all else as drawn.
+    /// An arm with gains within 5 %, offsets within 5 deg, and all else nominal.
     pub fn with_sensor_errors(robot: &'a Robot, rng: &mut ChaCha8Rng) -> Self {
         Self {
             robot,
@@ -102,7 +101,7 @@ impl<'a> TrueArm<'a> {
         }
     }
 
-    /// Moves camera and tags off their drawing by what robot.toml says of them.
+    /// Moves camera and tags off their nominal poses by robot.toml's standard deviations.
     pub fn misplace(&mut self, rng: &mut ChaCha8Rng) {
         let camera = &self.robot.camera;
         self.camera.link_from_frame *= small_motion(camera.mount_std_m, camera.mount_std_rad, rng);
@@ -138,7 +137,7 @@ impl<'a> TrueArm<'a> {
             let spec = &self.robot.sensors[j];
             let straight_rad = angles[j] - spec.center_rad - self.offset_rad[j];
             let mut travel_rad = straight_rad / self.gain[j];
-            // The curve is a hundred times less steep than the line: each round gains two digits.
+            // The curve's slope is a hundredth of the line's: each round gains two digits.
             for _ in 0..if self.curve[j].0 == [0.0; 12] { 0 } else { 10 } {
                 travel_rad = (straight_rad - self.curve[j].at(travel_rad / spec.half_range_rad)) / self.gain[j];
             }
@@ -146,7 +145,7 @@ impl<'a> TrueArm<'a> {
         })
     }
 
-    /// The corners of a tag as the camera at true `angles` sees them, if it does.
+    /// Corners of a tag as the camera at true `angles` sees them; `None` if it does not see all.
     pub fn corners(&self, angles: &JointAngles, tag_idx: usize) -> Option<[[f64; 2]; 4]> {
         let camera_from_base = self.robot.chain.link_poses(angles).frame(&self.camera).inverse();
         let camera_from_tag = camera_from_base * self.base_from_tag[tag_idx];
@@ -178,7 +177,7 @@ impl<'a> TrueArm<'a> {
         shots
     }
 
-    /// Uniform within the limits; the last joint moves neither camera nor tool point and stays.
+    /// Random angles, uniform within the limits; the last joint moves neither camera nor tool point and stays.
     pub fn random_angles(&self, rng: &mut ChaCha8Rng) -> JointAngles {
         JointAngles::from_fn(self.robot.n_joints(), |j| {
             self.robot.chain.joints()[j].limits.map_or(0.0, |l| rng.random_range(l.lower_rad..l.upper_rad))
@@ -216,13 +215,13 @@ impl<'a> TrueArm<'a> {
     }
 }
 
-/// Where an arm believes its tool to be, less where it is, over poses all over its range.
+/// Distances of the estimated tool from the true one, over poses in the whole range.
 #[derive(Clone, Copy, Debug)]
 pub struct ToolFigures {
-    /// Medians.
+    /// Median distance, m.
     pub error_m: f64,
     pub predicted_m: f64,
-    /// Mean of the squared error over its covariance; 3 if that is right.
+    /// Mean of the squared error over its covariance; 3 if the covariance is right.
     pub nees: f64,
 }
 
@@ -260,7 +259,7 @@ pub fn small_motion(std_m: f64, std_rad: f64, rng: &mut ChaCha8Rng) -> Isometry3
     Isometry3::from_parts(translation, UnitQuaternion::from_scaled_axis(std_rad * normal3(rng)))
 }
 
-/// Kannala-Brandt in polar form, within 1.25 rad of the axis and 10 px of the border.
+/// Pixel by Kannala-Brandt in polar form; `None` beyond 1.25 rad of the axis and within 10 px of the border.
 pub fn pixel(lens: &CameraModel, p: &Point3<f64>) -> Option<[f64; 2]> {
     let theta = p.x.hypot(p.y).atan2(p.z);
     let [.., k1, k2, k3, k4] = lens.intrinsics();

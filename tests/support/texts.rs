@@ -1,4 +1,4 @@
-//! Whole texts that people read, kept in tests/snapshots: `INSTA_UPDATE=always cargo test --release` renews them, and a
+//! Whole texts for people, kept in tests/snapshots. `INSTA_UPDATE=always cargo test --release` updates them, and a
 //! person reviews the difference.
 
 use std::cell::RefCell;
@@ -8,11 +8,11 @@ use std::process::Command;
 use super::{Answer, root};
 
 thread_local! {
-    /// What the program said since [`Texts::of`], by thread: a test runs on one.
+    /// Output of the program since [`Texts::of`], by thread: a test runs on one.
     static PAGE: RefCell<Option<String>> = const { RefCell::new(None) };
 }
 
-/// Collects what the program says to a test; at its end the texts are compared with the snapshot of that name.
+/// Collector of the program's output for a test; at its end the texts are compared with the snapshot of that name.
 #[must_use = "the texts are compared when it is dropped"]
 pub struct Texts {
     name: &'static str,
@@ -39,7 +39,7 @@ impl Drop for Texts {
     }
 }
 
-/// Lines of one text that are kept: what follows is data.
+/// Number of lines of one text that are kept; later ones are data.
 const MOST_LINES: usize = 40;
 
 /// Adds a text to the page of this test, if it has one.
@@ -54,11 +54,11 @@ pub fn note(what: &str, text: &str) {
 
 /// Adds a text whose figures depend on the processor in their last digits.
 pub fn note_without_digits(what: &str, text: &str) {
-    // Names of folders first: digits are part of them.
+    // Names of folders are replaced first, because they contain digits.
     note(what, &without_digits(&plain(text)));
 }
 
-/// Adds an answer: all of it where it is the same on every machine, else its errors.
+/// Adds an answer: the whole text where it is the same on every machine, else its errors.
 pub fn note_answer(command: &Command, answer: &Answer) {
     const OF_FILES_ALONE: [&str; 6] = ["check", "explain", "export", "inspect", "new-robot", "--version"];
     let Answer { code, stdout, stderr } = answer;
@@ -71,12 +71,12 @@ pub fn note_answer(command: &Command, answer: &Answer) {
     }
 }
 
-/// The text without what differs from machine to machine: folders, times and the version.
+/// The text without the parts that depend on the machine: folders, times and the version.
 fn plain(text: &str) -> String {
     let text = text.replace(env!("CARGO_PKG_VERSION"), "VERSION");
     let temporary = std::env::temp_dir().display().to_string();
     let mut text = text.replace(env!("CARGO_TARGET_TMPDIR"), "TARGET").replace(&root().display().to_string(), "ROOT");
-    // Temporary folders have names of their own.
+    // Temporary folders have random names.
     for start in [format!("{temporary}/.tmp"), "TARGET/shared-runs/.tmp".to_owned()] {
         while let Some(at) = text.find(&start) {
             let end = at + start.len();
@@ -87,8 +87,8 @@ fn plain(text: &str) -> String {
     text
 }
 
-/// Each number of a text as `#`, and no widths of columns: figures of a run differ in their last digits from one
-/// processor to the next.
+/// Replaces each number of a text by `#`, and removes the widths of columns, because a run's figures differ in their
+/// last digits between processors.
 fn without_digits(text: &str) -> String {
     let mut plain = String::new();
     for c in text.chars() {

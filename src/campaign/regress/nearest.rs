@@ -1,9 +1,10 @@
-//! The nearest approach of all runs: what a path keeps clear of shows in the few runs that come near anything.
+//! Smallest clearance of all runs: a change of a path's required clearance shows in the few runs that come near
+//! anything.
 //!
-//! The required clearance is a floor that most runs never come near, so that less of it moves the typical run little
-//! and the nearest runs by its whole size. The test is that of precedence (Nelson, *Tables for a precedence life test*,
-//! Technometrics 5, 1963), for pairs: where an unchanged program's two sides differ by chance alone, either run of a
-//! pair is as likely the nearer one, and the k nearest runs of all are all new ones in one case of 2^k at most.
+//! The required clearance is a floor that most runs never reach. Less of it hardly moves the typical run, and moves the
+//! nearest runs by its whole size. The test is that of precedence (Nelson, *Tables for a precedence life test*,
+//! Technometrics 5, 1963), for pairs. Where both sides of an unchanged program differ by chance, either run of a pair
+//! is equally likely the nearer one. Then the k nearest runs are all new ones with a probability of at most 1/2^k.
 
 use super::{Check, Judge, Pair, Verdict};
 use crate::campaign::Metric;
@@ -12,8 +13,8 @@ use armcal_core::units::Unit;
 const WHAT: &str = "nearest run, nearer by";
 
 impl<'a> Judge<'a> {
-    /// Finds what is nearer than the baseline ever was; it finds or does not, and is never inconclusive. `tail`: the
-    /// chance that an unchanged program is called nearer.
+    /// Checks for runs that are nearer than the baseline ever was; the verdict is never inconclusive. `tail` is the
+    /// probability that an unchanged program fails.
     pub(super) fn nearest(&mut self, budget_m: f64, tail: f64) {
         let mut pairs: Vec<(&'a Pair<'a>, f64, f64)> = self
             .figures(Metric::MinClearance)
@@ -24,7 +25,7 @@ impl<'a> Judge<'a> {
         pairs.sort_by(|a, b| a.2.total_cmp(&b.2));
         let floor_m = pairs.iter().map(|(_, was, _)| *was).fold(f64::INFINITY, f64::min);
         let nearer_by = |k: usize| pairs.get(k).map(|(_, _, is)| floor_m - is);
-        // The `n_needed` nearest are new: by chance in one case of 2^n_needed.
+        // The `n_needed` nearest runs are new by chance with a probability of 1/2^n_needed.
         let n_needed = (-tail.log2()).ceil().max(1.0) as usize;
         let (value, low) = (nearer_by(0), nearer_by(n_needed - 1));
         let is_worse = value.is_some_and(|nearer_m| nearer_m >= budget_m) && low.is_some_and(|low| low > 0.0);
@@ -57,8 +58,8 @@ mod tests {
     use armcal_core::stats::stream_rng;
     use rand::RngExt;
 
-    /// Three quarters of the runs pass everything at 70 to 170 mm, whatever is required; a quarter is led around
-    /// something and keeps `floor_m` and up to 10 mm more.
+    /// A table in which three quarters of the runs have 70 to 170 mm of clearance for any floor. A quarter has a detour
+    /// and keeps `floor_m` and up to 10 mm more.
     fn table(floor_m: f64, rng: &mut impl rand::Rng) -> Table {
         let mut clearance_m = || {
             let by_chance_m = rng.random_range(0.07..0.17);
@@ -69,7 +70,7 @@ mod tests {
         Table { names: vec![Metric::MinClearance.name().to_owned()], rows: rows.collect() }
     }
 
-    /// Of 200 comparisons: those in which the nearest runs are worse, and those in which the typical one is.
+    /// Of 200 comparisons, the number with worse nearest runs, and the number with a worse typical run.
     fn found(floor_m: f64) -> [usize; 2] {
         let mut found = [0; 2];
         for trial in 0..200 {
@@ -89,7 +90,7 @@ mod tests {
         assert!(nearest >= 160 && typical <= 60, "{nearest} and {typical} of 200");
     }
 
-    /// By 5 mm, the budget, and beyond doubt: chance alone does neither often.
+    /// A failure needs 5 mm, the budget, and significance: chance seldom causes both.
     #[test]
     fn the_same_floor_is_seldom_found_worse() {
         let [nearest, _] = found(0.05);

@@ -1,4 +1,4 @@
-//! The figures of pairs that are compared by how far they moved: ratios and differences.
+//! Figures that are compared pair by pair, as ratios or differences.
 
 use super::{Check, Judge, Pair, Verdict, figure};
 use crate::campaign::Metric;
@@ -6,17 +6,18 @@ use armcal_core::routine::RegressSettings;
 use armcal_core::stats::{Interval, signed_rank_location};
 use armcal_core::units::Unit;
 
-/// Of all figures together: the chance that any interval of an unchanged program lies on the worse side of no change.
+/// Probability that any interval of an unchanged program lies on the worse side of no change, over all figures
+/// together.
 const FALSE_ALARMS: f64 = 0.05;
-/// Of each figure by itself: the chance that its interval ends below how much worse it is. Only whether more pairs are
-/// needed hangs on this end.
+/// Probability that the interval of a figure ends below its true worsening, for each figure. This end only decides if
+/// more pairs are needed.
 const OVERLOOKED: f64 = 0.05;
-/// A change of the budget's size meets it in spite of rounding.
+/// Tolerance for rounding, so that a change of the budget's size reaches the budget.
 const ROUNDING: f64 = 1e-9;
-/// Logarithm of a ratio with zero on one side.
+/// Limit of the logarithm of a ratio with zero on one side.
 const LN_MOST: f64 = 700.0;
 
-/// What of two figures is compared.
+/// Measure of change between two figures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Scale {
     /// New over baseline, judged by its logarithm: twice and half are equally far from no change.
@@ -27,7 +28,7 @@ enum Scale {
 }
 
 impl Scale {
-    /// How much worse, 0 for no change.
+    /// Change of a figure, positive if worse, 0 for no change.
     fn worsening(self, was: f64, is: f64) -> f64 {
         match self {
             Self::NewOverBaseline => ln_ratio(was, is),
@@ -36,7 +37,7 @@ impl Scale {
         }
     }
 
-    /// As it is shown and as budgets have it.
+    /// The change in the form of tables and budgets.
     fn shown(self, worsening: f64) -> f64 {
         if self == Self::Drop { worsening } else { worsening.exp() }
     }
@@ -46,7 +47,7 @@ impl Scale {
     }
 }
 
-/// Nothing over nothing is no change.
+/// Logarithm of the ratio; zero over zero is no change.
 fn ln_ratio(was: f64, is: f64) -> f64 {
     if was == is { 0.0 } else { (is / was).ln().clamp(-LN_MOST, LN_MOST) }
 }
@@ -61,12 +62,12 @@ struct Figure<'a> {
 }
 
 impl<'a> Judge<'a> {
-    /// Judges all figures, each so strictly that all together give no more false alarms than one of twenty.
+    /// Judges all figures, each so strictly that all together give a false alarm in at most one case of twenty.
     pub(super) fn paired(&mut self, budgets: &RegressSettings) {
         let of =
             |(what, metric, scale, budget)| Figure { what, metric, scale, budget, pairs: self.moved(metric, scale) };
         let figures = compared(budgets).map(of);
-        // The clearance is looked at twice: typical of the pairs, and of the nearest runs.
+        // The clearance has two checks: one of the typical pair, one of the nearest runs.
         let looks = |figure: &Figure<'_>| if figure.metric == Metric::MinClearance { 2 } else { 1 };
         let n_compared: usize = figures.iter().filter(|figure| !figure.pairs.is_empty()).map(looks).sum();
         let tail = FALSE_ALARMS / n_compared.max(1) as f64;
@@ -80,7 +81,7 @@ impl<'a> Judge<'a> {
         self.nearest(budgets.clearance_drop_m, tail);
     }
 
-    /// How much worse each pair is that has the figure on both sides.
+    /// Worsening of each pair that has the figure on both sides.
     fn moved(&self, metric: Metric, scale: Scale) -> Vec<(&'a Pair<'a>, f64)> {
         let of = |pair: &'a Pair<'a>| {
             let (was, is) = (figure(self.baseline, pair.baseline, metric)?, figure(self.now, pair.now, metric)?);

@@ -1,5 +1,5 @@
-//! Words of the libraries on stderr: printable, and a limited number of them. Peers in a ROS domain can make the
-//! middleware say as much as they like, with names of theirs.
+//! Messages of the libraries on stderr: printable, and limited in number. Peers in a ROS domain can cause any number of
+//! middleware messages, with names that they choose.
 
 use std::io::{Result, Write};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -7,9 +7,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use armcal_core::text::printable;
 use tracing_subscriber::fmt::MakeWriter;
 
-/// Lines that are written.
+/// Largest number of written lines.
 const MAX_LINES: usize = 50;
-/// Characters of a line that are written.
+/// Largest number of written characters of a line.
 const MAX_CHARS: usize = 1000;
 
 /// Writes lines to `W`, up to a limit.
@@ -22,12 +22,12 @@ pub(super) struct LogLines<W> {
 /// Writes one line.
 pub(super) struct LogLine<'a, W> {
     lines: &'a LogLines<W>,
-    /// Errors of our own: a stop that could not be sent is written after any flood.
+    /// True for an error of our own: a failed stop command is written even after many lines.
     is_own_error: bool,
 }
 
 impl<W> LogLines<W> {
-    /// `level`: all lines are written where more than warnings is asked for.
+    /// A writer for `level`: it writes all lines if the level includes more than warnings.
     pub fn new(level: tracing::Level, to: fn() -> W) -> Self {
         let max_lines = if level > tracing::Level::WARN { usize::MAX } else { MAX_LINES };
         Self { to, n_written: AtomicUsize::new(0), max_lines }

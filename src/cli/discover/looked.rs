@@ -1,4 +1,4 @@
-//! A look around, and what is proposed of it.
+//! Listening to a ROS 2 domain, and the map proposed from it.
 
 use anyhow::Result;
 use armcal_core::codes::Code;

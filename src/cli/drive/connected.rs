@@ -22,10 +22,10 @@ use armcal_core::stats::quantile;
 use armcal_live::ImageSearch;
 use armcal_live::{Connection, LiveArm, RosbridgeWire, Survey, TagCheck, WatchedWire, Wire};
 
-/// An arm that was found ready.
+/// A connected arm that was found ready.
 pub struct ConnectedArm(LiveArm<Box<dyn Wire>>);
 
-/// What was heard before anything moved.
+/// Text on the messages that were received before anything moved.
 fn describe(survey: &Survey, robot: &Robot) -> String {
     let Survey { seconds, readings, images, tags, .. } = survey;
     let rate_hz = *readings as f64 / seconds.max(1e-9);
@@ -53,7 +53,7 @@ fn describe(survey: &Survey, robot: &Robot) -> String {
     text
 }
 
-/// Tags are looked for in the images of the arm's camera.
+/// Adds a search for tags in the images of the arm's camera.
 #[cfg(feature = "images")]
 fn with_images(wire: Box<dyn Wire>, robot: &Robot) -> Result<Box<dyn Wire>> {
     robot.require_lens()?;
@@ -69,7 +69,7 @@ fn with_images(_: Box<dyn Wire>, _: &Robot) -> Result<Box<dyn Wire>> {
 }
 
 impl ConnectedArm {
-    /// Waits until the arm is ready, and says what was heard of it.
+    /// Waits until the arm is ready, and prints what was received from it.
     pub fn open(file: &Path, inputs: &RunInputs) -> Result<Self> {
         let connection = Connection::load(file)?;
         let wire: Box<dyn Wire> = match &connection.rosbridge {
@@ -85,8 +85,7 @@ impl ConnectedArm {
         Ok(Self(arm))
     }
 
-    /// Moves one joint after the other by one degree and back, each after a yes, and ends at what is not as it should
-    /// be.
+    /// Moves one joint after the other by one degree and back, each after a yes; ends at the first error.
     pub fn nudge(&mut self, robot: &Robot, interrupt: &Interrupt) -> Result<()> {
         let mut answers = std::io::stdin().lock();
         for joint in 0..robot.n_joints() {
@@ -96,7 +95,7 @@ impl ConnectedArm {
         Ok(())
     }
 
-    /// Runs on the arm, tells it to stop where the run breaks off, and says how quickly it was answered.
+    /// Runs on the arm, tells it to stop if the run is interrupted, and reports the response times.
     pub fn execute(
         mut self,
         inputs: &RunInputs,

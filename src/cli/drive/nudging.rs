@@ -1,4 +1,4 @@
-//! `--nudge`: one joint by one degree, as the operator allows it.
+//! `--nudge`: moves one joint by one degree, after the operator's confirmation.
 
 use std::io::BufRead;
 
@@ -27,7 +27,7 @@ pub(super) fn nudge_one(
     ask(answers, &format!("Did {name}, and nothing else, turn by about one degree, + as its axis in the URDF says?"))
 }
 
-/// Goes on after a yes alone.
+/// Asks a question; continues only after a yes.
 fn ask(answers: &mut impl BufRead, question: &str) -> Result<()> {
     note(format_args!("{question} y (or yes) goes on, anything else ends here"));
     let mut line = String::new();

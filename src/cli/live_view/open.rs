@@ -1,4 +1,4 @@
-//! A view that was begun, and how it ended.
+//! An open view of a run, and its end.
 
 use armcal_core::codes::Code;
 use std::time::Duration;
@@ -11,7 +11,7 @@ use crate::cli::stdout::warn;
 use armcal_belief::session::MessageListener;
 use armcal_replay::{LiveDrawings, LiveView, LiveViewEnd};
 
-/// A view of a run that goes on.
+/// A view of a running run.
 pub struct OpenView {
     view: LiveView,
     address: String,
@@ -25,12 +25,12 @@ impl OpenView {
         Ok(Self { view, address: address.to_owned() })
     }
 
-    /// Takes messages; waits `patience` in all for a viewer that is too slow.
+    /// Listener that takes messages; it waits in total at most `patience` for a viewer that is too slow.
     pub fn listener(&self, patience: Duration) -> MessageListener {
         Box::new(self.view.listener(patience))
     }
 
-    /// Says once what was not shown.
+    /// Ends the view, and reports once the messages that were not shown.
     pub fn end(self) {
         let Self { view, address } = self;
         let LiveViewEnd { was_seen, was_taken, left_out, failure } = view.end();

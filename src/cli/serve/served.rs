@@ -1,4 +1,4 @@
-//! The world behind its topics, until somebody ends it.
+//! The simulated world on its topics, until the user ends it.
 
 use anyhow::{Context, Result};
 

@@ -15,10 +15,10 @@ use armcal_core::robot::Robot;
 use armcal_core::streams::Message;
 use armcal_core::time::Stamp;
 
-/// Between two looks at the file.
+/// Time between two checks of the file.
 const POLL: Duration = Duration::from_millis(500);
 
-/// When to stop waiting.
+/// Conditions for the end of the wait.
 pub(super) struct Patience {
     idle: Option<Duration>,
     interrupt: Interrupt,
@@ -32,7 +32,7 @@ impl Patience {
         Self { idle, interrupt, last_news: Instant::now(), seen: (0, 0) }
     }
 
-    /// Waits for the next look; `false` where nothing came for too long.
+    /// Waits for the next check; returns false if nothing came for too long.
     fn waits(&mut self, seen: (u64, u64)) -> bool {
         if seen != self.seen {
             (self.seen, self.last_news) = (seen, Instant::now());
@@ -73,8 +73,8 @@ pub(super) fn opened<'a>(path: &Path, map: &'a TopicMap, patience: &mut Patience
     }
 }
 
-/// Hears a recording until it ends, nothing comes any more, or somebody asks to stop. What was heard of one that was
-/// taken away meanwhile counts, with the reason.
+/// Reads a recording until it ends, nothing comes any more, or the user asks to stop. If the file is removed meanwhile,
+/// the messages until then count, with the reason.
 pub(super) fn follow(
     mut recording: GrowingRecording<'_>,
     robot: &Robot,

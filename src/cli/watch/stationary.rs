@@ -1,4 +1,4 @@
-//! `watch --stationary`: the online estimator on a batch's views, which must end where the batch does.
+//! `watch --stationary`: the online estimator on a batch's views, whose result must agree with the batch.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ use crate::cli::exit::Exit;
 use crate::cli::stdout::say;
 use armcal_belief::calib::Status;
 
-/// Takes the views of a batch in one by one, nothing drifting, and says how far from the batch it ends.
+/// Adds the views of a batch one by one, without drift, and prints the distance of the last estimate from the batch.
 pub(super) fn stationary(given: &CalibrationInputs<'_>, out: Option<&Path>, form: Form) -> Result<Exit> {
     let (batch, lost) = given.batch()?;
     let mut told = Told::new(form);
@@ -41,7 +41,7 @@ pub(super) fn stationary(given: &CalibrationInputs<'_>, out: Option<&Path>, form
     Ok(if calibration.status == Status::Refused { Exit::Refused } else { exit_of(&follower, by_data) })
 }
 
-/// Behind the lines of a stationary belief: the batch that it was taken from.
+/// Last line of a stationary estimate: the batch for comparison.
 #[derive(Serialize)]
 struct LastLine<'a> {
     batch: BatchLine<'a>,
@@ -51,6 +51,6 @@ struct LastLine<'a> {
 struct BatchLine<'a> {
     status: Status,
     refusal: Option<&'a str>,
-    /// Null where the batch estimates something else.
+    /// Largest difference from the batch in standard deviations; null where the batch estimates other parameters.
     largest_difference_sigmas: Option<f64>,
 }

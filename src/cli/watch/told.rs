@@ -1,4 +1,4 @@
-//! What was believed, line by line, and how it ended.
+//! The online estimates, line by line, and their summary.
 
 use std::path::Path;
 
@@ -10,19 +10,19 @@ use crate::cli::stdout::say;
 use crate::output;
 use armcal_belief::calib::online::{BeliefLine, BeliefLog, Follower, OnlineEvent};
 
-/// In which form lines are printed.
+/// Form of the printed lines.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Form {
     Text,
     Json,
 }
 
-/// What was believed, and what of it was printed.
+/// The online estimates, and the number of printed ones.
 pub(super) struct Told {
     log: BeliefLog,
     n_told: usize,
     form: Form,
-    /// That stdout takes it: one that cannot be written is an error at the end.
+    /// Result of the writes to stdout: a failure is reported at the end.
     printed: Result<()>,
 }
 
@@ -59,7 +59,7 @@ impl Told {
         }
     }
 
-    /// The last line, the file, and in words how it ended.
+    /// Prints the last line, writes the file, and prints the summary.
     pub fn end(mut self, follower: &Follower, out: Option<&Path>) -> Result<()> {
         let row = belief(follower)?;
         self.log.end(follower);

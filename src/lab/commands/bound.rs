@@ -43,7 +43,7 @@ pub(super) struct BoundArgs {
     keep: bool,
 }
 
-/// The world with gain, offset and noise alone, where there is a bound, and the routine's own.
+/// Worlds: one with only gain, offset and noise, where there is a bound, and the routine's own.
 const WORLDS: [(&str, &[&str]); 2] = [("as modelled", &AS_MODELLED), ("as the routine has it", &[])];
 
 pub(super) fn bound(args: &BoundArgs) -> Result<Exit> {

@@ -1,4 +1,4 @@
-//! Parse, dispatch.
+//! Parsing and dispatch of the command line.
 
 use std::process::ExitCode;
 
@@ -43,7 +43,7 @@ enum Study {
     DiveFaults(dive_faults::DiveFaultsArgs),
 }
 
-/// By the names of the commands.
+/// Examples by the names of the commands.
 const EXAMPLES: &[(&str, &[&str])] = &[
     ("paper", &["armcal-lab paper --quick"]),
     ("sensitivity", &["armcal-lab sensitivity routines/titan4-quickstart.toml --poses 40 --out sensitivity"]),

@@ -1,4 +1,4 @@
-//! `armcal-lab dive`: the online belief over a dive, for many seeds.
+//! `armcal-lab dive`: the online estimate over a dive, for many seeds.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -60,7 +60,7 @@ pub(super) fn dive(args: &DiveArgs) -> Result<Exit> {
     Ok(Exit::Ok)
 }
 
-/// Views and events of each seed.
+/// Lines with views and events of each seed.
 fn told(seeds: &[u64], studies: &[DiveStudy]) -> String {
     let mut text = String::new();
     for (seed, study) in seeds.iter().zip(studies) {
@@ -92,7 +92,7 @@ fn one(args: &DiveArgs, seed: u64) -> Result<DiveStudy> {
     Ok(dive_study(&recording, &truth, &robot, at_start))
 }
 
-/// A process of its own, as a user would start it.
+/// Runs the dive as a process of its own, as a user would start it.
 pub(super) fn run_dive(routine: &Path, seed: u64, settings: &[String], out: &Path) -> Result<()> {
     let mut command = Command::new(std::env::current_exe().context("this program cannot be found")?);
     command.arg("run").arg(routine).arg("--seed").arg(seed.to_string()).arg("--out").arg(out);

@@ -1,4 +1,4 @@
-//! `armcal-lab dive-faults`: when the online belief names what happens on a dive.
+//! `armcal-lab dive-faults`: the time until the online estimate names a fault on a dive.
 
 use armcal_core::codes::Code;
 use std::fs;
@@ -86,7 +86,7 @@ fn one(args: &DiveFaultsArgs, kind: DiveFaultKind, seed: u64) -> Result<DiveFaul
     };
     let fault = drawn_dive_fault(kind, seed, &robot, &work.looks_rad);
     if !run.join("truth.mcap").exists() {
-        // The arm works by the belief that is looked at.
+        // The arm works by the estimate that the study examines.
         let settings = [format!("step.{works}.belief=\"online\""), format!("world.fault={}", fault.setting)];
         run_dive(&args.routine, seed, &settings, &run)?;
     }

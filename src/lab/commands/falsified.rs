@@ -1,4 +1,4 @@
-//! `armcal-lab falsified`: the verdict where drawing, survey or a sensor is wrong.
+//! `armcal-lab falsified`: the verdict where nominal model, survey or a sensor is wrong.
 
 use armcal_core::codes::Code;
 use std::fs;
@@ -63,7 +63,7 @@ pub(super) fn falsified(args: &FalsifiedArgs) -> Result<Exit> {
     Ok(Exit::Ok)
 }
 
-/// The cases of `kinds`, and the good arm's; all of them where no kind is named.
+/// The cases of `kinds` and the good arm's; all cases where no kind is named.
 fn chosen(mut cases: Vec<Case>, kinds: &[String]) -> Result<Vec<Case>, UsageError> {
     let known = CaseKind::ALL.map(CaseKind::name);
     if let Some(unknown) = kinds.iter().find(|kind| !known.contains(&kind.as_str())) {

@@ -1,5 +1,5 @@
-//! The commands of `armcal-lab`: each measures one part, or the closed loop, against known truth, and writes tables
-//! into a folder. `armcal-lab run` is `armcal run`: some studies start loops as processes of their own.
+//! Commands of `armcal-lab`: each measures one part, or the closed loop, against known truth, and writes tables into a
+//! folder. `armcal-lab run` is `armcal run`: some studies start loops as processes of their own.
 
 mod bound;
 mod command_line;

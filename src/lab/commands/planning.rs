@@ -1,4 +1,4 @@
-//! `armcal-lab edges` and `paths`: the geometry of planning on its own.
+//! `armcal-lab edges` and `paths`: the geometry of planning without the rest of the loop.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -18,11 +18,11 @@ use armcal_lab::{
     path_study, paths_csv, problem_json, queries_json, random_edges,
 };
 
-/// Free water that the studies keep, m.
+/// Margin that the studies require, m.
 const MARGIN_M: f64 = 0.05;
-/// Edges that are written for other checkers.
+/// Number of edges that are written for other checkers.
 const WRITTEN_EDGES: usize = 2000;
-/// Edges that are timed under the beliefs' bounds.
+/// Number of edges that are timed under the joint error bounds.
 const TIMED_EDGES: usize = 2000;
 
 #[derive(Debug, Args)]

@@ -1,4 +1,4 @@
-//! `armcal-lab poses`: error over poses and time, chosen and random.
+//! `armcal-lab poses`: tool error against the number of poses and the time, for chosen and random poses.
 
 use std::fs;
 use std::path::PathBuf;

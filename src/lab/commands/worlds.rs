@@ -24,11 +24,11 @@ use armcal_core::routine;
 use armcal_core::streams::Message;
 use armcal_lab::{DrawnWorld, drawn_world};
 
-/// 99.9 % of the errors whose root mean square is 1, whatever their directions: that of one dimension is the largest.
+/// Multiple of the rms that bounds 99.9 % of the errors; one dimension, the worst case of their directions.
 const SIGMAS_99_9: f64 = 3.29;
-/// Fewer views than the routines have, for time's sake.
+/// Settings with fewer views than the routines have, to save time.
 const SHORT: [&str; 2] = ["capture.poses=14", "capture.held_out=4"];
-/// Looks at a child every so often.
+/// Time between two checks of a child process.
 const LOOK: Duration = Duration::from_millis(20);
 
 #[derive(Debug, Args)]
@@ -58,13 +58,13 @@ pub(super) struct WorldsArgs {
     threads: Option<u16>,
 }
 
-/// What became of one world.
+/// Outcome of one world.
 struct Row {
     world: DrawnWorld,
     ending: String,
-    /// As the program put it.
+    /// Reason in the program's own words.
     reason: String,
-    /// Of the routine's task.
+    /// Tolerance of the routine's task, m.
     tolerance_m: f64,
     summary: Option<RunSummary>,
     bumps: usize,
@@ -95,7 +95,7 @@ pub(super) fn worlds(args: &WorldsArgs) -> Result<Exit> {
     Ok(if rows.iter().all(|row| row.faults().is_empty()) { Exit::Ok } else { Exit::Refused })
 }
 
-/// Rows as they come, in the order in which the runs ended: what a study that is broken off leaves.
+/// Rows in the order in which the runs ended; they survive an interrupted study.
 struct Growing {
     path: PathBuf,
     file: Mutex<File>,
@@ -115,13 +115,13 @@ impl Growing {
             .with_context(|| format!("{}: cannot be written", self.path.display()))
     }
 
-    /// All of them are in rows.csv now, in their order.
+    /// Removes the partial file: rows.csv now has all rows in their order.
     fn end(self) -> Result<()> {
         Ok(output::remove(&self.path)?)
     }
 }
 
-/// A process of its own, so that nothing that it does harms the rest.
+/// Runs one world as a process of its own, so that no failure of it harms the others.
 fn run_one(args: &WorldsArgs, number: u64, tolerances_m: &[f64]) -> Result<Row> {
     let world = drawn_world(number, args.robot.len(), args.routine.len());
     let folder = tempfile::tempdir_in(&args.out).context("no folder for a run can be made")?;
@@ -153,7 +153,7 @@ fn run_one(args: &WorldsArgs, number: u64, tolerances_m: &[f64]) -> Result<Row> 
     Ok(Row { world, ending, reason, tolerance_m, bumps: bumps_told(&out), summary, seconds })
 }
 
-/// `None` after the time is over; the child is ended then.
+/// Waits for the child; ends it and returns `None` after the limit.
 fn wait(child: &mut Child, limit: Duration) -> Result<Option<ExitStatus>> {
     let began = Instant::now();
     loop {
@@ -169,7 +169,7 @@ fn wait(child: &mut Child, limit: Duration) -> Result<Option<ExitStatus>> {
     }
 }
 
-/// How a run ended, and why, for the table.
+/// Ending of a run and its reason, for the table.
 fn ending(status: Option<ExitStatus>, said: &str, summary: Option<&RunSummary>) -> (String, String) {
     let last = said.lines().rev().find(|line| line.starts_with("error")).unwrap_or_default().to_owned();
     let Some(status) = status else { return ("hangs".to_owned(), last) };
@@ -193,7 +193,7 @@ fn ending(status: Option<ExitStatus>, said: &str, summary: Option<&RunSummary>) 
     }
 }
 
-/// Bumps that the log tells of.
+/// Number of bumps in the run's log.
 fn bumps_told(out: &Path) -> usize {
     let Ok(recording) = read_recording(out.join("run.mcap")) else { return 0 };
     recording.messages.iter().filter(|(_, m)| matches!(m, Message::Log(log) if log.text.starts_with("bump"))).count()
@@ -204,7 +204,7 @@ impl Row {
         self.summary.as_ref().and_then(|summary| summary.capture.collisions).unwrap_or(0)
     }
 
-    /// Of the accepted: the largest error at a target, and the 99.9 % bound of what was predicted there.
+    /// Largest error at a target and the 99.9 % bound of its prediction, m; `None` unless the run is accepted.
     fn error_and_bound_m(&self) -> Option<(f64, f64)> {
         let summary = self.summary.as_ref().filter(|summary| summary.status == Status::Accepted)?;
         let after = summary.score.as_ref()?.after.as_ref()?.tool_error_m?.max;
@@ -212,7 +212,7 @@ impl Row {
         Some((after, SIGMAS_99_9 * predicted))
     }
 
-    /// What must not be.
+    /// Faults of the program: each is an outcome that no world may cause.
     fn faults(&self) -> Vec<&'static str> {
         let mut faults = Vec::new();
         if ["panics", "hangs"].contains(&self.ending.as_str()) || self.ending.starts_with("killed") {
@@ -236,7 +236,7 @@ impl Row {
     }
 }
 
-/// Reasons without their numbers, names and files, to be counted.
+/// The reason without its numbers, names and files, so that equal reasons can be counted.
 fn kind_of(reason: &str) -> String {
     let reason = reason.rsplit_once(".mcap: ").map_or(reason, |(_, reason)| reason);
     let reason = reason.rsplit_once(".toml: ").map_or(reason, |(_, reason)| reason);

@@ -1,4 +1,4 @@
-//! One capture of a routine in simulation: the bytes that it recorded, and the truth at the task's targets.
+//! One simulated capture of a routine: the recorded bytes, and the truth at the task's targets.
 
 use nalgebra::Vector3;
 
@@ -16,33 +16,33 @@ use armcal_core::time::Stamp;
 use armcal_sim::truth::{Truth, TruthRecorder, read_truth};
 use armcal_sim::{World, WorldInput, WorldSpec};
 
-/// Views of a case of alike views.
+/// Number of views in a case of alike views.
 const ALIKE_VIEWS: usize = 12;
 
-/// The arm at rest for a target, as it truly was.
+/// True state of the arm at rest for a target.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TrueRest {
-    /// Of the reach's mark.
+    /// Start of the reach's mark.
     pub start: Stamp,
     pub angles: JointAngles,
-    /// Base frame, m.
+    /// Tool position in the base frame, m.
     pub tool_m: Vector3<f64>,
 }
 
-/// What a seed's capture left.
+/// Recording and truth of one seed's capture.
 pub(super) struct Capture {
     pub seed: u64,
-    /// With the survey that was recorded.
+    /// The robot with the recorded survey.
     pub robot: Robot,
     pub recording: Recording,
     pub rests: Vec<TrueRest>,
-    /// Between the two halves of the captured views.
+    /// Time between the two halves of the captured views.
     pub middle: Stamp,
-    /// Travel by the datasheet at that time, rad.
+    /// Travel by the datasheet at `middle`, rad.
     pub middle_travel_rad: JointAngles,
 }
 
-/// What all seeds share.
+/// Inputs that all seeds share.
 pub(super) struct Scene<'a> {
     pub routine: &'a Routine,
     pub robot: &'a Robot,
@@ -77,7 +77,7 @@ impl Capture {
         world.finish_truth()?;
         recorder.into_writer().finish().map_err(FalsifiedError::of("recording"))?;
         let mut recording = read_recording(&run).map_err(FalsifiedError::of("recording"))?;
-        // The folder has another name each time, and messages name the file.
+        // The folder has another name each time, and messages name the file; a fixed path keeps the results equal.
         recording.path = "run.mcap".into();
         Self::of(scene.robot, seed, recording, &read_truth(&truth)?)
     }
@@ -112,7 +112,7 @@ impl Capture {
         if at > self.middle { CaptureHalf::Second } else { CaptureHalf::First }
     }
 
-    /// Touches that the recording has.
+    /// Number of touches in the recording.
     pub(super) fn n_touches(&self) -> usize {
         self.recording.messages.iter().filter(|(_, message)| matches!(message, Message::Touch(_))).count()
     }
@@ -148,7 +148,7 @@ impl Capture {
     }
 }
 
-/// The routine's captures, one calibration, and one reach of all targets after them.
+/// The routine cut down to its captures, one calibration, and one reach of all targets after them.
 fn abridged(routine: &Routine) -> Routine {
     let mut short = routine.clone();
     let first = short.steps.iter().position(|step| matches!(step, Step::Capture(_))).unwrap_or_default();
@@ -168,7 +168,7 @@ fn marks(recording: &Recording) -> impl Iterator<Item = &Mark> {
     })
 }
 
-/// In the order of time.
+/// Marks of captures in the order of time.
 fn capture_marks(recording: &Recording) -> Vec<&Mark> {
     let mut captures: Vec<&Mark> =
         marks(recording).filter(|mark| matches!(mark.kind, MarkKind::Capture { .. })).collect();
@@ -190,7 +190,7 @@ fn is_capture(message: &Message) -> Option<&Mark> {
     }
 }
 
-/// Keeps the first `n` touches: the arm takes each so that it tells most beside those before.
+/// Keeps the first `n` touches: the arm chooses each touch as the most informative after the previous ones.
 fn keep_touches(recording: &mut Recording, n: usize) {
     let mut n_before = 0;
     recording.messages.retain(|(_, message)| {
@@ -199,7 +199,7 @@ fn keep_touches(recording: &mut Recording, n: usize) {
     });
 }
 
-/// Takes away the marks of all captures but `n`.
+/// Removes the marks of all captures but `n`.
 fn keep_views(recording: &mut Recording, n: usize) {
     let kept = spread(recording, n);
     recording.messages.retain(|(_, message)| is_capture(message).is_none_or(|mark| kept.contains(&mark.start)));

@@ -4,26 +4,26 @@ use std::f64::consts::PI;
 
 use armcal_core::robot::Robot;
 
-/// One row of the table: what is falsified, of which element, and by how much.
+/// One row of the table: kind, element and size of the falsification.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Case {
     pub kind: CaseKind,
     pub element: Element,
-    /// In rad, m, px, a ratio or a number of views, by [`CaseKind::unit`].
+    /// Size in rad, m, px, a ratio or a number of views, by [`CaseKind::unit`].
     pub size: f64,
-    /// Touches of surveyed planes that the calibration has: the first ones of the recording.
+    /// Number of touches of surveyed planes in the calibration: the first ones of the recording.
     pub n_touches: usize,
 }
 
-/// What is falsified.
+/// Kind of falsification.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum CaseKind {
-    /// Nothing: the control.
+    /// No falsification: the control.
     GoodArm,
     MountTurned,
     MountShifted,
     TagMoved,
-    /// Neighbours by the same way.
+    /// Neighbouring tags moved by the same vector.
     TagsMoved,
     TagSize,
     AllTagSizes,
@@ -36,49 +36,49 @@ pub enum CaseKind {
     GripperAxisTurned,
     BaseShifted,
     BaseTurned,
-    /// All tags about the base's origin.
+    /// All tags turned about the base's origin.
     SurveyTurned,
-    /// From the middle of the capture on.
+    /// A sensor that keeps its reading from the middle of the capture on.
     SensorStuck,
     SensorDead,
     SensorReversed,
     SensorRescaled,
-    /// In the middle of the capture, for good.
+    /// A sensor that slips for good in the middle of the capture.
     SensorSlipped,
     FewViews,
-    /// Twelve views of this many configurations.
+    /// Twelve views from only this many configurations.
     AlikeViews,
 }
 
-/// Which element.
+/// Element that is falsified.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Element {
     Whole,
     Axis(usize),
     Joint(usize),
-    /// An axis of the parent link at the joint's place.
+    /// An axis of the parent link at the joint's origin.
     JointAxis {
         joint: usize,
         axis: usize,
     },
-    /// `n` tags from the `first` of the survey on; each seed begins one tag further on.
+    /// `n` tags from number `first` of the survey on; each seed begins one tag further on.
     Tags {
         first: usize,
         n: usize,
     },
 }
 
-/// How many cases.
+/// Extent of the table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tier {
-    /// A dozen, one or two of a sort.
+    /// About a dozen cases, one or two of a sort.
     Small,
     Full,
 }
 
 const DEG: f64 = PI / 180.0;
 const MM: f64 = 1e-3;
-/// The least that a calibration uses.
+/// Least number of touches that a calibration uses.
 pub(super) const N_TOUCHES: usize = 3;
 pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
 
@@ -174,13 +174,13 @@ impl Case {
         Self { kind, element, size, n_touches: 0 }
     }
 
-    /// What is falsified in words, with the touches.
+    /// Name of the kind in words, with its touches.
     #[must_use]
     pub fn kind_name(&self) -> String {
         kind_name(self.kind, self.n_touches)
     }
 
-    /// Indices into the survey of `n_tags` tags that a case on tags is about.
+    /// Survey indices of the tags that the case falsifies, of `n_tags` tags.
     #[must_use]
     pub fn tags(&self, n_tags: usize, seed: u64) -> Vec<usize> {
         let Element::Tags { first, n } = self.element else { return Vec::new() };
@@ -214,7 +214,8 @@ pub fn falsified_cases(robot: &Robot, tier: Tier) -> Vec<Case> {
     }
 }
 
-/// Those of `cases` that touches can tell of, with three of them: what moves the tool against the base at the readings.
+/// Those of `cases` that touches can reveal, with three touches: falsifications that move the tool against the base at
+/// the readings.
 #[must_use]
 pub fn touched_cases(cases: &[Case]) -> Vec<Case> {
     use CaseKind as K;
@@ -316,7 +317,7 @@ fn of_links(robot: &Robot) -> Vec<Case> {
         }
         all.push(Case::new(CaseKind::ToolShifted, Element::Axis(axis), 20.0 * MM));
         let Some(last) = n.checked_sub(1) else { continue };
-        // About its own axis it is an offset.
+        // A turn about the joint's own axis is an offset.
         let joint = &robot.chain.joints()[last];
         if (joint.parent_from_joint.rotation * joint.axis)[axis].abs() < 0.5 {
             let element = Element::JointAxis { joint: last, axis };

@@ -1,9 +1,9 @@
-//! Causes that the data cannot tell apart.
+//! Causes that the data cannot distinguish.
 //!
 //! Each cause has columns: the directions in which it can be wrong. With `c(z)` of the oracle's twin, the information
-//! about two columns is `I_ab = (c(a + b) - c(a) - c(b)) / 2`, all other parameters eliminated. A direction a and a
-//! cause with the columns N have the score correlation `rho^2 = I_aN I_NN^-1 I_Na / I_aa` (the canonical correlation of
-//! their scores). Above [`ALIKE`] no test on these views can tell which of them it was.
+//! about two columns is `I_ab = (c(a + b) - c(a) - c(b)) / 2`, all other parameters marginalised. For a direction a and
+//! a cause with the columns N, the score correlation is `rho^2 = I_aN I_NN^-1 I_Na / I_aa` (the canonical correlation
+//! of their scores). Above [`ALIKE`] no test on these views can distinguish the two.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
@@ -17,11 +17,11 @@ use armcal_core::robot::Robot;
 const ALIKE: f64 = 0.98;
 /// Non-centrality that columns are scaled to.
 const SCALED_TO: f64 = 4.0;
-/// A column is left out where this size (m, rad, or relative) is less than [`SCALED_TO`].
+/// Largest size of a column, m, rad, or relative; a column that needs more to reach [`SCALED_TO`] is omitted.
 const MAX_SIZE: f64 = 0.02;
-/// The first size that is tried.
+/// Size from which the scaling starts.
 const FIRST_SIZE: f64 = 1e-3;
-/// Eigenvalues of a cause's scaled information below this share of the largest say nothing.
+/// Least eigenvalue of a cause's scaled information that counts, as a share of the largest.
 const MIN_EIGENVALUE: f64 = 1e-3;
 
 /// One direction in which a cause can be wrong.
@@ -29,19 +29,19 @@ const MIN_EIGENVALUE: f64 = 1e-3;
 pub(super) struct Column {
     pub cause: String,
     pub words: String,
-    /// Of size one; then of the non-centrality that columns are scaled to.
+    /// Perturbation of size one; after scaling, of the non-centrality [`SCALED_TO`].
     unit: Perturbation,
 }
 
-/// What the views tell of every column.
+/// Information of the views about every column.
 #[derive(Clone, Debug)]
 pub struct EquivalenceClasses {
-    /// Those that the views see.
+    /// Columns that the views can observe.
     columns: Vec<Column>,
     information: DMatrix<f64>,
 }
 
-/// Classes of these columns by the views of one capture.
+/// Computes the classes of the columns from the views of one capture.
 pub(super) fn equivalence_classes(oracle: &Oracle<'_>, columns: Vec<Column>) -> EquivalenceClasses {
     let columns: Vec<Column> = columns.into_par_iter().filter_map(|c| scaled(oracle, c)).collect();
     let cost = |of: &[Perturbation]| oracle.effect(of).non_centrality;
@@ -57,7 +57,7 @@ pub(super) fn equivalence_classes(oracle: &Oracle<'_>, columns: Vec<Column>) -> 
     EquivalenceClasses { columns, information }
 }
 
-/// At the size of [`SCALED_TO`]; `None` where that is too large to have a meaning.
+/// Scales a column to the non-centrality [`SCALED_TO`]; `None` where that size is too large to have a meaning.
 fn scaled(oracle: &Oracle<'_>, column: Column) -> Option<Column> {
     let mut size = FIRST_SIZE;
     for _ in 0..2 {
@@ -70,7 +70,7 @@ fn scaled(oracle: &Oracle<'_>, column: Column) -> Option<Column> {
     Some(Column { unit: column.unit.scaled(size), ..column })
 }
 
-/// All directions of all causes, of size one.
+/// All directions of all causes, each of size one.
 pub(super) fn columns(robot: &Robot) -> Vec<Column> {
     use Perturbation as P;
     let mut all = Vec::new();
@@ -93,7 +93,7 @@ pub(super) fn columns(robot: &Robot) -> Vec<Column> {
         if axis < 2 {
             let one: [f64; 2] = std::array::from_fn(|k| f64::from(u8::from(k == axis)));
             add("lens", format!("focal length {name}"), P::FocalLength(one));
-            // 100 px: of the same order as the others' sizes.
+            // Sizes of 100 px are of the same order as the others' sizes.
             add("lens", format!("centre {name}"), P::ImageCentre(one.map(|one| 100.0 * one)));
         }
     }
@@ -106,13 +106,13 @@ pub(super) fn columns(robot: &Robot) -> Vec<Column> {
         let cause = format!("sensor_slip:{}", robot.chain.joints()[joint].name);
         add(&cause, "in the middle".to_owned(), P::Sensor(slip));
     }
-    // A cause's columns lie together.
+    // Sorting puts a cause's columns next to each other.
     all.sort_by(|a, b| a.cause.cmp(&b.cause));
     all
 }
 
 impl EquivalenceClasses {
-    /// Causes that explain what `perturbations` do to the data; empty where they are no combination of columns.
+    /// Causes that explain the effect of `perturbations` on the data; empty where they are no combination of columns.
     pub(super) fn of(&self, perturbations: &[Perturbation]) -> Vec<String> {
         let mut direction = DVector::zeros(self.columns.len());
         for perturbation in perturbations {
@@ -123,7 +123,7 @@ impl EquivalenceClasses {
         self.alike(&direction).into_iter().map(|(cause, _)| cause).collect()
     }
 
-    /// Adds `perturbation` to a direction in scaled columns; whether it is a combination of them.
+    /// Adds `perturbation` to a direction in scaled columns; returns true if it is a combination of them.
     fn add(&self, perturbation: &Perturbation, direction: &mut DVector<f64>) -> bool {
         let mut is_any = false;
         for (column, at) in self.columns.iter().zip(direction.iter_mut()) {
@@ -135,7 +135,7 @@ impl EquivalenceClasses {
         is_any
     }
 
-    /// Causes whose scores go with that of `direction`, and how far.
+    /// Causes whose scores correlate with that of `direction` above [`ALIKE`], with the correlation.
     fn alike(&self, direction: &DVector<f64>) -> Vec<(String, f64)> {
         let by_column = &self.information * direction;
         let own = by_column.dot(direction);
@@ -158,7 +158,7 @@ impl EquivalenceClasses {
         each.filter(|(_, correlation)| *correlation > ALIKE).collect()
     }
 
-    /// Each direction with the other causes that the data cannot tell from it.
+    /// Table of the directions, each with the other causes that the data cannot distinguish from it.
     #[must_use]
     pub fn markdown(&self) -> String {
         let mut out = format!("score correlation above {ALIKE}:\n\n| direction | not told from |\n|---|---|\n");
@@ -175,10 +175,10 @@ impl EquivalenceClasses {
     }
 }
 
-/// How many times `column` the same component of `perturbation` is; `None` where it is of another sort.
+/// Component of `perturbation` along `column`, in multiples of `column`; `None` for another sort of perturbation.
 fn coefficient(perturbation: &Perturbation, column: &Perturbation) -> Option<f64> {
     use Perturbation as P;
-    // Columns of vectors lie along one axis.
+    // Columns that are vectors lie along one axis.
     let along = |by: &Vector3<f64>, column: &Vector3<f64>| Some(by.dot(column) / column.norm_squared());
     let plane = |by: &[f64; 2], column: &[f64; 2]| {
         Some((by[0] * column[0] + by[1] * column[1]) / (column[0] * column[0] + column[1] * column[1]))

@@ -1,9 +1,9 @@
-//! Why the study has no result.
+//! Error of the study.
 
 use armcal_belief::session::SessionError;
 use armcal_sim::SimError;
 
-/// Why the study has no result.
+/// Reason that the study has no result.
 #[derive(Debug, thiserror::Error)]
 pub enum FalsifiedError {
     #[error("{0}")]

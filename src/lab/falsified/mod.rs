@@ -1,9 +1,10 @@
-//! What the verdict says when the drawing, the survey or a sensor is not what the estimator is told.
+//! Study of the verdict where nominal model, survey or a sensor differs from the estimator's input.
 //!
-//! For each seed one capture of a routine (`capture`). `cases` is the table of falsifications; `perturbation` applies
+//! Each seed has one capture of a routine (`capture`). `cases` is the table of falsifications; `perturbation` applies
 //! one to the robot's description or to recorded counts. `run` calibrates under each and scores the result by the
-//! truth; `naming` says which cause the result names first. `oracle` computes what the data can see of a falsification
-//! and what it means at the tool, `classes` which causes the data cannot tell apart. `report` makes table and CSV.
+//! truth; `naming` finds the cause that the result names first. `oracle` computes whether the data can show a
+//! falsification and its effect at the tool. `classes` finds the causes that the data cannot distinguish. `report`
+//! makes table and CSV.
 
 mod capture;
 mod cases;

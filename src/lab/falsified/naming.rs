@@ -1,7 +1,7 @@
-//! Which cause a result names first, and which names are right.
+//! The cause that a result names first, and the names that count as right.
 //!
-//! A cause is a word and a name, as `link:forearm_pitch`, `tag:3` or `lens`, whichever way a finding or a refusal
-//! spells it.
+//! A cause is a word and a name, as `link:forearm_pitch`, `tag:3` or `lens`, for every spelling in a finding or a
+//! refusal.
 
 use serde_json::Value;
 
@@ -10,7 +10,7 @@ use armcal_belief::calib::{Calibration, Refusal};
 use armcal_belief::say::{Finding, FindingKind};
 use armcal_core::robot::Robot;
 
-/// Causes that a result names first: those of its first finding, or else of its first refusal. None for a result
+/// Causes that a result names first: those of its first finding, or else of its first refusal. Empty for a result
 /// without any.
 pub(super) fn first_causes(robot: &Robot, calibration: &Calibration) -> Vec<String> {
     let of_touches = calibration.refusals.iter().find_map(causes_of_touches);
@@ -21,7 +21,7 @@ pub(super) fn first_causes(robot: &Robot, calibration: &Calibration) -> Vec<Stri
     finding.or_else(|| calibration.refusals.first().map(|refusal| cause_of_refusal(robot, refusal))).unwrap_or_default()
 }
 
-/// The class that touches name; `None` where they refuse nothing.
+/// Causes in a refusal by touches; `None` for other refusals.
 fn causes_of_touches(refusal: &Refusal) -> Option<Vec<String>> {
     let Refusal::Touch { causes, .. } = refusal else { return None };
     let word = |cause: &String| match cause.split(' ').next() {
@@ -33,7 +33,7 @@ fn causes_of_touches(refusal: &Refusal) -> Option<Vec<String>> {
     Some(causes.iter().map(word).collect())
 }
 
-/// A group of tags or joints has one cause for each.
+/// Causes of a finding; a group of tags or joints has one for each.
 pub(super) fn causes_of_finding(robot: &Robot, finding: &Finding) -> Vec<String> {
     let kind = serde_json::to_value(finding.kind).ok();
     let kind = kind.as_ref().and_then(Value::as_str).unwrap_or_default();
@@ -47,13 +47,13 @@ pub(super) fn causes_of_finding(robot: &Robot, finding: &Finding) -> Vec<String>
     }
 }
 
-/// Names in a list as people write it: `3 and 5`, `3, 5`, `all`.
+/// Names in a list in words: `3 and 5`, `3, 5`, `all`.
 fn names_in(text: &str) -> impl Iterator<Item = &str> {
     text.split(|c: char| !c.is_alphanumeric() && c != '_')
         .filter(|word| !["", "and", "tag", "tags", "together"].contains(word))
 }
 
-/// The joint on a link: a link's error is the place of the next joint.
+/// The joint on a link: a link's error is an error of the next joint's pose.
 fn joint_of_link(robot: &Robot, name: &str) -> String {
     let joints = robot.chain.joints();
     let next = joints.iter().position(|joint| joint.child_link == name).map(|parent| parent + 1);
@@ -78,7 +78,7 @@ fn cause_of_refusal(robot: &Robot, refusal: &Refusal) -> Vec<String> {
     }
 }
 
-/// The causes that name what a case falsifies; empty where there is nothing to name.
+/// Causes that correctly name a case's falsification; empty where there is nothing to name.
 pub(super) fn right_causes(robot: &Robot, case: &Case, seed: u64) -> Vec<String> {
     let tag_ids = || case.tags(robot.tags.len(), seed).into_iter().map(|idx| robot.tags[idx].id);
     let tags = |word: &str| tag_ids().map(|id| format!("{word}:{id}")).collect::<Vec<String>>();

@@ -1,11 +1,11 @@
-//! What the data can see of a falsification, and what it does at the tool: by a capture without noise.
+//! Observability of a falsification and its effect at the tool, by a capture without noise.
 //!
-//! A twin of the capture: the same views at the angles that the estimate with the right drawing has, exact readings,
-//! exact corners, every error zero. Fitted with the right drawing its cost is zero. Fitted with a falsified drawing z
-//! (at the noise, joint errors and priors of that estimate) it is `c(z)`, the least sum of squares in standard
-//! deviations over all other parameters x under their priors: to second order `z^T I z`, I the information of the
-//! views about z with x eliminated. That is the non-centrality of any chi-square test of z. The tool of that fit is off
-//! by `(d tool/dz + d tool/dx dx/dz) z`.
+//! The twin of the capture has the same views, at the angles of the estimate with the right model, with exact readings
+//! and corners. Fitted with the right model its cost is zero. Fitted with a falsified model z (at the noise, joint
+//! errors and priors of that estimate) its cost is `c(z)`. That is the least sum of squares in standard deviations over
+//! all other parameters x under their priors. To second order it is `z^T I z`, with I the information of the views
+//! about z with x marginalised. It is the non-centrality of any chi-square test of z. The tool error of that fit is `(d
+//! tool/dz + d tool/dx dx/dz) z`.
 
 use crate::falsified::capture::Capture;
 use crate::falsified::error::FalsifiedError;
@@ -22,14 +22,14 @@ use nalgebra::Isometry3;
 
 /// Non-centrality above which the data see an element.
 pub(super) const SEEN: f64 = 60.0;
-/// The solver stops where one more step would save less of the cost.
+/// Relative gain in cost below which the solver stops.
 const RELATIVE_GAIN: f64 = 1e-9;
 
-/// What a falsification is to the data and to the tool.
+/// Effect of a falsification on the data and on the tool.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OracleEffect {
     pub non_centrality: f64,
-    /// Root mean square over the task of how far the tool is believed to be from where it is, m.
+    /// Distance of the estimated tool from the true one, root mean square over the task, m.
     pub tool_m: f64,
 }
 
@@ -40,7 +40,7 @@ impl OracleEffect {
     }
 }
 
-/// The twin of one capture.
+/// Twin of one capture.
 pub(super) struct Oracle<'a> {
     pub capture: &'a Capture,
     views: Vec<View>,
@@ -76,12 +76,12 @@ impl<'a> Oracle<'a> {
         Ok(Self { capture, views: exact, model, scales, guess })
     }
 
-    /// The arm as drawn, with the right survey.
+    /// The nominal arm with the right survey.
     pub(super) fn robot(&self) -> &Robot {
         &self.capture.robot
     }
 
-    /// Of several changes at once.
+    /// Effect of several changes at once.
     pub(super) fn effect(&self, perturbations: &[Perturbation]) -> OracleEffect {
         let falsified = falsified_robot(&self.capture.robot, perturbations);
         let mut views = self.views.clone();
@@ -118,7 +118,7 @@ impl<'a> Oracle<'a> {
         OracleEffect { non_centrality: fit.cost_final, tool_m }
     }
 
-    /// What the sensors read under the faults among `perturbations`.
+    /// Readings of the sensors under the faults among `perturbations`.
     fn read(&self, perturbations: &[Perturbation], travel_rad: &JointAngles, half: CaptureHalf) -> JointAngles {
         let mut read = *travel_rad;
         for fault in perturbations.iter().filter_map(Perturbation::sensor_fault) {
@@ -132,7 +132,7 @@ impl<'a> Oracle<'a> {
     }
 }
 
-/// The view of an arm without any error at `angles`; tags that the lens does not map there are left out.
+/// The view of an arm without any error at `angles`; tags that the lens does not map are omitted.
 fn exact_view(robot: &Robot, view: &View, angles: &JointAngles) -> View {
     let poses = robot.chain.link_poses(angles);
     let base_from_camera = poses.frame(&robot.camera.mount);

@@ -1,4 +1,4 @@
-//! One falsification applied: to the description of the arm, or to the readings of a joint.
+//! One falsification, applied to the description of the arm or to the readings of a joint.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rand::RngExt;
@@ -10,30 +10,30 @@ use armcal_core::sensor::SensorModel;
 use armcal_core::spatial::Pose;
 use armcal_core::stats::stream_rng;
 
-/// A change of what the estimator is given. Lengths m, angles rad; ratios are relative changes.
+/// A change of the estimator's input. Lengths m, angles rad; ratios are relative changes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Perturbation {
-    /// The camera on its link, in its own axes.
+    /// Shift of the camera on its link, in its own axes.
     MountShift(Vector3<f64>),
     MountTurn(Vector3<f64>),
-    /// A joint's place on its parent link, in the link's axes; turned about the joint's origin.
+    /// Shift of a joint's origin on its parent link, in the link's axes. `LinkTurn` turns about the joint's origin.
     LinkShift(usize, Vector3<f64>),
     LinkTurn(usize, Vector3<f64>),
     ToolShift(Vector3<f64>),
-    /// A tag in the base's axes; turned about its own centre.
+    /// Shift of a tag in the base's axes. `TagTurn` turns about the tag's own centre.
     TagShift(usize, Vector3<f64>),
     TagTurn(usize, Vector3<f64>),
     TagSize(usize, f64),
     AllTagSizes(f64),
     TagsSwapped(usize, usize),
-    /// All tags about the base's origin.
+    /// Turn of all tags about the base's origin.
     SurveyTurn(Vector3<f64>),
     FocalLength([f64; 2]),
     ImageCentre([f64; 2]),
     Sensor(SensorFault),
 }
 
-/// What a sensor reads in place of what it should.
+/// A faulty sensor and its wrong reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SensorFault {
     pub joint: usize,
@@ -42,27 +42,27 @@ pub(super) struct SensorFault {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum WrongReading {
-    /// The reading of the middle of the capture, from then on.
+    /// The reading of the middle of the capture, kept from then on.
     Stuck,
-    /// Word zero.
+    /// A constant word of zero.
     Dead,
     Reversed,
     Rescaled(f64),
-    /// More by this from the middle of the capture on, rad.
+    /// An increase by this angle from the middle of the capture on, rad.
     Slipped(f64),
 }
 
-/// A joint at one moment.
+/// The right reading of a joint at one moment.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SoundReading {
-    /// From the middle of the range by the datasheet, rad.
+    /// Travel from the middle of the range by the datasheet, rad.
     pub travel_rad: f64,
-    /// The same in the middle of the capture.
+    /// Travel in the middle of the capture, rad.
     pub middle_travel_rad: f64,
     pub half: CaptureHalf,
 }
 
-/// Before or after the middle of the capture; what comes after the capture belongs to the second half.
+/// Half of the capture; the time after the capture belongs to the second half.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum CaptureHalf {
     First,
@@ -70,7 +70,7 @@ pub(super) enum CaptureHalf {
 }
 
 impl SensorFault {
-    /// What the sensor reads, travel by the datasheet, rad.
+    /// Reading of the faulty sensor, as travel by the datasheet, rad.
     pub(super) fn travel_rad(&self, sensor: &SensorModel, sound: &SoundReading) -> f64 {
         let is_late = sound.half == CaptureHalf::Second;
         match self.reading {
@@ -85,7 +85,7 @@ impl SensorFault {
 }
 
 impl Case {
-    /// What the case changes; nothing where it takes views away.
+    /// Changes that the case makes; empty for the good arm, and where the case only removes views.
     pub(super) fn perturbations(&self, robot: &Robot, seed: u64) -> Vec<Perturbation> {
         use Perturbation as P;
         let n_tags = robot.tags.len();
@@ -134,7 +134,7 @@ impl Case {
         }
     }
 
-    /// Drawn evenly from the sphere for a seed: the same for all sizes of an element.
+    /// A direction for a seed, uniform over the sphere: the same for all sizes of an element.
     fn direction(&self, seed: u64) -> Vector3<f64> {
         let mut rng = stream_rng(seed, &format!("{} {:?}", self.kind.name(), self.element));
         loop {
@@ -148,7 +148,7 @@ impl Case {
 }
 
 impl Perturbation {
-    /// The sensor's fault, where it is one.
+    /// The sensor's fault; `None` for other perturbations.
     pub(super) fn sensor_fault(&self) -> Option<SensorFault> {
         match self {
             Self::Sensor(fault) => Some(*fault),
@@ -156,7 +156,7 @@ impl Perturbation {
         }
     }
 
-    /// The same, `factor` times as large, where that has a meaning.
+    /// The perturbation, `factor` times as large where that has a meaning.
     pub(super) fn scaled(&self, factor: f64) -> Self {
         match *self {
             Self::MountShift(by) => Self::MountShift(by * factor),
@@ -178,7 +178,7 @@ impl Perturbation {
         }
     }
 
-    /// The description of an arm with it.
+    /// Applies the perturbation to the description of an arm.
     pub(super) fn apply(&self, robot: &mut Robot) {
         match *self {
             Self::MountShift(by) => shift_after(&mut robot.camera.mount.link_from_frame, &by),
@@ -225,19 +225,19 @@ impl Perturbation {
     }
 }
 
-/// The description of `robot` with all of `perturbations`.
+/// The description of `robot` with all `perturbations` applied.
 pub(super) fn falsified_robot(robot: &Robot, perturbations: &[Perturbation]) -> Robot {
     let mut falsified = robot.clone();
     perturbations.iter().for_each(|perturbation| perturbation.apply(&mut falsified));
     falsified
 }
 
-/// In the frame's own axes.
+/// Shifts a pose in its own axes.
 fn shift_after(place: &mut Isometry3<f64>, by: &Vector3<f64>) {
     *place *= Translation3::from(*by);
 }
 
-/// Turned about its own origin, in the parent's axes.
+/// Turns a pose about its own origin, in the parent's axes.
 fn turned_in_place(place: &Isometry3<f64>, by: &Vector3<f64>) -> Isometry3<f64> {
     Isometry3::from_parts(place.translation, UnitQuaternion::from_scaled_axis(*by) * place.rotation)
 }

@@ -14,7 +14,7 @@ fn status_name(status: RunStatus) -> &'static str {
     }
 }
 
-/// One line a calibration; lengths in mm.
+/// CSV with one line per calibration; lengths in mm.
 #[must_use]
 pub fn falsified_csv(rows: &[FalsifiedRow]) -> String {
     let mut out = String::from(
@@ -58,7 +58,7 @@ pub fn falsified_csv(rows: &[FalsifiedRow]) -> String {
     out
 }
 
-/// How many of those that count hold: `3/4`, or nothing where none counts.
+/// Share of the counted rows for which `holds` is true, as `3/4`; empty where no row counts.
 fn share<'a>(rows: impl Iterator<Item = &'a FalsifiedRow>, holds: impl Fn(&FalsifiedRow) -> bool) -> String {
     let (mut n, mut n_held) = (0, 0);
     for row in rows {
@@ -81,7 +81,7 @@ fn by_kind(rows: &[FalsifiedRow]) -> Vec<(String, Vec<&FalsifiedRow>)> {
     kinds
 }
 
-/// A line for each kind of falsification.
+/// Markdown table with a line for each kind of falsification.
 #[must_use]
 pub fn falsified_markdown(study: &FalsifiedStudy) -> String {
     let rows = &study.rows;

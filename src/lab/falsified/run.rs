@@ -1,4 +1,4 @@
-//! The study: each case of each seed calibrated and scored.
+//! The study: calibrates and scores each case of each seed.
 
 use rayon::prelude::*;
 
@@ -18,15 +18,15 @@ use armcal_core::robot::{Robot, Vehicle};
 use armcal_core::routine::Routine;
 use armcal_core::stats::Summary;
 
-/// A reservation's length per unit counts as right within this share.
+/// Relative tolerance within which a reservation's length per unit counts as right.
 const RESERVATION_SHARE: f64 = 0.1;
 
-/// What became of a calibration.
+/// Outcome of a calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RunStatus {
     Accepted,
     Refused,
-    /// No calibration came out at all.
+    /// The calibration gave no result.
     Failed,
 }
 
@@ -37,55 +37,56 @@ pub struct FalsifiedRow {
     pub case: Case,
     pub element: String,
     pub status: RunStatus,
-    /// What it names first; several for a group.
+    /// Causes that the result names first; several for a group.
     pub named_first: Vec<String>,
-    /// Every finding, repaired ones with a `+`.
+    /// All findings, repaired ones with a `+`.
     pub findings: Vec<String>,
     pub repaired: usize,
-    /// Reason to refuse in words, or why there is no calibration.
+    /// Reason of the refusal in words, or the reason that there is no calibration.
     pub reason: String,
     pub predicted_m: Option<Summary>,
     pub predicted_with_priors_m: Option<Summary>,
-    /// Distance at the task's targets of the tool as believed from where it is.
+    /// Distance of the estimated tool from the true one over the task's targets, m.
     pub true_m: Option<Summary>,
-    /// None where views are taken away and nothing is wrong.
+    /// Oracle's effect of the falsification; `None` where nothing is wrong: for the good arm, and where the case only
+    /// removes views.
     pub oracle: Option<OracleEffect>,
-    /// Whether what is named first is what was falsified, or what the data cannot tell from it; `None` where there is
-    /// nothing to name.
+    /// True if the first named cause is the falsification, or one that the data cannot distinguish from it; `None`
+    /// where there is nothing to name.
     pub is_named: Option<bool>,
-    /// Of the reservation about the element, m per rad or m per m.
+    /// Tool shift per unit by the reservation about the element, m per rad or m per m.
     pub reserved_per_unit: Option<f64>,
 }
 
-/// All rows, and which causes the data of the first seed cannot tell apart.
+/// All rows, and the causes that the data of the first seed cannot distinguish.
 pub struct FalsifiedStudy {
-    /// By seed, in the order of the cases.
+    /// Rows by seed, in the order of the cases.
     pub rows: Vec<FalsifiedRow>,
     pub classes: EquivalenceClasses,
 }
 
 impl FalsifiedRow {
-    /// Caught: nobody acts on it as it is.
+    /// True if the falsification is caught: the calibration is refused, or a finding is repaired.
     #[must_use]
     pub fn is_refused_or_repaired(&self) -> bool {
         self.status != RunStatus::Accepted || self.repaired > 0
     }
 
-    /// Accepted, with a true error (95 % of the targets) above three times what was predicted, priors included; or
-    /// with sensors that no program can read.
+    /// True if the calibration is accepted with a true error (95 % of the targets) above three times the prediction,
+    /// priors included. True as well for an accepted result whose sensors cannot be read.
     #[must_use]
     pub fn is_wrongly_accepted(&self) -> bool {
         let limit_m = self.predicted_with_priors_m.or(self.predicted_m).map_or(f64::INFINITY, |p| 3.0 * p.p95);
         self.status == RunStatus::Accepted && self.true_m.is_none_or(|error| error.p95 > limit_m)
     }
 
-    /// Accepted without a repair, and the tool is off by more than `limit_m` at 95 % of the targets.
+    /// True if it is accepted without a repair, and the tool error of 95 % of the targets exceeds `limit_m`.
     #[must_use]
     pub fn is_let_through(&self, limit_m: f64) -> bool {
         !self.is_refused_or_repaired() && self.true_m.is_none_or(|error| error.p95 > limit_m)
     }
 
-    /// Whether there is something to name: what the views see, or what touches refuse.
+    /// True if there is something to name: the views show the falsification, or touches refuse it.
     #[must_use]
     pub fn is_to_be_named(&self) -> bool {
         let is_told = self.case.n_touches > 0 && self.status != RunStatus::Accepted;
@@ -97,14 +98,14 @@ impl FalsifiedRow {
         self.oracle.is_some_and(|oracle| oracle.is_seen())
     }
 
-    /// Whether the falsification alone moves the tool by more than `factor` times what the data alone predict of a
-    /// good arm.
+    /// True if the falsification moves the tool by more than `factor` times `good_p95_m`, the error that the data
+    /// predict for a good arm.
     #[must_use]
     pub fn matters(&self, factor: f64, good_p95_m: f64) -> bool {
         self.oracle.is_some_and(|oracle| oracle.tool_m > factor * good_p95_m)
     }
 
-    /// Whether a reservation has the tool's shift per unit within a tenth.
+    /// True if a reservation has the tool's shift per unit within a tenth.
     #[must_use]
     pub fn is_reserved_rightly(&self) -> bool {
         let true_per_unit = self.oracle.map(|oracle| oracle.tool_m / self.case.size.abs());
@@ -126,7 +127,7 @@ pub fn falsified_study(
     study_of(&Scene { routine, robot, vehicle }, cases, seeds, columns)
 }
 
-/// Runs the study with classes of these directions only.
+/// Runs the study with classes of only these directions.
 pub(super) fn study_of(
     scene: &Scene<'_>,
     cases: &[Case],
@@ -160,7 +161,7 @@ pub(super) fn check_touches(capture: &Capture, cases: &[Case]) -> Result<(), Fal
     if n < n_touches { Err(FalsifiedError::Touches { seed, n, n_touches }) } else { Ok(()) }
 }
 
-/// Rows of the oracle's capture, in the order of the cases.
+/// Rows for the oracle's capture, in the order of the cases.
 pub(super) fn rows_of(oracle: &Oracle<'_>, classes: &EquivalenceClasses, cases: &[Case]) -> Vec<FalsifiedRow> {
     cases.par_iter().map(|case| row(oracle, classes, case)).collect()
 }
@@ -214,7 +215,7 @@ fn row(oracle: &Oracle<'_>, classes: &EquivalenceClasses, case: &Case) -> Falsif
     }
 }
 
-/// Single outliers are left out of every calibration: that is no repair of an element.
+/// True if the finding is a repair of an element; every calibration rejects single outliers, so those do not count.
 fn is_repair(finding: &Finding) -> bool {
     finding.repaired && finding.kind != FindingKind::Outliers
 }
@@ -227,18 +228,17 @@ fn findings(robot: &Robot, calibration: &Calibration) -> Vec<String> {
     words.collect()
 }
 
-/// The arm that is believed in after a calibration that was given `robot`: what was repaired of the drawing belongs
-/// here.
+/// The estimated arm after a calibration with `robot` as input, including the repairs of the nominal model.
 fn believed_robot(robot: &Robot, calibration: &Calibration) -> Robot {
     calibration.scaled_robot(robot)
 }
 
-/// Distance of the tool as the calibrated arm believes it from where it is, at each target.
+/// Distance of the calibrated arm's estimated tool from the true one over the targets, m.
 fn true_error(rests: &[TrueRest], recording: &Recording, robot: &Robot, calibration: &Calibration) -> Option<Summary> {
     let believed = believed_robot(robot, calibration);
     let sensors = calibration.sensors(&believed).ok()?;
     let first = rests.first()?.start;
-    // The links are in the robot already.
+    // The robot already includes the link corrections.
     let belief = Belief { from: first, sensors: &sensors, links: LinkCorrections::default() };
     let errors = reaches(recording, &believed, &[belief]).into_iter().filter_map(|rest| {
         let true_rest = rests.iter().find(|true_rest| true_rest.start == rest.start)?;
@@ -247,7 +247,7 @@ fn true_error(rests: &[TrueRest], recording: &Recording, robot: &Robot, calibrat
     Summary::of(&errors.collect::<Vec<f64>>())
 }
 
-/// Tool's shift per unit by the reservation about the case's element, if there is one.
+/// Tool shift per unit by the reservation about the case's element, if there is one.
 fn reserved_per_unit(robot: &Robot, case: &Case, calibration: &Calibration) -> Option<f64> {
     let (stem, axis) = reserved_element(robot, case)?;
     calibration.reservations.iter().filter(|found| found.prior_std > 0.0).find_map(|found| {
@@ -259,7 +259,7 @@ fn reserved_per_unit(robot: &Robot, case: &Case, calibration: &Calibration) -> O
     })
 }
 
-/// How a reservation about the case's element begins, and its axis.
+/// Beginning of the text of a reservation about the case's element, and its axis.
 fn reserved_element(robot: &Robot, case: &Case) -> Option<(String, &'static str)> {
     let place = |joint: usize| format!("pose of {}", robot.chain.joints()[joint].name);
     let (element, axis) = match (case.kind, case.element) {

@@ -1,4 +1,4 @@
-//! On two seeds: falsifications are applied, seen, named and scored as they are meant to be.
+//! Tests on two seeds: falsifications are applied, observed, named and scored correctly.
 
 use armcal_belief::say::{Finding, FindingKind};
 use std::path::Path;
@@ -29,7 +29,7 @@ fn scene_of(routine: &str) -> (Routine, Robot, Vehicle) {
     (routine, robot, vehicle)
 }
 
-/// The small tier on two seeds; tags that are turned, which no case is, are left out of the directions.
+/// The small tier on two seeds; the directions omit turned tags, because no case turns a tag.
 static SMALL: LazyLock<FalsifiedStudy> = LazyLock::new(|| {
     let (routine, robot, vehicle) = scene();
     let scene = Scene { routine: &routine, robot: &robot, vehicle: &vehicle };
@@ -40,7 +40,7 @@ static SMALL: LazyLock<FalsifiedStudy> = LazyLock::new(|| {
     study_of(&scene, &falsified_cases(&robot, Tier::Small), 1..3, without_turned_tags).expect("a study")
 });
 
-/// The first seed of it.
+/// Capture of the first seed.
 static CAPTURE: LazyLock<Capture> = LazyLock::new(|| capture_of(&scene()));
 
 fn capture_of((routine, robot, vehicle): &(Routine, Robot, Vehicle)) -> Capture {
@@ -51,7 +51,7 @@ fn of(kind: CaseKind) -> impl Iterator<Item = &'static FalsifiedRow> {
     SMALL.rows.iter().filter(move |row| row.case.kind == kind)
 }
 
-/// 95 % of the targets, m.
+/// Tool error of 95 % of the targets, m.
 fn true_p95_m(row: &FalsifiedRow) -> f64 {
     row.true_m.map_or(f64::INFINITY, |error| error.p95)
 }
@@ -91,7 +91,7 @@ fn what_no_view_shows_is_known_to_the_oracle() {
         let is_about_y = row.case.element == Element::Axis(1);
         assert_eq!(row.is_seen(), !is_about_y, "{row:?}");
         if is_about_y {
-            // 5 deg: the tool is off by what the oracle says, and the reservation has it.
+            // A turn of 5 deg: the tool error agrees with the oracle's, and the reservation has it.
             let oracle_m = row.oracle.expect("a falsification").tool_m;
             let true_m = row.true_m.expect("a calibration").median;
             assert!((true_m / oracle_m - 1.0).abs() < 0.1 && row.is_reserved_rightly(), "{row:?}");
@@ -100,12 +100,12 @@ fn what_no_view_shows_is_known_to_the_oracle() {
     for row in of(CaseKind::ToolShifted) {
         let oracle = row.oracle.expect("a falsification");
         assert!(oracle.non_centrality < 1e-6 && (oracle.tool_m - 0.02).abs() < 1e-9, "{row:?}");
-        // It does not hold yet that anything is said of it: the table counts it as wrongly accepted.
+        // No finding names this falsification yet: the table counts it as wrongly accepted.
         assert!(row.status != RunStatus::Accepted || (true_p95_m(row) - 0.02).abs() < 0.004, "{row:?}");
     }
 }
 
-/// Three touches: what no view shows is refused by name, and a good arm is left alone.
+/// Three touches refuse an unobservable tool point and name it; they leave a good arm alone.
 #[test]
 fn three_touches_refuse_a_tool_point_that_no_view_shows() {
     let scene = scene_of("titan4-touch");
@@ -115,7 +115,7 @@ fn three_touches_refuse_a_tool_point_that_no_view_shows() {
     let capture = capture_of(&scene);
     assert!(check_touches(&capture, &cases).is_ok());
     let oracle = Oracle::new(&capture).expect("an estimate");
-    // No view shows a tool point: it is in no class.
+    // The tool point is unobservable, so it is in no class.
     let classes = equivalence_classes(&oracle, Vec::new());
     let study = FalsifiedStudy { rows: rows_of(&oracle, &classes, &cases), classes };
     let [good, shifted] = &study.rows[..] else { panic!("{} rows", study.rows.len()) };
@@ -125,7 +125,7 @@ fn three_touches_refuse_a_tool_point_that_no_view_shows() {
     let table = falsified_markdown(&study);
     assert!(table.contains("| tool point shifted, 3 touches | 1 | 0 | 1 | 0 | 0 |"), "{table}");
     assert!(falsified_csv(&study.rows).contains("1,tool point shifted with 3 touches,x,20.000,mm,refused"));
-    // The quickstart touches nothing.
+    // The quickstart has no touches.
     let none = check_touches(&CAPTURE, &cases);
     assert!(matches!(none, Err(FalsifiedError::Touches { seed: 1, n: 0, n_touches: 3 })), "{none:?}");
 }
@@ -143,7 +143,7 @@ fn table_and_csv_have_every_row_and_kind() {
     assert!(table.contains("| good arm | 2 | 2 | 0 | 0 | 0 |"), "{table}");
 }
 
-/// A capture of its own, and few of the directions that the classes have.
+/// Uses a separate capture and few of the directions in the classes.
 #[test]
 fn the_same_seed_gives_the_same_rows_on_any_number_of_threads() {
     let few = [CaseKind::GoodArm, CaseKind::SensorSlipped, CaseKind::TagMoved];
@@ -188,7 +188,7 @@ fn the_oracle_is_a_quadratic_form_of_small_errors() {
 fn causes_that_the_data_cannot_tell_apart_are_one_class() {
     let classes = &SMALL.classes;
     let slip = Perturbation::Sensor(SensorFault { joint: 2, reading: WrongReading::Slipped(1.0) });
-    // A shift along the parallel axes of two pitch joints is one and the same for both.
+    // A shift along the parallel axes of two pitch joints is the same for both.
     let of = |unit: Perturbation| classes.of(&[unit.scaled(0.01)]);
     let along_axis = of(Perturbation::LinkShift(2, Vector3::z()));
     let others = ["link:forearm_pitch", "link:shoulder_pitch", "link:wrist_pitch"];
@@ -212,7 +212,7 @@ fn causes_are_named_alike_whoever_names_them() {
         repaired: false,
     };
     let causes = |kind, name: &str| causes_of_finding(&robot, &finding(kind, name));
-    // The joint that sits on the link is the one whose place is wrong.
+    // The cause is the joint on the link, whose pose is wrong.
     let upper_arm = &robot.chain.joints()[1].child_link;
     assert_eq!(causes(FindingKind::Link, upper_arm), ["link:forearm_pitch"]);
     assert_eq!(causes(FindingKind::TagMoved, "tags 3, 5 and 7"), ["tag:3", "tag:5", "tag:7"]);

@@ -1,4 +1,4 @@
-//! An arm as the world draws it, and what it shows at poses; it is put there, not driven.
+//! A true arm as the world draws it, and its views at given poses; it is placed there, not driven.
 //!
 //! Readings: `(1 + g + g_T warm)(theta - m) + nonlinearity(theta) + o + o_T warm + drift + play`, as the world's
 //! potentiometers have it. The oil warms with the tour's time. Corners: five images of the standard noise, of which
@@ -19,9 +19,9 @@ use armcal_core::streams::JointAngles;
 use armcal_core::time::SIMULATION_EPOCH;
 use armcal_sim::{AsBuilt, WorldSpec};
 
-/// Where the controller leaves a joint, one sigma. Assumed: of the world's 0.05 deg.
+/// Standard deviation of a joint's rest angle under its controller, rad. Assumed: of the world's 0.05 deg.
 const REST_STD_RAD: f64 = 0.0005;
-/// Steps of the fixed point `theta = reading - error(theta)`; the error's slope is a few hundredths.
+/// Iterations of the fixed point `theta = reading - error(theta)`; the error's slope is a few hundredths.
 const STEPS: usize = 20;
 
 pub(super) struct TrueArm<'a> {
@@ -31,7 +31,7 @@ pub(super) struct TrueArm<'a> {
     built: AsBuilt,
 }
 
-/// What the sensors' errors depend on besides the angle.
+/// Conditions other than the angle that the sensors' errors depend on.
 #[derive(Clone, Copy)]
 struct Moment {
     warm_k: f64,
@@ -43,7 +43,7 @@ impl<'a> TrueArm<'a> {
         Self { robot, clearance, world, built: AsBuilt::draw(robot, world, seed) }
     }
 
-    /// What a datasheet's sensor would say of a joint at `angle_rad`, rad.
+    /// Reading of the true sensor in terms of the datasheet, for a joint at `angle_rad`, rad.
     fn reading_rad(&self, joint: usize, angle_rad: f64, moment: &Moment) -> f64 {
         let built = &self.built.joints[joint];
         let gain = 1.0 + built.gain_error + built.temperature_gain_per_k * moment.warm_k;
@@ -75,7 +75,7 @@ impl<'a> TrueArm<'a> {
         oil_c - self.world.joint_sensors.reference_c
     }
 
-    /// Views from the poses of a plan that show any tag.
+    /// Views from those poses of a plan that show any tag.
     pub(super) fn views(&self, plan: &PosePlan, rng: &mut ChaCha8Rng) -> Vec<View> {
         let sensors = &self.world.joint_sensors;
         let step_s = plan.arm_time_s / plan.poses.len().max(1) as f64;
@@ -91,7 +91,7 @@ impl<'a> TrueArm<'a> {
             for joint in 0..n {
                 drift_rad[joint] += sensors.drift_rad_per_sqrt_h * (step_s / 3600.0).sqrt() * normal(rng);
                 approach[joint] = if pose.angles[joint] >= from[joint] { 1.0 } else { -1.0 };
-                // The sensor's shaft lags behind the joint by half of the play.
+                // The sensor's shaft lags behind the joint by half of the backlash.
                 moment.extra_rad[joint] = drift_rad[joint] - 0.5 * sensors.backlash_rad * approach[joint];
             }
             let reading = JointAngles::from_fn(n, |j| pose.angles[j] + REST_STD_RAD * normal(rng));
@@ -136,7 +136,7 @@ impl<'a> TrueArm<'a> {
         }
     }
 
-    /// Mean and scatter over the images that show the tag.
+    /// Mean and scatter of the corners over the images that show the tag.
     fn corners(&self, camera_from_tag: &Isometry3<f64>, size_m: f64, rng: &mut ChaCha8Rng) -> Option<MeanCorners> {
         let camera = &self.world.camera;
         let lens = &self.robot.camera.lens;
@@ -159,8 +159,8 @@ impl<'a> TrueArm<'a> {
         (n_frames > 0).then_some(MeanCorners { corners_px, n_frames, scatter_px2 })
     }
 
-    /// Distance of the tool from where it is sent, by an arm whose controller is told counts by `sensors`, at their
-    /// reference.
+    /// Distance of the tool from its target for a controller that converts angles to counts by `sensors`, at their
+    /// reference conditions.
     pub(super) fn tool_error_m(&self, sensors: &ArmSensors, to: &JointAngles) -> f64 {
         let travel = |j: usize| sensors.models[j].travel_under_rad(to[j], &Default::default());
         let reading = JointAngles::from_fn(to.len(), |j| self.robot.sensors[j].center_rad + travel(j));
@@ -171,7 +171,7 @@ impl<'a> TrueArm<'a> {
     }
 }
 
-/// Standard normal, from a stream.
+/// Draws a standard normal number.
 fn normal(rng: &mut ChaCha8Rng) -> f64 {
     rand_distr::Distribution::<f64>::sample(&rand_distr::StandardNormal, rng)
 }

@@ -20,7 +20,7 @@ fn name(criterion: PoseCriterion) -> &'static str {
     }
 }
 
-/// One line an estimate; lengths in mm.
+/// CSV with one line per estimate; lengths in mm.
 #[must_use]
 pub fn poses_csv(rows: &[PoseRow]) -> String {
     let mut out = String::from("seed,criterion,poses,views,true_mm,by_bundle_mm,planned_mm,arm_time_s\n");
@@ -40,8 +40,8 @@ fn quantile_of(rows: &[PoseRow], criterion: PoseCriterion, poses: usize, q: f64,
     quantile(&of(rows, criterion, poses).map(f).collect::<Vec<_>>(), q).unwrap_or(f64::NAN)
 }
 
-/// Poses and time of the arm (s) at which the median of the true error comes down to `limit_m`, between numbers of
-/// poses on a straight line; `None` where it does not.
+/// Number of poses and arm time (s) at which the median of the true error falls to `limit_m`, interpolated linearly
+/// between numbers of poses; `None` where it does not.
 fn cost(rows: &[PoseRow], criterion: PoseCriterion, limit_m: f64) -> Option<[f64; 2]> {
     let at = |poses: usize| {
         let median = |f: fn(&PoseRow) -> f64| quantile_of(rows, criterion, poses, 0.5, f);
@@ -60,7 +60,7 @@ fn cost(rows: &[PoseRow], criterion: PoseCriterion, limit_m: f64) -> Option<[f64
     None
 }
 
-/// Errors by number of poses, predictions beside them, and what each tolerance costs.
+/// Table of errors by number of poses with their predictions, and of the cost of each tolerance.
 #[must_use]
 pub fn poses_table(rows: &[PoseRow]) -> String {
     let seeds = of(rows, PoseCriterion::Random, POSES[0]).count();
@@ -115,10 +115,10 @@ pub fn poses_table(rows: &[PoseRow]) -> String {
     out
 }
 
-/// The median of the true error over poses and over the arm's time.
+/// Chart of the median true error over the number of poses and over the arm's time.
 ///
 /// # Errors
-/// What the drawing library says.
+/// Errors of the drawing library.
 pub fn poses_figure(rows: &[PoseRow]) -> Result<String, String> {
     let series = |x: fn(&PoseRow) -> f64| -> Vec<Series> {
         let of_criterion = |criterion: &PoseCriterion| Series {

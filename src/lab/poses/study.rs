@@ -1,4 +1,4 @@
-//! The estimates of the study: for each seed, criterion and number of poses.
+//! Estimates of the study: for each seed, criterion and number of poses.
 
 use rayon::prelude::*;
 
@@ -16,23 +16,23 @@ use armcal_sim::WorldSpec;
 
 use crate::poses::arm::TrueArm;
 
-/// One estimate.
+/// Result of one estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseRow {
     pub seed: u64,
     pub criterion: PoseCriterion,
-    /// Poses that were chosen; views of no tag are not used.
+    /// Number of chosen poses; views of no tag are not used.
     pub poses: usize,
     pub views: usize,
-    /// Root mean squares over the task's targets, m.
+    /// True tool error, root mean square over the task's targets, m. `by_bundle_m` and `planned_m` are its predictions.
     pub true_m: f64,
     pub by_bundle_m: f64,
     pub planned_m: f64,
-    /// Of the whole tour, settling and dwell included.
+    /// Time of the whole tour, settling and dwell included, s.
     pub arm_time_s: f64,
 }
 
-/// In this order in tables and charts.
+/// Criteria in the order of tables and charts.
 pub const CRITERIA: [PoseCriterion; 5] = [
     PoseCriterion::ToolError,
     PoseCriterion::DOptimal,
@@ -40,12 +40,12 @@ pub const CRITERIA: [PoseCriterion; 5] = [
     PoseCriterion::EOptimal,
     PoseCriterion::Random,
 ];
-/// Numbers of poses.
+/// Numbers of poses in the study.
 pub const POSES: [usize; 11] = [3, 4, 5, 6, 8, 10, 12, 16, 20, 25, 30];
-/// Candidates of each seed.
+/// Number of candidates per seed.
 const POOL: usize = 1000;
 
-/// Why a study of poses has no result.
+/// Reason that a study of poses has no result.
 #[derive(Debug, thiserror::Error)]
 pub enum PoseStudyError {
     #[error("{0}")]
@@ -56,7 +56,7 @@ pub enum PoseStudyError {
     NotSolved { seed: u64, poses: usize },
 }
 
-/// What all seeds share.
+/// Inputs that all seeds share.
 struct Scene<'a> {
     robot: &'a Robot,
     clearance: &'a ClearanceModel<'a>,
@@ -76,11 +76,11 @@ pub struct PoseGrid<'a> {
 }
 
 impl PoseGrid<'static> {
-    /// All that the table has.
+    /// Whole grid of the table.
     pub const WHOLE: Self = Self { criteria: &CRITERIA, poses: &POSES };
 }
 
-/// Runs `seeds` of the routine's scene; rows by seed, criterion and number of poses.
+/// Runs `seeds` of the routine's scene; returns rows by seed, criterion and number of poses.
 ///
 /// # Errors
 /// Where the routine captures nothing, a target is out of reach, or no pose is found.
@@ -163,7 +163,7 @@ impl Scene<'_> {
         }
     }
 
-    /// The tool's error, true and as `bundle` predicts it: root mean squares over the targets, m.
+    /// Tool error, true and as `bundle` predicts it: root mean squares over the targets, m.
     fn fitted(&self, arm: &TrueArm<'_>, views: &[View]) -> Option<(f64, f64)> {
         let scales = Hyperparameters::datasheet(self.robot);
         let input = BundleInput {

@@ -26,7 +26,7 @@ fn read(path: &Path) -> String {
     fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// A command, and the file that it leaves in `--out`.
+/// A command, and the file that it writes to `--out`.
 type Case = (&'static [&'static str], &'static str);
 
 const SHORT: [Case; 3] = [
@@ -34,10 +34,10 @@ const SHORT: [Case; 3] = [
     (&["paths", "--n=2"], "paths.csv"),
     (&["sensitivity", "routines/titan4-quickstart.toml", "--poses=3"], "statement.md"),
 ];
-/// `detection` and `poses`, a minute each, end in the same words.
+/// Slower commands. `detection` and `poses`, a minute each, end in the same words, so they are omitted.
 const LONG: [Case; 2] = [(&["paper", "--quick"], "report.md"), (&["falsified", "--quick", "--seeds=1"], "report.md")];
 
-/// With a stdout that is full, files come whole, and then one error.
+/// Expects, with a full stdout, complete files and then one error.
 fn expect_files_with_a_full_stdout(cases: &[Case]) {
     for (words, file) in cases {
         let folder = tempfile::tempdir().expect("a folder");
@@ -72,7 +72,8 @@ fn a_place_that_cannot_be_written_is_told_before_the_work() {
     assert!(!new.exists(), "what comes to nothing leaves nothing");
 }
 
-/// An hour under water: tags are passed in every other task, and the tool stays known while the calibration of the
+/// One hour under water: every other task passes tags. The tool stays known while the calibration of the start becomes
+/// wrong.
 /// start becomes wrong.
 #[test]
 #[ignore = "second tier: an hour of a dive, 11 s"]
@@ -99,7 +100,7 @@ fn the_tool_stays_known_through_an_hour_of_a_dive() {
     assert!((0.5..8.0).contains(&mean), "{mean}");
 }
 
-/// A sensor that slips on the way is named within three views after an oracle could tell it, and nothing else is.
+/// A sensor that slips on the way is named within three views after an oracle could name it, and no other fault is.
 #[test]
 #[ignore = "second tier: two dives of an hour with a fault, 23 s"]
 fn a_slip_on_a_dive_is_named_as_soon_as_views_tell_it() {

@@ -9,7 +9,7 @@ use armcal_belief::calib::{PositionProblem, Solution};
 use armcal_belief::model::{Hyperparameters, JointParameters, Model, Parameter, ParameterKind};
 use armcal_core::numeric::Outcome;
 
-/// What solves.
+/// Solver of a method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Solver {
     Position(PositionMethod),
@@ -18,7 +18,7 @@ pub enum Solver {
     Bundle,
 }
 
-/// One line of a table.
+/// A method with its settings: one line of a table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MethodVariant {
     pub name: &'static str,
@@ -66,8 +66,8 @@ impl MethodVariant {
         Self { name, options: SearchOptions { scaling: Scaling::Raw, ..self.options }, ..self }
     }
 
-    /// The answer for `draw`. With the gauge fixed, the first joint's offset is held at its true value, as a tag beside
-    /// the base would tell it.
+    /// Solves `draw`. With the gauge fixed, the first joint's offset is held at its true value, which a tag next to the
+    /// base would determine.
     #[must_use]
     pub fn solve(&self, draw: &Draw, setting: &Setting, watch: &mut dyn FnMut(f64)) -> Solution {
         let problem = PositionProblem::new(&draw.robot, &draw.views);

@@ -1,4 +1,4 @@
-//! What is compared, and what the paper says of it.
+//! Comparisons of the study, and the paper's own figures for them.
 
 use crate::minimum_variance::Gauge;
 use crate::position_method::PositionMethod;
@@ -6,16 +6,16 @@ use crate::search::SearchOptions;
 use crate::study::contender::{MethodVariant, Solver};
 use crate::study::scene::{Guess, PoseSampling, Readings, Setting};
 
-/// How many draws.
+/// Number of draws.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tier {
-    /// As published: minutes.
+    /// Number as published: minutes.
     Full,
-    /// The same questions with few draws: seconds.
+    /// The same experiments with few draws: seconds.
     Small,
 }
 
-/// Settings and contenders that belong into one table.
+/// Settings and contenders of one table.
 #[derive(Clone, Debug)]
 pub struct Experiment {
     pub name: &'static str,
@@ -26,7 +26,7 @@ pub struct Experiment {
 }
 
 impl Experiment {
-    /// The paper's own figure for the tool's error, where it has one for this.
+    /// The paper's own figure for the tool error, where it has one for this case; otherwise empty.
     #[must_use]
     pub fn paper_says(&self, setting: &Setting, contender: &MethodVariant) -> &'static str {
         let is_standard = setting.gain_error <= 0.05 && setting.guess == Guess::Datasheet;
@@ -44,7 +44,7 @@ impl Experiment {
 
 const NOISES_M: [f64; 4] = [0.001, 0.003, 0.01, 0.03];
 const SIZES: [(usize, usize); 7] = [(8, 1), (10, 6), (20, 6), (40, 3), (40, 6), (80, 8), (200, 10)];
-/// Gain error, offset error in deg.
+/// Pairs of gain error, and offset error in deg.
 const INITIAL_ERRORS: [(f64, f64); 4] = [(0.01, 1.0), (0.025, 2.5), (0.05, 5.0), (0.10, 10.0)];
 
 /// All tables of the study.
@@ -74,7 +74,7 @@ fn all_methods() -> Vec<MethodVariant> {
     vec![distance, free, fixed, squares, MethodVariant::bundle()]
 }
 
-/// Every method that knows where the landmarks are.
+/// Every method that uses the landmarks' surveyed positions.
 fn fixed_gauge_methods() -> Vec<MethodVariant> {
     let [_, fixed] = minimum_variances();
     vec![MethodVariant::minimum_distance(), fixed, MethodVariant::least_squares(), MethodVariant::bundle()]

@@ -11,10 +11,10 @@ use armcal_belief::model::JointParameters;
 use armcal_charts::{Axis, Panel, Series, Style, svg};
 use armcal_core::robot::Robot;
 
-/// Views in the picture of the clouds.
+/// Number of views in the picture of the clouds.
 const CLOUD_VIEWS: usize = 20;
 
-/// Files by name, as SVG text.
+/// Plots by file name, as SVG text.
 ///
 /// # Errors
 /// [`PaperStudyError`] when a scene or a plot cannot be drawn.
@@ -37,7 +37,7 @@ fn label(text: &str, axis: Axis) -> (String, Axis) {
     (text.to_owned(), axis)
 }
 
-/// Figure 2: what the search has reached after so many evaluations, with preconditioning and without.
+/// Figure 2: lowest objective of the search against the number of evaluations, with preconditioning and without.
 fn convergence(draw: &Draw) -> [Panel; 2] {
     let panel = |contender: MethodVariant, unit: &str| {
         let curve = |name: &str, contender: &MethodVariant| {
@@ -98,7 +98,7 @@ fn over_noise(rows: &[PaperRow]) -> Panel {
     }
 }
 
-/// Figure 3, left: where the tool is, was believed to be, and is believed to be.
+/// Figure 3, left: true tool positions, and their estimates before and after calibration.
 fn tool_positions(draw: &Draw, setting: &Setting) -> [Panel; 2] {
     [MethodVariant::minimum_variance(Gauge::Free), MethodVariant::minimum_distance()].map(|contender| {
         let solution = contender.solve(draw, setting, &mut |_| {});
@@ -124,7 +124,7 @@ fn tool_positions(draw: &Draw, setting: &Setting) -> [Panel; 2] {
     })
 }
 
-/// Figure 3, right: the landmarks as every view puts them, by the datasheet, by the answer and by the true sensors.
+/// Figure 3, right: the landmark positions from every view, by the datasheet, by the solution and by the true sensors.
 fn clouds(draw: &Draw, setting: &Setting) -> [Panel; 2] {
     let solution = MethodVariant::minimum_variance(Gauge::Free).solve(draw, setting, &mut |_| {});
     let series = |name: &str, believed: &JointParameters| {

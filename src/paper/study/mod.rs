@@ -1,9 +1,9 @@
-//! The paper's study again: gains and offsets from landmark positions with isotropic noise, on its own arm.
+//! The paper's study repeated: gains and offsets from landmark positions with isotropic noise, on its own arm.
 //!
-//! `scene` draws an arm, landmarks, poses and readings; `contender` is a method with its settings; `trials` runs
-//! contenders on the same draws and measures the tool; `experiments` lists what is compared, with the paper's own
-//! figures; `tables` and `figures` show it. `sensitivity` is its Figures 4 and 7. Draws run in parallel and are
-//! gathered in order, so that threads do not show.
+//! `scene` draws an arm, landmarks, poses and readings; `contender` is a method with its settings. `trials` runs
+//! contenders on the same draws and measures the tool. `experiments` lists the comparisons, with the paper's own
+//! figures; `tables` and `figures` show them. `sensitivity` is its Figures 4 and 7. Draws run in parallel and are
+//! gathered in order, so results do not depend on the threads.
 
 mod contender;
 mod experiments;
@@ -23,7 +23,7 @@ pub use sensitivity::{Sensitivity, SensitivityPoint, sensitivity};
 pub use tables::{paper_csv, paper_markdown};
 pub use trials::{PaperRow, run_experiment};
 
-/// Why the study cannot be made.
+/// Reason that the study cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum PaperStudyError {
     #[error("robot `{robot}`: {problem}")]

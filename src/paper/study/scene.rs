@@ -1,4 +1,4 @@
-//! An arm, its landmarks and what its camera says of them, drawn from a seed.
+//! An arm, its landmarks and its camera's measurements of them, drawn from a seed.
 
 use nalgebra::{Point3, Vector3};
 use rand::RngExt;
@@ -15,41 +15,42 @@ use armcal_core::spatial::Pose;
 use armcal_core::stats::stream_rng;
 use armcal_core::time::SIMULATION_EPOCH;
 
-/// What a reading is made of.
+/// Number format of a reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Readings {
     /// Real numbers.
     Exact,
-    /// Rounded to whole counts.
+    /// Readings rounded to whole counts.
     WholeCounts,
 }
 
-/// Where the search begins.
+/// Start of the search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Guess {
     Datasheet,
-    /// The true sensors, as for the right of the paper's Figure 3.
+    /// The true sensors, as on the right of the paper's Figure 3.
     Truth,
 }
 
-/// Which poses are drawn.
+/// Choice of the drawn poses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PoseSampling {
     /// Uniform over the joints' ranges; every landmark is seen from each, as the paper counts m measurements of all n.
     Everywhere,
-    /// Of those, the ones that have every landmark in the camera's image, at least 0.25 m away; nothing hides anything.
+    /// The poses of `Everywhere` that have every landmark in the camera's image, at least 0.25 m away; occlusion does
+    /// not count.
     InImage,
 }
 
-/// One way to draw arms.
+/// Setting from which arms are drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setting {
     pub poses: usize,
-    /// Landmarks, each seen from every pose.
+    /// Number of landmarks; every pose sees each.
     pub tags: usize,
-    /// Standard deviation of a landmark's position in the camera frame, per axis.
+    /// Standard deviation of a landmark's position in the camera frame, per axis, m.
     pub noise_m: f64,
-    /// Gains lie within so much of the datasheet's, uniformly, about the middle of the range.
+    /// Largest relative gain error, drawn uniformly; the gain acts about the middle of the range.
     pub gain_error: f64,
     pub offset_error_rad: f64,
     pub readings: Readings,
@@ -76,7 +77,7 @@ impl Default for Setting {
 /// One drawn arm and its data.
 #[derive(Clone, Debug)]
 pub struct Draw {
-    /// With the landmarks for its tags.
+    /// The robot, with the landmarks as its tags.
     pub robot: Robot,
     pub truth: JointParameters,
     pub views: Vec<View>,
@@ -84,11 +85,11 @@ pub struct Draw {
     pub tool_poses: Vec<JointAngles>,
 }
 
-/// Poses at which the tool's error is measured.
+/// Number of poses at which the tool error is measured.
 const TOOL_POSES: usize = 100;
-/// Nearer than this a camera sees no landmark, m.
+/// Least range at which the camera sees a landmark, m.
 const MIN_RANGE_M: f64 = 0.25;
-/// Random poses that are tried for one that sees all landmarks.
+/// Number of random poses that are tried for one that sees all landmarks.
 const MAX_TRIES: usize = 200_000;
 
 impl Draw {
@@ -116,18 +117,18 @@ impl Draw {
         Ok(Self { robot, truth, views, tool_poses })
     }
 
-    /// Gains and offsets of the joints before the camera.
+    /// Gains and offsets of the joints that move the camera.
     #[must_use]
     pub fn parameters(&self) -> Vec<Parameter> {
         let kinds = [ParameterKind::Gain, ParameterKind::Offset];
         (0..self.robot.camera.mount.n_joints).flat_map(|joint| kinds.map(|kind| Parameter { joint, kind })).collect()
     }
 
-    /// Angles that readings at the true `angles` are taken for, with sensors believed to be `believed`.
+    /// Joint angles that the parameters `believed` give for the readings at the true `angles`.
     #[must_use]
     pub fn taken_for(&self, angles: &JointAngles, believed: &JointParameters) -> JointAngles {
         JointAngles::from_fn(angles.len(), |joint| {
-            // Joints behind the camera are none of this study's business: their sensors are perfect.
+            // Joints beyond the camera are outside this study: their sensors are exact.
             if joint >= self.robot.camera.mount.n_joints {
                 return angles[joint];
             }
@@ -136,13 +137,13 @@ impl Draw {
         })
     }
 
-    /// The tool's place at `angles`, base frame, m.
+    /// Tool position at `angles`, base frame, m.
     #[must_use]
     pub fn tool_m(&self, angles: &JointAngles) -> Vector3<f64> {
         self.robot.chain.link_poses(angles).frame(&self.robot.tool.mount).translation.vector
     }
 
-    /// Root mean square over the tool poses of the distance between the tool as believed and as it is, m.
+    /// Distance between the estimated and the true tool, root mean square over the tool poses, m.
     #[must_use]
     pub fn tool_rms_m(&self, believed: &JointParameters) -> f64 {
         let square = |angles: &JointAngles| {

@@ -1,7 +1,7 @@
-//! The paper's Figures 4 and 7: what one wrong offset does to either objective, and to the tool.
+//! The paper's Figures 4 and 7: the effect of one wrong offset on both objectives, and on the tool.
 //!
-//! The sensors are right and nothing is noisy; the offset of one joint at a time is swept from 0 to 180 deg. Poses are
-//! drawn from a seed among those in which the routine's tags are visible from the routine's vehicle.
+//! The sensors are exact and the data have no noise; the offset of one joint at a time is swept from 0 to 180 deg.
+//! Poses are drawn from a seed among those in which the routine's tags are visible from the routine's vehicle.
 
 use std::fmt::Write as _;
 
@@ -18,31 +18,31 @@ use armcal_core::robot::Robot;
 use armcal_core::stats::stream_rng;
 use armcal_core::time::SIMULATION_EPOCH;
 
-/// One offset of one joint.
+/// Objectives and tool error for one offset of one joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SensitivityPoint {
     pub joint: usize,
     pub offset_deg: f64,
-    /// Minimum variance's objective, and minimum distance's.
+    /// Objective of minimum variance, m^2; `distance_m` is that of minimum distance, m.
     pub variance_m2: f64,
     pub distance_m: f64,
-    /// Over the poses, of the distance between the tool as believed and as it is.
+    /// Mean distance over the poses between the estimated and the true tool, m; `tool_max_m` is the largest.
     pub tool_mean_m: f64,
     pub tool_max_m: f64,
 }
 
-/// All of them, and what they rest on.
+/// All points, with the poses and tags behind them.
 #[derive(Clone, Debug)]
 pub struct Sensitivity {
     pub joints: Vec<String>,
-    /// Joints that move the camera.
+    /// Number of joints that move the camera.
     pub n_seen: usize,
     pub poses: usize,
     pub tags_seen: usize,
     pub points: Vec<SensitivityPoint>,
 }
 
-/// Random poses tried for one in which enough tags are visible.
+/// Number of random poses that are tried for one in which enough tags are visible.
 const MAX_TRIES: usize = 200_000;
 const STEP_DEG: f64 = 5.0;
 const STEPS: u32 = 36;
@@ -50,7 +50,7 @@ const STEPS: u32 = 36;
 /// Sweeps each joint's offset. `poses` poses see `min_tags` tags or more each.
 ///
 /// # Errors
-/// When too few poses see so many tags.
+/// An error if too few poses see so many tags.
 pub fn sensitivity(
     robot: &Robot,
     clearance: &ClearanceModel<'_>,
@@ -84,7 +84,7 @@ pub fn sensitivity(
     })
 }
 
-/// Readings of perfect sensors, and positions without noise.
+/// Views with readings of exact sensors, and positions without noise.
 fn views(
     robot: &Robot,
     clearance: &ClearanceModel<'_>,
@@ -145,14 +145,14 @@ impl Sensitivity {
         self.points.iter().filter(move |point| point.joint == joint)
     }
 
-    /// The most that an offset of `joint` changes minimum variance's objective, m^2.
+    /// Largest change of minimum variance's objective by an offset of `joint`, m^2.
     #[must_use]
     pub fn largest_change_m2(&self, joint: usize) -> f64 {
         let right = self.of(joint).next().map_or(f64::NAN, |point| point.variance_m2);
         self.of(joint).map(|point| (point.variance_m2 - right).abs()).fold(0.0, f64::max)
     }
 
-    /// One line a joint and offset; lengths in m.
+    /// CSV with one line per joint and offset; lengths in m.
     #[must_use]
     pub fn csv(&self) -> String {
         let mut out = String::from("joint,offset_deg,minimum_variance_m2,minimum_distance_m,tool_mean_m,tool_max_m\n");
@@ -167,10 +167,10 @@ impl Sensitivity {
         out
     }
 
-    /// Figure 4 and Figure 7: objective over the offset, and over it the tool's error.
+    /// Figures 4 and 7: objective over the offset, with the tool error above it.
     ///
     /// # Errors
-    /// What the drawing library says.
+    /// An error of the drawing library.
     pub fn figures(&self) -> Result<[(&'static str, String); 2], String> {
         let figure = |title: &str, unit: &str, objective: fn(&SensitivityPoint) -> f64| {
             let panel = |title: &str, unit: &str, value: fn(&SensitivityPoint) -> f64| {
@@ -196,7 +196,7 @@ impl Sensitivity {
         ])
     }
 
-    /// What the figures say, in Markdown.
+    /// Summary of the figures in Markdown.
     #[must_use]
     pub fn statement(&self) -> String {
         let mut out = format!(
@@ -273,9 +273,9 @@ mod tests {
                 assert!(at(joint, 0.0).distance_m < 1e-9 && at(joint, 5.0).distance_m > 0.1);
                 assert!(at(joint, 0.0).tool_mean_m == 0.0);
             }
-            // The camera hangs before the last joint, and the tool lies on its axis.
+            // The camera is mounted before the last joint, and the tool lies on that joint's axis.
             assert!(found.largest_change_m2(5) == 0.0 && at(5, 90.0).tool_max_m < 1e-9);
-            // A turn by 25 deg moves nothing farther than the reach of 1.922 m allows: 0.83 m.
+            // A turn by 25 deg moves no point by more than the reach of 1.922 m allows: 0.83 m.
             assert!((0.3..0.832).contains(&at(0, 25.0).tool_max_m), "{}", at(0, 25.0).tool_max_m);
         }
     }

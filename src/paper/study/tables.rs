@@ -35,7 +35,7 @@ fn data(row: &PaperRow) -> String {
     text
 }
 
-/// Tables in Markdown, one an experiment. Errors of the tool in mm.
+/// Tables in Markdown, one per experiment; tool errors in mm.
 #[must_use]
 pub fn paper_markdown(experiments: &[Experiment], rows: &[PaperRow]) -> String {
     let mut out = String::from(
@@ -78,7 +78,7 @@ pub fn paper_markdown(experiments: &[Experiment], rows: &[PaperRow]) -> String {
     out
 }
 
-/// The same in SI units, one line a row.
+/// Rows as CSV in SI units, one line per row.
 #[must_use]
 pub fn paper_csv(rows: &[PaperRow]) -> String {
     let mut out = String::from(

@@ -65,7 +65,7 @@ fn at_one_centimetre_minimum_distance_is_near_least_squares_and_that_at_the_boun
     assert!((15.0..60.0).contains(&(high / low)), "{low} {high}");
 }
 
-/// Figure 3, right: beginning at the truth, less spread and a worse tool.
+/// Figure 3, right: a search from the truth ends at less spread and a worse tool.
 #[test]
 fn from_the_truth_minimum_variance_finds_less_spread_and_a_worse_tool() {
     let rows = &*FROM_THE_TRUTH;

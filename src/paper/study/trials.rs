@@ -1,4 +1,4 @@
-//! Contenders on the same draws, and what comes of it at the tool.
+//! Contenders on the same draws, and their tool errors.
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -13,32 +13,32 @@ use armcal_core::numeric::Outcome;
 use armcal_core::robot::Robot;
 use armcal_core::stats::quantile;
 
-/// One contender over all draws of a setting.
+/// Results of one contender over all draws of a setting.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PaperRow {
     pub experiment: &'static str,
     pub setting: Setting,
     pub contender: &'static str,
     pub draws: usize,
-    /// Of each draw the root mean square over random poses; of those the root mean square, median and 95th percentile,
-    /// m.
+    /// Root mean square, over the draws, of each draw's tool error, m. A draw's tool error is the root mean square over
+    /// random poses. `tool_median_m` and `tool_p95_m` are its median and 95th percentile.
     pub tool_rms_m: f64,
     pub tool_median_m: f64,
     pub tool_p95_m: f64,
-    /// The same root mean square that the Cramer-Rao bound allows with the map known; none without noise.
+    /// Cramer-Rao bound of `tool_rms_m` with the map known, m; `None` without noise.
     pub bound_rms_m: Option<f64>,
     pub before_rms_m: f64,
-    /// Over that of least squares on the same draws, where it takes part.
+    /// Ratio of `tool_rms_m` to that of least squares on the same draws, where it takes part.
     pub over_least_squares: Option<f64>,
     pub evaluations_median: f64,
     pub cost_initial_median: f64,
     pub cost_final_median: f64,
     pub converged: usize,
-    /// What the paper says of it.
+    /// The paper's own figure.
     pub paper: &'static str,
 }
 
-/// One answer.
+/// Result of one solution.
 struct Trial {
     tool_rms_m: f64,
     evaluations: f64,
@@ -47,14 +47,14 @@ struct Trial {
     is_converged: bool,
 }
 
-/// All answers on one draw.
+/// All solutions on one draw.
 struct Paired {
     trials: Vec<Trial>,
     bound_m2: Option<f64>,
     before_m: f64,
 }
 
-/// Runs every contender of `experiment` on the same draws; rows in the order of settings and contenders.
+/// Runs every contender of `experiment` on the same draws; returns rows in the order of settings and contenders.
 ///
 /// # Errors
 /// [`PaperStudyError`] when a scene cannot be drawn.
@@ -96,8 +96,8 @@ fn pair(
     })
 }
 
-/// The least mean square of the tool's error over the tool poses that any unbiased estimator can have on this draw:
-/// `J C J^T` with the inverse of the Fisher information for `C` (Cramer-Rao), m^2.
+/// The least mean square of the tool error over the tool poses for any unbiased estimator on this draw, m^2. It is `J C
+/// J^T` with the inverse of the Fisher information for `C` (Cramer-Rao).
 fn bound_m2(draw: &Draw, noise_m: f64) -> Option<f64> {
     let problem = PositionProblem::new(&draw.robot, &draw.views);
     let free = draw.parameters();

@@ -1,4 +1,4 @@
-//! How good the tool is: target by target, over the reach task, and against the number of views.
+//! Tool accuracy: target by target, over the reach task, and against the number of views.
 
 use std::collections::BTreeMap;
 
@@ -40,7 +40,7 @@ fn reach_task(score: &Score) -> Markup {
     }
 }
 
-/// All that is known of one target.
+/// All figures of one target.
 #[derive(Clone, Copy, Default)]
 struct Target<'a> {
     truth: Option<&'a TargetScore>,
@@ -65,7 +65,7 @@ impl<'a> Target<'a> {
     }
 }
 
-/// By the number of the target, from 1.
+/// Targets by their number, from 1.
 fn targets<'a>(report: &'a Report<'_>) -> BTreeMap<usize, Target<'a>> {
     let mut all: BTreeMap<usize, Target<'a>> = BTreeMap::new();
     for truth in report.summary.score.iter().flat_map(|score| &score.targets) {
@@ -121,7 +121,7 @@ fn target_table(targets: &BTreeMap<usize, Target<'_>>) -> Markup {
     }
 }
 
-/// Predicted error by the number of views of the last capture, and the true one at its end.
+/// Chart of the predicted error against the number of views of the last capture, with the true error at its end.
 fn growth(report: &Report<'_>) -> Markup {
     let renewals = &report.summary.capture.renewals;
     let last = renewals.chunk_by(|before, after| before.views < after.views).last().unwrap_or_default();

@@ -1,4 +1,4 @@
-//! The arm at the same readings by the datasheet and as calibrated, drawn from the shapes of its URDF.
+//! The arm at the same readings with datasheet and with calibrated sensors, drawn from the shapes of its URDF.
 
 use maud::{Markup, html as markup};
 use nalgebra::{Point3, Vector3};
@@ -10,14 +10,14 @@ use armcal_core::kinematics::LinkPoses;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::ArmSensors;
 
-/// One configuration under both beliefs.
+/// The arm at the same sensor readings before and after calibration.
 struct Posture {
     before: LinkPoses,
     after: LinkPoses,
     tools_m: [Vector3<f64>; 2],
 }
 
-/// From base coordinates to a picture: to the right, and up.
+/// Projection from base coordinates to the picture: to the right, and up.
 type Projection = Box<dyn Fn(&Point3<f64>) -> [f64; 2]>;
 
 pub(super) fn section(report: &Report<'_>) -> Markup {
@@ -52,7 +52,7 @@ impl Posture {
     }
 }
 
-/// At each target of the task, or else at each view. `None` where the calibration is of another arm.
+/// The arm at each target of the task, or else at each view; `None` where the calibration belongs to another arm.
 fn postures(report: &Report<'_>) -> Option<Vec<Posture>> {
     let (drawn, details) = (report.robot, &report.calibration.details);
     let calibrated = report.calibration.applied_to(drawn);
@@ -77,7 +77,7 @@ const WIDTH: f64 = 440.0;
 const HEIGHT: f64 = 330.0;
 const MARGIN: f64 = 14.0;
 
-/// Metres to the picture's units, around all that is shown.
+/// Scale from metres to the picture's units, with all drawn points inside.
 struct Scale {
     low: [f64; 2],
     high: [f64; 2],
@@ -108,7 +108,7 @@ impl Scale {
     }
 }
 
-/// What is drawn of an arm: outlines of its shapes, and the line through its joints.
+/// Drawing of an arm: outlines of its shapes, and the line through its joints.
 struct Drawn {
     outlines: Vec<Vec<[f64; 2]>>,
     line: Vec<[f64; 2]>,

@@ -3,9 +3,9 @@
 use armcal_charts::{Axis, Color, Panel, Series, Style, inlay};
 use maud::{Markup, PreEscaped, html as markup};
 
-/// Of a chart, before the page scales it, px.
+/// Size of a chart before the page scales it, px.
 const SIZE_PX: (u32, u32) = (440, 250);
-/// Of a chart on which a unit is as long on both axes.
+/// Size of a chart with equal units on both axes, px.
 const MAP_PX: (u32, u32) = (440, 330);
 
 const NAME_SPACE: &str = " xmlns=\"http://www.w3.org/2000/svg\"";
@@ -15,7 +15,7 @@ pub fn series(name: &str, color: Color, style: Style, points: Vec<[f64; 2]>) -> 
     Series { name: name.to_owned(), color: Some(color), style, points }
 }
 
-/// Straight axes.
+/// Chart panel with linear axes.
 pub fn panel(title: &str, x: &str, y: &str, series: Vec<Series>) -> Panel {
     Panel {
         title: title.to_owned(),
@@ -26,7 +26,7 @@ pub fn panel(title: &str, x: &str, y: &str, series: Vec<Series>) -> Panel {
     }
 }
 
-/// The chart under its caption; what cannot be drawn says so in its place.
+/// The chart under its caption; a message replaces a chart that cannot be drawn.
 pub fn figure(panel: &Panel, caption: &str) -> Markup {
     let size_px = if panel.is_map { MAP_PX } else { SIZE_PX };
     // The legend stands below the chart, where it hides nothing.
@@ -40,7 +40,7 @@ pub fn figure(panel: &Panel, caption: &str) -> Markup {
     markup! {
         figure {
             @match drawn {
-                // Within a page the name space goes without saying, and no address shall be in it.
+                // SVG within a page needs no name space, and the page shall hold no address.
                 Ok(svg) => div role="img" aria-label=(label) { (PreEscaped(svg.replace(NAME_SPACE, ""))) },
                 Err(why) => p { "This chart cannot be drawn: " (why) },
             }

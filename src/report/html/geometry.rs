@@ -1,4 +1,4 @@
-//! Where camera, links and tags were found, each with its standard deviation.
+//! Poses of camera, links and tags, each with its standard deviation.
 
 use armcal_core::codes::Coded;
 use maud::{Markup, html as markup};
@@ -42,7 +42,7 @@ fn triple(values: [f64; 3], scale: f64, digits: usize) -> String {
     values.map(|value| format!("{:.digits$}", value * scale)).join(", ")
 }
 
-/// Where a camera is on its link, with one sigma.
+/// Rows of a camera's pose on its link, with standard deviations.
 fn place_rows(
     position_m: [f64; 3],
     position_std_m: [f64; 3],

@@ -1,4 +1,4 @@
-//! Each joint's sensor: the line found, and how far it is from the datasheet's over the range.
+//! Each joint's sensor: the calibrated line, and its distance from the datasheet's over the range.
 
 use armcal_charts::{Color, Style};
 use maud::{Markup, html as markup};
@@ -9,7 +9,7 @@ use armcal_belief::calib::{Calibration, JointAt, JointResult, ParameterCovarianc
 use armcal_core::robot::Robot;
 use armcal_core::sensor::{ArmSensors, ConditionChange};
 
-/// Points of a curve.
+/// Number of points of a curve.
 const POINTS: usize = 41;
 
 pub(super) fn section(report: &Report<'_>) -> Markup {
@@ -69,7 +69,7 @@ fn table(calibration: &Calibration) -> Markup {
     }
 }
 
-/// What the curves are drawn from.
+/// Inputs of the curves.
 struct Curves<'a> {
     calibration: &'a Calibration,
     robot: Robot,
@@ -78,7 +78,7 @@ struct Curves<'a> {
 }
 
 impl<'a> Curves<'a> {
-    /// `None` where the calibration is of other joints than the robot's.
+    /// Inputs from a report; `None` where the calibration has other joints than the robot.
     fn of(report: &Report<'a>) -> Option<Self> {
         let calibration = report.calibration;
         let robot = calibration.scaled_robot(report.robot);

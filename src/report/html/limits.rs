@@ -1,4 +1,4 @@
-//! What the answer does not hold for, what it rests on beside the data, what was left out; and what one degree costs.
+//! Limits of the result, its conditions, rejected observations, and the tool motion per degree of joint error.
 
 use maud::{Markup, html as markup};
 use nalgebra::Vector3;
@@ -8,7 +8,7 @@ use armcal_belief::calib::{Calibration, Check, Reservation, VerdictTable};
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::Robot;
 
-/// Rejected observations in the list; the rest is a number.
+/// Number of rejected observations in the list; the page only counts the others.
 const MOST_LISTED: usize = 40;
 
 pub(super) fn section(report: &Report<'_>) -> Markup {
@@ -42,12 +42,12 @@ fn reservations(reservations: &[Reservation]) -> Markup {
     }
 }
 
-/// One degree, rad; one millimetre of a slide, m.
+/// Joint step for the sensitivity table: one degree in rad, or one millimetre of a slide in m.
 fn shown_step(robot: &Robot, joint: usize) -> f64 {
     if robot.sensors[joint].moves.is_slide() { 1e-3 } else { 1f64.to_radians() }
 }
 
-/// How far one degree of each joint (one millimetre of a slide) moves the tool, root mean square over `at`, m.
+/// Tool motion per degree of each joint (per millimetre of a slide), root mean square over the configurations `at`, m.
 fn tool_per_degree_m(robot: &Robot, at: &[JointAngles]) -> Vec<f64> {
     let square_m2 = |joint: usize, angles: &JointAngles| {
         let poses = robot.chain.link_poses(angles);

@@ -1,8 +1,8 @@
 //! report.html: one file, no network, no scripts; for a screen, light or dark, and for paper.
 //!
-//! The order is that in which an engineer asks: `verdict` (may I use it, why, what next, what is this of), `accuracy`
-//! (how good at each target), `arm` (a picture of what changed), `joints` (each sensor's curve), `geometry` (camera
-//! mount, links, tags), `residuals` (what the fit leaves), `limits` (what it does not hold for). `figure` draws charts.
+//! The order is that in which an engineer asks. `verdict` has decision, reasons, next step and details, `accuracy` the
+//! error at each target. `arm` is a picture of the change, `joints` each sensor's curve. Then follow `geometry` (camera
+//! mount, links, tags), `residuals` and `limits` (conditions and ranges of the result). `figure` draws charts.
 
 mod accuracy;
 mod arm;
@@ -24,17 +24,17 @@ use armcal_belief::calib::Calibration;
 use armcal_belief::calib::online::BeliefLog;
 use armcal_core::robot::Robot;
 
-/// All that a report shows.
+/// Contents of a report.
 pub struct Report<'a> {
     pub summary: &'a RunSummary,
     pub calibration: &'a Calibration,
-    /// By its folder: drawing and datasheets.
+    /// The robot as its folder describes it: nominal model (URDF) and datasheets.
     pub robot: &'a Robot,
     pub online: Option<&'a BeliefLog>,
     pub about: About,
 }
 
-/// What a report is of, as far as somebody said it.
+/// Details of the report that the user gave; each may be absent.
 #[derive(Clone, Debug, Default)]
 pub struct About {
     pub operator: Option<String>,

@@ -4,10 +4,10 @@ use nalgebra::{Isometry3, Point3};
 
 use armcal_core::robot::{PlacedShape, Shape};
 
-/// Points about a circle.
+/// Number of points on a circle.
 const AROUND: usize = 16;
 
-/// Points whose hull is the shape, or as good as that in a picture; about its own centre, m.
+/// Points whose hull is the shape, or close to it in a picture; relative to its own centre, m.
 fn corners(shape: &Shape) -> Vec<Point3<f64>> {
     let ring = |radius_m: f64, z: f64| {
         (0..AROUND).map(move |n| {

@@ -1,4 +1,4 @@
-//! What the fit leaves: by tag, by joint, over time, and over the image.
+//! Residuals by tag, by joint, over time, and over the image.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use armcal_belief::calib::{CornerResidual, ObservedTag, ViewResidual};
 use armcal_belief::tagmap::files::spoken_name;
 use armcal_core::robot::JointSensorSpec;
 
-/// A residual in the picture of the image is this many times as long as it is.
+/// Magnification of residuals in the picture of the image.
 const MAGNIFIED: f64 = 40.0;
 
 pub(super) fn section(report: &Report<'_>) -> Markup {
@@ -103,7 +103,7 @@ fn by_joint(views: &[ViewResidual], sensors: &[JointSensorSpec]) -> Markup {
             @let shown = units(sensors);
             tr { th { "joint" } th { "residual, " (shown) " rms" } th { "largest, " (shown) } }
             @for (joint, spec) in sensors.iter().enumerate() {
-                // What no view shows is never off.
+                // The residual of an unobservable joint is exactly zero, which says nothing.
                 @let is_off = worst(joint) > 0.0;
                 @let shown = |rad: f64| if is_off { spec.unit().number(rad, 3) } else { "-".to_owned() };
                 tr { td { (spec.joint) } td { (shown(rms(joint))) } td { (shown(worst(joint))) } }
@@ -112,7 +112,7 @@ fn by_joint(views: &[ViewResidual], sensors: &[JointSensorSpec]) -> Markup {
     }
 }
 
-/// What the joints' errors are shown in.
+/// Units in which the joints' errors are shown.
 fn units(sensors: &[JointSensorSpec]) -> &'static str {
     if sensors.iter().any(|spec| spec.moves.is_slide()) { "deg (mm of slides)" } else { "deg" }
 }
@@ -122,7 +122,7 @@ fn time_s(views: &[ViewResidual], view: &ViewResidual) -> f64 {
     views.iter().map(|view| view.end).min().map_or(0.0, |first| view.end.since_s(first))
 }
 
-/// Of each observation; in pixels where there are corners, or else in millimetres.
+/// Chart of each observation's residual over time, px; mm where there are no corners.
 fn over_time(views: &[ViewResidual]) -> Markup {
     let has_corners = views.iter().flat_map(|view| &view.tags).any(|tag| tag.rms_px().is_some());
     let (mut used, mut rejected) = (Vec::new(), Vec::new());
@@ -133,7 +133,7 @@ fn over_time(views: &[ViewResidual]) -> Markup {
             points.extend(off.map(|off| [time_s(views, view), off]));
         }
     }
-    // What was rejected would hide the rest: it stands at the upper edge.
+    // A large rejected residual would compress the scale, so those stand at the upper edge.
     let top = used.iter().map(|p: &[f64; 2]| p[1]).fold(0.0, f64::max) * 1.1;
     rejected.iter_mut().for_each(|p| p[1] = p[1].min(top));
     let y = if has_corners { "corner residual, px rms" } else { "position residual, mm" };
@@ -154,7 +154,7 @@ fn with_rejected(used: Series, rejected: Vec<[f64; 2]>) -> Vec<Series> {
     all
 }
 
-/// Every corner where it was seen, its residual as a stroke.
+/// Picture of every observed corner at its place in the image, with its residual as a stroke.
 fn over_image(views: &[ViewResidual]) -> Markup {
     let (mut strokes, mut rejected) = (Vec::new(), Vec::new());
     for tag in views.iter().flat_map(|view| &view.tags) {
@@ -176,7 +176,7 @@ fn over_image(views: &[ViewResidual]) -> Markup {
     figure(&chart, "Strokes lead from the measured to the predicted corner, 40 times enlarged.")
 }
 
-/// How far each joint was off its calibrated sensor.
+/// Chart of each joint's residual against its calibrated sensor over time.
 fn joint_errors(views: &[ViewResidual], sensors: &[JointSensorSpec]) -> Markup {
     let of_joint = |(joint, spec): (usize, &JointSensorSpec)| {
         let scale = spec.unit().scale();

@@ -1,4 +1,4 @@
-//! May it be used, why, what to do next; and what the report is of.
+//! The verdict, its reasons and the next step; then the details of the report.
 
 use maud::{Markup, html as markup};
 
@@ -25,7 +25,7 @@ pub(super) fn section(report: &Report<'_>) -> Markup {
     }
 }
 
-/// The figure that matters, in words.
+/// The decisive figure in words.
 fn in_one_sentence(report: &Report<'_>) -> String {
     let mm = |m: f64| Unit::Metres.shown(m, 1);
     let mut words = match u95_in_words(report.summary) {
@@ -43,7 +43,7 @@ fn in_one_sentence(report: &Report<'_>) -> String {
     words
 }
 
-/// What this is a report of.
+/// Table of the report's details, such as arm, vehicle, operator and recordings.
 fn facts(report: &Report<'_>) -> Markup {
     let (summary, calibration, about) = (report.summary, report.calibration, &report.about);
     let nanos = u64::try_from(calibration.valid.time_nanos).ok().filter(|nanos| *nanos > 0);
@@ -85,7 +85,7 @@ fn conditions(valid: &ValidRange) -> Option<String> {
     (!both.is_empty()).then(|| both.join(", "))
 }
 
-/// Of sea water, 1025 kg/m^3, below one atmosphere.
+/// Depth in sea water of 1025 kg/m^3 that has the valid range of pressures, with one atmosphere at the surface.
 fn depth(valid: &ValidRange) -> Option<String> {
     let [low, high] = valid.pressure_pa?;
     let metres = |pa: f64| ((pa - 101_325.0) / (1025.0 * 9.806_65)).max(0.0);
@@ -95,7 +95,7 @@ fn depth(valid: &ValidRange) -> Option<String> {
     Some(format!("{metres} m ({megapascals} MPa)"))
 }
 
-/// The lines of the terminal's table, all of them.
+/// All lines of the terminal's table.
 pub(super) fn all_lines(summary: &RunSummary) -> Markup {
     markup! {
         h2 { "Course of the run" }
@@ -107,7 +107,7 @@ pub(super) fn all_lines(summary: &RunSummary) -> Markup {
     }
 }
 
-/// Lines to sign on.
+/// Lines for signatures.
 pub(super) fn signatures() -> Markup {
     markup! { div.sign { p { "Date" } p { "Name" } p { "Signature" } } }
 }
@@ -119,7 +119,7 @@ mod tests {
     #[test]
     fn depth_is_that_of_the_water_column() {
         let at = |pa: [f64; 2]| ValidRange { time_nanos: 0, oil_c: None, water_c: None, pressure_pa: Some(pa) };
-        // 4000 m of 1025 kg/m^3: 40.2 MPa and an atmosphere.
+        // Depth 4000 m in water of 1025 kg/m^3: 40.2 MPa and an atmosphere.
         assert_eq!(depth(&at([101_325.0, 40_308_389.0])).expect("a depth"), "0 .. 4000 m (0.10 .. 40.31 MPa)");
     }
 }

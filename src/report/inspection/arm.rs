@@ -1,4 +1,4 @@
-//! What the messages on armcal's topics tell, without a robot.
+//! Contents of armcal's own topics, read without a robot.
 
 use std::collections::BTreeMap;
 
@@ -10,24 +10,24 @@ use armcal_core::streams::{CaptureSet, Mark, MarkKind, Message, ReachAttempt, Th
 /// Joints, views, tags, task and ranges.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ArmContents {
-    /// As the joint messages name them, base first.
+    /// Joint names from the joint messages, base first.
     pub joints: Vec<String>,
     pub joint_readings: u64,
-    /// Marks `capture_fit` and `capture_held_out`.
+    /// Number of `capture_fit` marks; `views_held_out` counts `capture_held_out`.
     pub views_fit: u64,
     pub views_held_out: u64,
-    /// Marks `reach_before` and `reach_after`.
+    /// Number of `reach_before` marks; `reaches_after` counts `reach_after`.
     pub reaches_before: u64,
     pub reaches_after: u64,
-    /// Messages with detections, tags in them or not.
+    /// Number of messages with detections, including those without any tag.
     pub detection_frames: u64,
     pub tags: Vec<TagSeen>,
-    /// What the detector saw and did not believe, by reason.
+    /// Number of detections that the detector rejected, by reason.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub detections_rejected: BTreeMap<String, u64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub task: Option<TaskSeen>,
-    /// Lowest and highest reading.
+    /// Lowest and highest oil temperature, degC.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub oil_c: Option<[f64; 2]>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -97,7 +97,7 @@ impl Collector {
         }
     }
 
-    /// `recording` holds at least the task.
+    /// Finishes the counts; `recording` holds at least the task.
     pub fn finish(self, recording: &Recording) -> ArmContents {
         let task = recording.messages.iter().find_map(|(_, message)| match message {
             Message::Task(task) => Some(TaskSeen { targets_m: task.targets_m.clone(), tolerance_m: task.tolerance_m }),
@@ -126,7 +126,7 @@ fn widen(range: &mut Option<[f64; 2]>, value: f64) {
     *range = Some([low.min(value), high.max(value)]);
 }
 
-/// The mark of a captured view, also of one in which a single joint moved.
+/// True if the message marks a captured view; views in which a single joint moved count.
 pub(crate) fn is_capture(message: &Message) -> bool {
     matches!(message, Message::Mark(Mark { kind: MarkKind::Capture { .. } | MarkKind::Identify { .. }, .. }))
 }

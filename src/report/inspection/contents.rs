@@ -1,4 +1,4 @@
-//! What a recording holds, whether it is whole, and what could be calibrated from it.
+//! Contents of a recording, its completeness, and what could be calibrated from it.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -14,53 +14,54 @@ use armcal_core::log::{Completeness, FileContents, LogError, ROS1_ADVICE, RawSum
 use armcal_core::robot::Robot;
 use armcal_core::streams::Message;
 
-/// All that is told of one recording; field names with units, for programs too.
+/// Description of one recording; field names have units, because programs read them too.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Inspection {
     pub version: u32,
     pub recording: String,
     pub bytes: u64,
-    /// `ros2`, `ros1`, empty or another.
+    /// Profile of the MCAP file: `ros2`, `ros1`, empty or another.
     pub profile: String,
-    /// The program that wrote it.
+    /// Name of the program that wrote the file.
     pub library: String,
     pub completeness: CompletenessReport,
-    /// Readable messages.
+    /// Number of readable messages.
     pub messages: u64,
     /// Log time of the first and the last, nanoseconds since the Unix epoch; `None` without messages.
     pub time_nanos: Option<[u64; 2]>,
     pub duration_s: Option<f64>,
-    /// How often, in the order of the file, log time went backwards.
+    /// Number of times that log time went backwards in the order of the file.
     pub non_monotonic: u64,
-    /// Chunks that lie behind later ones, and exact copies of others; read in the order of time, and once.
+    /// Number of chunks stored after later ones; `chunk_copies` counts exact copies. Chunks are read in the order of
+    /// time, copies once.
     pub chunks_moved: u64,
     pub chunk_copies: u64,
-    /// Messages on armcal's topics that cannot be used, by "topic: reason".
+    /// Number of unusable messages on armcal's topics, by "topic: reason".
     pub rejected: BTreeMap<String, u64>,
     pub compression: Vec<Compression>,
     pub topics: Vec<TopicContents>,
     pub attachments: Vec<Attachment>,
     pub metadata: Vec<Metadata>,
     pub arm: ArmContents,
-    /// What a robot's calibration could take from it; `None` where no robot was named.
+    /// Parameters that a robot's calibration could take from the recording; `None` where no robot was named.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub observable: Option<ObservableParameters>,
-    /// How far the joints left the lines of their set-points; `None` where no robot was named or nothing was driven.
+    /// Tracking error of the joints against their set-points; `None` where no robot was named or nothing was driven.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tracking_error: Option<TrackingError>,
-    /// What a user may want to know or do.
+    /// Advice for the user: obstacles to a calibration, and possible next steps.
     pub hints: Vec<String>,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CompletenessReport {
     pub state: State,
-    /// The first damage or the cut, with its place in the file.
+    /// The first damage or the cut, with its offset in the file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
     pub lost_chunks: u64,
     pub lost_bytes: u64,
-    /// `None` where the file's own count is lost too.
+    /// Number of lost messages; `None` where the file's own count is lost too.
     pub lost_messages: Option<u64>,
 }
 
@@ -74,7 +75,7 @@ pub enum State {
 
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Compression {
-    /// `zstd`, `lz4`, `none`.
+    /// Name of the compression: `zstd`, `lz4`, `none`.
     pub name: String,
     pub chunks: u64,
     pub compressed_bytes: u64,
@@ -94,7 +95,7 @@ pub struct Metadata {
     pub entries: BTreeMap<String, String>,
 }
 
-/// Looks at a recording.
+/// Inspects a recording.
 ///
 /// # Errors
 /// [`LogError`] when the file is no recording or cannot be read. Cuts and damage are no errors.
@@ -123,7 +124,7 @@ pub fn inspect(path: &Path, robot: Option<&Robot>) -> Result<Inspection, LogErro
         topics.iter_mut().filter(|t| t.topic == log_topics::JOINT_STATES).for_each(|t| t.known_as = None);
     }
     if topics.iter().any(|t| t.topic == log_topics::SCENE) {
-        // Every ROS arm has a topic of that name, too; it is armcal's own beside another one of its own.
+        // Every ROS arm has a topic /tf; it is armcal's own if the recording has another topic of armcal's.
         let known_as = Some("estimated arm, for viewers");
         topics.iter_mut().filter(|t| t.topic == log_topics::TF).for_each(|t| t.known_as = known_as);
     }
@@ -195,7 +196,7 @@ fn metadata(contents: &FileContents) -> Vec<Metadata> {
     contents.metadata.iter().map(|(name, entries)| Metadata { name: name.clone(), entries: entries.clone() }).collect()
 }
 
-/// What stands between the recording and a calibration, and what could be tried.
+/// Obstacles between the recording and a calibration, and possible remedies.
 fn hints(inspection: &Inspection) -> Vec<String> {
     let mut hints = Vec::new();
     let mut hint = |text: &str| hints.push(text.to_owned());

@@ -1,8 +1,8 @@
-//! What `armcal inspect` tells of a recording: what is in it, whether it is whole, what could be calibrated from it.
+//! Report of `armcal inspect` on a recording: its contents, its completeness, and what could be calibrated from it.
 //!
-//! One pass over the file counts and keeps nothing but marks and the task, so a recording of any length can be looked
-//! at; with a robot, a second pass keeps the readings within the captured spans and asks `calib` what they
-//! determine. `tracking_error` compares readings with set-points.
+//! One pass over the file counts messages and keeps only marks and the task, so a recording may have any length. With a
+//! robot, a second pass keeps the readings within the captured spans and asks `calib` which parameters they determine.
+//! `tracking_error` compares readings with set-points.
 
 mod arm;
 mod contents;

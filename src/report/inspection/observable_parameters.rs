@@ -1,4 +1,4 @@
-//! What a robot's calibration could take from the recording.
+//! Parameters that a robot's calibration could take from the recording.
 
 use std::path::Path;
 
@@ -13,26 +13,26 @@ use armcal_belief::model::{JointParameters, Parameter};
 use armcal_core::log::{LogError, Recording, TopicMap, scan_recording};
 use armcal_core::robot::Robot;
 
-/// Views and parameters, in words.
+/// Counts of views and tags, and the parameters in words.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ObservableParameters {
     pub robot: String,
-    /// Captured views that show a tag of the survey, for the fit and for the verdict.
+    /// Number of captured views for the fit that show a surveyed tag; `held_out_views` counts those for the verdict.
     pub views: usize,
     pub held_out_views: usize,
-    /// Tags in the views for the fit.
+    /// Number of tags in the views for the fit.
     pub tags_used: usize,
-    /// Ids that were seen in captured views and are not in the robot's survey.
+    /// Ids in captured views that are not in the robot's survey.
     pub unknown_tags: Vec<u32>,
     /// Parameters that the views determine better than the datasheet does: `joint gain`, `joint offset`.
     pub parameters: Vec<String>,
-    /// `joint gain: why` of those that would stay at the datasheet's values.
+    /// Parameters that would keep the datasheet's values, as `joint gain: why`.
     pub undetermined: Vec<String>,
-    /// What is missing for a calibration that could be accepted; empty if nothing.
+    /// Requirements for an accepted calibration that the recording does not meet; empty if it meets all.
     pub missing: Vec<String>,
 }
 
-/// `marked` holds the marks of the recording at `path`.
+/// Determines the parameters from the recording at `path`; `marked` holds its marks.
 pub(super) fn observable_parameters(
     path: &Path,
     robot: &Robot,
@@ -57,7 +57,7 @@ pub(super) fn observable_parameters(
     let (recording, _) = scan_recording(path, &TopicMap::default(), |_| {}, |_, message| spans.hold(message))?;
     let robot = &*surveyed(&recording, robot);
     let as_drawn = associate(&recording, robot);
-    // A scale that cannot be measured leaves the datasheet's; what `calibrate` says of it is for `calibrate` to say.
+    // A scale that cannot be measured keeps the datasheet's value; `calibrate` explains why, so nothing is said here.
     let scaled = identify_scales(&as_drawn, robot).map_or_else(|_| robot.clone(), |(scaled, _)| scaled);
     let (data, robot) = (associate(&recording, &scaled), &scaled);
     let with_tags = |views: &[View]| views.iter().filter(|view| !view.tags.is_empty()).count();
@@ -82,7 +82,7 @@ fn knows(robot: &Robot, id: u32) -> bool {
     robot.tags.iter().map(|tag| tag.id).chain(robot.gripper_tag.map(|tag| tag.id)).any(|known| known == id)
 }
 
-/// What a tag on the gripper determines.
+/// Parameters that a tag on the gripper determines.
 fn behind_the_camera(robot: &Robot, views: &[View]) -> Vec<Parameter> {
     let found = robot.gripper_tag.map(|tag| mount_by_gripper_tag(robot, &tag, views, &JointParameters::default()));
     found.and_then(Result::ok).map(|mount| mount.determined(robot)).unwrap_or_default()
@@ -92,7 +92,7 @@ fn missing(determined: &ObservableParameters) -> Vec<String> {
     let mut missing = Vec::new();
     let parameters = determined.parameters.len();
     let wanted = MIN_VIEWS.max((MIN_VIEWS_PER_PARAMETER * parameters as f64).ceil() as usize);
-    // The default method fits all views, and leaves them out in turn for its verdict.
+    // The default method fits all views, and cross-validates them for its verdict.
     let views = determined.views + determined.held_out_views;
     if views < wanted {
         let of = if views == 0 { String::new() } else { format!(" for {parameters} parameters") };

@@ -7,11 +7,11 @@ use crate::report::inspection::observable_parameters::ObservableParameters;
 use crate::report::inspection::{Inspection, State};
 use armcal_core::time::utc;
 
-/// Of sea water, and at its surface.
+/// Pressure increase per metre of sea water, at its surface, Pa/m.
 const PA_PER_M: f64 = 10_055.0;
 const SURFACE_PA: f64 = 101_325.0;
 
-/// Lays an inspection out for a terminal of so many columns, or for anything of any width.
+/// Lays an inspection out for a terminal with `width` columns, or without a limit of the width.
 #[must_use]
 pub fn to_text(inspection: &Inspection, width: Option<usize>) -> String {
     let mut lines = head(inspection);
@@ -36,7 +36,7 @@ pub fn to_text(inspection: &Inspection, width: Option<usize>) -> String {
     lines.join("\n")
 }
 
-/// What the reader of bags in SQLite files says for their writer.
+/// Library name that the reader of SQLite bags reports for their writer.
 const BAG_LIBRARY: &str = "rosbag2, SQLite";
 
 fn head(inspection: &Inspection) -> Vec<String> {
@@ -94,7 +94,7 @@ fn head(inspection: &Inspection) -> Vec<String> {
     lines
 }
 
-/// The topics; where they do not fit, their types are left out.
+/// Table of the topics; it omits their types where the lines would not fit.
 fn topic_lines(inspection: &Inspection, width: usize) -> Vec<String> {
     let fits = |lines: &[String]| lines.iter().all(|line| line.chars().count() <= width);
     let whole = topic_table(inspection, &[0, 1, 2, 3, 4, 5, 6, 7]);
@@ -106,7 +106,7 @@ fn topic_lines(inspection: &Inspection, width: usize) -> Vec<String> {
     narrow
 }
 
-/// The columns with these numbers.
+/// Table of the topics with the given columns.
 fn topic_table(inspection: &Inspection, columns: &[usize]) -> Vec<String> {
     const NAMES: [&str; 8] = ["topic", "type", "encoding", "messages", "Hz", "first s", "last s", "what"];
     let mut table = Table::new();
@@ -193,7 +193,7 @@ fn determined_lines(d: &ObservableParameters) -> Vec<String> {
     lines
 }
 
-/// A value that may be a whole file.
+/// A value shortened for display: it may be a whole file.
 fn short(value: &str) -> String {
     let line = value.lines().next().unwrap_or_default();
     let told: String = line.chars().take(60).collect();

@@ -1,4 +1,4 @@
-//! Counts by topic, and what topics of others may hold.
+//! Counts by topic, and possible uses of topics that are not armcal's.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,32 +8,32 @@ use armcal_core::log::ros::{JointState, TfMessage, decode_detections};
 use armcal_core::log::{RawMessage, decode};
 use armcal_core::log::{Stream, topics};
 
-/// One topic.
+/// Counts and type of one topic.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TopicContents {
     pub topic: String,
     /// Name of the messages' type; empty where the file declares none.
     pub schema: String,
-    /// `cdr`, `ros1`, `json`, `protobuf` or another.
+    /// Encoding of the messages: `cdr`, `ros1`, `json`, `protobuf` or another.
     pub encoding: String,
     pub messages: u64,
-    /// Of the messages themselves, uncompressed.
+    /// Size of the uncompressed messages, bytes.
     pub bytes: u64,
     /// Lowest and highest log time, nanoseconds since the Unix epoch.
     pub time_nanos: [u64; 2],
-    /// Mean over its own span; `None` for fewer than two messages or none of them later.
+    /// Mean rate over the topic's own span, Hz; `None` for fewer than two messages or a span of zero.
     pub rate_hz: Option<f64>,
-    /// What armcal's own recordings have on a topic of that name and type.
+    /// Content that armcal's own recordings have on a topic of that name and type.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub known_as: Option<&'static str>,
-    /// What a topic of another's recording may be good for.
+    /// Possible use of a topic that is not armcal's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub may_be: Option<String>,
 }
 
-/// Messages of a topic that are looked into.
+/// Number of a topic's messages that are decoded.
 const MAX_SAMPLES: u64 = 200;
-/// Names that are told of one topic.
+/// Number of names that are listed per topic.
 const MAX_NAMES: usize = 12;
 
 /// Types that an input map may name, in addition to those of detections.
@@ -54,15 +54,15 @@ struct Seen {
     first_nanos: u64,
     last_nanos: u64,
     names: BTreeSet<String>,
-    /// In the order of the message.
+    /// Joint names in the order of the message.
     joints: Vec<String>,
     largest: f64,
 }
 
-/// Collects from every message of a file.
+/// Collects counts and samples from every message of a file.
 #[derive(Default)]
 pub(super) struct Collector {
-    /// By topic; one topic may have several types.
+    /// Contents of each topic; one topic may have several types.
     seen: BTreeMap<String, Vec<Seen>>,
 }
 
@@ -102,7 +102,7 @@ impl Collector {
     }
 }
 
-/// `sensor_msgs/JointState` for `sensor_msgs/msg/JointState`.
+/// Returns `sensor_msgs/JointState` for `sensor_msgs/msg/JointState`.
 fn plain(schema: &str) -> String {
     schema.replace("/msg/", "/")
 }
@@ -152,7 +152,7 @@ impl Seen {
     }
 
     fn may_be(&self, schema: &str) -> Option<String> {
-        // Foxglove's types have dots.
+        // Foxglove's type names have dots.
         let (_, name) = schema.rsplit_once(['/', '.']).unwrap_or(("", schema));
         let may_be = match name {
             "JointState" | "JointStates" => self.joint_sensors(),

@@ -1,8 +1,8 @@
-//! How far an arm left the straight lines that it was commanded along, from a recording.
+//! Tracking error of an arm against the straight lines that it was commanded along, from a recording.
 //!
 //! Set-points that lie on one line make an edge. Each reading on it is compared with the nearest point of the line,
-//! joint by joint: what is left over is what the joints lag, droop and overshoot each in its own way, which planning
-//! bounds by robot.toml's `[motion]` (`plan::Stray`).
+//! joint by joint. The remaining distance is the part of lag, droop and overshoot in which the joints differ. Planning
+//! bounds it by robot.toml's `[motion]` (`plan::Stray`).
 
 use serde::Serialize;
 
@@ -12,46 +12,46 @@ use armcal_core::sensor::ArmSensors;
 use armcal_core::streams::{JointAngles, JointCounts, Message};
 use armcal_core::time::Stamp;
 
-/// Set-points within this of a line are on it, rad.
+/// Largest distance of a set-point on the line, rad.
 const ON_LINE_RAD: f64 = 1e-3;
-/// Shorter edges are left out, rad.
+/// Shortest edge that counts, rad.
 const SHORTEST_RAD: f64 = 0.05;
-/// Set-points farther apart belong to no one edge: what is between them was not recorded, s.
+/// Longest gap between set-points of one edge, s: the motion in a longer gap was not recorded.
 const LONGEST_GAP_S: f64 = 1.0;
-/// Readings are looked at for so long after the last set-point of an edge, s.
+/// Time after the last set-point of an edge during which readings count, s.
 const AFTER_S: f64 = 0.5;
-/// Readings this far along an edge are at its end.
+/// Share of the edge from which a reading is at its end.
 const AT_END: f64 = 0.999;
-/// Joints that are slower than this share of their full rate are left out where overshoot is told by the rate.
+/// Least share of a joint's full rate at which its overshoot counts.
 const LEAST_RATE_SHARE: f64 = 0.1;
-/// Multiple of the sensor's noise that a reading may be off beside, and the controller's rest, rad.
+/// Allowance for the sensor's noise, in standard deviations of one reading.
 const NOISE_SIGMAS: f64 = 4.0;
 
-/// What the readings on all edges show.
+/// Tracking error of all edges.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TrackingError {
     pub n_edges: usize,
     pub n_readings: usize,
-    /// Readings of which some joint is off the line by more than the bound and its noise, on the way and where the edge
-    /// ends.
+    /// Number of readings with some joint off the line by more than its bound and noise: on the way, and at the edge's
+    /// end.
     pub n_beyond: [usize; 2],
     pub joints: Vec<JointTrackingError>,
 }
 
-/// The same of one joint, noise taken off.
+/// Tracking error of one joint, less the allowance for noise.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct JointTrackingError {
     pub name: String,
     /// Largest distance from the line, rad.
     pub most_rad: f64,
-    /// The same over the rate that the edge has there, where that is at least a third of the edge's largest, s.
+    /// Largest distance over the edge's rate there, s. Only rates of at least a third of the edge's largest count.
     pub most_lag_s: f64,
-    /// Largest distance while the edge ends, rad.
+    /// Largest distance at the edge's end, rad.
     pub most_at_end_rad: f64,
-    /// The least `overshoot_rad` of `[motion]` that covers the ends of all edges on which it has a tenth of its rate or
-    /// more.
+    /// The least `overshoot_rad` of `[motion]` that covers the ends of all edges on which the joint has at least a
+    /// tenth of its rate.
     pub most_overshoot_rad: f64,
-    /// Largest share of the bound.
+    /// Largest share of the bound that the distance reached.
     pub most_of_bound: f64,
 }
 
@@ -122,7 +122,7 @@ fn edges(commands: &[(Stamp, JointAngles)]) -> Vec<Edge> {
     let mut edges = Vec::new();
     let mut first = 0;
     while first + 1 < commands.len() {
-        // Rest before the edge is no part of it, nor a gap of the recording.
+        // Neither rest before the edge nor a gap of the recording belongs to the edge.
         let is_gap = commands[first + 1].0.since_s(commands[first].0) > LONGEST_GAP_S;
         if is_gap || commands[first].1.max_abs_difference(&commands[first + 1].1) < 1e-9 {
             first += 1;
@@ -154,7 +154,7 @@ fn is_line(points: &[(Stamp, JointAngles)]) -> bool {
     })
 }
 
-/// The nearest point of a line, and its share of the way.
+/// Returns the share of the way to the nearest point of the line, and that point.
 fn nearest(from: &JointAngles, to: &JointAngles, at: &JointAngles) -> (f64, JointAngles) {
     let (mut along, mut length) = (0.0, 0.0);
     for joint in 0..from.len() {
@@ -171,7 +171,7 @@ impl TrackingError {
         let (share, on_line) = nearest(&edge.from, &edge.to, reading);
         let timing = Timing::new(robot);
         let duration_s = edge.end.since_s(edge.start);
-        // Set-points begin and end with a rest of a period or so, by which the edge seems quicker than it was.
+        // Set-points begin and end with about one period of rest, which makes the edge look quicker than it was.
         let slowness = f64::max(duration_s / timing.least_duration_s(&edge.from, &edge.to), 1.0);
         let tracking_error =
             TrackingErrorBound::new(robot, &timing, &Motion { from: edge.from, to: edge.to, time_scale: slowness });
@@ -193,7 +193,7 @@ impl TrackingError {
             }
             if share >= AT_END {
                 found.most_at_end_rad = found.most_at_end_rad.max(off_rad);
-                // What does not move by itself tells nothing of how far a moving joint overshoots.
+                // A joint that hardly moves by itself does not show how far a moving joint overshoots.
                 if tracking_error.end_rad(joint) > LEAST_RATE_SHARE * robot.drive.motion.overshoot_rad {
                     let full_rad = off_rad * robot.drive.motion.overshoot_rad / tracking_error.end_rad(joint);
                     found.most_overshoot_rad = found.most_overshoot_rad.max(full_rad);
@@ -209,7 +209,7 @@ impl TrackingError {
         self.n_beyond[usize::from(share >= AT_END)] += usize::from(is_beyond);
     }
 
-    /// As a table.
+    /// Table of the joints, with the counts above it.
     pub(super) fn to_text(&self) -> String {
         let [moving, at_end] = self.n_beyond;
         let mut text = format!(
@@ -276,9 +276,9 @@ mod tests {
         let study = motions.finish(&robot).expect("edges were driven");
         assert_eq!(study.n_edges, 2, "{}", study.to_text());
         let lags: Vec<f64> = study.joints.iter().map(|joint| joint.most_lag_s).collect();
-        // Against the nearest point of the line joint 0 is late by `lag (1 - u_0^2)` and the others by `-lag u_0^2`, u
-        // the edge's direction: 0.139 s on the second edge, 0.083 s on the first. While the rate falls, what was lost
-        // at a higher rate counts for more; the largest is up to 1.4 times that.
+        // Distances are to the nearest point of the line, with u the edge's direction: joint 0 is late by `lag (1 -
+        // u_0^2)`, the others by `-lag u_0^2`. Joint 0 has 0.139 s on the second edge, 0.083 s on the first. While the
+        // rate falls, distance lost at a higher rate counts for more; the largest is up to 1.4 times that.
         assert!((0.139..0.139 * 1.4).contains(&lags[0]), "{lags:?}");
         assert!(lags[1..3].iter().all(|lag| (0.083..0.083 * 1.4).contains(lag)), "{lags:?}");
         assert!(lags[3..].iter().all(|lag| *lag == 0.0), "{lags:?}");

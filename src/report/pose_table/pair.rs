@@ -1,4 +1,4 @@
-//! Two tables, one of the joints and one of what the camera saw: which is which, and what joins their rows.
+//! Roles of two tables, one of the joints and one of the camera's measurements, and the columns that join their rows.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -9,24 +9,24 @@ use crate::report::proposed_map::ProposalError;
 use armcal_core::input::{TableContents, plain_key, read_table_contents};
 use armcal_core::robot::Robot;
 
-/// A table as it was looked at.
+/// An inspected table.
 #[derive(Clone, Debug)]
 pub struct LookedAt {
-    /// Its file.
+    /// Path of the table's file.
     pub path: PathBuf,
-    /// Its columns and first cells.
+    /// Columns and first cells of the table.
     pub contents: TableContents,
 }
 
 /// Columns that join two tables.
 pub(super) enum ProposedJoin {
-    /// Columns of times: that of the tags.
+    /// Join by time: the column of times in the tags' table.
     Time(String),
-    /// Columns of texts: of the joints, and of the tags.
+    /// Join by equal texts: the columns of the joints' and of the tags' table.
     Key([String; 2]),
 }
 
-/// Two tables that belong together.
+/// A table of the joints and its table of the tags.
 pub(super) struct TablePair<'a> {
     pub joints: &'a LookedAt,
     pub tags: &'a LookedAt,
@@ -34,16 +34,16 @@ pub(super) struct TablePair<'a> {
     pub join: ProposedJoin,
 }
 
-/// Words of a column that names an image.
+/// Words in the name of a column that names an image.
 const IMAGES: [&str; 6] = ["image", "img", "frame", "file", "picture", "photo"];
-/// Rows of the tags whose key a row of the joints has, of those that were looked at.
+/// Least share of the inspected tag rows whose key a joint row must have.
 const MOST: f64 = 0.5;
-/// Rows of the joints with a key of their own; `calibrate` names those that have not.
+/// Least share of the joint rows that must have a key of their own; `calibrate` names the others.
 const ONCE: f64 = 0.9;
-/// Tables that are looked at next to one.
+/// Number of tables in the same folder that are inspected.
 const MAX_NEIGHBOURS: usize = 20;
 
-/// Orders two tables and finds what joins them.
+/// Orders two tables and finds the columns that join them.
 pub(super) fn pair<'a>([a, b]: [&'a LookedAt; 2], robot: Option<&Robot>) -> Result<TablePair<'a>, ProposalError> {
     let roles = |of: &LookedAt| Roles::of(&of.contents, robot);
     let sides = [(a, b, roles(a), roles(b)), (b, a, roles(b), roles(a))];
@@ -81,7 +81,7 @@ pub(super) fn pair<'a>([a, b]: [&'a LookedAt; 2], robot: Option<&Robot>) -> Resu
     }
 }
 
-/// An image's name, else times, else another column with the same texts.
+/// Join of two tables: an image's name, else times, else another column with the same texts.
 fn join([joints, tags]: [&LookedAt; 2], [of_joints, of_tags]: [&Roles; 2]) -> Option<ProposedJoin> {
     let keys = keys([joints, tags], [of_joints, of_tags]);
     let is_image = |name: &String| IMAGES.iter().any(|word| name.to_lowercase().contains(word));
@@ -105,7 +105,7 @@ fn is_rising(joints: &LookedAt, roles: &Roles) -> bool {
     joints.contents.columns.iter().any(|column| Some(&column.name) == roles.time.as_ref() && column.is_rising)
 }
 
-/// Columns of both tables whose first cells agree, those with the same name first.
+/// Pairs of columns, one per table, whose first cells agree; those with the same name first.
 fn keys([joints, tags]: [&LookedAt; 2], [of_joints, of_tags]: [&Roles; 2]) -> Vec<[String; 2]> {
     let free = |of: &LookedAt, roles: &Roles| {
         let is_free = |name: &String| ["", "time"].contains(&roles.of_column(name)) && !name.is_empty();
@@ -132,7 +132,8 @@ fn keys([joints, tags]: [&LookedAt; 2], [of_joints, of_tags]: [&Roles; 2]) -> Ve
     found
 }
 
-/// Numbers of rows agree at first in any two tables, and then run beyond those of the joints.
+/// True if the tags' keys stay within the joints' keys. Row numbers agree at first in any two tables, then exceed the
+/// joints'.
 fn is_within(joints: &TableContents, [of_joint, of_tag]: [&String; 2], tags: &TableContents) -> bool {
     let range = |table: &TableContents, name: &String| table.columns.iter().find(|c| c.name == *name)?.range;
     match (range(joints, of_joint), range(tags, of_tag)) {
@@ -154,7 +155,7 @@ pub(super) fn apart_s(pair: &TablePair<'_>) -> Option<f64> {
     (of_tags[1] < of_joints[0] || of_tags[0] > of_joints[1]).then(|| of_joints[0] - of_tags[0])
 }
 
-/// Tables in the folder of `table` with what it lacks; none where it lacks neither joints nor what the camera saw.
+/// Tables in the folder of `table` that have what it lacks; empty unless it lacks exactly one of joints and tags.
 #[must_use]
 pub fn neighbours(table: &LookedAt, robot: Option<&Robot>) -> Vec<LookedAt> {
     let roles = Roles::of(&table.contents, robot);
@@ -168,7 +169,7 @@ pub fn neighbours(table: &LookedAt, robot: Option<&Robot>) -> Vec<LookedAt> {
     let others = paths.into_iter().filter(|path| path.file_name() != table.path.file_name());
     let looked_at = others.filter_map(|path| {
         let contents = read_table_contents(&path)?.ok()?;
-        // As the user named the folder.
+        // The path begins as the user named the folder.
         let path = table.path.with_file_name(path.file_name()?);
         Some(LookedAt { path, contents })
     });

@@ -12,13 +12,13 @@ use armcal_core::kind::Kind;
 use armcal_core::robot::Robot;
 use armcal_core::schema::first_line;
 
-/// No joint of an arm turns more than two turns either way.
+/// Largest angle in rad: no joint of an arm turns more than two turns either way.
 const MAX_RAD: f64 = 4.0 * std::f64::consts::PI;
-/// A robot folder whose readings are radians has one count per radian.
+/// Tolerance of a scale of one count per radian, as a robot folder with readings in radians has it.
 const RADIANS_WITHIN: f64 = 1e-6;
-/// No camera of an arm sees a tag farther away, m; larger numbers are millimetres. Assumed.
+/// Largest distance of a tag from the camera, m; larger numbers are millimetres. Assumed.
 const MAX_DISTANCE_M: f64 = 20.0;
-/// Rotation vectors and angles in radians are smaller.
+/// Limit of rotation vectors and angles in radians; larger numbers are degrees.
 const MAX_TURN_RAD: f64 = 7.0;
 
 /// The text of an input map for a table, or for two that hold joints and tags; with `robot`, joints are matched to
@@ -46,9 +46,9 @@ pub fn propose_table_map(
 /// A proposed input map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProposedTableMap {
-    /// Its TOML.
+    /// The map as TOML.
     pub text: String,
-    /// The table that `calibrate` takes.
+    /// Path of the table that `calibrate` takes.
     pub recording: PathBuf,
 }
 
@@ -152,7 +152,7 @@ fn column_of<'a>(table: &'a TableContents, name: &String) -> Option<&'a TableCol
     table.columns.iter().find(|column| column.name == *name)
 }
 
-/// The largest number in the columns, without its sign.
+/// The largest absolute value in the columns.
 fn largest<'a>(table: &TableContents, names: impl IntoIterator<Item = &'a String>) -> f64 {
     let ranges = names.into_iter().filter_map(|name| column_of(table, name)?.range);
     ranges.flatten().map(f64::abs).fold(0.0, f64::max)
@@ -202,7 +202,7 @@ fn list(names: &[String]) -> String {
     names.iter().map(|name| quoted(name)).collect::<Vec<_>>().join(", ")
 }
 
-/// Corners of tags where a column has the tag's number, otherwise of a board.
+/// Lines for corners: of tags where a column has the tag's number, otherwise of a board.
 fn corners(table: &TableContents, roles: &Roles) -> String {
     let pixel = roles.pixel.as_ref().map_or(String::new(), |pixel| list(pixel));
     let id = roles.id.as_ref().map_or(String::new(), |id| quoted(id));
@@ -220,7 +220,7 @@ fn corners(table: &TableContents, roles: &Roles) -> String {
     format!("use = \"corners\"\n\n[tags.columns]\nid = {id}   # the tag's number\n{of_tag}{order}")
 }
 
-/// The keys of `[tags]`.
+/// Lines of `[tags]`.
 fn tags(table: &TableContents, roles: &Roles) -> String {
     let Some(position) = &roles.position else { return corners(table, roles) };
     let mut text = String::new();

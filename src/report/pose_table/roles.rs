@@ -5,21 +5,21 @@ use std::collections::{BTreeMap, BTreeSet};
 use armcal_core::input::{TableColumn, TableContents, tag_number};
 use armcal_core::robot::{Robot, likely_name};
 
-/// Three columns of one place, or three or four of one rotation.
+/// Three columns of one position, or three or four of one rotation.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Columns {
     pub names: Vec<String>,
-    /// The part of the names that they share.
+    /// Common part of the columns' names.
     stem: String,
 }
 
-/// The rotation's columns and the form that the input map names.
+/// Columns of the rotation, and its form as the input map names it.
 pub(super) type Rotation = (Columns, &'static str);
 
 /// Roles that the columns may have.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Roles {
-    /// The robot's joint, or without a robot the column itself, to the column.
+    /// Pairs of joint and column; without a robot the column's name is the joint.
     pub joints: Vec<(String, String)>,
     /// Joints of the robot without a column.
     pub missing_joints: Vec<String>,
@@ -28,20 +28,20 @@ pub(super) struct Roles {
     pub other_positions: Vec<Columns>,
     pub rotation: Option<Rotation>,
     pub pixel: Option<[String; 2]>,
-    /// A corner's number, where the tag's is in another column.
+    /// Column of a corner's number, where the tag's is in another column.
     pub corner: Option<String>,
     /// Columns of a tag's four corners.
     pub corners: Option<[String; 8]>,
     pub id: Option<String>,
 }
 
-/// Names of a column of times, of ids, and words for what the camera sees and for the arm itself.
+/// Names of a column of times.
 const TIMES: [&str; 8] = ["t", "time", "stamp", "timestamp", "secs", "seconds", "nanos", "time_s"];
 const IDS: [&str; 9] = ["id", "tag", "tag_id", "tagid", "tag_number", "marker", "marker_id", "aruco_id", "landmark"];
 const CORNERS: [&str; 5] = ["corner", "corner_id", "corner_index", "corner_idx", "point"];
 /// Names of a corner's two columns, u and v.
 const PIXELS: [[&str; 2]; 4] = [["u", "v"], ["x", "y"], ["px", "py"], ["u_px", "v_px"]];
-/// Longer names of columns are not looked into.
+/// Longest name of a column that is searched for roles.
 const MAX_NAME: usize = 100;
 const SEEN_WORDS: [&str; 10] =
     ["tag", "board", "marker", "target", "track", "cam", "object", "pattern", "aruco", "landmark"];
@@ -106,7 +106,7 @@ impl Roles {
         }
     }
 
-    /// Columns called `q1`, `q2` .. are the joints in the robot's order, where there are as many.
+    /// Assigns columns called `q1`, `q2` .. to the joints in the robot's order, if their number is that of the joints.
     fn number_joints(&mut self, names: &[String], robot: &Robot) {
         let used = self.used();
         let free: Vec<&String> = names.iter().filter(|name| !used.contains(name) && is_joint_name(name)).collect();
@@ -117,7 +117,7 @@ impl Roles {
         }
     }
 
-    /// The role of one column, in words.
+    /// The role of one column in words.
     pub fn of_column(&self, name: &String) -> &'static str {
         let is_of = |columns: &Columns| columns.names.contains(name);
         if self.joints.iter().any(|(_, column)| column == name) {
@@ -142,7 +142,7 @@ impl Roles {
     }
 }
 
-/// The column that is called as one of times, of numbers or dates; without one the first column of dates.
+/// Column of times: one with such a name that holds numbers or dates, else the first column of dates.
 fn time(columns: &[TableColumn]) -> Option<String> {
     let is_called = |column: &&TableColumn| {
         let name = column.name.to_lowercase();
@@ -152,12 +152,12 @@ fn time(columns: &[TableColumn]) -> Option<String> {
     called.or_else(|| columns.iter().find(|column| column.n_dates > 0)).map(|column| column.name.clone())
 }
 
-/// Cells such as `tag36h11:3` instead of numbers.
+/// True if the cells are names such as `tag36h11:3` instead of numbers.
 pub(super) fn is_of_tags(column: &TableColumn) -> bool {
     column.n_numbers == 0 && column.first_other.as_deref().and_then(tag_number).is_some()
 }
 
-/// The last word of a path, as it is compared: `Tag ID` and `tag.id [-]` are `tag_id` and `id`.
+/// The last word of a path in the form for comparison: `Tag ID` and `tag.id [-]` become `tag_id` and `id`.
 fn last_part(name: &str) -> String {
     let without_unit = name.split(['[', '(']).next().map_or("", str::trim);
     let last = without_unit.rsplit('.').next().unwrap_or(name);
@@ -187,7 +187,7 @@ pub(super) fn unit_of_time(column: &TableColumn) -> (&'static str, f64) {
     *by_date.or(by_steps).unwrap_or(&UNITS[3])
 }
 
-/// `q1`, `j_2`, `joint3.position`, or a number alone.
+/// True if the name is `q1`, `j_2`, `joint3.position`, or only a number.
 fn is_joint_name(name: &str) -> bool {
     let name = name.to_lowercase();
     let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
@@ -198,14 +198,14 @@ fn is_joint_name(name: &str) -> bool {
         || (is_numbered && (stem.ends_with(".q") || stem.ends_with("joints")))
 }
 
-/// All sets of columns whose names differ in x, y, z alone, with w where it is there.
+/// All sets of columns whose names differ only in x, y, z, including w where it exists.
 fn triples(names: &[String]) -> Vec<Columns> {
     let has = |name: &String| names.contains(name);
     let mut found = Vec::new();
     for name in names {
         let lower = name.to_lowercase();
         let Some(at) = lower.rfind('x').filter(|_| name.is_ascii()) else { continue };
-        // Within a word, x is a letter as any other.
+        // Inside a word, x is an ordinary letter.
         let is_end = at + 1 == name.len() || !name[at + 1..].starts_with(|c: char| c.is_ascii_alphanumeric());
         let upper = name[at..].starts_with('X');
         let with = |letter: char| {
@@ -234,7 +234,7 @@ fn extracted(all: &mut Vec<Columns>, is: impl Fn(&Columns) -> bool) -> Vec<Colum
     found
 }
 
-/// Lower for names of what a camera sees than for those of the arm.
+/// Rank of a column for the camera's measurements: words for them rank before words for the arm.
 fn seen_rank(stem: &str) -> u32 {
     let has = |words: &[&str]| words.iter().any(|word| stem.contains(word));
     match (has(&SEEN_WORDS), has(&ARM_WORDS)) {
@@ -263,7 +263,7 @@ fn rotation(names: &[String], found: Vec<Columns>, position_stem: &str) -> Optio
     Some((Columns { names: vec![roll, pitch, yaw], stem: lower[..at].to_owned() }, "fixed_xyz"))
 }
 
-/// Nine columns such as `r11` to `r33`, or `r00` to `r22`.
+/// Columns of a rotation matrix, such as `r11` to `r33`, or `r00` to `r22`.
 fn matrix(names: &[String]) -> Option<Columns> {
     names.iter().find_map(|name| {
         let counted = [("11", 1), ("00", 0)].into_iter().find_map(|(end, from)| Some((name.strip_suffix(end)?, from)));
@@ -279,7 +279,8 @@ fn pixel(names: &[String]) -> Option<[String; 2]> {
     Some([find(["u", "px", "u_px"])?, find(["v", "py", "v_px"])?])
 }
 
-/// Columns such as `u0`, `v0` to `u3`, `v3`, `corner1_x` to `corner4_y`, or `corners.0.0` to `corners.3.1`.
+/// Columns of four corners, such as `u0`, `v0` to `u3`, `v3`, `corner1_x` to `corner4_y`, or `corners.0.0` to
+/// `corners.3.1`.
 fn four_corners(names: &[String]) -> Option<[String; 8]> {
     let all: BTreeSet<&str> = names.iter().map(String::as_str).collect();
     let with = |(before, after): (&str, &str), from: usize| {
@@ -293,7 +294,7 @@ fn four_corners(names: &[String]) -> Option<[String; 8]> {
         Some([a, b, c, d, e, f, g, h])
     };
     names.iter().filter(|name| name.len() <= MAX_NAME).find_map(|name| {
-        // The first corner's first column: its digit, and next to it or at the end the letter.
+        // The digit of the first corner's column, and the letter next to it or at the end.
         name.char_indices().filter(|(_, digit)| ['0', '1'].contains(digit)).find_map(|(at, digit)| {
             let (before, after) = (&name[..at], &name[at + 1..]);
             let letter_and_before = before.trim_end_matches(['_', '.', '-']);

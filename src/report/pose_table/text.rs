@@ -1,4 +1,4 @@
-//! A table in plain lines, and as data.
+//! A table as plain lines, and as data.
 
 use std::path::Path;
 
@@ -12,12 +12,12 @@ use armcal_core::robot::Robot;
 use armcal_core::text::printable;
 use armcal_core::time::utc;
 
-/// One column as `inspect --json` has it.
+/// One column in the output of `inspect --json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ColumnInspection {
     name: String,
     numbers: usize,
-    /// Dates instead of numbers; the range is their seconds since 1970.
+    /// Number of dates; their range is in seconds since 1970.
     #[serde(skip_serializing_if = "is_zero")]
     dates: usize,
     empty: usize,
@@ -25,7 +25,7 @@ pub struct ColumnInspection {
     range: Option<[f64; 2]>,
     #[serde(skip_serializing_if = "str::is_empty")]
     may_be: &'static str,
-    /// The first cell that is neither.
+    /// The first cell that is neither number nor date.
     #[serde(skip_serializing_if = "Option::is_none")]
     other: Option<String>,
 }
@@ -48,10 +48,10 @@ fn is_zero(n: &usize) -> bool {
     *n == 0
 }
 
-/// Columns that are printed.
+/// Largest number of columns that are printed.
 const MOST_COLUMNS: usize = 60;
 
-/// Looks at a table.
+/// Inspects a table.
 #[must_use]
 pub fn inspect_table(path: &Path, table: &TableContents, robot: Option<&Robot>) -> TableInspection {
     let roles = Roles::of(table, robot);
@@ -76,7 +76,7 @@ pub fn inspect_table(path: &Path, table: &TableContents, robot: Option<&Robot>) 
     }
 }
 
-/// Reasons for which `calibrate` cannot read the table.
+/// Reasons that `calibrate` cannot read the table.
 fn missing(table: &TableContents, roles: &Roles) -> Vec<String> {
     let mut missing: Vec<String> = [missing_joints(roles), missing_seen(roles)].into_iter().flatten().collect();
     for column in gaps(table, roles) {
@@ -87,13 +87,13 @@ fn missing(table: &TableContents, roles: &Roles) -> Vec<String> {
     missing
 }
 
-/// A value of a column that holds `n_dates` dates, as its cells have it: the number, or the date of these seconds since
-/// 1970.
+/// A value of a column in the form of its cells: a number, or a date where the column holds dates (`n_dates` above
+/// zero).
 pub(super) fn cell_of(n_dates: usize, value: f64) -> String {
     if n_dates > 0 { utc((1e3 * value).round() as u64 * 1_000_000) } else { value.to_string() }
 }
 
-/// Columns of joints that a map would need.
+/// Columns of joints that a map would still need.
 pub(super) fn missing_joints(roles: &Roles) -> Option<String> {
     match (roles.missing_joints.is_empty(), roles.joints.is_empty()) {
         (false, _) => Some(format!("columns of the robot's joints {:?}", roles.missing_joints)),
@@ -102,7 +102,7 @@ pub(super) fn missing_joints(roles: &Roles) -> Option<String> {
     }
 }
 
-/// Columns of what the camera saw that a map would need.
+/// Columns of the camera's measurements that a map would still need.
 pub(super) fn missing_seen(roles: &Roles) -> Option<String> {
     let missing = match (&roles.position, &roles.pixel, &roles.corners) {
         (None, None, None) => {
@@ -116,7 +116,7 @@ pub(super) fn missing_seen(roles: &Roles) -> Option<String> {
     Some(missing.to_owned())
 }
 
-/// Columns with a role in which rows lack a number.
+/// Columns with a role in which some rows lack a number.
 pub(super) fn gaps<'a>(table: &'a TableContents, roles: &Roles) -> Vec<&'a TableColumn> {
     let has_gaps = |column: &&TableColumn| {
         column.n_empty + column.n_others > 0 && !roles.of_column(&column.name).is_empty() && !is_of_tags(column)

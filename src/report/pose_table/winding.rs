@@ -1,18 +1,18 @@
-//! Which way round the corners of a table's tags run in the image.
+//! Winding of the corners of a table's tags in the image.
 
 use std::collections::BTreeMap;
 
 use super::roles::Roles;
 use armcal_core::input::{TableContents, tag_number};
 
-/// Tags of the first rows, counted by the way round of their corners.
+/// Counts of the tags in the first rows by the winding of their corners.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Windings {
     pub clockwise: usize,
     pub counter_clockwise: usize,
-    /// Neither: two sides cross.
+    /// Tags that are neither: two sides cross.
     pub crossed: usize,
-    /// Of these, clockwise with the last two exchanged.
+    /// Crossed tags that are clockwise once their last two corners are exchanged.
     pub row_by_row: usize,
 }
 
@@ -37,7 +37,7 @@ impl Windings {
         self.clockwise + self.counter_clockwise + self.crossed
     }
 
-    /// The line of the input map with its reason.
+    /// The line of the input map for the corners' order, with its reason.
     pub fn corner_order(self) -> String {
         /// Corners of a tag seen from afar may lie on a line.
         const NEARLY_ALL: f64 = 0.9;
@@ -68,9 +68,9 @@ enum Way {
     CounterClockwise,
 }
 
-/// `None` where the corners are not around a convex shape.
+/// Winding of four corners; `None` where they do not form a convex shape.
 fn way_round(corners: [[f64; 2]; 4]) -> Option<Way> {
-    // v counts downwards, so that a turn from u to v is clockwise.
+    // v counts downwards, so a turn from u to v is clockwise.
     let turns = [0, 1, 2, 3].map(|k| {
         let [a, b, c] = [0, 1, 2].map(|step| corners[(k + step) % 4]);
         (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
@@ -82,7 +82,7 @@ fn way_round(corners: [[f64; 2]; 4]) -> Option<Way> {
     }
 }
 
-/// The start corner, which the cells do not show.
+/// Text on the start corner, which the cells do not show.
 fn first_corner([n, of]: [usize; 2], [way, first, other]: [&str; 3]) -> String {
     format!(
         "{way} in {n} of {of} tags\n# The first corner is taken as {first} as printed. Where it is another one \

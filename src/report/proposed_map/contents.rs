@@ -1,4 +1,4 @@
-//! What of a recording an input map may name.
+//! Contents of a recording that an input map may name.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,14 +10,14 @@ use armcal_core::log::ros::{
 use armcal_core::log::{RawMessage, RosMessage, decode, is_type};
 use armcal_core::time::Stamp;
 
-/// Messages of a topic that are decoded.
+/// Number of a topic's messages that are decoded.
 const MAX_SAMPLES: u64 = 1000;
-/// Times of one topic that are kept: 16 bytes each.
+/// Number of one topic's times that are kept: 16 bytes each.
 const MAX_TIMES: usize = 2_000_000;
-/// Topics, and names or frames of one topic, that are kept.
+/// Number of topics, and of names or frames of one topic, that are kept.
 const MAX_NAMES: usize = 2000;
 
-/// What a topic may be for.
+/// Possible use of a topic.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Kind {
     Joints,
@@ -52,12 +52,11 @@ impl Kind {
     }
 }
 
-/// One topic.
+/// Contents of one topic.
 #[derive(Debug, Default)]
 pub(super) struct Topic {
     pub kind: Kind,
-    /// Name of the messages' type.
-    /// Its type, with the encoding where that is not read.
+    /// Name of the messages' type, with the encoding where that is not read.
     pub schema: String,
     pub is_cdr: bool,
     pub messages: u64,
@@ -69,11 +68,11 @@ pub(super) struct Topic {
     pub frames: BTreeSet<(String, String)>,
     /// Numbers of detected tags, or of a board's corners.
     pub ids: BTreeSet<i32>,
-    /// Detections that have an outline, as tags do.
+    /// Number of detections that have an outline, as tags do.
     pub outlines: u64,
-    /// Frame of the first message with one.
+    /// Frame of the first message that names one.
     pub frame: String,
-    /// Image size of the first usable lens, px; else why the first lens is of no use.
+    /// Image size of the first usable lens, px; otherwise the reason that the first lens is unusable.
     pub lens: Option<Result<[u32; 2], String>>,
     /// The highest column and row of a corner, px.
     pub extent_px: [f64; 2],
@@ -114,13 +113,14 @@ impl Contents {
     }
 }
 
-/// A corner of a board is a detection without one: nothing but its centre is a place in the image.
+/// True if the tag has an outline. A board's corner is a detection without one: only its centre is a place in the
+/// image.
 fn has_outline(tag: &AprilTagDetection) -> bool {
     tag.corners.iter().any(|corner| *corner != tag.corners[0])
 }
 
 impl Topic {
-    /// Whether all that was detected there are places without an outline: corners of a board.
+    /// True if no detection has an outline: they are corners of a board.
     pub fn has_board_corners(&self) -> bool {
         !self.ids.is_empty() && self.outlines == 0
     }
@@ -131,7 +131,7 @@ impl Topic {
     }
 
     fn note_time(&mut self, raw: &RawMessage<'_>) {
-        // A message of transforms begins with their number.
+        // A message of transforms begins with their count.
         let skip = match self.kind {
             Kind::Joints | Kind::Detections | Kind::Images => 0,
             Kind::Transforms => 4,

@@ -8,13 +8,13 @@ use armcal_core::robot::{Robot, likely_name};
 use super::contents::{Contents, Kind, Topic};
 use super::{others, quoted};
 
-/// No joint of an arm turns more than two turns either way.
+/// Largest angle in rad: no joint of an arm turns more than two turns either way.
 const MAX_RAD: f64 = 4.0 * std::f64::consts::PI;
-/// A robot folder whose readings are radians has one count per radian.
+/// Tolerance of a scale of one count per radian, as a robot folder with readings in radians has it.
 const RADIANS_WITHIN: f64 = 1e-6;
 
-/// The topic and the text of `[joint_sensors]`; the error is that there is no topic (`None`), or what is wrong with
-/// them all.
+/// Returns the topic and the text of `[joint_sensors]`. The error is `None` without a topic of joints, else the fault
+/// of all such topics.
 pub(super) fn choose_joints(contents: &Contents, robot: Option<&Robot>) -> Result<(String, String), Option<String>> {
     let wanted = robot.map(Robot::joint_names).unwrap_or_default();
     let n_needed = robot.map_or(0, |robot| robot.camera.mount.n_joints);

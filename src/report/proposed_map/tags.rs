@@ -1,4 +1,4 @@
-//! The choice of the tags: detections before transforms before images.
+//! The choice of the tags: detections first, then transforms, then images.
 
 use std::collections::BTreeMap;
 
@@ -9,12 +9,12 @@ use super::{comment, others, quoted};
 const CAMERA_WORDS: [&str; 3] = ["cam", "optical", "fisheye"];
 const TAG_WORDS: [&str; 8] = ["tag", "board", "marker", "target", "aruco", "landmark", "fiducial", "pattern"];
 
-/// One landmark, or all numbered ones of a name, seen from one camera.
+/// One landmark, or all numbered landmarks of a name, seen from one camera.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Candidate {
     topic: String,
     camera: String,
-    /// As `tags.child_frame` has it.
+    /// Child frame in the form of `tags.child_frame`.
     child: String,
 }
 
@@ -50,8 +50,8 @@ fn of_detections(contents: &Contents) -> Option<(String, String)> {
     Some((name.clone(), text))
 }
 
-/// The line with the lens of a camera whose detections or images are on that topic: of the camera_info with the same
-/// frame, with all corners in its image and with the most similar name. A comment where none is usable.
+/// The line that names a camera's lens for the detections or images on that topic. It prefers the camera_info with the
+/// same frame, all corners in its image and the most similar name. A comment where none is usable.
 fn camera_info(contents: &Contents, (name, topic): (&str, &Topic)) -> String {
     let shared = |other: &str| other.chars().zip(name.chars()).take_while(|(a, b)| a == b).count();
     let rank = |(of, info): &(&String, &Topic)| {
@@ -71,7 +71,7 @@ fn camera_info(contents: &Contents, (name, topic): (&str, &Topic)) -> String {
     line + &others("other lenses", rest)
 }
 
-/// The best of all pairs of frames by their names; all of them are named beside it.
+/// The best pair of frames by their names; a comment lists all other pairs.
 fn of_transforms(contents: &Contents) -> Option<(String, String)> {
     let mut found: BTreeMap<Candidate, u32> = BTreeMap::new();
     for (name, topic) in contents.of_kind(Kind::Transforms) {
@@ -87,7 +87,7 @@ fn of_transforms(contents: &Contents) -> Option<(String, String)> {
             }
         }
     }
-    // One pair of frames alone can only be the camera and what it saw.
+    // A single pair of frames can only be the camera and its target.
     let least = if found.len() <= 2 { 0 } else { 4 };
     let (best, _) = found.iter().filter(|(_, score)| **score >= least).min_by_key(|(_, score)| u32::MAX - **score)?;
     let pairs: Vec<String> = found
@@ -127,7 +127,8 @@ fn has_word(frame: &str, words: &[&str]) -> bool {
     words.iter().any(|word| frame.contains(word))
 }
 
-/// `tag36h11:{id}` for `tag36h11:7`; a plain name otherwise. Braces are no part of names that maps can hold.
+/// Pattern of a numbered frame: `tag36h11:{id}` for `tag36h11:7`; a plain name otherwise. Names that maps can hold have
+/// no braces.
 fn pattern(frame: &str) -> String {
     let stem = frame.trim_end_matches(|c: char| c.is_ascii_digit());
     let is_number = frame[stem.len()..].parse::<u32>().is_ok();

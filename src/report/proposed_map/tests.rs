@@ -53,7 +53,7 @@ impl Given {
         (self.folder, found.map(|text| text.replace(&named, "FOLDER")))
     }
 
-    /// Why nothing can be proposed.
+    /// Reason that nothing can be proposed.
     fn missing(self, robot: Option<&Robot>) -> String {
         let (folder, found) = self.proposed(robot);
         found.expect_err("something is missing").to_string().replace(&folder.path().display().to_string(), "FOLDER")

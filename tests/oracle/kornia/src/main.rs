@@ -34,7 +34,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         for tag in found {
             print!(" {}", tag.id);
             for corner in tag.quad.corners {
-                // As the C library, it has pixel centres at halves.
+                // It has pixel centres at halves, as the C library.
                 print!(" {:.4} {:.4}", corner.x - 0.5, corner.y - 0.5);
             }
             println!();
