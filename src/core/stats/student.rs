@@ -1,10 +1,10 @@
-//! Student's t distribution: how likely a mean over its own scatter is by chance.
+//! Student's t distribution: the probability of a mean, relative to its own scatter, by chance.
 
 use crate::stats::chi_square::ln_gamma_of_half;
 
-/// Probability that a t variable of `dof` degrees of freedom exceeds `t`: half of `I_x(dof/2, 1/2)`, `x = dof / (dof +
-/// t^2)`, for `t > 0`; the regularized incomplete beta function by its continued fraction (Press et al., Numerical
-/// Recipes, 6.4). Not a number without degrees of freedom, or where `t` is none.
+/// Returns the probability that a t variable of `dof` degrees of freedom exceeds `t`. For `t > 0` it is half of
+/// `I_x(dof/2, 1/2)`, `x = dof / (dof + t^2)`: the regularized incomplete beta function by its continued fraction
+/// (Press et al., Numerical Recipes, 6.4). NaN without degrees of freedom, or if `t` is NaN.
 #[must_use]
 pub fn student_t_above(t: f64, dof: usize) -> f64 {
     if dof == 0 || t.is_nan() {
@@ -15,7 +15,7 @@ pub fn student_t_above(t: f64, dof: usize) -> f64 {
     if t > 0.0 { side } else { 1.0 - side }
 }
 
-/// `I_x(dof/2, 1/2)`.
+/// Returns `I_x(dof/2, 1/2)`.
 fn incomplete_beta_half(x: f64, dof: usize) -> f64 {
     let (a, b) = (0.5 * dof as f64, 0.5);
     if x <= 0.0 || x >= 1.0 {
@@ -30,7 +30,7 @@ fn incomplete_beta_half(x: f64, dof: usize) -> f64 {
     }
 }
 
-/// Of `I_x(a, b)`, by Lentz's method.
+/// Returns the continued fraction of `I_x(a, b)`, by Lentz's method.
 fn continued_fraction(a: f64, b: f64, x: f64) -> f64 {
     const TINY: f64 = 1e-300;
     const MAX_TERMS: usize = 10_000;
