@@ -107,8 +107,8 @@ impl LinkPoses {
         if self.is_slide(joint) { child_m - self.axis(joint) * self.slides.out_m[joint] } else { child_m }
     }
 
-    /// Returns d(point)/d(angle of `joint`), m/rad, for a point (base frame) that the joint carries: `axis x (point -
-    /// origin)`. For a slide it is the axis, m/m.
+    /// Returns d(point)/d(angle of `joint`), m/rad, for a point (base frame) that the joint carries:
+    /// `axis x (point - origin)`. For a slide it is the axis, m/m.
     #[inline]
     #[must_use]
     pub fn point_jacobian(&self, joint: usize, point_m: &Vector3<f64>) -> Vector3<f64> {

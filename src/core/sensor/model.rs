@@ -8,9 +8,9 @@ use crate::time::Stamp;
 pub const N_SHAPE: usize = 12;
 
 /// Correction of the datasheet by calibration. With the travel t from the middle of the range, the angle is the sum of
-/// `center + (gain + gain_per_k T) t + offset + sum_h nonlinearity_h phi_h(t / half_range)` and `offset_per_k T +
-/// offset_per_mpa P + drift h + half_backlash a + bump(t)`. T (K), P (MPa) and h (hours) are the [`ConditionChange`]
-/// from the calibration's reference; a is the side from which the joint came.
+/// `center + (gain + gain_per_k T) t + offset + sum_h nonlinearity_h phi_h(t / half_range)` and
+/// `offset_per_k T + offset_per_mpa P + drift h + half_backlash a + bump(t)`. T (K), P (MPa) and h (hours) are the
+/// [`ConditionChange`] from the calibration's reference; a is the side from which the joint came.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Correction {
     /// Factor on the nominal travel; 1 is the datasheet.

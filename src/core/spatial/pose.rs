@@ -159,8 +159,8 @@ impl<A: Frame, B: Frame> Mul<Point<B>> for Pose<A, B> {
     }
 }
 
-/// Returns the adjoint of a pose, which maps a twist (translation, rotation) of frame B to frame A. `exp(Ad xi) = X
-/// exp(xi) X^-1` (Barfoot, eq. 7.46 with the halves exchanged).
+/// Returns the adjoint of a pose, which maps a twist (translation, rotation) of frame B to frame A.
+/// `exp(Ad xi) = X exp(xi) X^-1` (Barfoot, eq. 7.46 with the halves exchanged).
 #[must_use]
 pub fn adjoint(a_from_b: &Isometry3<f64>) -> Matrix6<f64> {
     let rotation = *a_from_b.rotation.to_rotation_matrix().matrix();

@@ -271,8 +271,9 @@ pub struct RecordedTag {
     pub rotation_std_rad: f64,
 }
 
-/// Contact of the tool's tip with a surveyed plane, felt by the arm or its pilot. `normal . (tool - point) =
-/// tip_radius` holds within one standard deviation, by the joint sensors' readings from `stamp` on for `duration_s`.
+/// Contact of the tool's tip with a surveyed plane, felt by the arm or its pilot.
+/// `normal . (tool - point) = tip_radius` holds within one standard deviation, by the joint sensors' readings from
+/// `stamp` on for `duration_s`.
 ///
 /// A tip in a socket is three contacts with normals at right angles and no radius.
 #[derive(Clone, Debug, PartialEq)]
