@@ -23,7 +23,7 @@ pub fn counted(n: usize, thing: &str) -> String {
     if n == 1 { format!("1 {thing}") } else { format!("{n} {thing}s") }
 }
 
-/// Returns the entry of `known` that `word` most likely stands for; `None` if it resembles none.
+/// Returns the entry of `known` that `word` most likely stands for; `None` if it resembles no entry.
 #[must_use]
 pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let distances = known.into_iter().map(|other| (edits(word, other), other));

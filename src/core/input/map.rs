@@ -3,15 +3,15 @@
 //! ```toml
 //! version = 1
 //! kind = "input"
-//! max_gap_s = 0.5                    # optional: a tag message farther from any reading is left out
-//! while_moving = "leave_out"         # optional: or "use": what the camera saw while the arm was on its way
+//! max_gap_s = 0.5                    # optional: largest gap between a tag message and the nearest reading
+//! while_moving = "leave_out"         # optional: or "use": tags that were detected while the arm moved
 //! not_finite = "refuse"              # optional: or "leave_out": NaN and infinities
-//! stamps = "header"                  # optional: or "log_time": the recorder's times, where the senders' clocks differ
+//! stamps = "header"                  # optional: or "log_time": the recorder's times, if the senders' clocks differ
 //! [joint_sensors]
 //! topic = "/joint_states"            # sensor_msgs/msg/JointState, position[] = the raw sensor reading
-//! names = { elbow = "joint_3" }      # optional: the robot's joint = the recorded name, where they differ
-//! unit = "counts"                    # optional: or "rad", "deg": angles made of the sensors by their datasheet
-//! slide_unit = "m"                   # optional, with "rad" or "deg": or "mm", of joints that slide
+//! names = { elbow = "joint_3" }      # optional: the robot's joint = the recorded name, if they differ
+//! unit = "counts"                    # optional: or "rad", "deg": angles of the sensors by their datasheet
+//! slide_unit = "m"                   # optional, with "rad" or "deg": unit of slides, or "mm"
 //! factor = { elbow = -1.0 }          # optional, with "rad" or "deg": the angle is factor x (reading - zero)
 //! zero = { elbow = 90.0 }            # optional, with "rad" or "deg"
 //! # optional: LeRobot's calibration JSON, next to this file; then unit stays "counts", which are the motors' ticks
@@ -23,19 +23,19 @@
 //! camera_frame = "fisheye"
 //! child_frame = "tag36h11:{id}"      # or a plain name, for one landmark
 //! use = "position"                   # "position" | "pose" | "corners" | "board_corners"
-//! corner_order = "apriltag"          # optional, detections alone: or "opencv", clockwise from the top left
-//! family = "36h11"                   # optional, images alone: "Standard41h12" ..; absent: that of the robot's tags
-//! image_period_s = 0.2               # optional, images alone: time between two that are looked at; absent: all
-//! camera_info = "/camera_info"       # optional, images alone: sensor_msgs/msg/CameraInfo, for robots without a lens
-//! [[further_tags]]                   # optional: what a [[further_camera]] of robot.toml saw, in the form of [tags]
+//! corner_order = "apriltag"          # optional, only for detections: or "opencv", clockwise from the top left
+//! family = "36h11"                   # optional, only for images: or "Standard41h12" ..; absent: the robot's family
+//! image_period_s = 0.2               # optional, only for images: time between two that are searched; absent: all
+//! camera_info = "/camera_info"       # optional, only for images: sensor_msgs/msg/CameraInfo, if the robot has no lens
+//! [[further_tags]]                   # optional: tags of a [[further_camera]] of robot.toml, in the form of [tags]
 //! camera = "elbow_camera"            # its name in robot.toml
 //! topic = "/tf"
 //! camera_frame = "elbow_fisheye"
 //! [conditions]                       # optional
 //! oil_temperature = "/oil"           # sensor_msgs/msg/Temperature, deg C
 //! pressure = "/depth"                # sensor_msgs/msg/FluidPressure, Pa
-//! attitude = "/imu"                  # sensor_msgs/msg/Imu of what carries the arm: which way is up
-//! attitude_in_base_wxyz = [1.0, 0.0, 0.0, 0.0]   # optional: how the attitude sensor is turned in the base link
+//! attitude = "/imu"                  # sensor_msgs/msg/Imu of the arm's carrier: direction of up
+//! attitude_in_base_wxyz = [1.0, 0.0, 0.0, 0.0]   # optional: rotation of the attitude sensor in the base link
 //! ```
 //!
 //! Tables have columns instead of topics: [`TableLayout`].
@@ -298,8 +298,8 @@ pub struct InputMap {
 }
 
 impl InputMap {
-    /// Checks that the joints of `joint_sensors` and the cameras of `further_tags` exist on this robot, and that each
-    /// joint has a recorded name of its own.
+    /// Checks that the joints of `joint_sensors` and the cameras of `further_tags` exist on this robot. Also checks that
+    /// each joint has a recorded name of its own.
     ///
     /// # Errors
     /// [`FileIssue`] naming `file`, the unknown name and the robot's names.
@@ -439,10 +439,10 @@ struct TagsToml {
     #[serde(default)]
     #[schemars(range(min = -4.3e9, max = 4.3e9))]
     clock_offset_s: f64,
-    /// Noise of a tag's position, one sigma per axis.
+    /// Noise of a tag's position, standard deviation per axis.
     #[schemars(range(min = 1e-7, max = 10.0))]
     position_std_m: Option<f64>,
-    /// Noise of a tag's attitude, one sigma per axis.
+    /// Noise of a tag's attitude, standard deviation per axis.
     #[schemars(range(min = 1e-7, max = 3.0))]
     rotation_std_rad: Option<f64>,
 }

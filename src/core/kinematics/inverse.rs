@@ -1,7 +1,7 @@
 //! Inverse kinematics for a tool position: damped least squares inside the limits, with a pull towards a configuration.
 //!
 //! Levenberg-Marquardt on the position error with a weak pull to the seed configuration in the null space (Nakamura and
-//! Hanafusa 1986); joints at a limit are held for the step.
+//! Hanafusa 1986). Joints at a limit are held for the step.
 
 use nalgebra::{DMatrix, Vector3};
 

@@ -16,7 +16,7 @@ const MIN_SCATTER_RATIO: f64 = 1e-4;
 const MIN_AHEAD: f64 = 0.05;
 
 /// A chessboard, or a ChArUco board: its inner corners are numbered along x first, from 0, as OpenCV does. Corner 0 is
-/// one square along x and one along y from the origin, which is an outer corner of the board; all are at z = 0.
+/// one square along x and one along y from the origin, an outer corner of the board. All are at z = 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Chessboard {
     /// Squares along x and along y.

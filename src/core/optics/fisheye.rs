@@ -24,7 +24,7 @@ const BEYOND_RAD: f64 = 0.05;
 
 impl Fisheye {
     /// Builds a lens whose field of view is not given. The view extends as far from the axis as the projected radius
-    /// grows, at most to 1.5 times the radius of the image's corners and to 172 deg.
+    /// grows. It ends at most at 1.5 times the radius of the image's corners and at 172 deg.
     #[must_use]
     pub fn with_widest_view(
         focal_px: [f64; 2],

@@ -85,7 +85,7 @@ pub(super) struct CameraFile {
     max_view_angle_rad: Option<f64>,
     /// Flat window between lens and water. With it the lens is calibrated in air, without it in its medium.
     port: Option<PortFile>,
-    /// Noise of a tag's corner, one sigma per coordinate; absent: 0.3 px.
+    /// Noise of a tag's corner, standard deviation per coordinate; absent: 0.3 px.
     #[schemars(range(min = 1e-3, max = 100.0))]
     corner_std_px: Option<f64>,
     /// Relative standard deviation of the focal length; absent: 0.0025 (assumed).

@@ -126,7 +126,7 @@ pub(super) struct SensorFile {
     /// Largest relative gain error that planning allows for.
     #[schemars(range(min = 0.0, max = 0.5))]
     gain_bound: f64,
-    /// Noise of one reading, one sigma; it also distinguishes a still joint from a moving one.
+    /// Noise of one reading, standard deviation; it also distinguishes a still joint from a moving one.
     #[schemars(range(min = 0.0, max = 1e6))]
     noise_std_counts: f64,
     /// Counts per degree of the joint, at least 0.001 in absolute value; negative if the reading falls as the angle

@@ -122,8 +122,8 @@ fn mesh_files(arm: &UrdfChain<'_>, urdf: &Path) -> Result<Vec<NewFile>, RobotErr
     found.into_iter().map(read).collect()
 }
 
-/// Returns the file of a mesh by its path, relative to the URDF or in a package above it; `None` if there is none that
-/// can be read.
+/// Returns the file of a mesh by its path, relative to the URDF or in a package above it. `None` if no such file can be
+/// read.
 fn mesh_source(urdf: &Path, name: &str) -> Option<PathBuf> {
     let folder = urdf.parent().unwrap_or(Path::new("."));
     let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());

@@ -232,7 +232,7 @@ fn sixty() -> f64 {
     60.0
 }
 
-/// Returns the schema of the list of steps. Keys of `fault` beside its kind are the simulator's.
+/// Returns the schema of the list of steps. Keys of `fault` other than its kind belong to the simulator.
 pub(super) fn schema(generator: &mut SchemaGenerator) -> Schema {
     let fault = json_schema!({ "properties": { "kind": { "type": "string" } }, "required": ["kind"] });
     let mut capture = CaptureSettings::json_schema(generator);

@@ -116,13 +116,13 @@ pub struct TimeColumn {
 /// kind = "input"
 /// [table]
 /// format = "csv"                           # optional: "csv" or "yaml"; absent: by the end of the file's name
-/// rows = "poses"                           # optional, YAML alone: where the rows are, keys joined by dots
+/// rows = "poses"                           # optional, only for YAML: keys that lead to the rows, joined by dots
 /// time = { column = "t", unit = "s" }      # optional: "s", "ms", "us", "ns", "iso8601"; absent: rows are 1 s apart
 /// [joint_sensors]
-/// names = { elbow = "q3" }                 # columns that are not called as the robot's joint
+/// names = { elbow = "q3" }                 # columns whose name differs from the robot's joint
 /// unit = "rad"                             # optional: "counts" | "rad" | "deg"
 /// [tags]
-/// child_frame = "board"                    # the landmark; absent where a column has the tags' numbers
+/// child_frame = "board"                    # the landmark; absent if a column has the tags' ids
 /// use = "pose"                             # "position" | "pose"
 /// [tags.columns]
 /// direction = "tag_from_camera"            # or "camera_from_tag"

@@ -88,7 +88,7 @@ pub struct SceneEntity {
     pub lines: NoneOfThem,
     /// Triangle meshes.
     pub triangles: Vec<TriangleListPrimitive>,
-    /// Names next to the solids.
+    /// Labels with names.
     pub texts: Vec<TextPrimitive>,
     /// Empty.
     pub models: NoneOfThem,
