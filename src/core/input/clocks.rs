@@ -83,7 +83,7 @@ fn share_with_reading(frames: &[Stamp], readings: &[Stamp], offset_s: f64, max_g
 }
 
 /// Compares the clocks of two streams and finds the key of the input map that corrects them. `None` if most frames have
-/// a reading, or if no other clock would give them one.
+/// a reading. `None` also if the streams overlap in time and log times give most frames no reading.
 #[must_use]
 pub fn compare_clocks(gap_s: f64, joints: StreamTimes, tags: StreamTimes) -> Option<ClockDoubt> {
     let (joints, tags) = (joints.sorted(), tags.sorted());

@@ -210,7 +210,7 @@ impl Values<'_> {
         Some((joint, self.value(reading, joint)))
     }
 
-    /// Largest absolute number of joints that turn, in the stated unit.
+    /// Largest absolute recorded number; only of joints that turn, unless the numbers are counts.
     fn largest(&self) -> f64 {
         let counts = |joint: usize| self.stated == JointUnit::Counts || !self.sensors[joint].moves.is_slide();
         let all = self.each().filter(|(_, joint)| counts(*joint));

@@ -66,7 +66,7 @@ pub struct CampaignSettings {
     pub seeds: Option<SeedRange>,
     /// Keys with their values, sorted by key; the full product is run.
     pub matrix: Vec<(String, Vec<Value>)>,
-    /// Frequencies of the values of a key of the matrix, relative to each other. Empty: all points have equal weight.
+    /// Relative frequencies of the values, by key of the matrix. Empty: all points have equal weight.
     pub weights: Vec<(String, Vec<f64>)>,
 }
 

@@ -1,9 +1,9 @@
 //! Shift of paired samples: the Hodges-Lehmann estimate and Wilcoxon's interval about it.
 //!
-//! Both are order statistics of the Walsh averages: the means of all pairs, each sample with itself included
-//! (Hodges and Lehmann 1963; Hollander, Wolfe and Chicken, Nonparametric Statistical Methods, 3.2 and 3.3). Differences
-//! of pairs whose two sides are exchangeable are symmetric about zero. So the interval holds exactly for any such
-//! distribution. For normal samples the median needs 57 % more samples for the same precision.
+//! Both are order statistics of the Walsh averages: the means of all pairs of samples, including each sample paired
+//! with itself. Sources: Hodges and Lehmann 1963; Hollander, Wolfe and Chicken, Nonparametric Statistical Methods, 3.2
+//! and 3.3. Differences of pairs whose two sides are exchangeable are symmetric about zero. So the interval holds
+//! exactly for any such distribution. For normal samples the median needs 57 % more samples for the same precision.
 
 use super::Interval;
 

@@ -1,7 +1,7 @@
 //! Problems of a TOML text: all missing keys at once, and for an unknown key the likeliest known one.
 //!
 //! A reader stops at the first missing key. So that key is inserted with a value that it accepts, and the text is read
-//! again, until no key is missing or another mistake comes first.
+//! again. This ends when no key is missing or another mistake comes first.
 
 use std::ops::Range;
 
