@@ -298,8 +298,8 @@ pub struct InputMap {
 }
 
 impl InputMap {
-    /// Checks that the joints of `joint_sensors` and the cameras of `further_tags` exist on this robot. Also checks that
-    /// each joint has a recorded name of its own.
+    /// Checks that the joints of `joint_sensors` and the cameras of `further_tags` exist on this robot. Also checks
+    /// that each joint has a recorded name of its own.
     ///
     /// # Errors
     /// [`FileIssue`] naming `file`, the unknown name and the robot's names.
