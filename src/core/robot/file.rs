@@ -190,7 +190,7 @@ fn chain_joints(folder: &Path, robot: &toml::Table) -> Option<Vec<(String, Joint
     Some(chain.joints().iter().map(|joint| (joint.name.clone(), joint.kind)).collect())
 }
 
-/// Returns what planning needs and `raw` lacks.
+/// Returns the data that planning needs and `raw` lacks.
 fn planning_issues(file: &Path, raw: &RobotFile, camera: &CameraSpec, arm: &UrdfChain<'_>) -> Vec<FileIssue> {
     let mut issues = Vec::new();
     if raw.stowed_rad.is_none() {
