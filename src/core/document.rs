@@ -26,7 +26,7 @@ pub fn parse_file<T: DeserializeOwned>(kind: Kind, file: &Path, text: &str) -> R
 /// Checks that a file states this version and `kind`.
 ///
 /// # Errors
-/// As [`parse_file`], for those two keys.
+/// [`FileIssue`] as from [`parse_file`], for those two keys.
 pub fn check_head(kind: Kind, file: &Path, table: &Table) -> Result<(), FileIssue> {
     let found = stated_kind(file, table, Some(kind))?;
     if found != kind {
@@ -53,8 +53,8 @@ pub fn missing_kind(file: &Path, kind: Kind) -> FileIssue {
     FileIssue::new(Code::FileKind, file, "kind", problem)
 }
 
-/// Returns the kind that a file states. A file of version 1 without `kind`, as they were until now, is of the kind that
-/// its keys suggest, or the expected one; `armcal check` refuses it with the line to add.
+/// Returns the kind that a file states. A file without `kind`, which version 1 allowed until now, is of the kind that
+/// its keys suggest, or else of the expected one. `armcal check` refuses it with the line to add.
 ///
 /// # Errors
 /// [`FileIssue`] with the line to add or to correct.

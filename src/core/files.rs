@@ -1,25 +1,25 @@
 //! Files at paths that users name, read within limits.
 //!
 //! Only regular files are opened: a device may have no end, and a pipe no beginning. No file is read beyond the limit
-//! of its kind, whatever size it claims. Errors are ends of a sentence that begins with the file's name.
+//! of its kind, regardless of the size that it claims. Errors are ends of a sentence that begins with the file's name.
 
 use std::fs::{File, FileType, metadata};
 use std::io::{Error, ErrorKind, Read, Result};
 use std::path::{Component, Path};
 
-/// What a file holds, which decides how long it may be.
+/// Kind of a file's content, which limits its length.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FileKind {
     /// TOML, YAML, URDF, a calibration's compact line.
     Text,
     /// Rows of a campaign or of a recorded motion.
     Table,
-    /// STL or OBJ.
+    /// A mesh: STL or OBJ.
     Mesh,
 }
 
 impl FileKind {
-    /// The most bytes that are read.
+    /// Returns the maximum number of bytes that are read.
     #[must_use]
     pub fn max_bytes(self) -> u64 {
         match self {
@@ -33,35 +33,36 @@ impl FileKind {
 /// Opens a regular file; recordings, which are read piece by piece, have no limit of size.
 ///
 /// # Errors
-/// As the system gives it, or that the file is not a regular one.
+/// The system's error, or an error if the file is not a regular one.
 pub fn open(file: &Path) -> Result<File> {
-    // Looked at first, for opening a pipe without a writer waits; and again, for it may be another one by now.
+    // The type is checked first, because opening a pipe without a writer waits. It is checked again after opening,
+    // because the file may have been replaced.
     check_regular(metadata(file)?.file_type())?;
     let opened = File::open(file)?;
     check_regular(opened.metadata()?.file_type())?;
     Ok(opened)
 }
 
-/// The bytes of a regular file of this kind.
+/// Returns the bytes of a regular file of this kind.
 ///
 /// # Errors
-/// As [`open`], or that the file is too long.
+/// The errors of [`open`], or an error if the file is too long.
 pub fn read_bytes(file: &Path, kind: FileKind) -> Result<Vec<u8>> {
     read_within(open(file)?, kind)
 }
 
-/// The text of a regular file of this kind.
+/// Returns the text of a regular file of this kind.
 ///
 /// # Errors
-/// As [`read_bytes`], or that it is not UTF-8.
+/// The errors of [`read_bytes`], or an error if the file is not UTF-8.
 pub fn read_text(file: &Path, kind: FileKind) -> Result<String> {
     into_text(read_bytes(file, kind)?)
 }
 
-/// The text that a file's bytes are.
+/// Returns the text that a file's bytes encode.
 ///
 /// # Errors
-/// That they are not UTF-8, and which encoding their beginning states.
+/// An error if the bytes are not UTF-8; it names the encoding that their beginning states.
 pub fn into_text(bytes: Vec<u8>) -> Result<String> {
     let is_utf16 = bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]);
     String::from_utf8(bytes).map_err(|error| {
@@ -77,10 +78,10 @@ pub fn into_text(bytes: Vec<u8>) -> Result<String> {
     })
 }
 
-/// All of `source`, such as stdin, as a file of this kind.
+/// Returns all bytes of `source`, such as stdin, read as a file of this kind.
 ///
 /// # Errors
-/// As the system gives it, or that the source is too long.
+/// The system's error, or an error if the source is too long.
 pub fn read_within(source: impl Read, kind: FileKind) -> Result<Vec<u8>> {
     let max = kind.max_bytes();
     let mut bytes = Vec::new();
@@ -91,11 +92,11 @@ pub fn read_within(source: impl Read, kind: FileKind) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Checks that `file` leaves `folder` by no link. One that is outside by its name passes, and so does what does not
-/// exist: reading it gives the better error.
+/// Checks that no link leads from `file` out of `folder`. A file that is outside by its name passes. So does a file
+/// that does not exist: reading it gives the better error.
 ///
 /// # Errors
-/// That a link leads out of the folder.
+/// An error if a link leads out of the folder.
 pub fn check_within(folder: &Path, file: &Path) -> Result<()> {
     let is_inside = |path: &Path| path.components().all(|part| matches!(part, Component::Normal(_)));
     if !file.strip_prefix(folder).is_ok_and(is_inside) {

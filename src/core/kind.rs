@@ -1,4 +1,4 @@
-//! Kinds of TOML files: the name that each states in its key `kind`, and the command that takes it.
+//! Kinds of TOML files: the value of the key `kind`, and the command that takes the file.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -75,37 +75,37 @@ impl Kind {
         Self::ALL.into_iter().find(|kind| kind.name() == name)
     }
 
-    /// Defaults of files that state no kind.
+    /// Default kind of plan files that state none.
     #[must_use]
     pub fn plan() -> Self {
         Self::Plan
     }
 
-    /// As [`Kind::plan`].
+    /// Default kind of calibration files that state none.
     #[must_use]
     pub fn calibration() -> Self {
         Self::Calibration
     }
 
-    /// As [`Kind::plan`].
+    /// Default kind of covariance files that state none.
     #[must_use]
     pub fn covariance() -> Self {
         Self::Covariance
     }
 
-    /// As [`Kind::plan`].
+    /// Default kind of vehicle files that state none.
     #[must_use]
     pub fn vehicle() -> Self {
         Self::Vehicle
     }
 
-    /// As [`Kind::plan`].
+    /// Default kind of self-collision files that state none.
     #[must_use]
     pub fn self_collision() -> Self {
         Self::SelfCollision
     }
 
-    /// As [`Kind::plan`].
+    /// Default kind of scene files that state none.
     #[must_use]
     pub fn scene() -> Self {
         Self::Scene
@@ -149,7 +149,7 @@ impl Kind {
         }
     }
 
-    /// Top-level keys that only files of this kind have together.
+    /// Returns the top-level keys that together identify files of this kind.
     fn marks(self) -> &'static [&'static str] {
         match self {
             Self::Robot => &["urdf", "base_link"],
@@ -167,7 +167,7 @@ impl Kind {
         }
     }
 
-    /// Returns the kind that the keys of a file without `kind` suggest. Only the words of an error use it.
+    /// Returns the kind that the keys of a file without `kind` suggest; used only in the words of an error.
     #[must_use]
     pub fn suggested_by(table: &toml::Table) -> Option<Self> {
         // A routine has obstacles of its own.

@@ -1,8 +1,8 @@
-//! What truth and belief share: arm, sensors, optics, messages, recordings, routines.
+//! Parts shared by simulator and estimator: arm, sensors, optics, messages, recordings, routines.
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
-// For its symbols: the sines of everything that is linked with this crate.
+// Linked for its symbols: they replace the sine functions of everything that is linked with this crate.
 use armcal_libm as _;
 
 pub mod codes;

@@ -1,4 +1,4 @@
-//! JSON Schemas of the TOML files, made of the types that read them.
+//! JSON Schemas of the TOML files, derived from the types that read them.
 
 use schemars::generate::SchemaSettings;
 use schemars::transform::{Transform, transform_subschemas};
@@ -23,7 +23,7 @@ pub fn first_line(kind: Kind) -> String {
     format!("#:schema {}\n", address(kind))
 }
 
-/// Returns the committed schema of a kind. A test holds each against the types that read its files.
+/// Returns the committed schema of a kind. A test compares each with the types that read its files.
 #[must_use]
 pub fn committed(kind: Kind) -> &'static str {
     match kind {
@@ -70,13 +70,13 @@ fn state_head(root: &mut Map<String, Value>, kind: Kind) {
             keys.insert(0, key.into());
         }
     }
-    // Left over from the type of the key.
+    // The definition is left over from the type of the key.
     if let Some(Value::Object(definitions)) = root.get_mut("definitions") {
         definitions.remove("Kind");
     }
 }
 
-/// Returns the object under `key`, which is put there where it is missing.
+/// Returns the object under `key`, and inserts it if it is missing.
 fn member<'a>(of: &'a mut Map<String, Value>, key: &str) -> &'a mut Map<String, Value> {
     let value = of.entry(key).or_insert_with(|| json!({}));
     if !value.is_object() {
@@ -88,8 +88,7 @@ fn member<'a>(of: &'a mut Map<String, Value>, key: &str) -> &'a mut Map<String, 
     }
 }
 
-/// Takes out what TOML does not have (null) and what Rust alone means (formats of numbers), and joins the lines of
-/// sentences.
+/// Removes what TOML lacks (null) and what only Rust uses (formats of numbers), and joins the lines of sentences.
 #[derive(Clone, Debug)]
 struct Tidy;
 
@@ -138,7 +137,7 @@ fn without_null(object: &mut Map<String, Value>) {
     }
 }
 
-/// Units by the end of a key's name, the longer ends first.
+/// Units by the suffix of a key's name, longer suffixes first.
 const UNITS: [(&str, &str); 45] = [
     ("_counts_per_deg", "counts/deg"),
     ("_counts_per_mm", "counts/mm"),
@@ -209,7 +208,7 @@ fn state_units(object: &mut Map<String, Value>) {
     }
 }
 
-/// Returns the schema of a table whose key `tag` has this value, of the schema of its other keys.
+/// Returns the schema of a table whose key `tag` has this value, given the schema of its other keys.
 #[must_use]
 pub fn tagged(mut schema: Schema, tag: &str, value: &str, description: &str) -> Schema {
     let object = schema.ensure_object();

@@ -1,10 +1,10 @@
-//! Text from files as it may be shown.
+//! Text from files, made safe to show.
 
 use std::borrow::Cow;
 
-/// `text` with control characters escaped, as `\u001b`, so that a name in a file cannot steer the terminal; so are
-/// those that change the direction of writing. Ends of lines and tabs stay. The escape is that of strings in JSON, TOML
-/// and YAML, so that a file of these keeps its names.
+/// Returns `text` with control characters escaped, as `\u001b`, so that a name in a file cannot steer the terminal.
+/// Characters that change the direction of writing are escaped too. Line ends and tabs stay. The escape is that of
+/// strings in JSON, TOML and YAML, so that a file of these keeps its names.
 #[must_use]
 pub fn printable(text: &str) -> Cow<'_, str> {
     if !text.contains(steers) {
@@ -17,13 +17,13 @@ pub fn printable(text: &str) -> Cow<'_, str> {
     Cow::Owned(shown)
 }
 
-/// `1 tag`, `3 tags`.
+/// Returns a number with its noun: `1 tag`, `3 tags`.
 #[must_use]
 pub fn counted(n: usize, thing: &str) -> String {
     if n == 1 { format!("1 {thing}") } else { format!("{n} {thing}s") }
 }
 
-/// The one of `known` that `word` most likely stands for; `None` where it is like none of them.
+/// Returns the entry of `known` that `word` most likely stands for; `None` if it resembles no entry.
 #[must_use]
 pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let distances = known.into_iter().map(|other| (edits(word, other), other));
@@ -31,8 +31,8 @@ pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
     (edits <= 1 + word.chars().count().max(other.chars().count()) / 4).then_some(other)
 }
 
-/// Letters that are put in, taken out or replaced to make one of the other (Levenshtein 1966), neighbours that are
-/// exchanged as one.
+/// Returns the number of inserted, deleted or replaced letters that turn one word into the other (Levenshtein 1966). An
+/// exchange of neighbours counts as one.
 fn edits(from: &str, to: &str) -> usize {
     let (from, to): (Vec<char>, Vec<char>) = (from.chars().collect(), to.chars().collect());
     let mut rows: Vec<Vec<usize>> = vec![(0..=to.len()).collect()];
@@ -54,14 +54,14 @@ fn edits(from: &str, to: &str) -> usize {
 /// The YAML reader's advice to programmers.
 const READERS_ADVICE: &str = ", set DuplicateKeyPolicy in Options if acceptable";
 
-/// Words of an error of the YAML reader for those who wrote the file.
+/// Returns the text of a YAML reader's error, worded for the author of the file.
 #[must_use]
 pub fn yaml_problem(error: &str) -> String {
     with_nearest(error).replace(READERS_ADVICE, "; name it once")
 }
 
-/// A reader's message about an unknown name, with the likeliest of those that it lists: unknown field `a`, expected
-/// one of `b`, `c`.
+/// Returns a reader's message about an unknown name, with the nearest of the names that it lists: unknown field `a`,
+/// expected one of `b`, `c`.
 #[must_use]
 pub fn with_nearest(message: &str) -> String {
     let unknown = message.rfind("unknown field `").or_else(|| message.rfind("unknown variant `"));

@@ -1,6 +1,6 @@
-//! SI inside, and what people read: a figure is stored in the unit of its name and shown in a handier one.
+//! Units: a figure is stored in the SI unit of its name and shown in a more convenient one.
 
-/// What a figure is measured in.
+/// Unit of a figure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unit {
     /// Shown in millimetres.
@@ -11,16 +11,16 @@ pub enum Unit {
     Seconds,
     /// Shown as stored.
     Pixels,
-    /// Whole, from 0.
+    /// Integer, from 0.
     Count,
-    /// One over another.
+    /// Ratio of two figures of one unit.
     Ratio,
     /// A number without a unit.
     None,
 }
 
 impl Unit {
-    /// What a stored value is multiplied with to be shown.
+    /// Returns the factor from the stored value to the shown value.
     #[must_use]
     pub const fn scale(self) -> f64 {
         match self {
@@ -30,7 +30,7 @@ impl Unit {
         }
     }
 
-    /// What stands behind the number; empty where nothing does.
+    /// Returns the symbol shown after the number; empty if there is none.
     #[must_use]
     pub const fn symbol(self) -> &'static str {
         match self {
@@ -43,19 +43,19 @@ impl Unit {
         }
     }
 
-    /// The bare number with `digits` after the point.
+    /// Returns the number alone, with `digits` after the point.
     #[must_use]
     pub fn number(self, value: f64, digits: usize) -> String {
         format!("{:.digits$}", value * self.scale())
     }
 
-    /// The number with `digits` after the point, and its unit: `1.25 mm`.
+    /// Returns the number with `digits` after the point, and its unit: `1.25 mm`.
     #[must_use]
     pub fn shown(self, value: f64, digits: usize) -> String {
         format!("{} {}", self.number(value, digits), self.symbol()).trim_end().to_owned()
     }
 
-    /// The same, or a dash for what was not measured.
+    /// Returns the number with its unit, or a dash if it was not measured.
     #[must_use]
     pub fn shown_if(self, value: Option<f64>, digits: usize) -> String {
         value.map_or_else(|| "-".to_owned(), |value| self.shown(value, digits))

@@ -240,11 +240,11 @@ pub trait Coded {
     fn code(&self) -> Code;
 }
 
-/// Text that is no code.
+/// Error: a text that is not a code.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`{text}` is no code; `armcal explain` lists all")]
 pub struct UnknownCode {
-    /// The text as given.
+    /// The text that was read.
     pub text: String,
 }
 

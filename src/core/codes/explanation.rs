@@ -39,7 +39,7 @@ pub enum CodeKind {
 }
 
 impl CodeKind {
-    /// Word for people.
+    /// Returns the word shown to people.
     #[must_use]
     pub fn word(self) -> &'static str {
         match self {

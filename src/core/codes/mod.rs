@@ -1,7 +1,7 @@
 //! One stable code for each error, refusal, warning and finding.
 //!
-//! `code.rs` lists the codes, `explanations.toml` says of each what causes it, what was measured, the remedy and the
-//! page to read. The words of a message stand where it is made; scripts and tests go by the code.
+//! `code.rs` lists the codes. `explanations.toml` gives the cause, measured quantity, remedy and page of each. The
+//! words of a message stand where it is made; scripts and tests go by the code.
 
 mod code;
 mod explanation;

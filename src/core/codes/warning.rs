@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::codes::Code;
 
-/// One warning: its code and its sentence.
+/// A warning: its code and its sentence.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Warning {
@@ -25,7 +25,7 @@ impl Warning {
     }
 }
 
-/// The sentence, and the code in brackets.
+/// Writes the sentence, then the code in brackets.
 impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} [{}]", self.text, self.code)

@@ -1,4 +1,4 @@
-//! Attitude of what carries the arm, by `sensor_msgs/msg/Imu`: which way is up at the base.
+//! Attitude of the arm's carrier, by `sensor_msgs/msg/Imu`: the direction of up at the base.
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
@@ -9,12 +9,12 @@ use crate::log::ros::Imu;
 use crate::log::{RawMessage, decode};
 use crate::time::Stamp;
 
-/// Which way is up, at one stamp.
+/// Direction of up at one stamp.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AttitudeReading {
-    /// Header's stamp, or the log time where the header has none.
+    /// The header's stamp, or the log time if the header has none.
     pub stamp: Stamp,
-    /// Against gravity, in the frame of the arm's base, unit.
+    /// Unit vector against gravity, in the frame of the arm's base.
     pub up: Vector3<f64>,
     /// Hash of the message's bytes.
     pub digest: [u8; 32],
@@ -72,7 +72,7 @@ impl<'a> AttitudeReader<'a> {
         Ok(())
     }
 
-    /// In the order of time.
+    /// Returns the readings in the order of time, and the number of messages left out.
     pub fn finish(mut self) -> (Vec<AttitudeReading>, u64) {
         self.readings.sort_by_key(|reading| reading.stamp);
         (self.readings, self.left_out)

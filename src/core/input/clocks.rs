@@ -1,11 +1,12 @@
-//! Stamps of the camera against those of the joints: whether their clocks agree, and what to do where they do not.
+//! Comparison of the camera's clock with that of the joints, and the remedy if they differ.
 
 use crate::log::ros::Time;
 use crate::time::{Stamp, utc};
 
-/// With fewer of the frames next to a joint reading, the clocks are compared. Assumed: gaps in a recording are shorter.
+/// Share of frames next to a joint reading below which the clocks are compared. Assumed: gaps in a recording are
+/// shorter.
 const FEW: f64 = 0.5;
-/// With more of them next to a reading, another time source explains the gap. Assumed.
+/// Share of frames next to a reading above which another time source explains the gap. Assumed.
 const NEARLY_ALL: f64 = 0.9;
 /// Clocks that started at boot stay below this, s: ten years. Wall clocks count from 1970.
 const LONGEST_UPTIME_S: f64 = 10.0 * 365.25 * 86_400.0;
@@ -28,7 +29,7 @@ pub enum ClockRemedy {
     LogTime,
     /// `clock_offset_s` of `[tags]`, s.
     Offset(f64),
-    /// Nothing that the recording shows.
+    /// The recording shows no remedy.
     Unknown,
 }
 
@@ -41,7 +42,7 @@ pub struct ClockDoubt {
     pub remedy: ClockRemedy,
 }
 
-/// The stamp of the header with which a CDR message begins, or which lies `skip` bytes after its beginning.
+/// Returns the stamp of the header at the beginning of a CDR message, or `skip` bytes after it.
 #[must_use]
 pub fn header_stamp(data: &[u8], skip: usize) -> Option<Time> {
     let bytes = data.get(4 + skip..12 + skip)?;
@@ -59,7 +60,7 @@ impl StreamTimes {
         self
     }
 
-    /// The clock in words, by its first stamp.
+    /// Describes the clock in words, by its first stamp.
     fn clock(&self, first: Stamp) -> String {
         let first_s = first.since_s(Stamp::default());
         if (0.0..LONGEST_UPTIME_S).contains(&first_s) {
@@ -81,8 +82,8 @@ fn share_with_reading(frames: &[Stamp], readings: &[Stamp], offset_s: f64, max_g
     frames.iter().filter(has_reading).count() as f64 / frames.len().max(1) as f64
 }
 
-/// Compares the clocks of two streams and finds the key of the input map that corrects them; `None` where most frames
-/// have a reading, or where no other clock would give them one.
+/// Compares the clocks of two streams and finds the key of the input map that corrects them. `None` if most frames have
+/// a reading. `None` also if the streams overlap in time and log times give most frames no reading.
 #[must_use]
 pub fn compare_clocks(gap_s: f64, joints: StreamTimes, tags: StreamTimes) -> Option<ClockDoubt> {
     let (joints, tags) = (joints.sorted(), tags.sorted());
@@ -139,7 +140,8 @@ pub fn compare_clocks(gap_s: f64, joints: StreamTimes, tags: StreamTimes) -> Opt
 mod tests {
     use super::*;
 
-    /// 20 poses, 4 s apart: the stamps begin at the two times given, the log times at the other two.
+    /// Returns the doubt about 20 poses, 4 s apart: the stamps begin at the two times given, the log times at the other
+    /// two.
     fn told(stamps_s: [f64; 2], log_times_s: [f64; 2]) -> Option<String> {
         let from = |start_s: f64| (0..20).map(move |k| Stamp::default().plus_s(start_s + 4.0 * f64::from(k)));
         let stream = |k: usize, topic: &str| StreamTimes {
@@ -154,7 +156,7 @@ mod tests {
     fn clocks_that_differ_are_named_with_their_difference_and_the_key_that_helps() {
         let wall_s = 1_790_000_000.0;
         assert_eq!(told([wall_s, wall_s + 0.2], [wall_s; 2]), None);
-        // Nothing was read at these times, by any clock.
+        // No clock has a reading at these times.
         assert_eq!(told([wall_s, wall_s + 2.0], [wall_s, wall_s + 2.0]), None);
         let cases = [
             ([wall_s, 12.3], [wall_s + 0.01, wall_s + 0.02]),

@@ -9,14 +9,14 @@ use crate::log::ros::{FluidPressure, Temperature};
 use crate::log::{RawMessage, decode};
 use crate::time::Stamp;
 
-/// One reading of a slow sensor.
+/// A reading of a slow sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConditionReading {
-    /// Header's stamp, or the log time where the header has none.
+    /// The header's stamp, or the log time if the header has none.
     pub stamp: Stamp,
-    /// What it is, and so its unit.
+    /// Measured quantity, which decides the unit of `value`.
     pub kind: ConditionKind,
-    /// Finite.
+    /// The reading, finite.
     pub value: f64,
     /// Hash of the message's bytes.
     pub digest: [u8; 32],
@@ -39,7 +39,7 @@ impl<'a> ConditionReader<'a> {
         Self { file, topics, not_finite, clock, readings: Vec::new(), left_out: 0, messages: BTreeMap::new() }
     }
 
-    /// What `topic` holds by the input map.
+    /// Returns the quantity that `topic` holds by the input map.
     pub fn kind_of(&self, topic: &str) -> Option<ConditionKind> {
         self.topics.named().into_iter().find(|(name, _)| *name == topic).map(|(_, kind)| kind)
     }

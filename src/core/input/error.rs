@@ -1,4 +1,4 @@
-//! Why a recording of a real arm cannot be used.
+//! Errors of recordings of a real arm that cannot be used.
 
 use super::map::{JointUnit, SlideUnit};
 use crate::codes::{Code, Coded};
@@ -7,7 +7,7 @@ use crate::log::{CdrError, LogError, StampRegression};
 /// A message or a row of a table.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum BadPlace {
-    /// One message.
+    /// A message on a topic.
     Message {
         /// Name of the topic as recorded.
         topic: String,
@@ -27,7 +27,7 @@ impl std::fmt::Display for BadPlace {
     }
 }
 
-/// Why a recording of a real arm was refused; `file` is the recording.
+/// Reason why a recording of a real arm was refused; `file` is the recording.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum InputError {
@@ -84,7 +84,7 @@ pub enum InputError {
         value: f64,
         stated: JointUnit,
         likely: JointUnit,
-        /// Of the joints that are in the other unit, where not all are.
+        /// Factors of the joints that are in the other unit; empty if all joints are.
         factors: Vec<(String, f64)>,
     },
     #[error(
@@ -121,13 +121,13 @@ pub enum InputError {
     Use { file: String, topic: String, held: &'static str, allowed: &'static str },
 }
 
-/// The joints whose numbers are in another unit.
+/// Names the joints whose numbers are in another unit.
 fn whose_numbers(factors: &[(String, f64)]) -> String {
     let names: Vec<String> = factors.iter().map(|(joint, _)| format!("`{joint}`")).collect();
     if names.is_empty() { "the joints' numbers".to_owned() } else { format!("the numbers of {}", names.join(", ")) }
 }
 
-/// The keys for numbers in another unit, of all joints or of some.
+/// Names the keys for numbers in another unit, of all joints or of some.
 fn unit_remedy(likely: JointUnit, factors: &[(String, f64)]) -> String {
     let keys: Vec<String> = factors.iter().map(|(joint, factor)| format!("factor.{joint} = {factor:.7}")).collect();
     if keys.is_empty() {
@@ -136,7 +136,7 @@ fn unit_remedy(likely: JointUnit, factors: &[(String, f64)]) -> String {
     format!("in [joint_sensors] of the input map: {}", keys.join("; "))
 }
 
-/// The remedy for messages that are not CDR.
+/// Remedy for messages that are not CDR.
 fn encoding_remedy(found: &str) -> String {
     match found {
         "ros1" => format!("start from the ROS 1 bag (.bag) that it was made from: {}", crate::log::ROS1_ADVICE),

@@ -22,8 +22,8 @@ use crate::log::ros::{
 use crate::log::{RawMessage, RosMessage, RosSchema, for_each_raw};
 use crate::robot::Robot;
 
-/// Readings, and images with tags, of one recording: 22 hours at 100 Hz, 1 GB. Whether the arm rested between two
-/// images is seen from all readings between them, so that all are kept.
+/// Maximum number of readings, and of images with tags, of one recording: 22 hours at 100 Hz, 1 GB. All readings are
+/// kept, because those between two images show whether the arm rested.
 const MAX_MESSAGES: usize = 8_000_000;
 
 /// Reads the joint readings and tags of a recording or of a table; joints are matched by name.
@@ -36,10 +36,10 @@ pub fn read_external(path: &Path, map: &InputMap, robot: &Robot) -> Result<Exter
     read_up_to(MAX_MESSAGES, path, map, (robot, None))
 }
 
-/// The same, with someone who finds tags in images.
+/// Reads a recording as [`read_external`] does, with a detector of tags in images.
 ///
 /// # Errors
-/// As [`read_external`], and where images are of no use.
+/// The errors of [`read_external`], and an error if images cannot be used.
 pub fn read_external_images(
     path: &Path,
     map: &InputMap,
@@ -90,7 +90,7 @@ fn read_up_to<'a>(
     Ok(recording)
 }
 
-/// Of the further cameras that the map and the robot have.
+/// Readers of the further cameras that both the map and the robot have.
 fn further_readers<'a>(file: &'a str, map: &'a InputMap, topics: &'a Topics, robot: &Robot) -> Vec<TagReader<'a>> {
     let reader = |further: &'a FurtherTopic| {
         let camera = robot.cameras().skip(1).position(|camera| camera.name == further.camera)?;
@@ -104,14 +104,14 @@ struct MessageReader<'a> {
     file: &'a str,
     map: &'a InputMap,
     topics: &'a Topics,
-    /// Messages of a topic that may stay in memory.
+    /// Maximum number of messages of a topic that may stay in memory.
     most: usize,
     seen: BTreeSet<String>,
     joints: JointReader<'a>,
     tags: TagReader<'a>,
-    /// Of the further cameras that the map names, in its order.
+    /// Readers of the further cameras that the map names, in its order.
     further: Vec<TagReader<'a>>,
-    /// `None` where nobody looks at images.
+    /// Detector of tags in images; `None` if images are not searched.
     detector: Option<&'a mut dyn ImageDetector>,
     conditions: ConditionReader<'a>,
     attitudes: AttitudeReader<'a>,
@@ -160,7 +160,7 @@ impl MessageReader<'_> {
         std::iter::once(&self.tags).chain(&self.further)
     }
 
-    /// Checks that all is there, in the order of time.
+    /// Checks that all required data are present, in the order of time.
     fn check(&self) -> Result<(), InputError> {
         let file = || self.file.to_owned();
         let conditions =
@@ -189,13 +189,13 @@ impl MessageReader<'_> {
         }
     }
 
-    /// Messages whose stamps were replaced, by topic.
+    /// Sentences on messages whose stamps were replaced, by topic.
     fn notes(&self) -> Vec<String> {
         let joints = self.joints.clock.note(&self.topics.joints);
         joints.into_iter().chain(self.cameras().filter_map(|reader| reader.clock.note(reader.topic))).collect()
     }
 
-    /// A sentence where clocks that differ keep most frames from a joint reading.
+    /// Sentence on clocks so different that most frames have no joint reading; `None` if they agree.
     fn clock_doubt(&self) -> Option<String> {
         if self.map.stamps == StampSource::LogTime {
             return None;
@@ -316,7 +316,7 @@ mod tests {
         assert!(matches!(problem(12), InputError::NoTopic { .. }));
     }
 
-    /// Corners of the tag in a recording of one joint message and one detection.
+    /// Returns the corners of the tag in a recording of one joint message and one detection.
     fn corners_read(keys: &str, recorded_px: [[f64; 2]; 4]) -> RawMeasurement {
         let robot = crate::robot::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/titan4")).unwrap();
         let text = format!(

@@ -1,4 +1,4 @@
-//! Images of a recording whose tags nobody has looked for yet; who finds them is not known here.
+//! Images of a recording that were not searched for tags; this module does not know the detector.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use crate::log::ros::{CameraInfo, CompressedImage, Image};
 use crate::log::{CdrError, RawMessage, RosMessage, decode, for_each_raw};
 use crate::optics::{CameraModel, Fisheye, Radtan, TagFamily, check_image_size};
 
-/// One image as recorded.
+/// An image as recorded.
 #[derive(Clone, Debug, PartialEq)]
 pub enum RecordedImage {
     /// Pixels.
@@ -17,26 +17,26 @@ pub enum RecordedImage {
     Compressed(CompressedImage),
 }
 
-/// Number and corners of a tag, raw pixels: bottom left, bottom right, top right, top left as printed.
+/// Id and corners of a tag, raw pixels: bottom left, bottom right, top right, top left as printed.
 pub type TagCorners = (u32, [[f64; 2]; 4]);
 
-/// Why an image has no tags.
+/// Reason why an image has no tags.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ImageProblem {
-    /// It is damaged; others may not be.
+    /// The image is damaged; others may be intact.
     Damaged,
-    /// It claims more pixels than its bytes can hold a picture of, and is not decoded; others may not.
+    /// The image claims more pixels than its bytes can encode, and is not decoded; others may be intact.
     TooFewBytes,
-    /// None of its kind can be used; the end of a sentence about the image.
+    /// No image of this kind can be used; the text is the end of a sentence about the image.
     Unusable(String),
 }
 
 /// Finds tags in images.
 pub trait ImageDetector {
-    /// The family of tags that it knows.
+    /// Family of tags that the detector knows.
     fn family(&self) -> TagFamily;
 
-    /// The tags of one image of the robot's camera of that number.
+    /// Finds the tags of one image of the robot's camera number `camera`.
     ///
     /// # Errors
     /// [`ImageProblem`].
@@ -54,19 +54,20 @@ impl RecordedImage {
     }
 }
 
-/// The lens of a topic of camera_info.
+/// Lens of a camera_info topic.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraInfoLens {
     /// Lens of the first message that holds a usable one.
     pub lens: CameraModel,
-    /// Sentences on messages that were skipped, or hold another lens.
+    /// Sentences on messages that were skipped or hold another lens.
     pub notes: Vec<String>,
-    /// Focal lengths and centre of rectified images, px, by the message's projection; zeros where it has none.
+    /// Focal lengths and centre of rectified images, px, by the message's projection; zeros if it has none.
     pub projection: [f64; 4],
 }
 
 impl CameraInfoLens {
-    /// A sentence where `images`, a topic of rectified images by its name, cannot be of this lens: it has a distortion.
+    /// Returns a sentence if this lens has a distortion and `images`, by its name a topic of rectified images, cannot
+    /// use it.
     #[must_use]
     pub fn rectified_note(&self, images: &str, topic: &str) -> Option<String> {
         let is_rectified = images.split(['/', '_']).any(|part| part.starts_with("rect"));
@@ -87,10 +88,10 @@ impl CameraInfoLens {
     }
 }
 
-/// The lens by the first usable `sensor_msgs/msg/CameraInfo` on `topic`.
+/// Returns the lens of the first usable `sensor_msgs/msg/CameraInfo` on `topic`.
 ///
 /// # Errors
-/// [`InputError`] where there is none, or its lens is of no model that is supported.
+/// [`InputError`] if there is none, or its lens is of an unsupported model.
 pub fn read_camera_info(path: &Path, topic: &str) -> Result<CameraInfoLens, InputError> {
     let file = path.display().to_string();
     let mut found = CameraInfos::default();
@@ -118,13 +119,13 @@ pub fn read_camera_info(path: &Path, topic: &str) -> Result<CameraInfoLens, Inpu
 #[derive(Default)]
 struct CameraInfos {
     n: u64,
-    /// The first usable one, and its message's number.
+    /// First usable lens, and its message's number.
     lens: Option<(u64, CameraModel)>,
-    /// Projection of the first usable one.
+    /// Projection of the first usable lens.
     projection: [f64; 4],
-    /// The first reason for an unusable one, and the number of those.
+    /// First reason for an unusable message, and the number of unusable messages.
     first_problem: Option<(u64, String)>,
-    /// The first message with another lens than the first usable one, its image size, and the number of those.
+    /// First message with another lens than the first usable one, its image size, and the number of such messages.
     other: Option<(u64, [u32; 2], u64)>,
 }
 
@@ -163,10 +164,10 @@ impl CameraInfos {
     }
 }
 
-/// The lens of a `CameraInfo`.
+/// Returns the lens of a `CameraInfo`.
 ///
 /// # Errors
-/// The end of a sentence about it, with the remedy.
+/// The end of a sentence about the message, with the remedy.
 pub fn lens_of_camera_info(info: &CameraInfo) -> Result<CameraModel, String> {
     const ALLOWED: &str = "armcal knows \"plumb_bob\" and \"rational_polynomial\" without its last three coefficients, \
         and \"equidistant\"; give another lens in robot.toml";
@@ -204,7 +205,7 @@ pub fn lens_of_camera_info(info: &CameraInfo) -> Result<CameraModel, String> {
     }
 }
 
-/// Names the lens of a binned image or of a part of one, whose pixels `k` does not describe; `None` for a whole image.
+/// Describes the lens of a binned or cropped image, whose pixels `k` does not describe; `None` for a whole image.
 fn part_of_image(info: &CameraInfo) -> Option<String> {
     let (roi, binning) = (&info.roi, [info.binning_x.max(1), info.binning_y.max(1)]);
     let offset = [roi.x_offset, roi.y_offset];
@@ -218,7 +219,7 @@ fn part_of_image(info: &CameraInfo) -> Option<String> {
     }
     let pixels: [u32; 2] = std::array::from_fn(|k| size[k] / binning[k]);
     let focal_px: [f64; 2] = std::array::from_fn(|k| info.k[4 * k] / f64::from(binning[k]));
-    // The middle of the first pixel is 0, so that half a pixel is added before the division and taken away after it.
+    // The centre of the first pixel is 0, so half a pixel is added before the division and subtracted after it.
     let center_px: [f64; 2] =
         std::array::from_fn(|k| (info.k[2 + 3 * k] - f64::from(offset[k]) + 0.5) / f64::from(binning[k]) - 0.5);
     Some(format!(

@@ -1,4 +1,4 @@
-//! Whether the recorded joints' numbers are in the unit that the input map says.
+//! Check that the recorded joints' numbers are in the unit that the input map states.
 
 use std::f64::consts::TAU;
 
@@ -8,27 +8,28 @@ use super::lerobot::LerobotCalibration;
 use super::map::{InputMap, JointAngleLines, JointUnit, SlideUnit};
 use crate::robot::{JointSensorSpec, Robot};
 
-/// An angle may lie so far outside of the joint's range: sensors are off.
+/// Tolerance of an angle outside of the joint's range, because sensors have errors.
 const RANGE_FACTOR: f64 = 1.1;
 const BEYOND_RANGE_RAD: f64 = 0.2;
 const BEYOND_RANGE_M: f64 = 0.05;
-/// A joint without limits may have turned so far.
+/// Largest angle of a joint without limits, from its centre: four turns.
 const TURNS_RAD: f64 = 8.0 * std::f64::consts::PI;
-/// With fewer of the numbers within the joints' ranges the unit is wrong, if with another one nearly all are.
+/// Share of the numbers within the joints' ranges below which the unit is wrong, if nearly all are within in another
+/// unit.
 const FEW: f64 = 0.7;
 const NEARLY_ALL: f64 = 0.99;
-/// An arm whose joints all move by less was not moved for a calibration; by more than `MOVED_RAD`, it was.
+/// Largest motion of an arm that was not moved for a calibration; motion above `MOVED_RAD` means that it was.
 const STOOD_RAD: f64 = 0.12;
 const MOVED_RAD: f64 = 0.3;
-/// Angles in radians are smaller.
+/// Upper limit of angles in radians.
 const LARGEST_RAD: f64 = 7.0;
-/// LeRobot's numbers are single precision.
+/// Rounding tolerance of LeRobot's numbers, which are single precision.
 const ROUNDED: f64 = 1e-3;
 
-/// What speaks for another unit without proving it; `None` where nothing does.
+/// Returns evidence for another unit that does not prove it; `None` if there is none.
 ///
 /// # Errors
-/// [`InputError::Unit`] where most numbers lie outside of their joints' ranges, and none do in another unit.
+/// [`InputError::Unit`] if most numbers lie outside of their joints' ranges, and none do in another unit.
 pub(super) fn check_unit(
     file: &str,
     map: &InputMap,
@@ -68,7 +69,7 @@ pub(super) fn check_unit(
     }))
 }
 
-/// Refuses ticks that no number of LeRobot's stands for.
+/// Refuses ticks that match no number of LeRobot's.
 fn check_lerobot(
     file: &str,
     map: &InputMap,
@@ -98,7 +99,7 @@ struct Values<'a> {
 }
 
 impl Values<'_> {
-    /// The number as recorded.
+    /// Returns the number as recorded.
     fn value(&self, reading: &Reading, joint: usize) -> f64 {
         let (spec, counts) = (&self.sensors[joint], reading.counts[joint]);
         match self.lines.of(self.stated, spec) {
@@ -119,7 +120,7 @@ impl Values<'_> {
         self.off_center_rad(unit, reading, joint).abs() <= self.most_rad(joint)
     }
 
-    /// Allows a turn less or more: readings may be wrapped to 0 to 360 deg.
+    /// Returns true if the number is within the range, or a turn from it: readings may be wrapped to 0 to 360 deg.
     fn is_within_a_turn(&self, unit: JointUnit, reading: &Reading, joint: usize) -> bool {
         let off_rad = self.off_center_rad(unit, reading, joint).abs();
         let turn_rad = if self.sensors[joint].moves.is_slide() { 0.0 } else { TAU };
@@ -135,20 +136,20 @@ impl Values<'_> {
         if spec.is_limited() { RANGE_FACTOR * spec.half_range_rad + BEYOND_RANGE_RAD } else { TURNS_RAD }
     }
 
-    /// True where some joint's numbers are in `unit` and not as stated, and no joint's speak against `unit`.
+    /// Returns true if some joint's numbers are in `unit` and not as stated, and no joint's numbers contradict `unit`.
     fn prove(&self, unit: JointUnit) -> bool {
         let no_other = self.share(|reading, joint| self.is_within_a_turn(unit, reading, joint)) > NEARLY_ALL;
         no_other && (0..self.sensors.len()).any(|joint| self.proves(unit, joint))
     }
 
-    /// True where the numbers of this joint are outside of its range as stated, and within it in `unit`.
+    /// Returns true if the numbers of this joint are outside of its range as stated, and within it in `unit`.
     fn proves(&self, unit: JointUnit, joint: usize) -> bool {
         let share = |unit| self.share_of_readings(|reading| self.is_within(unit, reading, joint));
         share(self.stated) < FEW && share(unit) > NEARLY_ALL
     }
 
-    /// The factors of the joints whose numbers are in `unit`, where as many others move as stated and stand still in
-    /// `unit`; empty where all are in it.
+    /// Returns the factors of the joints whose numbers are in `unit`, if as many others move as stated and stand still
+    /// in `unit`. Empty if all joints are in `unit`.
     fn factors_of_some(&self, unit: JointUnit) -> Vec<(String, f64)> {
         let all = || 0..self.sensors.len();
         let moves_as_stated = |joint: usize| {
@@ -192,31 +193,31 @@ impl Values<'_> {
         self.readings.iter().flat_map(|reading| (0..self.sensors.len()).map(move |joint| (reading, joint)))
     }
 
-    /// Those numbers of all joints for which `is_so` is true.
+    /// Share of the numbers, over all readings and joints, for which `is_so` is true.
     fn share(&self, is_so: impl Fn(&Reading, usize) -> bool) -> f64 {
         let n = (self.readings.len() * self.sensors.len()).max(1) as f64;
         self.each().filter(|(reading, joint)| is_so(reading, *joint)).count() as f64 / n
     }
 
-    /// Those readings for which `is_so` is true.
+    /// Share of the readings for which `is_so` is true.
     fn share_of_readings(&self, is_so: impl Fn(&Reading) -> bool) -> f64 {
         self.readings.iter().filter(|reading| is_so(reading)).count() as f64 / self.readings.len().max(1) as f64
     }
 
-    /// The joint and number of the first one outside of its range.
+    /// First number outside of its joint's range, with the joint.
     fn first_outside(&self) -> Option<(usize, f64)> {
         let (reading, joint) = self.each().find(|(reading, joint)| !self.is_within(self.stated, reading, *joint))?;
         Some((joint, self.value(reading, joint)))
     }
 
-    /// Readings of joints that turn, in the stated unit.
+    /// Largest absolute recorded number; only of joints that turn, unless the numbers are counts.
     fn largest(&self) -> f64 {
         let counts = |joint: usize| self.stated == JointUnit::Counts || !self.sensors[joint].moves.is_slide();
         let all = self.each().filter(|(_, joint)| counts(*joint));
         all.map(|(reading, joint)| self.value(reading, joint).abs()).fold(0.0, f64::max)
     }
 
-    /// How far the joint that moved most did.
+    /// Motion of the joint that moved most, rad.
     fn most_moved_rad(&self, unit: JointUnit) -> f64 {
         (0..self.sensors.len()).map(|joint| self.moved_rad(unit, joint)).fold(0.0, f64::max)
     }
@@ -240,7 +241,7 @@ mod tests {
         crate::robot::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/titan4")).unwrap()
     }
 
-    /// The arm at six poses; `recorded` has a joint and its angle in rad.
+    /// Checks the unit of the arm at six poses; `recorded` maps a joint and its angle in rad to the recorded number.
     fn checked(keys: &str, recorded: impl Fn(usize, f64) -> f64) -> Result<Option<String>, InputError> {
         let robot = titan();
         let text = format!(
@@ -262,13 +263,13 @@ mod tests {
         check_unit("run.mcap", &map, &robot, &readings)
     }
 
-    /// Its angles in rad times `factor`, read as `unit`.
+    /// Result of reading the arm's angles in rad times `factor` as `unit`.
     fn told(unit: &str, factor: f64) -> Result<Option<String>, String> {
         let keys = format!("unit = \"{unit}\"");
         checked(&keys, |_, angle_rad| factor * angle_rad).map_err(|error| error.to_string())
     }
 
-    /// One joint's numbers from 0 to 360 deg prove nothing, and refute nothing.
+    /// Numbers from 0 to 360 deg of one joint neither prove nor refute a unit.
     #[test]
     fn degrees_are_refused_where_a_joint_is_wrapped() {
         for wrapped in 0..n_needed(&titan()) {

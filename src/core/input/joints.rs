@@ -11,18 +11,18 @@ use crate::log::{RawMessage, StampOrder, decode};
 use crate::robot::{JointSensorSpec, Robot};
 use crate::time::Stamp;
 
-/// One raw reading of all joints, in the robot's order.
+/// A raw reading of all joints, in the robot's order.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reading {
-    /// Header's stamp, or the log time where the header has none.
+    /// The header's stamp, or the log time if the header has none.
     pub stamp: Stamp,
-    /// As recorded; 0 for joints that the recording lacks.
+    /// Readings as recorded; 0 for joints that the recording lacks.
     pub counts: JointCounts,
     /// Hash of the message's bytes.
     pub digest: [u8; 32],
 }
 
-/// A joint that a message has twice with different positions, as recorded.
+/// A joint that occurs twice in a message with different positions, as recorded.
 #[derive(Clone, Debug, PartialEq)]
 struct TwoValues {
     joint: String,
@@ -30,12 +30,12 @@ struct TwoValues {
     message: u64,
 }
 
-/// The joints of the robot, from the base on, that a recording may not lack.
+/// Returns the number of joints, from the base on, that a recording may not lack.
 pub(super) fn n_needed(robot: &Robot) -> usize {
     if robot.gripper_tag.is_some() { robot.n_joints() } else { robot.n_seen_joints() }
 }
 
-/// Why a message holds no reading; `None` where it has a position for each name.
+/// Reason why a message holds no reading; `None` if it has a position for each name.
 fn without_reading(message: &JointState) -> Option<&'static str> {
     match (message.name.len(), message.position.len()) {
         (0, _) => Some("joint messages without joint names"),
@@ -49,15 +49,15 @@ pub(super) struct JointReader<'a> {
     file: &'a str,
     map: &'a InputMap,
     topic: &'a str,
-    /// Of the robot, base first.
+    /// Sensors of the robot, base first.
     sensors: &'a [JointSensorSpec],
-    /// The first joints, which may not be absent.
+    /// Number of proximal joints that may not be absent.
     n_needed: usize,
-    /// Recorded names of the latest message, and where in it each of the robot's joints is.
+    /// Recorded names of the latest message, and the position of each of the robot's joints in it.
     layout: (Vec<String>, Vec<Option<usize>>),
-    /// Joints that the latest message needs and names again: the joint, and where its name stands again.
+    /// Needed joints that the latest message names twice: the joint, and the position of its second name.
     again: Vec<(usize, usize)>,
-    /// The first one, and the number of such messages.
+    /// First joint with two values, and the number of such messages.
     two_values: Option<(TwoValues, u64)>,
     pub clock: TopicClock,
     /// Log time of each reading.
@@ -65,7 +65,7 @@ pub(super) struct JointReader<'a> {
     pub readings: Vec<Reading>,
     pub order: StampOrder,
     pub names: BTreeSet<String>,
-    /// Joints behind the needed ones that some reading has.
+    /// Joints distal to the needed ones that some reading has.
     pub present: BTreeSet<usize>,
     left_out: BTreeMap<String, u64>,
     n_without_positions: u64,
@@ -145,7 +145,8 @@ impl<'a> JointReader<'a> {
         *self.left_out.entry(why.to_owned()).or_default() += 1;
     }
 
-    /// The first needed joint that the message has twice, with positions farther apart than its sensor's noise.
+    /// Returns the first needed joint that the message has twice, with positions that differ by more than its sensor's
+    /// noise.
     fn two_values_of(&self, position: &[f64]) -> Option<TwoValues> {
         self.again.iter().find_map(|&(joint, again)| {
             let (spec, first) = (&self.sensors[joint], self.layout.1[joint]?);
@@ -176,7 +177,7 @@ impl<'a> JointReader<'a> {
         self.layout = (names.to_vec(), at);
     }
 
-    /// The error for a topic none of whose messages gives a reading.
+    /// Error for a topic without any message that gives a reading.
     pub fn no_reading(&self) -> InputError {
         let (file, topic) = (self.file.to_owned(), self.topic.to_owned());
         if let Some((TwoValues { joint, values: [first, second], message }, n)) = self.two_values.clone() {
@@ -199,7 +200,7 @@ impl<'a> JointReader<'a> {
         }
     }
 
-    /// Number of messages without a reading, which nobody misses.
+    /// Number of messages without a reading that may be ignored.
     pub fn skipped(&self) -> BTreeMap<String, u64> {
         let why = "joint messages without positions (velocities or efforts only)".to_owned();
         Some((why, self.n_without_positions)).filter(|(_, n)| *n > 0).into_iter().collect()

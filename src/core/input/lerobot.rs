@@ -1,10 +1,11 @@
-//! LeRobot's calibration JSON: what its recorded numbers are in ticks of the motors, and the homing offsets.
+//! Reader of LeRobot's calibration JSON, which converts recorded numbers to ticks of the motors and holds the homing
+//! offsets.
 //!
 //! huggingface/lerobot 7427f31, src/lerobot/motors/motors_bus.py, lines 176 to 181 (fields) and 854 to 881
-//! (`_normalize`): degrees are `(tick - (range_min + range_max) / 2) 360 / 4095`, `drive_mode` turns percents alone,
-//! and these of Feetech (motors/feetech/feetech.py, line 95), not of Dynamixel (motors/dynamixel/dynamixel.py, line
-//! 100). Ticks are the motor's `Present_Position`: `Actual - Homing_Offset` of Feetech (feetech.py, line 281),
-//! `Actual + Homing_Offset` of Dynamixel (dynamixel.py, line 226). The older form, before e23b41e,
+//! (`_normalize`): degrees are `(tick - (range_min + range_max) / 2) 360 / 4095`. `drive_mode` reverses only percents,
+//! and only those of Feetech (motors/feetech/feetech.py, line 95), not of Dynamixel (motors/dynamixel/dynamixel.py,
+//! line 100). Ticks are the motor's `Present_Position`: `Actual - Homing_Offset` of Feetech (feetech.py, line 281),
+//! `Actual + Homing_Offset` of Dynamixel (dynamixel.py, line 226). The older form, before e23b41e, is in
 //! robot_devices/motors/feetech.py, lines 448 to 478: degrees are `(+-tick + homing_offset) / 2048 * 180`, percents
 //! `(tick - start_pos) / (end_pos - start_pos) * 100`.
 
@@ -20,7 +21,7 @@ use crate::text::yaml_problem;
 
 /// Ticks of a turn: feetech/tables.py, lines 186 to 192; dynamixel/tables.py, lines 132 to 141.
 const TICKS: f64 = 4096.0;
-/// Counts of robot.toml are ticks, within this share.
+/// Tolerance, as a share, within which the counts of robot.toml are ticks.
 const TICK_WITHIN: f64 = 0.1;
 /// Ticks of a range that a motor can have, and of its homing offset (feetech/tables.py, line 209: 11 bits and a sign).
 const FEETECH_RANGE: [f64; 2] = [0.0, 4095.0];
@@ -62,12 +63,12 @@ pub enum LerobotValues {
     /// Percents of the range; the older form's `LINEAR`.
     #[serde(rename = "range_0_100")]
     Range0To100,
-    /// Not normalized.
+    /// Ticks, not normalized.
     Ticks,
 }
 
 impl LerobotValues {
-    /// Name in the input map.
+    /// Returns the name in the input map.
     pub(super) fn key(self) -> &'static str {
         match self {
             Self::Degrees => "degrees",
@@ -88,7 +89,7 @@ impl LerobotValues {
     }
 }
 
-/// Part of an input map.
+/// LeRobot part of an input map.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct LerobotToml {
@@ -100,7 +101,7 @@ pub(super) struct LerobotToml {
     values: LerobotValues,
 }
 
-/// A motor's entry.
+/// Entry of one motor.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Motor {
@@ -151,7 +152,7 @@ struct Line {
 }
 
 impl LerobotCalibration {
-    /// Reads the file that an input map names, from the map's folder on.
+    /// Reads the file that an input map names, relative to the map's folder.
     pub(super) fn read(map: &Path, raw: &LerobotToml) -> Result<Self, RobotError> {
         let file = map.parent().unwrap_or(Path::new("")).join(&raw.file);
         Self::parse(&file, &read_text(&file)?, raw)
@@ -268,7 +269,7 @@ impl LerobotCalibration {
         self.line(motor_name(recorded)).map(|_| ())
     }
 
-    /// The tick that a recorded number stands for; NaN for a joint without a motor, which `check_joint` refuses.
+    /// Returns the tick of a recorded number; NaN for a joint without a motor, which `check_joint` refuses.
     pub(super) fn tick(&self, recorded: &str, value: f64) -> f64 {
         self.line(motor_name(recorded)).map_or(f64::NAN, |line| line.at_zero + line.per_unit * value)
     }
@@ -320,19 +321,20 @@ impl LerobotCalibration {
         }
     }
 
-    /// The tick that LeRobot shows as the middle of a joint: zero of its degrees.
+    /// Returns the tick that LeRobot shows as the middle of a joint: zero of its degrees.
     ///
     /// # Errors
-    /// [`FileIssue`] where the joint, as recorded, has no motor, or one without degrees.
+    /// [`FileIssue`] if the joint, as recorded, has no motor, or a motor without degrees.
     pub fn middle_tick(&self, recorded: &str) -> Result<f64, FileIssue> {
         let degrees = Self { values: LerobotValues::Degrees, ..self.clone() };
         degrees.line(motor_name(recorded)).map(|line| line.at_zero)
     }
 
-    /// Moves a motor's homing offset so that what was shown as `from_tick` will be as `to_tick`, rounded to a tick.
+    /// Shifts a motor's homing offset so that the tick shown as `from_tick` is then shown as `to_tick`, rounded to a
+    /// tick.
     ///
     /// # Errors
-    /// [`FileIssue`] where the motor cannot hold the offset.
+    /// [`FileIssue`] if the motor cannot hold the offset.
     pub fn rehome(&mut self, recorded: &str, from_tick: f64, to_tick: f64) -> Result<(), FileIssue> {
         let name = motor_name(recorded);
         let ahead = (from_tick - to_tick).round();
@@ -360,12 +362,13 @@ impl LerobotCalibration {
     }
 }
 
-/// LeRobot's features are called `shoulder_pan.pos` (so_follower.py, line 67), the motor `shoulder_pan`.
+/// Returns the motor's name, such as `shoulder_pan`, of a LeRobot feature such as `shoulder_pan.pos` (so_follower.py,
+/// line 67).
 fn motor_name(recorded: &str) -> &str {
     recorded.strip_suffix(".pos").unwrap_or(recorded)
 }
 
-/// JSON is a part of YAML, whose reader refuses a key that is there twice.
+/// Reads JSON as YAML, whose reader refuses a duplicate key.
 fn json<T: serde::de::DeserializeOwned>(file: &Path, text: &str) -> Result<T, RobotError> {
     serde_saphyr::from_str(text).map_err(|error| {
         let message = yaml_problem(&error.to_string());

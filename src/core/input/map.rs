@@ -1,17 +1,17 @@
-//! The input map: where in a real arm's recording joint readings and tags are.
+//! The input map: places of joint readings and tags in a real arm's recording.
 //!
 //! ```toml
 //! version = 1
 //! kind = "input"
-//! max_gap_s = 0.5                    # optional: a tag message farther from any reading is left out
-//! while_moving = "leave_out"         # optional: or "use": what the camera saw while the arm was on its way
+//! max_gap_s = 0.5                    # optional: largest gap between a tag message and the nearest reading
+//! while_moving = "leave_out"         # optional: or "use": tags that were detected while the arm moved
 //! not_finite = "refuse"              # optional: or "leave_out": NaN and infinities
-//! stamps = "header"                  # optional: or "log_time": the recorder's times, where the senders' clocks differ
+//! stamps = "header"                  # optional: or "log_time": the recorder's times, if the senders' clocks differ
 //! [joint_sensors]
 //! topic = "/joint_states"            # sensor_msgs/msg/JointState, position[] = the raw sensor reading
-//! names = { elbow = "joint_3" }      # optional: the robot's joint = the recorded name, where they differ
-//! unit = "counts"                    # optional: or "rad", "deg": angles made of the sensors by their datasheet
-//! slide_unit = "m"                   # optional, with "rad" or "deg": or "mm", of joints that slide
+//! names = { elbow = "joint_3" }      # optional: the robot's joint = the recorded name, if they differ
+//! unit = "counts"                    # optional: or "rad", "deg": angles of the sensors by their datasheet
+//! slide_unit = "m"                   # optional, with "rad" or "deg": unit of slides, or "mm"
 //! factor = { elbow = -1.0 }          # optional, with "rad" or "deg": the angle is factor x (reading - zero)
 //! zero = { elbow = 90.0 }            # optional, with "rad" or "deg"
 //! # optional: LeRobot's calibration JSON, next to this file; then unit stays "counts", which are the motors' ticks
@@ -23,19 +23,19 @@
 //! camera_frame = "fisheye"
 //! child_frame = "tag36h11:{id}"      # or a plain name, for one landmark
 //! use = "position"                   # "position" | "pose" | "corners" | "board_corners"
-//! corner_order = "apriltag"          # optional, detections alone: or "opencv", clockwise from the top left
-//! family = "36h11"                   # optional, images alone: "Standard41h12" ..; absent: that of the robot's tags
-//! image_period_s = 0.2               # optional, images alone: time between two that are looked at; absent: all
-//! camera_info = "/camera_info"       # optional, images alone: sensor_msgs/msg/CameraInfo, for robots without a lens
-//! [[further_tags]]                   # optional: what a [[further_camera]] of robot.toml saw, in the form of [tags]
+//! corner_order = "apriltag"          # optional, only for detections: or "opencv", clockwise from the top left
+//! family = "36h11"                   # optional, only for images: or "Standard41h12" ..; absent: the robot's family
+//! image_period_s = 0.2               # optional, only for images: time between two that are searched; absent: all
+//! camera_info = "/camera_info"       # optional, only for images: sensor_msgs/msg/CameraInfo, if the robot has no lens
+//! [[further_tags]]                   # optional: tags of a [[further_camera]] of robot.toml, in the form of [tags]
 //! camera = "elbow_camera"            # its name in robot.toml
 //! topic = "/tf"
 //! camera_frame = "elbow_fisheye"
 //! [conditions]                       # optional
 //! oil_temperature = "/oil"           # sensor_msgs/msg/Temperature, deg C
 //! pressure = "/depth"                # sensor_msgs/msg/FluidPressure, Pa
-//! attitude = "/imu"                  # sensor_msgs/msg/Imu of what carries the arm: which way is up
-//! attitude_in_base_wxyz = [1.0, 0.0, 0.0, 0.0]   # optional: how the attitude sensor is turned in the base link
+//! attitude = "/imu"                  # sensor_msgs/msg/Imu of the arm's carrier: direction of up
+//! attitude_in_base_wxyz = [1.0, 0.0, 0.0, 0.0]   # optional: rotation of the attitude sensor in the base link
 //! ```
 //!
 //! Tables have columns instead of topics: [`TableLayout`].
@@ -68,89 +68,90 @@ mod own_names;
 mod table;
 mod units;
 
-/// How far a quaternion's length may be from 1.
+/// Largest deviation of a quaternion's length from 1.
 pub(super) const QUATERNION_LENGTH_TOLERANCE: f64 = 0.01;
 
-/// What of a tag's measurement counts.
+/// Part of a tag's measurement that the fit uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum TagUse {
-    /// Its position in the camera frame.
+    /// Position of the tag in the camera frame.
     Position,
-    /// Position and rotation.
+    /// Position and rotation of the tag in the camera frame.
     Pose,
-    /// The corner pixels.
+    /// Pixels of the tag's corners.
     Corners,
     /// Pixels of a board's inner corners, by their numbers.
     BoardCorners,
 }
 
 impl TagUse {
-    /// Whether pixels are used, which a lens must turn into directions.
+    /// Returns true if pixels are used, which a lens must convert to directions.
     #[must_use]
     pub fn needs_lens(self) -> bool {
         matches!(self, Self::Corners | Self::BoardCorners)
     }
 }
 
-/// Stated noise of a tag's pose in the camera frame, one sigma per axis; what all tags of a view share included.
+/// Stated noise of a tag's pose in the camera frame, standard deviation per axis, including the part that all tags of a
+/// view share.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TagNoise {
-    /// Position in the camera frame.
+    /// Noise of the position in the camera frame, m.
     pub position_std_m: f64,
-    /// Direction of the camera: it moves a tag by this times its distance. `None`: not stated.
+    /// Noise of the camera's direction: it moves a tag by this angle times its distance. `None`: not stated.
     pub rotation_std_rad: Option<f64>,
 }
 
-/// What becomes of tags that were seen while the arm moved.
+/// Use of tags that were detected while the arm moved.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum WhileMoving {
-    /// Clocks of arm and camera differ: at 0.1 rad/s some 50 ms are 0.3 deg.
+    /// Such tags are left out, because clocks of arm and camera differ: at 0.1 rad/s about 50 ms are 0.3 deg.
     #[default]
     LeaveOut,
-    /// They count as any other.
+    /// Such tags are used like all others.
     Use,
 }
 
-/// What becomes of NaN and infinities in joint readings and tags.
+/// Use of NaN and infinities in joint readings and tags.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum NotFinite {
-    /// The recording is refused with the place of the first one.
+    /// The recording is refused; the error names the first occurrence.
     #[default]
     Refuse,
     /// The message (of a joint reading) or the tag is left out and counted.
     LeaveOut,
 }
 
-/// Which time of a message counts.
+/// Time of a message that is used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum StampSource {
-    /// The stamp in its header, by the sender's clock; the log time where that is zero.
+    /// The stamp in the header, by the sender's clock; the log time if that is zero.
     #[default]
     Header,
     /// The log time, by the recorder's clock.
     LogTime,
 }
 
-/// How the frames of tags are called.
+/// Names of the tags' frames.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ChildFrame {
-    /// The tag's number stands between the two.
+    /// Name with the tag's id between two texts.
     Numbered {
-        /// Text in front of the id; may be empty.
+        /// Text before the id; may be empty.
         before: String,
-        /// Text behind the id; may be empty.
+        /// Text after the id; may be empty.
         after: String,
     },
-    /// One landmark.
+    /// Name of the frame of a single landmark.
     Plain(String),
 }
 
 impl ChildFrame {
-    /// As the input map writes it.
+    /// Returns the name as the input map writes it.
     #[must_use]
     pub fn text(&self) -> String {
         match self {
@@ -159,7 +160,7 @@ impl ChildFrame {
         }
     }
 
-    /// The number of the tag whose frame is called `frame`; 0 for the plain name.
+    /// Returns the id of the tag whose frame is called `frame`; 0 for the plain name.
     #[must_use]
     pub fn id_of(&self, frame: &str) -> Option<u32> {
         let frame = without_slash(frame);
@@ -167,19 +168,19 @@ impl ChildFrame {
             Self::Plain(name) => (frame == name).then_some(0),
             Self::Numbered { before, after } => {
                 let digits = frame.strip_prefix(before.as_str())?.strip_suffix(after.as_str())?;
-                // `parse` would take a sign, too.
+                // `parse` would also accept a sign.
                 digits.bytes().all(|byte| byte.is_ascii_digit()).then(|| digits.parse().ok())?
             }
         }
     }
 }
 
-/// What a slow sensor measures.
+/// Quantity that a slow sensor measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ConditionKind {
-    /// Degrees Celsius.
+    /// Temperature of the oil, degrees Celsius.
     OilTemperature,
-    /// Pa, absolute.
+    /// Ambient pressure, absolute, Pa.
     Pressure,
 }
 
@@ -191,45 +192,45 @@ pub struct ConditionTopics {
     pub oil_temperature: Option<String>,
     /// Ambient pressure, `sensor_msgs/msg/FluidPressure`.
     pub pressure: Option<String>,
-    /// Attitude of what carries the arm, `sensor_msgs/msg/Imu`.
+    /// Attitude of the arm's carrier, `sensor_msgs/msg/Imu`.
     pub attitude: Option<String>,
-    /// base_from_sensor of the attitude's, as written; absent: as the base link.
+    /// Rotation base_from_sensor of the attitude sensor, as written; absent: aligned with the base link.
     attitude_in_base_wxyz: Option<[f64; 4]>,
 }
 
 impl ConditionTopics {
-    /// Those that are given.
+    /// Returns the topics that are given.
     pub(super) fn named(&self) -> Vec<(&String, ConditionKind)> {
         let oil = self.oil_temperature.iter().map(|topic| (topic, ConditionKind::OilTemperature));
         oil.chain(self.pressure.iter().map(|topic| (topic, ConditionKind::Pressure))).collect()
     }
 }
 
-/// Where in a ROS recording the data are.
+/// Topics of the data in a ROS recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Topics {
     /// Joint readings, `sensor_msgs/msg/JointState`.
     pub joints: String,
     /// Tags, `tf2_msgs/msg/TFMessage` or `apriltag_msgs/msg/AprilTagDetectionArray`, or images.
     pub tags: String,
-    /// Without a leading slash, as all frames here.
+    /// Frame of the camera without a leading slash, like all frames here.
     pub camera_frame: Option<String>,
     /// The camera's lens, `sensor_msgs/msg/CameraInfo`, for a robot that has none.
     pub camera_info: Option<String>,
-    /// Seconds added to the header stamps of the tags, of further cameras too.
+    /// Seconds added to the header stamps of the tags, also those of further cameras.
     pub clock_offset_s: f64,
-    /// Least time between two images that are looked at.
+    /// Minimum time between two images that are searched, s.
     pub image_period_s: f64,
-    /// What further cameras saw.
+    /// Topics of the tags of further cameras.
     pub further: Vec<FurtherTopic>,
-    /// Slow sensors; boxed for their size.
+    /// Topics of slow sensors; boxed for their size.
     pub conditions: Box<ConditionTopics>,
-    /// How the attitude sensor is turned in the base link.
+    /// Rotation of the attitude sensor in the base link.
     pub base_from_attitude: UnitQuaternion<f64>,
 }
 
 impl Topics {
-    /// What cameras see is on topics of their own.
+    /// Checks that the topics of cameras are not also those of joints or slow sensors.
     fn check_further(&self, file: &Path) -> Result<(), FileIssue> {
         let conditions = self.conditions.named().into_iter().map(|(topic, _)| topic).chain(&self.conditions.attitude);
         let others: Vec<&String> = conditions.chain([&self.joints]).collect();
@@ -243,18 +244,18 @@ impl Topics {
     }
 }
 
-/// Where the tags are that a further camera saw; in the form of the first's.
+/// Topic of the tags of a further camera, in the form of the first camera's.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FurtherTopic {
     /// Name of a further camera in robot.toml.
     pub camera: String,
-    /// As that of the first camera's tags, and maybe the same.
+    /// Topic of this camera's tags, which may be that of the first camera.
     pub topic: String,
-    /// As that of the first camera.
+    /// Frame of this camera, without a leading slash.
     pub camera_frame: Option<String>,
 }
 
-/// Where the data are.
+/// Source of the data.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Source {
     /// Messages of a ROS recording.
@@ -268,40 +269,40 @@ pub enum Source {
 pub struct InputMap {
     /// Topics or columns.
     pub source: Source,
-    /// Robot's joint to recorded name, where they differ.
+    /// Recorded name of each joint of the robot, if they differ.
     pub joint_names: BTreeMap<String, String>,
-    /// What the recorded numbers of the joints are.
+    /// Unit of the recorded numbers of the joints.
     pub joint_unit: JointUnit,
-    /// Lines from readings to angles, where `joint_unit` is one of angles.
+    /// Lines from readings to angles, if `joint_unit` is a unit of angles.
     pub joint_lines: JointAngleLines,
-    /// LeRobot's calibration, by which its numbers become ticks.
+    /// LeRobot's calibration, which converts its numbers to ticks.
     pub lerobot: Option<LerobotCalibration>,
-    /// Names of the tags' frames; `None` with [`TagUse::Corners`] alone.
+    /// Names of the tags' frames; `None` only with [`TagUse::Corners`].
     pub child_frame: Option<ChildFrame>,
-    /// What is printed on the tags in images; `None`: what is on the robot's.
+    /// Family of the tags in images; `None`: the family of the robot's tags.
     pub tag_family: Option<TagFamily>,
-    /// What of a tag's measurement counts.
+    /// Part of a tag's measurement that the fit uses.
     pub tag_use: TagUse,
     /// Order of the corners in recorded detections.
     pub corner_order: CornerOrder,
-    /// Stated noise of positions and poses of tags, where there is one.
+    /// Stated noise of positions and poses of tags, if there is one.
     pub tag_noise: Option<TagNoise>,
-    /// Largest gap between a tag message and the nearest joint reading; a tag farther off is left out.
+    /// Largest gap between a tag message and the nearest joint reading, s; tags with a larger gap are left out.
     pub max_gap_s: f64,
-    /// What becomes of tags seen while the arm moved.
+    /// Use of tags that were detected while the arm moved.
     pub while_moving: WhileMoving,
-    /// What becomes of NaN and infinities.
+    /// Use of NaN and infinities.
     pub not_finite: NotFinite,
-    /// Which time of a message counts.
+    /// Time of a message that is used.
     pub stamps: StampSource,
 }
 
 impl InputMap {
-    /// Checks that the joints of `joint_sensors` and the cameras of `further_tags` are of this robot, and that each
-    /// joint has a recorded name of its own.
+    /// Checks that the joints of `joint_sensors` and the cameras of `further_tags` exist on this robot. Also checks
+    /// that each joint has a recorded name of its own.
     ///
     /// # Errors
-    /// [`FileIssue`] naming `file`, the name and those that the robot has.
+    /// [`FileIssue`] naming `file`, the unknown name and the robot's names.
     pub fn check_robot(&self, file: &Path, robot: &Robot) -> Result<(), FileIssue> {
         self.joint_names.keys().try_for_each(|name| check_name(file, "names", name, robot))?;
         self.joint_lines.check_robot(file, robot)?;
@@ -322,7 +323,7 @@ impl InputMap {
         }
     }
 
-    /// The raw reading that a recorded number stands for.
+    /// Returns the raw reading of a recorded number.
     pub(super) fn counts(&self, spec: &JointSensorSpec, value: f64) -> f64 {
         if let Some(lerobot) = &self.lerobot {
             return lerobot.tick(self.recorded_name(&spec.joint), value);
@@ -331,13 +332,13 @@ impl InputMap {
         spec.offset_counts + spec.counts_per_rad * stated.angle_rad(value)
     }
 
-    /// Line from a joint's readings to its angle; `None`: they are counts.
+    /// Line from a joint's readings to its angle; `None` if they are counts.
     #[must_use]
     pub fn stated(&self, spec: &JointSensorSpec) -> Option<StatedAngle> {
         self.joint_lines.of(self.joint_unit, spec)
     }
 
-    /// What further cameras saw.
+    /// Returns the topics of the tags of further cameras.
     #[must_use]
     pub fn further(&self) -> &[FurtherTopic] {
         match &self.source {
@@ -346,7 +347,7 @@ impl InputMap {
         }
     }
 
-    /// The name that the recording has for `joint` of the robot.
+    /// Returns the recorded name of the robot's joint `joint`.
     #[must_use]
     pub fn recorded_name<'a>(&'a self, joint: &'a String) -> &'a String {
         self.joint_names.get(joint).unwrap_or(joint)
@@ -356,7 +357,7 @@ impl InputMap {
 /// Offsets of clocks that fit ROS times, the years 1901 to 2038, s.
 const CLOCK_OFFSETS_S: std::ops::RangeInclusive<f64> = -4.3e9..=4.3e9;
 
-/// Old ROS names begin with a slash; both mean one frame.
+/// Returns the frame without the leading slash of old ROS names; both mean one frame.
 pub(super) fn without_slash(frame: &str) -> &str {
     frame.strip_prefix('/').unwrap_or(frame)
 }
@@ -401,7 +402,7 @@ struct MapToml {
 struct FurtherTagsToml {
     /// Name of a [[further_camera]] of robot.toml.
     camera: String,
-    /// Topic of its tags.
+    /// Topic of this camera's tags.
     topic: String,
     /// Frame of that camera.
     camera_frame: Option<String>,
@@ -412,7 +413,7 @@ struct FurtherTagsToml {
 struct TagsToml {
     /// Topic of transforms, detections or images.
     topic: Option<String>,
-    /// Table of the tags, where the joints are in another one.
+    /// Table of the tags, if the joints are in another one.
     table: Option<TagTableToml>,
     /// Frame of the camera in the transforms.
     camera_frame: Option<String>,
@@ -428,7 +429,7 @@ struct TagsToml {
     columns: Option<TagColumnsToml>,
     /// Family of the tags in images; absent: that of the robot's tags.
     family: Option<String>,
-    /// Least time between two images that are searched; 0: all.
+    /// Minimum time between two images that are searched; 0: all.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 3600.0))]
     image_period_s: f64,
@@ -438,10 +439,10 @@ struct TagsToml {
     #[serde(default)]
     #[schemars(range(min = -4.3e9, max = 4.3e9))]
     clock_offset_s: f64,
-    /// Noise of a tag's position, one sigma per axis.
+    /// Noise of a tag's position, standard deviation per axis.
     #[schemars(range(min = 1e-7, max = 10.0))]
     position_std_m: Option<f64>,
-    /// Noise of a tag's attitude, one sigma per axis.
+    /// Noise of a tag's attitude, standard deviation per axis.
     #[schemars(range(min = 1e-7, max = 3.0))]
     rotation_std_rad: Option<f64>,
 }
@@ -469,7 +470,7 @@ impl TagsToml {
     }
 }
 
-/// Default of `max_gap_s`, s. Assumed: half of what one pose a second leaves.
+/// Default of `max_gap_s`, s. Assumed: half the interval of one pose per second.
 pub const DEFAULT_MAX_GAP_S: f64 = 0.5;
 
 fn usual_gap_s() -> f64 {
@@ -494,10 +495,9 @@ pub fn read_input_map(file: &Path) -> Result<InputMap, RobotError> {
     Ok(InputMap { lerobot, ..map })
 }
 
-/// Parses the text of an input map; `file` names it in errors. LeRobot's JSON, which it may name, is not read.
-///
+/// Parses the text of an input map; `file` names it in errors. LeRobot's JSON, which the map may name, is not read.
 /// # Errors
-/// As [`read_input_map`].
+/// The errors of [`read_input_map`].
 pub fn parse_input_map(file: &Path, text: &str) -> Result<InputMap, RobotError> {
     checked(file, parse_file(Kind::Input, file, text)?)
 }
@@ -581,7 +581,8 @@ fn check_no_topics(file: &Path, raw: &MapToml) -> Result<(), FileIssue> {
     }
 }
 
-/// Each camera once, told from the others by its topic or its frame.
+/// Returns the topics of the further cameras. Each camera occurs once, distinguished from the others by its topic or
+/// its frame.
 fn further(file: &Path, first: &TagsToml, raw: Vec<FurtherTagsToml>) -> Result<Vec<FurtherTopic>, FileIssue> {
     let mut seen = vec![(first.topic.clone().unwrap_or_default(), first.camera_frame.clone())];
     let mut found: Vec<FurtherTopic> = Vec::with_capacity(raw.len());

@@ -3,7 +3,7 @@
 use super::error::InputError;
 use crate::log::{RawMessage, RosSchema, is_type};
 
-/// Compares whole names: types of other packages may have the same last name and another layout.
+/// Checks a message's type by its whole name: types of other packages may have the same last name and another layout.
 pub(super) fn check_type(file: &str, raw: &RawMessage<'_>, types: &[RosSchema]) -> Result<(), InputError> {
     let (file, topic) = (|| file.to_owned(), || raw.topic().to_owned());
     if raw.channel.message_encoding != "cdr" {

@@ -2,8 +2,8 @@
 //!
 //! `map` reads the input map: topics or columns, frames and names. `external` reads a recording by it, message by
 //! message, into raw joint readings (`joints`), slow sensors (`conditions`), attitudes (`attitude`) and detections
-//! (`tags`, those in images by an `images::ImageDetector` that is given), `table` a CSV or YAML file. Nothing is
-//! paired or averaged. `task` reads `--task` files, the targets that the arm is calibrated for.
+//! (`tags`). The caller supplies an `images::ImageDetector` for detections in images. `table` reads a CSV or YAML file.
+//! Nothing is paired or averaged. `task` reads `--task` files, the targets that the arm is calibrated for.
 
 mod attitude;
 mod clocks;

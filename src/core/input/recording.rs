@@ -1,4 +1,4 @@
-//! What the readers of external recordings hand on.
+//! Output of the readers of external recordings.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -14,32 +14,32 @@ use crate::log::{ChunkOrder, Completeness};
 pub struct ExternalRecording {
     /// The recording's file, as given.
     pub path: PathBuf,
-    /// In the order of their stamps.
+    /// Joint readings in the order of their stamps.
     pub readings: Vec<Reading>,
-    /// What the first camera saw, in the order of their stamps; each has a tag.
+    /// Frames of the first camera in the order of their stamps; each has a tag.
     pub frames: Vec<TagFrame>,
-    /// The same of each further camera of the robot; empty where the input map does not name it.
+    /// Frames of each further camera of the robot; empty if the input map does not name it.
     pub further_frames: Vec<Vec<TagFrame>>,
     /// Readings of slow sensors, in the order of the file.
     pub conditions: Vec<ConditionReading>,
-    /// Attitudes of what carries the arm, in the order of their stamps.
+    /// Attitudes of the arm's carrier, in the order of their stamps.
     pub attitudes: Vec<AttitudeReading>,
     /// Joints of the robot that no reading has, by index; none of them moves the camera.
     pub absent_joints: Vec<usize>,
     /// Recorded joints that the robot lacks.
     pub extra_joints: Vec<String>,
-    /// What speaks for another unit of the joints' numbers than the input map says.
+    /// Evidence that the joints' numbers are in another unit than the input map states.
     pub unit_doubt: Option<String>,
-    /// A sentence where clocks that differ keep most frames from a joint reading.
+    /// Sentence on clocks so different that most frames have no joint reading.
     pub clock_doubt: Option<String>,
-    /// Sentences on what was read in another way than the messages say.
+    /// Sentences on data that were not read as the messages state.
     pub notes: Vec<String>,
-    /// Number of messages that hold no data of use, by reason.
+    /// Number of messages without usable data, by reason.
     pub skipped: BTreeMap<String, u64>,
     /// Number of unused messages by reason.
     pub left_out: BTreeMap<String, u64>,
-    /// Whether the file could be read to its end.
+    /// Completeness of the file: read to its end or not.
     pub completeness: Completeness,
-    /// What was put right in the order of the file's chunks.
+    /// Corrections to the order of the file's chunks.
     pub chunk_order: ChunkOrder,
 }

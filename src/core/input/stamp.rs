@@ -4,11 +4,11 @@ use super::map::StampSource;
 use crate::log::ros::Time;
 use crate::time::Stamp;
 
-/// The stamps of one topic: which time of a message counts, and how many messages lacked a stamp.
+/// Stamps of one topic: the time of a message that is used, and the number of messages without a stamp.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct TopicClock {
     source: StampSource,
-    /// Added to every header's stamp, s.
+    /// Offset added to every header's stamp, s.
     offset_s: f64,
     /// Messages without a valid stamp, whose log time was used.
     pub unstamped: u64,
@@ -25,7 +25,7 @@ impl TopicClock {
         Self { offset_s, ..self }
     }
 
-    /// The time that counts: the header's stamp, or the log time where that is zero or invalid, or is asked for.
+    /// Returns the time that is used: the header's stamp, or the log time if that is zero or invalid, or requested.
     pub fn read(&mut self, stamp: Time, log_time: Stamp) -> Stamp {
         if self.source == StampSource::LogTime {
             return log_time;
@@ -42,7 +42,7 @@ impl TopicClock {
         }
     }
 
-    /// A sentence about messages without a stamp on `topic`; `None` where all had one.
+    /// Returns a sentence about messages without a stamp on `topic`; `None` if all had one.
     pub fn note(&self, topic: &str) -> Option<String> {
         let (n, of) = (self.unstamped, self.unstamped + self.stamped);
         (n > 0)

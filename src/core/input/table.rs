@@ -1,8 +1,8 @@
 //! Tables of poses at rest: CSV and YAML files by the columns of an input map.
 //!
 //! `one_table` reads rows that have joints and tags, `two_tables` joins the rows of two files. Both take numbers and
-//! tags from `row_reader`, the rows from `csv_text` and `yaml`. `contents` looks at a table before a map says what its
-//! columns are.
+//! tags from `row_reader`, the rows from `csv_text` and `yaml`. `contents` examines a table before a map states its
+//! columns.
 
 use std::collections::BTreeMap;
 use std::io::{Error, ErrorKind, Read};
@@ -64,12 +64,12 @@ pub(super) fn read_table(
 /// First bytes of the texts in UTF-16 that Windows writes.
 const UTF16: [u8; 2] = [0xff, 0xfe];
 
-/// Where a table's rows are.
+/// Path, format and position of a table's rows.
 #[derive(Clone, Copy)]
 struct TableFile<'a> {
     path: &'a Path,
     format: Option<TableFormat>,
-    /// Keys that lead to them in YAML.
+    /// Keys that lead to the rows in YAML.
     rows_at: &'a [String],
 }
 
@@ -103,7 +103,7 @@ fn read_table_text(path: &Path, format: TableFormat) -> Result<String, InputErro
     into_text(bytes).map_err(problem)
 }
 
-/// Refuses a file whose name ends as no table's does.
+/// Error for a file whose name does not end like a table's.
 fn of_unknown_format(path: &Path) -> InputError {
     let file = path.display().to_string();
     let mut start = Vec::new();
@@ -133,7 +133,7 @@ fn format_by_name(path: &Path) -> Option<TableFormat> {
     }
 }
 
-/// Makes tags of the rows' corners, which a frame holds as those of a board each.
+/// Merges the rows' corners into tags; a frame holds them first as corners of a board each.
 fn join_corners(recording: &mut ExternalRecording) {
     let mut incomplete = 0;
     for frame in &mut recording.frames {

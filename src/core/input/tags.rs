@@ -1,5 +1,5 @@
-//! Detections from transforms (`tf2_msgs/msg/TFMessage`), corners (`AprilTagDetectionArray` of `apriltag_msgs` or
-//! `isaac_ros_apriltag_interfaces`) or images.
+//! Reader of detections from transforms (`tf2_msgs/msg/TFMessage`), corners (`AprilTagDetectionArray` of
+//! `apriltag_msgs` or `isaac_ros_apriltag_interfaces`) or images.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,17 +14,17 @@ use crate::log::{CdrError, RawMessage, StampOrder, decode};
 use crate::optics::TagFamily;
 use crate::time::Stamp;
 
-/// One landmark in one image.
+/// Detection of one landmark in one image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExternalDetection {
-    /// Its number; `None` is the one landmark of a plain `child_frame`.
+    /// Id of the landmark; `None` for the single landmark of a plain `child_frame`.
     pub id: Option<u32>,
-    /// What the recording says of it, in the form that the input map asks for.
+    /// Measurement of the landmark, in the form that the input map requires.
     pub seen: RawMeasurement,
 }
 
 impl ExternalDetection {
-    /// What tells it from others of one frame: the landmark's number, and the corner's on a board.
+    /// Key that is unique within a frame: the landmark's id, and the corner's number on a board.
     #[must_use]
     pub fn key(&self) -> (Option<u32>, Option<u32>) {
         match self.seen {
@@ -34,41 +34,41 @@ impl ExternalDetection {
     }
 }
 
-/// How it was seen.
+/// Measurement of a landmark in one image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RawMeasurement {
     /// Raw pixels: bottom left, bottom right, top right, top left as printed.
     Corners([[f64; 2]; 4]),
-    /// Its position in the camera frame, m.
+    /// Position in the camera frame, m.
     Position(Vector3<f64>),
     /// `camera_from_tag`.
     Pose(Isometry3<f64>),
-    /// One inner corner of a board.
+    /// An inner corner of a board.
     BoardCorner {
-        /// Its number on the board.
+        /// Number of the corner on the board.
         number: u32,
         /// Raw pixel.
         pixel: [f64; 2],
     },
 }
 
-/// What the camera saw at one stamp.
+/// Measurements of a camera at one stamp.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TagFrame {
-    /// Header's stamp, or the log time where the header has none.
+    /// The header's stamp, or the log time if the header has none.
     pub stamp: Stamp,
-    /// Sorted by id, each once; never empty.
+    /// Detections sorted by id, each once; never empty.
     pub tags: Vec<ExternalDetection>,
-    /// Hashes of the messages that it comes from.
+    /// Hashes of the messages that the frame comes from.
     pub digests: Vec<[u8; 32]>,
 }
 
-/// A landmark in the lens itself is a transform that nobody filled in, m.
+/// Smallest distance of a landmark from the lens, m; a smaller one is a transform that was not filled in.
 pub(super) const MIN_DISTANCE_M: f64 = 1e-6;
 /// Names of frames that an error lists.
 const MAX_LISTED: usize = 20;
 
-/// Reads what one camera saw.
+/// Reader of one camera's detections.
 pub(super) struct TagReader<'a> {
     file: &'a str,
     map: &'a InputMap,
@@ -76,9 +76,9 @@ pub(super) struct TagReader<'a> {
     /// Number of the robot's camera.
     pub camera: usize,
     camera_frame: Option<&'a str>,
-    /// Least time between two images that are looked at.
+    /// Minimum time between two images that are searched, s.
     image_period_s: f64,
-    /// What is looked for in images.
+    /// Family of the tags that are searched for in images.
     family: TagFamily,
     last_image: Option<Stamp>,
     frames: BTreeMap<Stamp, TagFrame>,
@@ -93,7 +93,7 @@ pub(super) struct TagReader<'a> {
 }
 
 impl<'a> TagReader<'a> {
-    /// Of the first camera.
+    /// Builds the reader of the first camera.
     pub fn new(file: &'a str, map: &'a InputMap, topics: &'a Topics) -> Self {
         Self {
             file,
@@ -114,7 +114,7 @@ impl<'a> TagReader<'a> {
         }
     }
 
-    /// Of a further camera, whose number is `camera`.
+    /// Turns the reader into that of the further camera number `camera`.
     pub fn of_further(self, camera: usize, further: &'a FurtherTopic) -> Self {
         Self { camera, topic: &further.topic, camera_frame: further.camera_frame.as_deref(), ..self }
     }
@@ -280,7 +280,7 @@ impl<'a> TagReader<'a> {
         stamp
     }
 
-    /// Stamps and log times of its frames.
+    /// Stamps and log times of the frames.
     pub fn times(&self) -> impl Iterator<Item = (Stamp, Stamp)> {
         self.frames.keys().filter_map(|stamp| Some((*stamp, *self.log_times.get(stamp)?)))
     }
@@ -311,7 +311,8 @@ impl<'a> TagReader<'a> {
         *self.left_out.entry(what.to_owned()).or_default() += 1;
     }
 
-    /// In the order of time. A tag that is twice in one frame at different places is in it no more.
+    /// Returns the frames in the order of time, and the number of unused messages by reason. A frame drops a tag that
+    /// occurs twice in it at different positions.
     pub fn finish(mut self) -> (Vec<TagFrame>, BTreeMap<String, u64>) {
         let mut frames: Vec<TagFrame> = std::mem::take(&mut self.frames).into_values().collect();
         for frame in &mut frames {
@@ -339,7 +340,7 @@ impl<'a> TagReader<'a> {
         self.frames.len()
     }
 
-    /// Why nothing of the topic could be used.
+    /// Reason why no message of the topic could be used.
     pub fn problem(&self) -> String {
         let others: Vec<&String> = self.others.iter().take(MAX_LISTED).collect();
         let left_out: Vec<String> = self.left_out.iter().map(|(what, n)| format!("{n} {what}")).collect();

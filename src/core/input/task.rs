@@ -1,4 +1,4 @@
-//! `--task` files: what an arm is calibrated for, where no recording says it.
+//! Reader of `--task` files: the task of an arm, if no recording states it.
 //!
 //! ```toml
 //! version = 1
@@ -31,7 +31,7 @@ pub struct TaskFile {
     pub tolerance_m: f64,
     /// Tool positions in the base frame, m.
     pub targets_m: Vec<[f64; 3]>,
-    /// Joint angles at which the tool shall be, rad.
+    /// Joint angles of the tool targets, rad.
     pub poses_rad: Vec<Vec<f64>>,
 }
 
@@ -49,7 +49,7 @@ struct TaskToml {
     #[serde(default)]
     #[schemars(inner(inner(range(min = -100.0, max = 100.0))))]
     targets_m: Vec<[f64; 3]>,
-    /// Joint angles at which the tool shall be, base first (m for slides).
+    /// Joint angles of the tool targets, base first (m for slides).
     #[serde(default)]
     #[schemars(inner(inner(range(min = -100.0, max = 100.0))))]
     poses_rad: Vec<Vec<f64>>,
@@ -61,7 +61,7 @@ pub fn task_schema() -> serde_json::Value {
     schema_of::<TaskToml>(Kind::Task)
 }
 
-/// Farther than any arm reaches, m.
+/// Limit beyond the reach of any arm, m.
 const MAX_TARGET_M: f64 = 100.0;
 
 /// Reads a task file.
@@ -72,10 +72,10 @@ pub fn read_task(file: &Path) -> Result<TaskFile, RobotError> {
     parse_task(file, &read_text(file)?)
 }
 
-/// The same from a text; `file` names it in errors.
+/// Parses the text of a task file; `file` names it in errors.
 ///
 /// # Errors
-/// As [`read_task`].
+/// The errors of [`read_task`].
 pub fn parse_task(file: &Path, text: &str) -> Result<TaskFile, RobotError> {
     let raw: TaskToml = parse_file(Kind::Task, file, text)?;
     FileIssue::check_range(file, "tolerance_m", raw.tolerance_m, 1e-6..=1.0)?;
@@ -101,7 +101,7 @@ impl TaskFile {
     /// Checks that each pose lies within the joints' limits.
     ///
     /// # Errors
-    /// [`FileIssue`] naming `file`, the pose, the joint and its limits; also whether the pose is in degrees.
+    /// [`FileIssue`] naming `file`, the pose, the joint and its limits; it also says if the pose is in degrees.
     pub fn check_poses(&self, file: &Path, robot: &Robot) -> Result<(), FileIssue> {
         self.for_robot(file, robot)?;
         let is_within = |joint: &ChainJoint, angle: f64| {
@@ -131,10 +131,10 @@ impl TaskFile {
         Ok(())
     }
 
-    /// The task for `robot`: the targets, and where its tool is at the poses by the drawing.
+    /// Returns the task for `robot`: the targets, and the positions of its tool at the poses by the nominal model.
     ///
     /// # Errors
-    /// [`FileIssue`] naming `file` where a pose has not as many angles as the robot has joints.
+    /// [`FileIssue`] naming `file` if a pose does not have one angle per joint of the robot.
     pub fn for_robot(&self, file: &Path, robot: &Robot) -> Result<ReachTask, FileIssue> {
         let mut targets_m = self.targets_m.clone();
         for (k, pose) in self.poses_rad.iter().enumerate() {

@@ -6,14 +6,14 @@ use std::ops::{Deref, DerefMut};
 /// The most joints that an arm may have; arrays of this size live on the stack, so that loops do not allocate.
 pub const MAX_JOINTS: usize = 8;
 
-/// Unit marker: radians; metres of a slide.
+/// Unit marker: radians; for a slide metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Radians;
 /// Unit marker: raw sensor counts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Counts;
 
-/// One value per joint in the order of the chain, base first.
+/// Array with one value per joint in the order of the chain, base first.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointArray<U> {
     n: usize,
@@ -21,9 +21,9 @@ pub struct JointArray<U> {
     unit: PhantomData<U>,
 }
 
-/// Angles of the joints, rad; of a slide the way along its axis, m.
+/// Angles of the joints, rad; for a slide the travel along its axis, m.
 pub type JointAngles = JointArray<Radians>;
-/// Raw readings of the joint sensors, counts. Not angles: a sensor model converts, and only it.
+/// Raw readings of the joint sensors, counts. They are not angles: only a sensor model converts them.
 ///
 /// ```compile_fail
 /// use armcal_core::joints::{JointAngles, JointCounts};
@@ -61,7 +61,7 @@ impl<U> JointArray<U> {
         array
     }
 
-    /// The largest absolute difference of any joint.
+    /// Returns the largest absolute difference of any joint.
     #[must_use]
     pub fn max_abs_difference(&self, other: &Self) -> f64 {
         self.iter().zip(other.iter()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)

@@ -10,32 +10,32 @@ use crate::kinematics::link_correction::LinkCorrections;
 use crate::kinematics::link_poses::{Attachment, LinkPoses, Slides};
 use crate::units::Unit;
 
-/// How a joint moves.
+/// Type of motion of a joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum JointKind {
-    /// It turns about its axis: its coordinate is an angle, rad.
+    /// Rotation about the joint's axis; the coordinate is an angle, rad.
     #[default]
     Revolute,
-    /// It slides along its axis (a slide): its coordinate is a way, m. Names with `_rad` then mean m.
+    /// Translation along the joint's axis (a slide); the coordinate is a distance, m. Names with `_rad` then mean m.
     Prismatic,
 }
 
 impl JointKind {
-    /// Whether it slides.
+    /// Returns true for a slide.
     #[inline]
     #[must_use]
     pub fn is_slide(self) -> bool {
         self == Self::Prismatic
     }
 
-    /// Whether it turns; for files, which say it of slides alone.
+    /// Returns true for a revolute joint. Files omit the kind of such a joint.
     #[must_use]
     pub fn is_turning(&self) -> bool {
         *self == Self::Revolute
     }
 
-    /// What its coordinate is measured in, and how that is shown: an angle, or a way.
+    /// Returns the unit of the coordinate, which decides how it is shown: as an angle or as a distance.
     #[must_use]
     pub fn unit(self) -> Unit {
         match self {
@@ -44,7 +44,7 @@ impl JointKind {
         }
     }
 
-    /// Unit of its coordinate as it is stored: `rad`, or `m`.
+    /// Returns the unit of the coordinate as stored: `rad` or `m`.
     #[must_use]
     pub fn si(self) -> &'static str {
         match self {
@@ -54,7 +54,7 @@ impl JointKind {
     }
 }
 
-/// Joint range, rad; m of a slide.
+/// Joint range, rad; for a slide m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointLimits {
     /// Smallest angle.
@@ -64,33 +64,35 @@ pub struct JointLimits {
 }
 
 impl JointLimits {
-    /// Whether there is but one angle.
+    /// Returns true if the range has only one angle.
     #[must_use]
     pub fn are_locked(&self) -> bool {
         self.lower_rad == self.upper_rad
     }
 }
 
-/// One moving joint: fixed transform from the parent joint's link frame, then a rotation about `axis`, or a way along
-/// it.
+/// One moving joint: a fixed transform from the parent joint's link frame, then a rotation about `axis` or a
+/// translation along it.
 #[derive(Clone, Debug)]
 pub struct ChainJoint {
     /// Name of the joint in the URDF.
     pub name: String,
     /// Name of the link that it moves.
     pub child_link: String,
-    /// Whether it turns or slides.
+    /// Type of motion: rotation or translation.
     pub kind: JointKind,
     /// Pose of the joint's frame at angle zero in the frame of the parent link.
     pub parent_from_joint: Isometry3<f64>,
-    /// Axis of rotation in the joint's frame; angles count by the right-hand rule. The way of a slide.
+    /// Axis of rotation in the joint's frame; angles count by the right-hand rule. For a slide the direction of
+    /// translation.
     pub axis: UnitVector3<f64>,
-    /// `None` for a continuous joint.
+    /// Joint range; `None` for a continuous joint.
     pub limits: Option<JointLimits>,
 }
 
 impl ChainJoint {
-    /// The child link at `coordinate` (rad; m of a slide), where the joint's frame is at `base_from_joint`.
+    /// Returns the pose of the child link at `coordinate` (rad; m of a slide), for the joint's frame at
+    /// `base_from_joint`.
     #[inline]
     fn moved(&self, base_from_joint: Isometry3<f64>, coordinate: f64) -> Isometry3<f64> {
         match self.kind {
@@ -109,32 +111,32 @@ pub struct Chain {
 }
 
 impl Chain {
-    /// A chain of these joints, base first; at most `MAX_JOINTS`.
+    /// Builds the chain of these joints, base first; at most `MAX_JOINTS`.
     pub fn new(joints: Vec<ChainJoint>) -> Self {
         assert!(joints.len() <= MAX_JOINTS, "readers of files check the number of joints");
         Self { joints, loads: ArmLoads::default(), sag: Sag::default() }
     }
 
-    /// The same chain with these loads.
+    /// Returns the chain with these loads.
     #[must_use]
     pub fn with_loads(self, loads: ArmLoads) -> Self {
         Self { loads, ..self }
     }
 
-    /// What it carries.
+    /// Weights that the arm carries.
     #[must_use]
     pub fn loads(&self) -> &ArmLoads {
         &self.loads
     }
 
-    /// How much it gives.
+    /// Compliance of the arm.
     #[must_use]
     pub fn sag(&self) -> &Sag {
         &self.sag
     }
 
-    /// The farthest that sag at the near end of each body (base first: of the mount) may bring any point behind it from
-    /// where it would be, m: with every link stretched out from each joint.
+    /// Upper bound of the displacement of any distal point by the sag at the near end of each body, m. Base first; the
+    /// base's near end is the mount. The bound assumes that every link is stretched out from each joint.
     #[must_use]
     pub fn most_sag_m(&self) -> [f64; MAX_JOINTS + 1] {
         let tool = &self.loads.tool;
@@ -144,7 +146,7 @@ impl Chain {
         };
         let (mut reach_m, mut most_nm, mut weight_n, mut most_m) = (0.0, 0.0, 0.0, [0.0; MAX_JOINTS + 1]);
         for body in (0..=self.joints.len()).rev() {
-            // Of what hangs behind the body's far end, carried by its near end.
+            // Loads distal to the body's far end; the body's near end carries them.
             let load = &self.loads.links[body];
             let tool_n = if body == tool.n_joints { self.sag.tool_load_n.abs() } else { 0.0 };
             weight_n += tool_n;
@@ -160,13 +162,13 @@ impl Chain {
         most_m
     }
 
-    /// Place of the first joint on the base; the base's own for a chain without joints.
+    /// Returns the pose of the first joint on the base; the identity for a chain without joints.
     #[must_use]
     pub fn first_place(&self) -> Isometry3<f64> {
         self.joints.first().map_or_else(Isometry3::identity, |first| first.parent_from_joint)
     }
 
-    /// Puts the first joint elsewhere on the base.
+    /// Moves the first joint to this pose on the base.
     pub fn set_first_place(&mut self, base_from_joint: &Isometry3<f64>) {
         if let Some(first) = self.joints.first_mut() {
             first.parent_from_joint = *base_from_joint;
@@ -187,19 +189,19 @@ impl Chain {
         self.joints.len()
     }
 
-    /// Poses of all links at `angles` by the sensors (rad; m of slides).
+    /// Returns the poses of all links at the angles `angles` of the sensors (rad; m of slides).
     #[must_use]
     pub fn link_poses(&self, angles: &JointAngles) -> LinkPoses {
         self.bent_poses(angles, (&self.sag, &self.loads), |_, joint| joint.parent_from_joint)
     }
 
-    /// The same for the arm with `corrections` of its drawing, its own sag aside.
+    /// Returns the poses of all links with `corrections` of the nominal model; their sag replaces the chain's.
     #[must_use]
     pub fn corrected_link_poses(&self, angles: &JointAngles, corrections: &LinkCorrections) -> LinkPoses {
         self.corrected_link_poses_under(angles, corrections, &self.loads)
     }
 
-    /// The same under other loads, such as [`ArmLoads::with_up`] of a base that leans.
+    /// Returns the corrected poses under other loads, such as [`ArmLoads::with_up`] of a base that leans.
     #[must_use]
     pub fn corrected_link_poses_under(
         &self,
@@ -214,7 +216,7 @@ impl Chain {
         self.bent_poses(angles, (&corrections.sag, loads), |i, _| places[i])
     }
 
-    /// The chain with `corrections` of its drawing.
+    /// Returns the chain with `corrections` of the nominal model.
     #[must_use]
     pub fn corrected(&self, corrections: &LinkCorrections) -> Self {
         let mut corrected = Self { sag: corrections.sag, ..self.clone() };
@@ -235,7 +237,7 @@ impl Chain {
         if sag.is_rigid() {
             return straight;
         }
-        // The load of the bent arm, for the straight one's is off by as much as bending turns a link.
+        // The load of the bent arm: the straight arm's load is wrong by as much as bending turns a link.
         let mut poses = straight;
         for _ in 0..2 {
             let bend: AboutAxes = sag.bend(&loads.torques(&poses, sag.tool_load_n));
@@ -246,7 +248,7 @@ impl Chain {
         poses
     }
 
-    /// The chain whose joint number `joint` has the range of one angle, `angle_rad`.
+    /// Returns the chain in which joint number `joint` is locked at `angle_rad`.
     #[must_use]
     pub fn locked(&self, joint: usize, angle_rad: f64) -> Self {
         let mut joints = self.joints.clone();
@@ -280,8 +282,8 @@ impl Chain {
         poses
     }
 
-    /// The pose of one attached frame in the base frame at `angles` (rad; m of slides), to the bit that of
-    /// [`Self::link_poses`].
+    /// Returns the pose of one attached frame in the base frame at `angles` (rad; m of slides). It equals that of
+    /// [`Self::link_poses`] to the bit.
     #[inline]
     #[must_use]
     pub fn frame(&self, angles: &JointAngles, attachment: &Attachment) -> Isometry3<f64> {

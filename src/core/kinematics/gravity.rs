@@ -1,17 +1,17 @@
-//! Torques of weight less buoyancy about joints and base, and how an arm bends under them.
+//! Torques of weight less buoyancy about joints and base, and the bending of an arm under them.
 //!
-//! With the weight less buoyancy `w_k` of link k, its first moment about the base's origin `s_k` (weight at the centre
-//! of mass, buoyancy at the centre of volume), up `u` and joint j at `o_j` with axis `a_j`:
+//! Link k has the weight less buoyancy `w_k` and its first moment `s_k` about the base's origin. Weight acts at the
+//! centre of mass, buoyancy at the centre of volume. Up is `u`; joint j is at `o_j` with axis `a_j`:
 //!
 //! ```text
 //! L_j = sum_(k > j) (s_k - o_j w_k)        tau_j = a_j . (u x L_j)         joints
 //! L   = sum_k s_k                          M     = u x L                   base, about its origin
 //! ```
 //!
-//! A slide's force is `-(a_j . u) W_j`, with the weight `W_j` beyond it, N in the place of N m.
+//! The force of a slide is `-(a_j . u) W_j`, N instead of N m, with the weight `W_j` distal to it.
 //!
-//! Each joint then turns by `c_j tau_j` behind its sensor, and the base by `(c_x M_x, c_y M_y, c_z M_z)` on what
-//! carries it. Torques are those of the arm bent by the torques of the straight one: what is left is of third order.
+//! Each joint then turns by `c_j tau_j` behind its sensor, and the base turns by `(c_x M_x, c_y M_y, c_z M_z)` on its
+//! mount. Torques are those of the arm bent by the torques of the straight one; the remaining error is of third order.
 
 use std::ops::Range;
 
@@ -20,59 +20,59 @@ use nalgebra::{UnitQuaternion, Vector3};
 use crate::joints::MAX_JOINTS;
 use crate::kinematics::link_poses::{Attachment, LinkPoses};
 
-/// Of one link, in its own frame.
+/// Load of one link, in the link's own frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LinkLoad {
     /// Weight less buoyancy.
     pub weight_n: f64,
-    /// The same times the place where it acts: weight at the centre of mass less buoyancy at that of volume.
+    /// Weight times centre of mass, less buoyancy times centre of volume.
     pub moment_nm: Vector3<f64>,
 }
 
-/// What an arm has to carry.
+/// Weights that an arm carries, and the direction of gravity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ArmLoads {
-    /// Against gravity, base frame, unit.
+    /// Unit vector against gravity, base frame.
     pub up: Vector3<f64>,
-    /// Base first; zero where no mass is known.
+    /// Load of each link, base first; zero if its mass is unknown.
     pub links: [LinkLoad; MAX_JOINTS + 1],
-    /// Where a load in the gripper hangs.
+    /// Frame at which a load in the gripper acts.
     pub tool: Attachment,
 }
 
-/// A number about each joint's axis, and about the base's axes: torques (N m) or angles (rad). Of slides forces (N) or
-/// ways (m).
+/// One value about each joint's axis and about the base's axes: torques (N m) or angles (rad). For slides forces (N) or
+/// distances (m).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AboutAxes {
-    /// About the joints, base first.
+    /// Values about the joints' axes, base first.
     pub joints: [f64; MAX_JOINTS],
-    /// About the axes of the base, through its origin.
+    /// Values about the axes of the base, through its origin.
     pub base: Vector3<f64>,
 }
 
-/// How much an arm gives.
+/// Compliance of an arm under its weight.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sag {
-    /// Of each joint behind its sensor, rad/(N m); m/N of a slide.
+    /// Compliance of each joint behind its sensor, rad/(N m); for a slide m/N.
     pub joint_rad_per_nm: [f64; MAX_JOINTS],
-    /// Of the base on what carries it, about the base's axes, rad/(N m).
+    /// Compliance of the base on its mount, about the base's axes, rad/(N m).
     pub mount_rad_per_nm: [f64; 3],
-    /// Weight less buoyancy at the tool point that the drawing does not have, N.
+    /// Weight less buoyancy at the tool point that the nominal model omits, N.
     pub tool_load_n: f64,
 }
 
-/// Of the links distal to each joint, and of all.
+/// Weights and moments of the links distal to each joint, and of all links.
 struct Moments {
-    /// About that joint's origin, N m.
+    /// Moment about each joint's origin, N m.
     about_joints: [Vector3<f64>; MAX_JOINTS],
-    /// N.
+    /// Weight distal to each joint, N.
     weights_n: [f64; MAX_JOINTS],
-    /// Of all about the base's origin, N m.
+    /// Moment of all links about the base's origin, N m.
     about_base: Vector3<f64>,
 }
 
 impl Moments {
-    /// How the moment of what joint `joint` carries changes with its angle, N m/rad; N of a slide.
+    /// Returns the derivative of the moment that joint `joint` carries by its own angle, N m/rad; for a slide N.
     fn change(&self, poses: &LinkPoses, joint: usize) -> Vector3<f64> {
         if poses.is_slide(joint) {
             return poses.axis(joint) * self.weights_n[joint];
@@ -82,31 +82,31 @@ impl Moments {
 }
 
 impl ArmLoads {
-    /// Whether any moving link has a weight.
+    /// Returns true if any moving link has a weight.
     #[must_use]
     pub fn are_known(&self) -> bool {
         self.links[1..].iter().any(|link| link.weight_n != 0.0)
     }
 
-    /// The same where gravity points against `up` (unit, base frame): on a base that leans.
+    /// Returns the loads with gravity against `up` (unit, base frame), for a base that leans.
     #[must_use]
     pub fn with_up(&self, up: Vector3<f64>) -> Self {
         Self { up, ..*self }
     }
 
-    /// Torques of all links and of `tool_load_n` at the tool, N m.
+    /// Returns the torques of all links and of `tool_load_n` at the tool, N m.
     #[must_use]
     pub fn torques(&self, poses: &LinkPoses, tool_load_n: f64) -> AboutAxes {
         self.torques_by(poses, &self.moments(poses, 1.0, tool_load_n))
     }
 
-    /// Torques of one newton at the tool alone, N m.
+    /// Returns the torques of one newton at the tool only, N m.
     #[must_use]
     pub fn torques_by_tool(&self, poses: &LinkPoses) -> AboutAxes {
         self.torques_by(poses, &self.moments(poses, 0.0, 1.0))
     }
 
-    /// How the torques change with the angle of each joint, N m/rad.
+    /// Returns the derivative of all torques by the angle of each joint, N m/rad.
     #[must_use]
     pub fn torque_derivatives(&self, poses: &LinkPoses, tool_load_n: f64) -> [AboutAxes; MAX_JOINTS] {
         let moments = self.moments(poses, 1.0, tool_load_n);
@@ -119,7 +119,7 @@ impl ArmLoads {
         // The second derivative of a potential is symmetric.
         let derivative = |joint: usize| {
             let (near, far) = (joint.min(by), joint.max(by));
-            // What is beyond a slide weighs the same wherever it is.
+            // The position of a slide does not change the weight distal to it.
             if poses.is_slide(near) { 0.0 } else { poses.axis(near).dot(&self.up.cross(&moments.change(poses, far))) }
         };
         let mut change = AboutAxes { base: self.up.cross(&moments.change(poses, by)), ..Default::default() };
@@ -166,14 +166,14 @@ impl Default for ArmLoads {
 }
 
 impl Sag {
-    /// Whether nothing gives.
+    /// Returns true if no joint yields and the mount does not.
     #[inline]
     #[must_use]
     pub fn is_rigid(&self) -> bool {
         self.joint_rad_per_nm == [0.0; MAX_JOINTS] && self.mount_rad_per_nm == [0.0; 3]
     }
 
-    /// Angles by which joints and base turn under `torques`, rad; m of slides.
+    /// Returns the angles by which joints and base turn under `torques`, rad; for slides the distance, m.
     #[must_use]
     pub fn bend(&self, torques: &AboutAxes) -> AboutAxes {
         AboutAxes {
@@ -184,8 +184,8 @@ impl Sag {
 }
 
 impl AboutAxes {
-    /// How a frame at `point_m` (base frame) behind `joints` moves, where these are small turns: its point m, and
-    /// itself about the base's axes rad. The base's own turn counts where `joints` begin at the base.
+    /// Returns the translation (m) of `point_m` and the rotation (rad) of its frame, caused by these small turns of
+    /// `joints`. Both are in the base frame. The base's own turn counts if `joints` begins at 0.
     #[must_use]
     pub fn motion(&self, poses: &LinkPoses, joints: Range<usize>, point_m: &Vector3<f64>) -> [Vector3<f64>; 2] {
         let base = if joints.start == 0 { self.base } else { Vector3::zeros() };
@@ -195,7 +195,7 @@ impl AboutAxes {
         })
     }
 
-    /// The base's turn.
+    /// Returns the rotation of the base.
     pub(crate) fn base_turn(&self) -> UnitQuaternion<f64> {
         UnitQuaternion::from_scaled_axis(self.base)
     }

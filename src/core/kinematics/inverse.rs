@@ -1,7 +1,7 @@
-//! Inverse kinematics for a tool position: damped least squares inside the limits, pulled towards a posture.
+//! Inverse kinematics for a tool position: damped least squares inside the limits, with a pull towards a configuration.
 //!
-//! Levenberg-Marquardt on the position error with a weak pull to the seed posture in the null space
-//! (Nakamura and Hanafusa 1986); joints at a limit are held for the step.
+//! Levenberg-Marquardt on the position error with a weak pull to the seed configuration in the null space (Nakamura and
+//! Hanafusa 1986). Joints at a limit are held for the step.
 
 use nalgebra::{DMatrix, Vector3};
 
@@ -10,36 +10,36 @@ use super::link_poses::Attachment;
 use crate::joints::{JointAngles, MAX_JOINTS};
 use crate::numeric::{Damping, LeastSquares, Proposal, Stop, StopRule, minimize};
 
-/// Where to bring a frame's origin, base frame, m.
+/// Goal of the inverse kinematics: a position of the frame's origin.
 #[derive(Clone, Copy, Debug)]
 pub struct IkGoal {
-    /// Where the frame's origin is to be, base frame.
+    /// Goal of the frame's origin in the base frame, m.
     pub position_m: Vector3<f64>,
 }
 
-/// What the solver may do.
+/// Limits and tolerances of the inverse kinematics.
 #[derive(Clone, Debug)]
 pub struct IkSettings {
     /// Range allowed to each joint, rad.
     pub limits: Vec<JointLimits>,
-    /// Joints that stay at the seed's angle.
+    /// True for each joint that stays at the seed's angle.
     pub locked: Vec<bool>,
     /// Distance from the goal at which the search ends.
     pub tolerance_m: f64,
-    /// Limit of the steps proposed.
+    /// Maximum number of proposed steps.
     pub max_iterations: usize,
 }
 
-/// Why no angles were found.
+/// Reason why no angles were found.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum IkError {
-    /// The goal is farther away than the arm is long, or behind its limits.
+    /// The goal is outside the arm's length or its joint limits.
     #[error("out of reach: the nearest point found is {error_m:.3} m from the target")]
     OutOfReach { error_m: f64 },
 }
 
-/// Solves for the joint angles that bring `tip` to `goal`, starting at `seed` and staying near it.
+/// Returns the joint angles that bring `tip` to `goal`, starting at `seed` and staying near it.
 ///
 /// # Errors
 /// [`IkError::OutOfReach`] with the distance that remains.
@@ -61,7 +61,7 @@ pub fn solve_position(
     }
 }
 
-/// Added to the normal matrix, m^2/rad^2.
+/// Damping added to the normal matrix, m^2/rad^2.
 const DAMPING: Damping = Damping { first: 1e-3, min: 1e-9, max: 1e6, down: 0.3, up: 8.0, min_after_rejection: 0.0 };
 /// Longest step of a joint, rad.
 const MAX_STEP_RAD: f64 = 0.3;
@@ -104,7 +104,7 @@ impl LeastSquares for Search<'_> {
 
     fn trial_cost(&mut self) -> Option<f64> {
         self.trial_error = position_error(self.chain, self.tip, self.goal, &self.trial);
-        // Against its limits the arm goes nowhere: that is no step that helps.
+        // A step that ends against the limits does not move the arm, so it counts as rejected.
         Some(self.trial_error.norm()).filter(|trial| *trial < self.error.norm())
     }
 

@@ -1,4 +1,4 @@
-//! Where joints sit on their parent links beyond what the drawing says, and how the arm bends.
+//! Corrections of the nominal model: poses of joints on their parent links, and sag of the arm.
 
 use std::ops::{Index, IndexMut};
 
@@ -7,21 +7,21 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use crate::joints::MAX_JOINTS;
 use crate::kinematics::gravity::Sag;
 
-/// What is to be added to one joint's place in its parent link, along and about the parent link's axes.
+/// Correction of one joint's pose in its parent link, along and about the parent link's axes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LinkCorrection {
-    /// Of the joint's origin, m.
+    /// Translation of the joint's origin, m.
     pub shift_m: Vector3<f64>,
-    /// Of the joint's attitude, about its origin: a rotation vector, rad.
+    /// Rotation vector of the joint about its origin, rad.
     pub turn_rad: Vector3<f64>,
 }
 
-/// What a whole arm is beyond its drawing; indexed by joint.
+/// Corrections of a whole arm's nominal model, indexed by joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LinkCorrections {
-    /// Of every joint, base first.
+    /// Pose correction of every joint, base first.
     pub places: [LinkCorrection; MAX_JOINTS],
-    /// How it bends under its weight.
+    /// Compliance of the arm under its weight.
     pub sag: Sag,
 }
 
@@ -41,7 +41,7 @@ impl IndexMut<usize> for LinkCorrections {
 }
 
 impl LinkCorrection {
-    /// The corrected `parent_from_joint`.
+    /// Returns the corrected `parent_from_joint`.
     #[inline]
     #[must_use]
     pub fn applied_to(&self, parent_from_joint: &Isometry3<f64>) -> Isometry3<f64> {

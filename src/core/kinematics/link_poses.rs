@@ -1,10 +1,10 @@
-//! Where an arm's links and the frames on them are.
+//! Poses of an arm's links and of the frames on them.
 
 use nalgebra::{Isometry3, Vector3};
 
 use crate::joints::MAX_JOINTS;
 
-/// A frame fixed to the link behind the first `n_joints` joints (0: the base).
+/// A frame fixed to the link distal to the first `n_joints` joints (0: the base).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Attachment {
     /// Number of joints proximal to the link.
@@ -14,24 +14,24 @@ pub struct Attachment {
 }
 
 impl Attachment {
-    /// The base frame itself.
+    /// Returns the attachment that is the base frame.
     #[must_use]
     pub fn base() -> Self {
         Self { n_joints: 0, link_from_frame: Isometry3::identity() }
     }
 }
 
-/// `base_from_link` for the base (index 0) and each joint's child link.
+/// Poses `base_from_link` of the base (index 0) and of each joint's child link.
 #[derive(Clone, Copy, Debug)]
 pub struct LinkPoses {
     pub(super) n_joints: usize,
     pub(super) base_from_link: [Isometry3<f64>; MAX_JOINTS + 1],
-    /// Unit axes of the joints in the base frame.
+    /// Unit vectors of the joints' axes in the base frame.
     pub(super) axes: [Vector3<f64>; MAX_JOINTS],
     pub(super) slides: Slides,
 }
 
-/// Which joints slide, and how far they are out.
+/// Flags of the joints that slide, and their travel.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Slides {
     are_slides: [bool; MAX_JOINTS],
@@ -53,14 +53,14 @@ impl LinkPoses {
         self.n_joints
     }
 
-    /// `base_from_link` of the base (0) or of the child link of joint `body - 1`.
+    /// Returns `base_from_link` of the base (0) or of the child link of joint `body - 1`.
     #[inline]
     #[must_use]
     pub fn link(&self, body: usize) -> &Isometry3<f64> {
         &self.base_from_link[..=self.n_joints][body]
     }
 
-    /// The same poses and axes in an attached frame instead of the base frame.
+    /// Returns these poses and axes in an attached frame instead of the base frame.
     #[must_use]
     pub fn in_frame(&self, attachment: &Attachment) -> Self {
         if *attachment == Attachment::base() {
@@ -77,38 +77,38 @@ impl LinkPoses {
         moved
     }
 
-    /// The pose of an attached frame in the base frame; the caller names it.
+    /// Returns the pose of an attached frame in the base frame; the caller names the frame.
     #[inline]
     #[must_use]
     pub fn frame(&self, attachment: &Attachment) -> Isometry3<f64> {
         self.link(attachment.n_joints) * attachment.link_from_frame
     }
 
-    /// Whether joint `joint` slides along its axis.
+    /// Returns true if joint `joint` slides along its axis.
     #[inline]
     #[must_use]
     pub fn is_slide(&self, joint: usize) -> bool {
         self.slides.are_slides[joint]
     }
 
-    /// Axis of joint `joint` in the base frame, unit: what it turns about, or slides along.
+    /// Returns the unit axis of joint `joint` in the base frame, about which it turns or along which it slides.
     #[inline]
     #[must_use]
     pub fn axis(&self, joint: usize) -> &Vector3<f64> {
         &self.axes[..self.n_joints][joint]
     }
 
-    /// Origin of joint `joint` in the base frame, m: of its frame on the parent link.
+    /// Returns the origin of the frame of joint `joint` on the parent link, in the base frame, m.
     #[inline]
     #[must_use]
     pub fn joint_origin(&self, joint: usize) -> Vector3<f64> {
         let child_m = self.base_from_link[joint + 1].translation.vector;
-        // A joint's rotation leaves its own origin where it is, so the child link's origin serves.
+        // A rotation leaves the joint's own origin in place, so the child link's origin serves.
         if self.is_slide(joint) { child_m - self.axis(joint) * self.slides.out_m[joint] } else { child_m }
     }
 
-    /// d(point)/d(angle of `joint`), m/rad, for a point (base frame) carried by that joint: `axis x (point - origin)`.
-    /// Of a slide the axis, m/m.
+    /// Returns d(point)/d(angle of `joint`), m/rad, for a point (base frame) that the joint carries:
+    /// `axis x (point - origin)`. For a slide it is the axis, m/m.
     #[inline]
     #[must_use]
     pub fn point_jacobian(&self, joint: usize, point_m: &Vector3<f64>) -> Vector3<f64> {
@@ -118,8 +118,8 @@ impl LinkPoses {
         self.axis(joint).cross(&(point_m - self.joint_origin(joint)))
     }
 
-    /// d(attitude)/d(angle of `joint`), about the axes of the base frame, rad/rad, of what that joint carries: the
-    /// axis. Of a slide zero, rad/m.
+    /// Returns d(attitude)/d(angle of `joint`) of the bodies that the joint carries, about the base's axes, rad/rad:
+    /// the axis. For a slide it is zero, rad/m.
     #[inline]
     #[must_use]
     pub fn turn_jacobian(&self, joint: usize) -> Vector3<f64> {

@@ -1,7 +1,7 @@
 //! Forward kinematics, Jacobians and inverse kinematics of a serial chain, from the URDF's figures.
 //!
-//! No sensors; masses only where the arm bends under them (`gravity`). Angles in, poses in the base frame out. Nothing
-//! here allocates; the chain holds at most `MAX_JOINTS` joints. Oracle: Pinocchio (tests/oracle).
+//! No sensors; masses only where the arm bends under them (`gravity`). Input are angles, output are poses in the base
+//! frame. Nothing here allocates; the chain holds at most `MAX_JOINTS` joints. Oracle: Pinocchio (tests/oracle).
 
 mod chain;
 mod gravity;

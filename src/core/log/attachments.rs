@@ -1,4 +1,4 @@
-//! Files attached to a recording. They serve viewers; belief never reads them.
+//! Files attached to a recording. They serve viewers; the estimator never reads them.
 
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
@@ -9,17 +9,17 @@ use super::error::LogError;
 use super::raw::file_contents;
 use crate::files;
 
-/// Larger attachments are skipped; the URDF and other files of a robot are smaller.
+/// Maximum length of an attachment that is read; the URDF and other files of a robot are smaller.
 const MAX_BYTES: u64 = 16 << 20;
-/// Limits of all attachments that are read.
+/// Limits over all attachments that are read.
 const MAX_TOTAL_BYTES: u64 = 64 << 20;
 const MAX_ATTACHMENTS: usize = 1000;
 
-/// Name and bytes of every attachment that passes its checksum, in the order of the file, up to 64 MiB in all. A cut
-/// file gives those before the cut. Messages are skipped.
+/// Returns name and bytes of every attachment that passes its checksum, in the order of the file, up to 64 MiB in all.
+/// A cut file gives the attachments before the cut. Messages are skipped.
 ///
 /// # Errors
-/// As [`super::for_each_raw`].
+/// The errors of [`super::for_each_raw`].
 pub fn read_attachments(path: impl AsRef<Path>) -> Result<Vec<(String, Vec<u8>)>, LogError> {
     let path = path.as_ref();
     let read = |source| LogError::Read { path: path.to_owned(), source };

@@ -5,10 +5,10 @@ use serde::{Deserialize, Serialize};
 
 /// Encapsulation header of plain CDR, little endian.
 const LITTLE_ENDIAN_HEADER: [u8; 4] = [0, 1, 0, 0];
-/// Most bytes of padding at a message's end, by the largest alignment of CDR.
+/// Maximum number of padding bytes at a message's end, by the largest alignment of CDR.
 const MAX_PADDING_BYTES: usize = 7;
 
-/// Why bytes are not a message of the expected type. Without values, so that equal causes count as one.
+/// Reason why bytes are not a message of the expected type. It has no values, so that equal causes count as one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum CdrError {
@@ -41,7 +41,7 @@ impl From<re_cdr::Error> for CdrError {
 /// Decodes one message, with its four bytes of header.
 ///
 /// # Errors
-/// [`CdrError`] when the bytes are not a `T`. Numbers are not checked: they may be NaN.
+/// [`CdrError`] if the bytes are not a `T`. Numbers are not checked: they may be NaN.
 pub fn decode<'de, T: Deserialize<'de>>(bytes: &'de [u8]) -> Result<T, CdrError> {
     let (header, body) = bytes.split_first_chunk::<4>().ok_or(CdrError::Header)?;
     let (value, used) = match header[..2] {
@@ -55,10 +55,10 @@ pub fn decode<'de, T: Deserialize<'de>>(bytes: &'de [u8]) -> Result<T, CdrError>
     Ok(value)
 }
 
-/// Encodes one message, header first, into `out`, whose former content goes.
+/// Encodes one message, header first, into `out`, and replaces its content.
 ///
 /// # Errors
-/// [`CdrError::Type`] when `T` has a field that CDR cannot express.
+/// [`CdrError::Type`] if `T` has a field that CDR cannot express.
 pub fn encode<T: Serialize + ?Sized>(value: &T, out: &mut Vec<u8>) -> Result<(), CdrError> {
     out.clear();
     out.extend_from_slice(&LITTLE_ENDIAN_HEADER);

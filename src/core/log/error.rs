@@ -1,4 +1,4 @@
-//! Errors of recordings and reasons to reject single messages.
+//! Errors of recordings, and reasons for the rejection of single messages.
 
 use crate::codes::{Code, Coded};
 use std::path::PathBuf;
@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use super::cdr::CdrError;
 use crate::time::Stamp;
 
-/// Why a recording could not be read or written at all.
+/// Reason why a recording could not be read or written at all.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum LogError {
@@ -38,7 +38,7 @@ pub enum LogError {
     Late { path: PathBuf, source: crate::streams::LateError },
 }
 
-/// Why a message cannot be encoded.
+/// Reason why a message cannot be encoded.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum EncodeError {
@@ -54,7 +54,7 @@ pub enum EncodeError {
     Cdr(#[from] CdrError),
 }
 
-/// Why a message of a recording is rejected. Rejections are counted by topic and reported.
+/// Reason why a message of a recording is rejected. Rejections are counted by topic and reported.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum DecodeRejection {

@@ -9,11 +9,10 @@ use super::reader::{Collector, Recording, TopicMap};
 use crate::streams::Message;
 use crate::time::Stamp;
 
-/// A recording that may still grow, read as far as it is complete.
+/// A recording that may still grow, read up to its last complete record.
 ///
-/// Each message is heard once, in the order of the file, by the checks of `scan_recording`. A record that is not
-/// written to its end is left for later. Memory does not grow with the file. The file may be renamed meanwhile, as a
-/// run does when it ends.
+/// Each message is passed on once, in the order of the file, with the checks of `scan_recording`. An incomplete record
+/// is left for later. Memory does not grow with the file. The file may be renamed meanwhile, as at the end of a run.
 pub struct GrowingRecording<'a> {
     path: PathBuf,
     identity: Option<FileIdentity>,
@@ -22,7 +21,7 @@ pub struct GrowingRecording<'a> {
 }
 
 impl<'a> GrowingRecording<'a> {
-    /// Opens a regular file, which may be empty as yet.
+    /// Opens a regular file, which may still be empty.
     ///
     /// # Errors
     /// [`LogError::Read`].
@@ -32,13 +31,13 @@ impl<'a> GrowingRecording<'a> {
         Ok(Self { path, identity, raw, collector: Collector::new(map) })
     }
 
-    /// Hears what has become complete since the last call, a chunk or some hundred kilobytes at most.
+    /// Passes on the messages completed since the last call, at most one chunk or a few hundred kilobytes.
     ///
     /// # Errors
-    /// [`LogError::Read`], [`LogError::NotMcap`]; [`LogError::Truncated`], [`LogError::Replaced`] where what was read
-    /// does not lie there any more. Damage is no error; the result of [`Self::finish`] tells of it.
+    /// [`LogError::Read`], [`LogError::NotMcap`]; [`LogError::Truncated`], [`LogError::Replaced`] if the bytes read are
+    /// no longer in the file. Damage is no error; the result of [`Self::finish`] reports it.
     pub fn poll(&mut self, mut hear: impl FnMut(Stamp, &Message)) -> Result<Growth, LogError> {
-        // Before reading: what was written to the old file before the new one came is read first.
+        // Checked before reading: data written to the old file before its replacement is read first.
         let is_replaced = self.is_replaced();
         let growth = self.raw.poll(|raw| {
             self.collector.take(raw, |raw, message| {
@@ -52,11 +51,11 @@ impl<'a> GrowingRecording<'a> {
         }
     }
 
-    /// Hears what is left where no more comes: of a cut chunk the beginning. The counts of the result are of all
-    /// messages; it holds none.
+    /// Passes on the rest of a file that no longer grows, including the beginning of a cut chunk. The counts of the
+    /// result cover all messages; it holds none.
     ///
     /// # Errors
-    /// As [`Self::poll`], and [`LogError::Empty`].
+    /// The errors of [`Self::poll`], and [`LogError::Empty`].
     pub fn finish(mut self, mut hear: impl FnMut(Stamp, &Message)) -> Result<Recording, LogError> {
         let collector = &mut self.collector;
         let summary = self.raw.finish(|raw| {
@@ -68,38 +67,40 @@ impl<'a> GrowingRecording<'a> {
         Ok(self.collector.finish(&self.path, &summary.map_err(|error| of_scan(&self.path, error))?))
     }
 
-    /// What was heard of a recording that goes on: its end does not count as missing.
+    /// Returns the summary of a recording that goes on; its end does not count as missing.
     #[must_use]
     pub fn stop(self) -> Recording {
         self.collector.finish(&self.path, &self.raw.stop())
     }
 
-    /// The file, as given.
+    /// Path of the file, as given.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Length of the file as last seen, and the bytes of it that were read. Where neither changes, nothing came.
+    /// Length of the file as last seen, and number of its bytes that were read. If neither changes, the file did not
+    /// grow.
     #[must_use]
     pub fn seen(&self) -> (u64, u64) {
         self.raw.seen()
     }
 
-    /// The joints that the sensors' messages name; `None` before the first.
+    /// Names of the joints in the sensors' messages; `None` before the first message.
     #[must_use]
     pub fn joint_names(&self) -> Option<&[String]> {
         self.collector.sensor_joints()
     }
 
-    /// Whether chunks lie in another order than that of time, or twice: a finished file is sorted by `scan_recording`,
-    /// a growing one is heard as it lies.
+    /// Returns true if chunks are not in the order of time, or occur twice. `scan_recording` sorts a finished file; a
+    /// growing file is read in the order of the file.
     #[must_use]
     pub fn is_out_of_order(&self) -> bool {
         self.raw.is_out_of_order()
     }
 
-    /// Whether the name belongs to another file now. A name that is gone is none: the file may have been renamed.
+    /// Returns true if the name belongs to another file now. A missing name does not count: the file may have been
+    /// renamed.
     fn is_replaced(&self) -> bool {
         self.identity.is_some() && metadata(&self.path).is_ok_and(|now| identity(&now) != self.identity)
     }

@@ -9,8 +9,8 @@ use crate::time::Stamp;
 /// Start of the hashed bytes; a new encoding gets a new version.
 const DOMAIN: &[u8] = b"armcal messages 1";
 
-/// BLAKE3 over the canonical encoding of messages: topic (the name in our recordings), log time and CDR bytes of each,
-/// with lengths, all little endian. Frame names and tag family are excluded.
+/// BLAKE3 hash over the canonical encoding of messages: topic (the name in our recordings), log time and CDR bytes of
+/// each. All have lengths and are little endian. Frame names and tag family are excluded.
 pub struct MessageHasher {
     hasher: blake3::Hasher,
     header: RecordingHeader,
@@ -18,7 +18,7 @@ pub struct MessageHasher {
 }
 
 impl MessageHasher {
-    /// The hash of no messages; `joint_names`, base first, become part of the bytes of joint messages.
+    /// Returns the hash of no messages; `joint_names`, base first, become part of the bytes of joint messages.
     #[must_use]
     pub fn new(joint_names: &[String]) -> Self {
         let mut hasher = blake3::Hasher::new();
@@ -36,7 +36,7 @@ impl MessageHasher {
     /// Adds one message; the order counts.
     ///
     /// # Errors
-    /// [`EncodeError`] for a message that no recording can hold; those read from one never give it.
+    /// [`EncodeError`] for a message that no recording can hold; messages read from a recording never cause it.
     pub fn add(&mut self, log_time: Stamp, message: &Message) -> Result<(), EncodeError> {
         encode_message(message, &self.header, &mut self.bytes)?;
         let topic = Stream::of(message).topic();
@@ -48,17 +48,17 @@ impl MessageHasher {
         Ok(())
     }
 
-    /// The hash so far, 64 hexadecimal digits.
+    /// Returns the hash so far, 64 hexadecimal digits.
     #[must_use]
     pub fn hex(&self) -> String {
         self.hasher.finalize().to_hex().to_string()
     }
 }
 
-/// Hashes messages in the order given, see [`MessageHasher`]; 64 hexadecimal digits.
+/// Hashes messages in the order given, see [`MessageHasher`]. Returns 64 hexadecimal digits.
 ///
 /// # Errors
-/// As [`MessageHasher::add`].
+/// The errors of [`MessageHasher::add`].
 pub fn hash_messages<'a>(
     messages: impl IntoIterator<Item = (Stamp, &'a Message)>,
     joint_names: &[String],
@@ -81,12 +81,12 @@ mod tests {
         hash_messages(messages.iter().map(|(log_time, message)| (*log_time, message)), &names).unwrap()
     }
 
-    /// A changed byte of any message would make calibrations of old recordings differ.
+    /// The hash must not change: otherwise calibrations of old recordings would differ.
     #[test]
     fn hash_of_known_messages_is_unchanged() {
         let mut messages: Vec<_> = samples::one_of_each().into_iter().map(|m| (SIMULATION_EPOCH, m)).collect();
         assert_eq!(hash(&messages), "284650a436f17712e8021e288ecbfcf39080665fc3de7173838e3f595093c25e");
-        // Kinds that came later leave the others as they were.
+        // Kinds added later do not change the hash of the others.
         messages.retain(|(_, message)| !matches!(message, Message::Touch(_)));
         assert_eq!(hash(&messages), "ead77c6dbcc91e1cb3529dc86dbf8835242371c4826425d354d239f002ced0de");
     }

@@ -5,10 +5,10 @@ use crate::optics::TagFamily;
 /// The frame of the arm's base in our recordings.
 pub(super) const BASE_FRAME: &str = "base_link";
 
-/// What every message of a recording shares. It is written into the messages, not beside them.
+/// Names that all messages of a recording share. They are written into the messages, not next to them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RecordingHeader {
-    /// In the order of the chain, base first.
+    /// Names of the joints in the order of the chain, base first.
     pub joint_names: Vec<String>,
     /// `frame_id` of the task.
     pub base_frame: String,
@@ -21,7 +21,7 @@ pub struct RecordingHeader {
 }
 
 impl RecordingHeader {
-    /// The joints, with frames `base_link`, `camera_wrist`, `vehicle` and tags of tag36h11.
+    /// Builds the header of these joints, with frames `base_link`, `camera_wrist`, `vehicle` and tags of tag36h11.
     #[must_use]
     pub fn new(joint_names: Vec<String>) -> Self {
         Self {
@@ -33,7 +33,7 @@ impl RecordingHeader {
         }
     }
 
-    /// The same with tags of another family.
+    /// Returns the header with tags of another family.
     #[must_use]
     pub fn with_tags_of(mut self, family: TagFamily) -> Self {
         family.long_name().clone_into(&mut self.tag_family);

@@ -1,4 +1,4 @@
-//! Camera images of a recording, one at a time: they are most of its bytes, and few readers need them.
+//! Camera images of a recording, one at a time: they make up most of its bytes, and few readers need them.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use crate::time::Stamp;
 /// Calls `take` with every readable camera image of a recording and its log time, in the order of the file.
 ///
 /// # Errors
-/// As [`super::read_recording`].
+/// The errors of [`super::read_recording`].
 pub fn for_each_image(path: impl AsRef<Path>, mut take: impl FnMut(Stamp, CameraImage)) -> Result<(), LogError> {
     for_each_raw(path.as_ref(), |raw| {
         if raw.topic() == Stream::Images.topic()

@@ -43,7 +43,7 @@ pub enum Stream {
 }
 
 impl Stream {
-    /// Every stream once.
+    /// All streams, each once.
     pub const ALL: [Self; 17] = [
         Self::JointSensors,
         Self::JointCommands,
@@ -64,7 +64,7 @@ impl Stream {
         Self::Log,
     ];
 
-    /// The stream that carries a message.
+    /// Returns the stream that carries a message.
     #[must_use]
     pub fn of(message: &Message) -> Self {
         match message {
@@ -90,7 +90,7 @@ impl Stream {
         }
     }
 
-    /// Topic and ROS type of each stream.
+    /// Returns topic and ROS type of the stream.
     const fn row(self) -> (&'static str, &'static RosSchema) {
         match self {
             Self::JointSensors => (JOINT_SENSORS, &JointState::SCHEMA),
@@ -113,31 +113,31 @@ impl Stream {
         }
     }
 
-    /// Its topic in our own recordings.
+    /// Returns the stream's topic in our own recordings.
     #[must_use]
     pub fn topic(self) -> &'static str {
         self.row().0
     }
 
-    /// The ROS type of its messages.
+    /// Returns the ROS type of the stream's messages.
     #[must_use]
     pub fn schema(self) -> &'static RosSchema {
         self.row().1
     }
 
-    /// Decodes and checks one message that stands alone, such as one that came over a network. Joints are in the order
-    /// of their names there.
+    /// Decodes and checks a single message, such as one received over a network. Joints are in the order of their names
+    /// in the message.
     ///
     /// # Errors
-    /// [`DecodeRejection`], whatever the bytes are.
+    /// [`DecodeRejection`], for any bytes.
     pub fn decode_alone(self, bytes: &[u8]) -> Result<Message, DecodeRejection> {
         self.decode(bytes, &mut FirstJoints::default())
     }
 
-    /// Decodes and checks one of its messages. Every number that it gives back is finite.
+    /// Decodes and checks one message of the stream. Every number that it returns is finite.
     ///
     /// # Errors
-    /// [`DecodeRejection`], whatever the bytes are.
+    /// [`DecodeRejection`], for any bytes.
     pub(super) fn decode(self, bytes: &[u8], first: &mut FirstJoints) -> Result<Message, DecodeRejection> {
         Ok(match self {
             Self::JointSensors => {
@@ -180,10 +180,10 @@ impl Stream {
     }
 }
 
-/// Encodes `message` into `out`, whose former content goes.
+/// Encodes `message` into `out`, and replaces its content.
 ///
 /// # Errors
-/// [`EncodeError`] when a count, stamp or id has no ROS form.
+/// [`EncodeError`] if a count, stamp or id has no ROS form.
 pub fn encode_message(message: &Message, header: &RecordingHeader, out: &mut Vec<u8>) -> Result<(), EncodeError> {
     match message {
         Message::JointSensors(m) => joints::encode(m.stamp, &m.counts, header, out)?,

@@ -1,10 +1,10 @@
 //! Recordings: the streams of an arm as an MCAP file of ROS 2 messages.
 //!
 //! [`RecordingWriter`] is a sink of `streams`; its bytes depend on its input only. [`read_recording`] reads recordings
-//! of simulated and real arms and reports the losses of a cut or damaged file, [`GrowingRecording`] one that is still
-//! being written. [`for_each_raw`] and [`decode`] read any
-//! topic of any MCAP file. The table `message_codec::Stream` names topic, ROS type and codec of each stream; `messages`
-//! holds the codecs. [`hash_messages`] hashes messages, not files; [`strip`] copies the messages alone.
+//! of simulated and real arms and reports the losses of a cut or damaged file. [`GrowingRecording`] reads one that is
+//! still being written. [`for_each_raw`] and [`decode`] read any topic of any MCAP file. The table
+//! `message_codec::Stream` names topic, ROS type and codec of each stream; `messages` holds the codecs.
+//! [`hash_messages`] hashes messages, not files; [`strip`] copies only the messages.
 
 #[macro_use]
 mod schema;

@@ -2,11 +2,11 @@
 
 use crate::time::Stamp;
 
-/// Largest step back of one sender's stamps, whose threads overtake each other, s; assumed. A larger one means that a
-/// clock was set or that files were merged.
+/// Largest step back of one sender's stamps, s; assumed. Threads of the sender may overtake each other by this. A
+/// larger step means that a clock was set or that files were merged.
 const JITTER_S: f64 = 0.1;
 
-/// Place where the stamps of a topic go backwards by more than its senders' jitter.
+/// Position at which the stamps of a topic go backwards by more than its senders' jitter.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
     "time stamps go backwards at message {message}: {:.3} s before the latest one before it ({} ns against {} ns)",
@@ -30,12 +30,12 @@ pub struct StampOrder {
 }
 
 impl StampOrder {
-    /// The next message of the topic.
+    /// Adds the next message of the topic.
     pub fn add(&mut self, stamp: Stamp) {
         self.add_of(self.messages + 1, stamp);
     }
 
-    /// A stamp of the topic's message of that number, from 1. A message may have several.
+    /// Adds a stamp of the topic's message of that number, from 1. A message may have several stamps.
     pub fn add_of(&mut self, message: u64, stamp: Stamp) {
         self.messages = message;
         let latest = self.latest.unwrap_or(stamp);
@@ -45,7 +45,7 @@ impl StampOrder {
         self.latest = Some(latest.max(stamp));
     }
 
-    /// The first place where the stamps go backwards by more than the jitter.
+    /// Returns the first position at which the stamps go backwards by more than the jitter.
     #[must_use]
     pub fn first_regression(&self) -> Option<StampRegression> {
         self.first

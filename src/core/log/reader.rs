@@ -15,28 +15,28 @@ use crate::time::Stamp;
 /// Topics that differ from those of our recordings, and topics to keep undecoded.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct TopicMap {
-    /// The topic of the raw joint readings, instead of `/joint_sensors`, which is then not read.
+    /// Topic of the raw joint readings, instead of `/joint_sensors`, which is then not read.
     pub joint_sensors: Option<String>,
-    /// The topic of the detections, instead of `/camera/wrist/detections`.
+    /// Topic of the detections, instead of `/camera/wrist/detections`.
     pub detections: Option<String>,
     /// Topics whose messages are kept undecoded, such as `/tf`. None of them yields [`Message`]s.
     pub raw: BTreeSet<String>,
-    /// The streams that are read; `None` is all.
+    /// Streams that are read; `None`: all.
     pub only: Option<BTreeSet<Stream>>,
 }
 
 /// A message kept undecoded, see [`TopicMap::raw`]; `super::decode` reads its bytes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RawRecord {
-    /// As recorded.
+    /// Topic of the message, as recorded.
     pub topic: String,
-    /// Name of its type; empty where the file has none.
+    /// Name of the message's type; empty if the file has none.
     pub schema_name: String,
-    /// Such as `cdr`.
+    /// Encoding of the message, such as `cdr`.
     pub message_encoding: String,
     /// Recorder's clock.
     pub log_time: Stamp,
-    /// Encoded bytes, as recorded.
+    /// Encoded message, as recorded.
     pub data: Vec<u8>,
 }
 
@@ -45,15 +45,15 @@ pub struct RawRecord {
 pub struct Recording {
     /// The file, as given.
     pub path: PathBuf,
-    /// With their log times, ordered by them; those of equal log time are in the order of the file.
+    /// Messages with their log times, ordered by them; messages of equal log time are in the order of the file.
     pub messages: Vec<(Stamp, Message)>,
-    /// As the joint messages name them, base first; empty if there are none.
+    /// Names of the joints as in the joint messages, base first; empty if there are none.
     pub joint_names: Vec<String>,
-    /// Whether the file could be read to its end.
+    /// Completeness of the file: read to its end or not.
     pub completeness: Completeness,
-    /// What was put right in the order of the file's chunks.
+    /// Corrections to the order of the file's chunks.
     pub chunk_order: ChunkOrder,
-    /// Number of usable messages that are not among `messages`, by stream.
+    /// Number of usable messages that are not in `messages`, by stream.
     pub left_in_file: BTreeMap<Stream, u64>,
     /// Messages kept undecoded, in the same order.
     pub raw: Vec<RawRecord>,
@@ -63,7 +63,7 @@ pub struct Recording {
     pub rejected: BTreeMap<String, u64>,
     /// Number of times that log time goes backwards, in the order of the file.
     pub non_monotonic: u64,
-    /// The first step back of the stamps of joint sensors and detections, by topic.
+    /// First step back of the stamps of joint sensors and detections, by topic.
     pub stamp_regressions: BTreeMap<String, StampRegression>,
 }
 
@@ -71,7 +71,7 @@ pub struct Recording {
 /// `for_each_image` reads them.
 ///
 /// # Errors
-/// As [`read_recording_with`].
+/// The errors of [`read_recording_with`].
 pub fn read_recording(path: impl AsRef<Path>) -> Result<Recording, LogError> {
     let is_kept = |_: Stamp, message: &Message| !matches!(message, Message::Image(_));
     scan_recording(path, &TopicMap::default(), |_| {}, is_kept).map(|(recording, _)| recording)
@@ -89,7 +89,7 @@ pub fn read_recording_with(path: impl AsRef<Path>, map: &TopicMap) -> Result<Rec
 /// selects those that stay in memory. The counts of the result are of all messages.
 ///
 /// # Errors
-/// As [`read_recording_with`].
+/// The errors of [`read_recording_with`].
 pub fn scan_recording(
     path: impl AsRef<Path>,
     map: &TopicMap,
@@ -105,13 +105,13 @@ pub fn scan_recording(
     Ok((collector.finish(path, &summary), summary))
 }
 
-/// What of a recording stays in memory, where that is known only after all of it was seen.
+/// Selection of the messages that stay in memory, if it depends on the whole recording.
 pub trait Choice {
-    /// A message of the first pass, and the part of the file that it lies in.
+    /// Takes a message of the first pass, and the part of the file in which it lies.
     fn note(&mut self, part: u64, message: &Message);
-    /// After the first pass: the parts that are read again.
+    /// Returns the parts to read again, after the first pass.
     fn parts(&mut self) -> BTreeSet<u64>;
-    /// Whether a message of these parts stays.
+    /// Returns true if a message of these parts stays in memory.
     fn keeps(&self, message: &Message) -> bool;
 }
 
@@ -119,7 +119,7 @@ pub trait Choice {
 /// result are of all messages.
 ///
 /// # Errors
-/// As [`read_recording_with`].
+/// The errors of [`read_recording_with`].
 pub fn read_chosen(path: &Path, map: &TopicMap, choice: &mut impl Choice) -> Result<Recording, LogError> {
     let mut all = Collector::new(map);
     let (summary, again) = for_each_raw_twice(path, |raw| {
@@ -142,11 +142,11 @@ pub fn read_chosen(path: &Path, map: &TopicMap, choice: &mut impl Choice) -> Res
     Ok(Collector { messages: chosen.messages, ..all }.finish(path, &summary))
 }
 
-/// Decodes messages and counts what cannot be used.
+/// Decodes messages and counts the unusable ones.
 pub(super) struct Collector<'a> {
     map: &'a TopicMap,
     streams: BTreeMap<&'a str, Stream>,
-    /// Topic of each stream, and what its first message says of joints.
+    /// Topic of each stream, and the joints of its first message.
     joints: BTreeMap<Stream, (String, FirstJoints)>,
     messages: Vec<(Stamp, Message)>,
     left_in_file: BTreeMap<Stream, u64>,
@@ -207,7 +207,7 @@ impl<'a> Collector<'a> {
         }
     }
 
-    /// The joints that the sensors' messages name so far.
+    /// Names of the joints in the sensors' messages so far.
     pub(super) fn sensor_joints(&self) -> Option<&[String]> {
         self.joints.get(&Stream::JointSensors)?.1.names.as_deref()
     }
@@ -267,8 +267,8 @@ impl<'a> Collector<'a> {
         }
     }
 
-    /// Names of the arm's joints: those of the joint sensors, else of the first other stream of joints. Messages of
-    /// streams with other names are rejected.
+    /// Returns the names of the arm's joints: those of the joint sensors, or else of the first other stream of joints.
+    /// Messages of streams with other names are rejected.
     fn settle_joint_names(&mut self) -> Vec<String> {
         // Stream orders the sensors first.
         let named: Vec<(Stream, String, Vec<String>)> = std::mem::take(&mut self.joints)
@@ -288,7 +288,7 @@ impl<'a> Collector<'a> {
     }
 }
 
-/// The stamp of a message whose stream must be in the order of time.
+/// Returns the stamp of a message whose stream must be in the order of time.
 fn ordered_stamp(message: &Message) -> Option<Stamp> {
     match message {
         Message::JointSensors(sample) => Some(sample.stamp),
@@ -303,7 +303,7 @@ fn check(stream: Stream, raw: &RawMessage<'_>) -> Result<(), DecodeRejection> {
         return Err(DecodeRejection::MessageEncoding { found: raw.channel.message_encoding.clone() });
     }
     let expected = stream.schema().name;
-    // ROS writes package/msg/Type; some converters omit the middle.
+    // ROS writes package/msg/Type; some converters omit `msg`.
     if raw.schema_name() != expected && raw.schema_name() != expected.replace("/msg/", "/") {
         return Err(DecodeRejection::Type { found: raw.schema_name().to_owned(), expected });
     }

@@ -43,7 +43,7 @@ fn marks(stamp: Stamp) -> Vec<Message> {
     kinds.map(|kind| Message::Mark(Mark { start: stamp, end: stamp.plus_s(0.5), kind })).collect()
 }
 
-/// Every variant and sub-variant of [`Message`].
+/// Returns every variant and sub-variant of [`Message`].
 pub fn one_of_each() -> Vec<Message> {
     let stamp = SIMULATION_EPOCH.plus_s(1.25);
     let corners_px = [[10.5, 20.25], [30.0, 21.0], [31.0, 1.0], [9.0, 0.5]];
@@ -104,10 +104,10 @@ pub fn one_of_each() -> Vec<Message> {
     messages
 }
 
-/// `n` steps of one joint sample each, with one of the other messages every tenth step. Numbers vary so that chunks do
-/// not shrink to nothing.
+/// Returns `n` steps of one joint sample each, with one of the other messages every tenth step. Numbers vary so that
+/// chunks do not compress to almost nothing.
 pub fn stream(n: usize) -> Vec<(Stamp, Message)> {
-    // Those that are read back by default.
+    // The other messages that are read back by default.
     let others: Vec<_> = one_of_each().into_iter().filter(|m| !matches!(m, Message::Image(_))).collect();
     let mut messages = Vec::new();
     let mut state = 1_u64;

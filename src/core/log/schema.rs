@@ -1,4 +1,4 @@
-//! Definitions of message types as `ros2msg` text: the message itself, then every type that it names.
+//! Definitions of message types as `ros2msg` text: the message itself, then every type that it references.
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -12,7 +12,7 @@ pub struct RosSchema {
     pub text: &'static str,
 }
 
-/// Returns true if `name` is the type `full` (`package/msg/Type`); some converters leave out the middle.
+/// Returns true if `name` is the type `full` (`package/msg/Type`); some converters omit `msg`.
 #[must_use]
 pub fn is_type(name: &str, full: &str) -> bool {
     let is_short =
@@ -20,7 +20,7 @@ pub fn is_type(name: &str, full: &str) -> bool {
     name == full || is_short()
 }
 
-/// A message whose bytes are CDR and whose definition is known.
+/// A message with CDR bytes and a known definition.
 pub trait RosMessage: Serialize + DeserializeOwned {
     /// Name and definition of the ROS type.
     const SCHEMA: RosSchema;

@@ -1,4 +1,4 @@
-//! Copy of a recording with its messages alone.
+//! Copy of only the messages of a recording.
 
 use std::fs;
 use std::path::Path;
@@ -10,11 +10,11 @@ use super::error::LogError;
 use super::raw::{RawMessage, RawSummary, for_each_raw};
 use super::writer::{FileWriter, create_file};
 
-/// Copies every readable message of `src` to a new file `dst`, with times, types and order, and without attachments and
-/// metadata. The result gives the completeness of `src`; `dst` is whole.
+/// Copies every readable message of `src` to a new file `dst`, with times, types and order, without attachments and
+/// metadata. The result gives the completeness of `src`; `dst` is complete.
 ///
 /// # Errors
-/// As [`for_each_raw`] for `src`, as `RecordingWriter::create` for `dst`, [`LogError::SameFile`].
+/// The errors of [`for_each_raw`] for `src` and of `RecordingWriter::create` for `dst`, [`LogError::SameFile`].
 pub fn strip(src: impl AsRef<Path>, dst: impl AsRef<Path>) -> Result<RawSummary, LogError> {
     let (src, dst) = (src.as_ref(), dst.as_ref());
     if fs::canonicalize(src).is_ok_and(|src| fs::canonicalize(dst).is_ok_and(|dst| src == dst)) {
@@ -30,7 +30,7 @@ pub fn strip(src: impl AsRef<Path>, dst: impl AsRef<Path>) -> Result<RawSummary,
     let written = written.and_then(|()| copy.finish().map(|_| ()));
     drop(copy);
     if summary.is_err() {
-        // An unreadable source leaves no empty recording behind; its error is the one to return.
+        // An unreadable source must not leave an empty recording; its error is the one to return.
         let _ = fs::remove_file(dst);
     }
     let summary = summary?;

@@ -1,8 +1,8 @@
-//! Topics of a recording, and what is on each.
+//! Topics of a recording and their content.
 
 /// Raw readings of the joint sensors, counts in `position`.
 pub const JOINT_SENSORS: &str = "/joint_sensors";
-/// Joint angles under the belief of the moment, rad.
+/// Joint angles under the estimate of the moment, rad.
 pub const JOINT_STATES: &str = "/joint_states";
 /// Set-points, counts.
 pub const JOINT_COMMANDS: &str = "/joint_commands";
@@ -28,7 +28,7 @@ pub const GRIPPER_COMMAND: &str = "/gripper_command";
 pub const TASK: &str = "/task";
 /// Surveyed tags, `armcal_msgs/msg/TagSurvey`, base frame.
 pub const TAG_SURVEY: &str = "/tag_survey";
-/// The tool against surveyed surfaces.
+/// Contacts of the tool with surveyed surfaces.
 pub const TOUCH: &str = "/touch";
 /// Spans of the recording by kind, `armcal_msgs/msg/Mark`.
 pub const MARKS: &str = "/marks";
@@ -39,15 +39,16 @@ pub const LOG: &str = "/log";
 pub const ROBOT_DESCRIPTION: &str = "/robot_description";
 /// The nominal lens, written once at the start, `sensor_msgs/msg/CameraInfo`.
 pub const CAMERA_INFO: &str = "/camera/wrist/camera_info";
-/// Frames that never move against each other, written once at the start, `tf2_msgs/msg/TFMessage`.
+/// Frames that are fixed relative to each other, written once at the start, `tf2_msgs/msg/TFMessage`.
 pub const TF_STATIC: &str = "/tf_static";
-/// Transforms, `tf2_msgs/msg/TFMessage`. In ours the arm as believed, for viewers; read in those of other systems.
+/// Transforms, `tf2_msgs/msg/TFMessage`. Our recordings have the estimated arm, for viewers; recordings of other
+/// systems are read.
 pub const TF: &str = "/tf";
 
 /// Tags, targets and meshes as solids, written once at the start, `foxglove_msgs/msg/SceneUpdate`.
 pub const SCENE: &str = "/scene";
-/// Tags found in an image, beside images alone, `foxglove_msgs/msg/ImageAnnotations`.
+/// Tags found in an image, only with images, `foxglove_msgs/msg/ImageAnnotations`.
 pub const IMAGE_MARKS: &str = "/camera/wrist/image/annotations";
 
-/// Topics for viewers; no message comes from them.
+/// Topics for viewers; they yield no messages.
 pub const VIEWER_TOPICS: [&str; 6] = [ROBOT_DESCRIPTION, CAMERA_INFO, TF_STATIC, TF, SCENE, IMAGE_MARKS];

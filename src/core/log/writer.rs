@@ -2,7 +2,7 @@
 //!
 //! The file only grows: at any moment the bytes on disk are the beginning of the finished file, whole chunks and at
 //! most one cut record. A chunk ends, and goes to the operating system, after 2 s of log time, 1 MiB or a flush. The
-//! bytes depend on the calls alone, not on clock, machine load or environment.
+//! bytes depend only on the calls, not on clock, machine load or environment.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -24,7 +24,7 @@ use crate::time::Stamp;
 
 /// Uncompressed size at which a chunk ends, bytes.
 const CHUNK_BYTES: u64 = 1 << 20;
-/// Log time after which a chunk ends, ns: the most that a kill loses. Shorter chunks compress worse.
+/// Log time after which a chunk ends, ns: the longest span that a kill can lose. Shorter chunks compress worse.
 const CHUNK_NANOS: u64 = 2_000_000_000;
 const ZSTD_LEVEL: u32 = 3;
 
@@ -36,7 +36,7 @@ struct OpenChannel {
     next_sequence: u32,
 }
 
-/// A recording in the making; the module tells what is on disk when.
+/// An unfinished recording; the module describes the state of the file on disk.
 ///
 /// Dropping it finishes the file and ignores errors; [`Self::finish`] returns them.
 pub struct RecordingWriter {
@@ -51,7 +51,7 @@ pub struct RecordingWriter {
 }
 
 impl RecordingWriter {
-    /// Creates the file, replacing one of that name. The directory must exist.
+    /// Creates the file, replacing a file of that name. The directory must exist.
     ///
     /// # Errors
     /// [`LogError::NoDirectory`], [`LogError::Create`] (no permission, a directory of that name), [`LogError::Write`].
@@ -72,7 +72,7 @@ impl RecordingWriter {
         Ok(writer)
     }
 
-    /// The file that it writes.
+    /// Path of the written file.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
@@ -96,7 +96,7 @@ impl RecordingWriter {
         written
     }
 
-    /// Attaches a file, such as the robot's URDF. Ends the current chunk. Belief never reads attachments.
+    /// Attaches a file, such as the robot's URDF, and ends the current chunk. The estimator never reads attachments.
     ///
     /// # Errors
     /// [`LogError::Write`].
@@ -111,7 +111,8 @@ impl RecordingWriter {
         self.file.attach(&attachment).map_err(|source| self.write_error(source))
     }
 
-    /// Adds a metadata record, such as the versions of a run. Ends the current chunk. Belief never reads metadata.
+    /// Adds a metadata record, such as the versions of a run, and ends the current chunk. The estimator never reads
+    /// metadata.
     ///
     /// # Errors
     /// [`LogError::Write`].
@@ -149,7 +150,7 @@ impl RecordingWriter {
         if nanos.abs_diff(since) >= CHUNK_NANOS { self.flush() } else { Ok(()) }
     }
 
-    /// The channel of `topic`, opened on first use, and the number of its next message.
+    /// Returns the channel of `topic`, opened on first use, and the number of its next message.
     fn channel(&mut self, topic: &str, schema: &RosSchema) -> Result<(u16, u32), LogError> {
         if !self.channels.contains_key(topic) {
             let opened = self
@@ -182,7 +183,7 @@ impl RecordingWriter {
         LogError::Write { path: self.path.clone(), source }
     }
 
-    /// That a message of `topic` has no ROS form.
+    /// Returns the error of a message of `topic` without a ROS form.
     #[must_use]
     pub fn encode_error(&self, topic: &str, source: EncodeError) -> LogError {
         LogError::Encode { path: self.path.clone(), topic: topic.to_owned(), source }
@@ -193,7 +194,7 @@ impl RecordingWriter {
     /// Adds a message.
     ///
     /// # Errors
-    /// [`LogError`] when it has no ROS form, or the file cannot be written.
+    /// [`LogError`] if the message has no ROS form, or the file cannot be written.
     pub fn write(&mut self, log_time: Stamp, message: &Message) -> Result<(), LogError> {
         let stream = Stream::of(message);
         let mut bytes = std::mem::take(&mut self.bytes);
@@ -211,7 +212,7 @@ impl Sink for RecordingWriter {
     }
 }
 
-/// Opens a file for a recording, with the options that make its bytes repeatable.
+/// Creates the file of a recording, with the options that make its bytes repeatable.
 pub(super) fn create_file(path: &Path) -> Result<FileWriter, LogError> {
     let directory = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
@@ -221,7 +222,7 @@ pub(super) fn create_file(path: &Path) -> Result<FileWriter, LogError> {
         return Err(LogError::NoDirectory { path: path.to_owned(), directory: directory.to_owned() });
     }
     let file = File::create(path).map_err(|source| LogError::Create { path: path.to_owned(), source })?;
-    // Without seeking, a chunk is assembled in memory and appended at once.
+    // A writer without seeking assembles a chunk in memory and appends it at once.
     WriteOptions::new()
         .profile("ros2")
         .library(concat!("armcal ", env!("CARGO_PKG_VERSION")))
@@ -305,7 +306,7 @@ mod tests {
         assert!(beginnings.iter().all(|beginning| whole.starts_with(beginning)));
     }
 
-    /// Without a flush, a kill loses no more than the chunk in the making.
+    /// Even without a flush, a kill loses at most the unfinished chunk.
     #[test]
     fn no_more_than_two_seconds_are_missing_on_disk_at_any_moment() {
         let dir = tempfile::tempdir().unwrap();

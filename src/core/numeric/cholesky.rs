@@ -11,7 +11,8 @@ const PART: usize = 8;
 /// Rows that are solved one by one.
 const SOLVE_BLOCK: usize = 32;
 
-/// Factor of a symmetric matrix, of which the lower triangle is read; `None` where it is not positive definite.
+/// Returns the Cholesky factor of a symmetric matrix, of which only the lower triangle is read. `None` if the matrix is
+/// not positive definite.
 #[must_use]
 pub fn cholesky(mut matrix: DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
     assert!(matrix.is_square(), "a Cholesky factor is of a square matrix");
@@ -53,7 +54,7 @@ pub fn solve_lower(factor: &Cholesky<f64, Dyn>, right: &mut DMatrix<f64>) {
     }
 }
 
-/// Subtracts what the finished columns from `from` to the first of `own` contribute to `own`.
+/// Subtracts the contribution of the finished columns, `from` to the first of `own`, from `own`.
 fn subtract_before(matrix: &mut DMatrix<f64>, from: usize, own: Range<usize>) {
     if from == own.start {
         return;
@@ -61,12 +62,12 @@ fn subtract_before(matrix: &mut DMatrix<f64>, from: usize, own: Range<usize>) {
     let (n, first, width) = (matrix.nrows(), own.start, own.len());
     let (done, mut own) = matrix.columns_range_pair_mut(from..first, own);
     let rows = done.rows_range(first..n);
-    // Products of matrices with the right one turned are several times as slow.
+    // Products of matrices with the right one transposed are several times as slow.
     let across = rows.rows_range(..width).transpose();
     own.rows_range_mut(first..n).gemm(-1.0, &rows, &across, 1.0);
 }
 
-/// Finishes `column`, from which those before `first` were subtracted already.
+/// Finishes `column`, from which the contributions of the columns before `first` are already subtracted.
 fn factor_column(matrix: &mut DMatrix<f64>, first: usize, column: usize) -> Option<()> {
     let n = matrix.nrows();
     for before in first..column {
@@ -75,7 +76,7 @@ fn factor_column(matrix: &mut DMatrix<f64>, first: usize, column: usize) -> Opti
         own.rows_range_mut(column..n).axpy(-factor, &done.rows_range(column..n), 1.0);
     }
     let pivot = matrix[(column, column)];
-    // Not a number is no pivot.
+    // NaN is no pivot.
     if !(pivot > 0.0 && pivot.is_finite()) {
         return None;
     }

@@ -1,92 +1,92 @@
 //! Levenberg-Marquardt: damped Gauss-Newton steps, the damping lowered after a step that helps and raised after one
 //! that does not (Levenberg 1944, Marquardt 1963).
 //!
-//! The loop knows neither matrices nor states: a [`LeastSquares`] problem solves its own normal equations, dense,
-//! sparse or with blocks eliminated, and keeps its memory, so that a step allocates nothing that the problem does not.
+//! The loop knows neither matrices nor states. A [`LeastSquares`] problem solves its own normal equations: dense,
+//! sparse or with marginalised blocks. It keeps its memory, so that a step allocates only what the problem allocates.
 
-/// A cost that damped Gauss-Newton steps lower. The problem holds a current state, linearized, and one trial state.
+/// A cost lowered by damped Gauss-Newton steps. The problem holds a linearized current state and one trial state.
 pub trait LeastSquares {
     /// Cost at the current state.
     fn cost(&self) -> f64;
 
-    /// Solves the normal equations, damped, and makes the trial state; `None` where they have no factor.
+    /// Solves the damped normal equations and makes the trial state; `None` if they have no factor.
     fn propose(&mut self, damping: f64) -> Option<Proposal>;
 
-    /// Cost at the trial state; `None` where it has none (a point behind the camera, say).
+    /// Cost at the trial state; `None` if it has none, for example with a point behind the camera.
     fn trial_cost(&mut self) -> Option<f64>;
 
     /// Makes the trial state the current one, and linearizes there.
     fn accept(&mut self);
 }
 
-/// A step that was proposed. What a problem does not know is infinite.
+/// A proposed step. A value that the problem does not know is infinite.
 #[derive(Clone, Copy, Debug)]
 pub struct Proposal {
     /// Length of the step, in the unit of [`StopRule::step_length`].
     pub length: f64,
-    /// What the step saves of the cost if the problem is linear.
+    /// Decrease of the cost that the linearized problem predicts for the step.
     pub predicted_gain: f64,
 }
 
-/// The course of the damping.
+/// Schedule of the damping.
 #[derive(Clone, Copy, Debug)]
 pub struct Damping {
-    /// At the start; at least this after equations without a factor.
+    /// Damping at the start; after equations without a factor the damping is at least this.
     pub first: f64,
-    /// Least damping after a step that lowers the cost.
+    /// Smallest damping after a step that lowers the cost.
     pub min: f64,
-    /// The search ends above it.
+    /// Largest damping; the search ends above it.
     pub max: f64,
-    /// Factor after a step that lowers the cost, and after one that does not.
+    /// Factor after a step that lowers the cost.
     pub down: f64,
     /// Factor after a step that does not lower the cost, or equations without a factor.
     pub up: f64,
-    /// Least damping after a step that does not lower the cost.
+    /// Smallest damping after a step that does not lower the cost.
     pub min_after_rejection: f64,
 }
 
-/// When to stop. A figure of zero never stops.
+/// Rules that stop the search. A rule with the value zero never stops it.
 #[derive(Clone, Copy, Debug)]
 pub struct StopRule {
-    /// Steps proposed.
+    /// Maximum number of proposed steps.
     pub max_iterations: usize,
-    /// Predicted gain over the cost.
+    /// Limit of the predicted gain over the cost.
     pub predicted_gain: f64,
-    /// Gain of a step over the cost before it.
+    /// Limit of the gain of a step over the cost before it.
     pub gain: f64,
-    /// Length of an accepted step, in the problem's own unit.
+    /// Limit of the length of an accepted step, in the problem's own unit.
     pub step_length: f64,
-    /// Cost.
+    /// Limit of the cost.
     pub cost: f64,
-    /// Share of the cost by which a step may raise it, and still count as one that helps.
+    /// Share of the cost by which a step may raise the cost and still be accepted.
     pub slack: f64,
-    /// Gain over the cost that is no more than the rounding of a sum: a step that should save no more, and does not,
-    /// ends the search.
+    /// Gain over the cost that is within the rounding of a sum. A step that should gain no more than this, and does
+    /// not, ends the search.
     pub rounding: f64,
 }
 
 impl StopRule {
-    /// Stops after so many iterations alone.
+    /// Returns the rule that stops only after this number of iterations.
     #[must_use]
     pub const fn after(max_iterations: usize) -> Self {
         Self { max_iterations, predicted_gain: 0.0, gain: 0.0, step_length: 0.0, cost: 0.0, slack: 0.0, rounding: 0.0 }
     }
 }
 
-/// How a solver ended.
+/// Result of a solver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
-    /// One of the rules for a minimum stopped the search.
+    /// A rule for a minimum stopped the search.
     Converged,
     /// The budget of evaluations ran out, or a parameter came to rest on its bound.
     Stalled,
-    /// The data leave the problem without a minimum.
+    /// The data determine no minimum.
     Degenerate,
 }
 
 impl Outcome {
-    /// As files write it.
+    /// Returns the name that files use.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -97,40 +97,40 @@ impl Outcome {
     }
 }
 
-/// What ended the loop.
+/// Reason why the loop ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {
-    /// A step saves too little of the cost: [`StopRule::gain`], [`StopRule::predicted_gain`].
+    /// A step gains too little: [`StopRule::gain`], [`StopRule::predicted_gain`].
     Gain,
-    /// See [`StopRule::step_length`].
+    /// The step was shorter than [`StopRule::step_length`].
     StepLength,
-    /// See [`StopRule::cost`].
+    /// The cost was below [`StopRule::cost`].
     Cost,
-    /// No step saves more than the last digits of the cost.
+    /// No step gains more than the rounding of the cost.
     Rounding,
-    /// See [`StopRule::max_iterations`].
+    /// The number of steps reached [`StopRule::max_iterations`].
     Iterations,
-    /// No step helps, however short.
+    /// No step lowers the cost, not even a very short one.
     Damping,
-    /// The normal equations have no factor, however damped.
+    /// The normal equations have no factor at any damping.
     Singular,
     /// The cost is not finite.
     NotFinite,
 }
 
-/// How it went.
+/// Record of a search.
 #[derive(Clone, Copy, Debug)]
 pub struct Report {
-    /// Why it ended.
+    /// Reason for the end of the search.
     pub stop: Stop,
     /// Number of steps proposed.
     pub iterations: usize,
-    /// Of the last step that helped, its gain over the cost before it; 1 if none did.
+    /// Gain over the cost before it of the last step that lowered the cost; 1 if none did.
     pub last_gain: f64,
 }
 
 impl Report {
-    /// What the stop means for the result.
+    /// Returns the outcome that the stop implies.
     #[must_use]
     pub fn outcome(&self) -> Outcome {
         match self.stop {
@@ -141,10 +141,10 @@ impl Report {
     }
 }
 
-/// A cost of zero is as low as any.
+/// Cost that counts as zero and cannot be lowered.
 const TINY_COST: f64 = 1e-300;
 
-/// Lowers the cost of `problem` from its current state on.
+/// Lowers the cost of `problem`, starting from its current state.
 pub fn minimize(problem: &mut impl LeastSquares, damping: &Damping, stop: &StopRule) -> Report {
     let mut level = damping.first;
     let mut report = Report { stop: Stop::Iterations, iterations: 0, last_gain: 1.0 };
@@ -169,7 +169,7 @@ pub fn minimize(problem: &mut impl LeastSquares, damping: &Damping, stop: &StopR
         report.iterations += 1;
         last_predicted_gain = predicted_gain.abs();
         let trial = problem.trial_cost();
-        // Not a number is no lower cost either.
+        // NaN is no lower cost either.
         if let Some(trial) = trial.filter(|trial| *trial <= cost * (1.0 + stop.slack)) {
             problem.accept();
             level = (level * damping.down).max(damping.min);
@@ -196,7 +196,7 @@ pub fn minimize(problem: &mut impl LeastSquares, damping: &Damping, stop: &StopR
     if problem.cost() < stop.cost {
         report.stop = Stop::Cost;
     } else if last_predicted_gain <= stop.rounding * problem.cost() {
-        // Steps to and fro between states that differ by rounding alone.
+        // The steps alternate between states that differ only by rounding.
         report.stop = Stop::Rounding;
     }
     report
@@ -273,7 +273,7 @@ mod tests {
         assert_eq!((report.stop, report.iterations, report.outcome()), (Stop::Iterations, 3, Outcome::Stalled));
     }
 
-    /// A problem that cannot be lowered, or has no factor.
+    /// A problem whose cost no step lowers, or whose equations have no factor.
     struct Wall {
         has_factor: bool,
     }
@@ -306,7 +306,7 @@ mod tests {
         }
     }
 
-    /// Two states whose costs differ by rounding, each a step from the other.
+    /// A problem that steps between two states whose costs differ only by rounding.
     struct Swing {
         cost: f64,
     }

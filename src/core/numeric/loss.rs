@@ -1,24 +1,24 @@
 //! Robust loss functions.
 
-/// Cost and weight of a residual by its squared whitened length.
+/// Cost and weight of a residual, as functions of its squared whitened length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Loss {
     /// `x`: least squares.
     Square,
     /// `x` to `k^2`, linear in the length beyond: `2 k sqrt(x) - k^2` (Huber 1964).
     Huber {
-        /// Standard deviations.
+        /// Limit of the quadratic part, in standard deviations.
         k: f64,
     },
-    /// `c^2 ln(1 + x / c^2)`: the pull fades with the distance.
+    /// `c^2 ln(1 + x / c^2)`: the weight falls with the distance.
     Cauchy {
-        /// Standard deviations.
+        /// Scale, in standard deviations.
         c: f64,
     },
 }
 
 impl Loss {
-    /// (cost, d(cost)/d(x)) of a residual of squared whitened length `x`.
+    /// Returns (cost, d(cost)/d(x)) of a residual of squared whitened length `x`.
     #[must_use]
     #[inline]
     pub fn of(self, x: f64) -> (f64, f64) {
@@ -35,7 +35,8 @@ impl Loss {
         }
     }
 
-    /// The same for a residual of `n` coordinates, whose length is `sqrt(n)` times as large for the same error of each.
+    /// Returns cost and weight of a residual of `n` coordinates. For the same error of each coordinate its length is
+    /// `sqrt(n)` times as large, and so is the scale.
     #[must_use]
     #[inline]
     pub fn of_coordinates(self, x: f64, n: usize) -> (f64, f64) {

@@ -1,6 +1,6 @@
 //! Numerical methods: nonlinear least squares, robust losses, factors of matrices.
 //!
-//! `levenberg_marquardt` solves all least-squares fits; `loss` has the robust loss functions (Huber, Cauchy);
+//! `levenberg_marquardt` solves all least-squares fits; `loss` has the robust loss functions (Huber, Cauchy).
 //! `cholesky` factors matrices of a hundred columns by blocks; `whole_part` turns floats into bytes.
 
 mod cholesky;

@@ -1,9 +1,9 @@
 //! Whole parts of floats without the range check of a cast, which no vector instruction makes.
 
-/// A float about this large has no fraction: its lowest bits are a whole number.
+/// A float about this large has no fraction: its lowest bits are an integer.
 pub const NO_FRACTION: f32 = 12_582_912.0;
 
-/// The whole part of 0 <= x <= 255.
+/// Returns the whole part of 0 <= x <= 255.
 #[inline]
 #[must_use]
 pub fn whole_part(x: f32) -> u8 {

@@ -1,22 +1,22 @@
-//! A flat board with a grid of points, and its pose from the pixels of those that were seen.
+//! A flat board with a grid of points, and its pose from the pixels of the detected points.
 //!
-//! A homography by least squares between the board's plane and the bearings (turned so that the board lies ahead)
-//! gives the start; Levenberg-Marquardt on the pixels refines it and its mirror image, and the better one is taken.
+//! A homography by least squares between the board's plane and the bearings (turned so that the board lies ahead) gives
+//! the initial guess. Levenberg-Marquardt on the pixels refines it and its mirror image; the better one is taken.
 
 use nalgebra::{Isometry3, Point3, SMatrix, SVector, Translation3, UnitQuaternion, Vector2, Vector3};
 
 use super::camera::Lens;
 use super::square::{SquareError, flipped, pose_of_homography, refine_points};
 
-/// Points fewer than these have no pose.
+/// Minimum number of points of a pose.
 const MIN_POINTS: usize = 4;
-/// Points whose scatter across is a smaller share of that along lie on a line.
+/// Ratio of the scatter across to the scatter along below which points count as collinear.
 const MIN_SCATTER_RATIO: f64 = 1e-4;
-/// Bearings closer to the plane across the board's direction than this (z) are not used for the start.
+/// Smallest z of a bearing that the initial guess uses, with z along the board's direction.
 const MIN_AHEAD: f64 = 0.05;
 
 /// A chessboard, or a ChArUco board: its inner corners are numbered along x first, from 0, as OpenCV does. Corner 0 is
-/// one square along x and one along y from the origin, which is an outer corner of the board; all are at z = 0.
+/// one square along x and one along y from the origin, an outer corner of the board. All are at z = 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Chessboard {
     /// Squares along x and along y.
@@ -32,7 +32,7 @@ impl Chessboard {
         self.squares.map(|n| n.saturating_sub(1)).iter().product()
     }
 
-    /// Where the inner corner of this number is in the board's frame, m; `None` where there is no such corner.
+    /// Returns the inner corner of this number in the board's frame, m; `None` if there is no such corner.
     #[must_use]
     pub fn corner(&self, number: u32) -> Option<Point3<f64>> {
         let along_x = self.squares[0].saturating_sub(1);
@@ -43,19 +43,19 @@ impl Chessboard {
     }
 }
 
-/// A board's pose in the camera frame, and how well it fits.
+/// Pose of a board in the camera frame, with its residual.
 #[derive(Clone, Copy, Debug)]
 pub struct BoardPose {
-    /// Either side of the board may face the camera.
+    /// Pose of the board; either side may face the camera.
     pub camera_from_board: Isometry3<f64>,
-    /// Root mean square over all coordinates, px.
+    /// Root mean square residual over all coordinates, px.
     pub rms_px: f64,
 }
 
-/// Solves for the pose of a board whose points `on_board` (m, z = 0) are seen at `pixels`.
+/// Solves for the pose of a board whose points `on_board` (m, z = 0) have the pixels `pixels`.
 ///
 /// # Errors
-/// [`SquareError`] when a pixel has no bearing, or the points (fewer than four, or on a line) have no pose.
+/// [`SquareError`] if a pixel has no bearing, or the points (fewer than four, or collinear) have no pose.
 pub fn solve_board(lens: &impl Lens, on_board: &[Point3<f64>], pixels: &[[f64; 2]]) -> Result<BoardPose, SquareError> {
     if on_board.len() < MIN_POINTS || on_board.len() != pixels.len() || are_on_a_line(on_board) {
         return Err(SquareError::Degenerate);
@@ -84,8 +84,8 @@ fn are_on_a_line(points: &[Point3<f64>]) -> bool {
     across.min() <= MIN_SCATTER_RATIO * across.max()
 }
 
-/// Least squares of the direct linear transform; lengths are in units of the points' own size, so that the normal
-/// equations are well conditioned.
+/// Solves the direct linear transform by least squares. Lengths are in units of the points' own size, so that the
+/// normal equations are well conditioned.
 fn start(lens: &impl Lens, points: &[Point3<f64>], pixels: &[[f64; 2]]) -> Result<Isometry3<f64>, SquareError> {
     let bearing = |pixel: &[f64; 2]| lens.unproject(&Vector2::from(*pixel)).map(nalgebra::Unit::into_inner);
     let bearings: Vec<Vector3<f64>> =

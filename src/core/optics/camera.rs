@@ -1,4 +1,4 @@
-//! Any camera: one set of methods over the models.
+//! Camera model: one set of methods over all lens models.
 
 use nalgebra::{Matrix2x3, SMatrix, Unit, Vector2, Vector3};
 
@@ -6,13 +6,13 @@ use super::fisheye::Fisheye;
 use super::flat_port::FlatPort;
 use super::radtan::Radtan;
 
-/// What pose estimation asks of a camera; points in the camera frame, m.
+/// Methods of a camera that pose estimation needs; points in the camera frame, m.
 pub trait Lens {
-    /// `None` where the lens does not see.
+    /// Returns the pixel of a point; `None` if the point is outside the lens's view.
     fn project(&self, point_m: &Vector3<f64>) -> Option<Vector2<f64>>;
-    /// Projection and d(pixel)/d(point), px/m.
+    /// Returns projection and d(pixel)/d(point), px/m.
     fn project_with_jacobian(&self, point_m: &Vector3<f64>) -> Option<(Vector2<f64>, Matrix2x3<f64>)>;
-    /// The direction that a pixel sees.
+    /// Returns the bearing of a pixel.
     fn unproject(&self, pixel_px: &Vector2<f64>) -> Option<Unit<Vector3<f64>>>;
 }
 
@@ -38,26 +38,26 @@ is_a_lens!(Fisheye);
 is_a_lens!(Radtan);
 is_a_lens!(CameraModel);
 
-/// A lens of either model, or none that is known.
+/// A lens of one of the models, or an unknown lens.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LensModel {
     /// Kannala and Brandt's fisheye.
     Equidistant(Fisheye),
-    /// Without distortion it is the plain pinhole.
+    /// Brown's pinhole with distortion; the plain pinhole if all coefficients are zero.
     Radtan(Radtan),
-    /// Nobody says what the lens is like.
+    /// Lens without a model.
     Unknown(UnknownLens),
 }
 
-/// Pixels of the largest image: the library that looks for tags takes 13 bytes for each.
+/// Maximum number of pixels of an image: the tag detector's library takes 13 bytes for each.
 const MAX_PIXELS: u64 = 100_000_000;
-/// Columns or rows of an image: that library counts them in 16 bits with a sign.
+/// Allowed columns and rows of an image: the same library counts them in signed 16-bit numbers.
 const SIDE_PX: std::ops::RangeInclusive<u32> = 16..=32767;
 
-/// Checks the size of a camera's images before anything is made of that size.
+/// Checks the size of a camera's images before any memory of that size is allocated.
 ///
 /// # Errors
-/// The end of a sentence about the images: their size and what is allowed.
+/// The end of a sentence about the images: their size and the allowed size.
 pub fn check_image_size(resolution_px: [u32; 2]) -> Result<(), String> {
     let [width, height] = resolution_px;
     let is_side = resolution_px.iter().all(|n| SIDE_PX.contains(n));
@@ -70,7 +70,7 @@ pub fn check_image_size(resolution_px: [u32; 2]) -> Result<(), String> {
     ))
 }
 
-/// A lens of which nothing is known: nothing is seen through it, and all its numbers are NaN.
+/// An unknown lens: it projects no point, and all its numbers are NaN.
 #[derive(Clone, Copy, Debug)]
 pub struct UnknownLens {
     focal_px: [f64; 2],
@@ -85,7 +85,7 @@ impl Default for UnknownLens {
     }
 }
 
-/// Nothing tells them apart.
+/// All unknown lenses are equal.
 impl PartialEq for UnknownLens {
     fn eq(&self, _: &Self) -> bool {
         true
@@ -114,16 +114,16 @@ impl UnknownLens {
     }
 }
 
-/// Any camera: a lens, and the window before it.
+/// A camera: a lens, and the window in front of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CameraModel {
-    /// In air where there is a window, in its medium otherwise.
+    /// Lens in air if there is a window, otherwise in its medium.
     pub lens: LensModel,
-    /// The window; `None` where the lens was measured as it looks, in its medium.
+    /// Window in front of the lens; `None` if the lens was calibrated in its medium.
     pub port: Option<FlatPort>,
 }
 
-/// Calls the same of any lens.
+/// Evaluates the same expression on the lens of each model.
 macro_rules! of_lens {
     ($camera:expr, $lens:ident => $value:expr) => {
         match &$camera.lens {
@@ -135,20 +135,20 @@ macro_rules! of_lens {
 }
 
 impl CameraModel {
-    /// The camera of which nobody says what its lens is like: it sees nothing.
+    /// Returns the camera with an unknown lens, which projects no point.
     #[must_use]
     pub fn unknown() -> Self {
         Self { lens: LensModel::Unknown(UnknownLens::default()), port: None }
     }
 
-    /// Whether the lens is known.
+    /// Returns true if the lens is known.
     #[inline]
     #[must_use]
     pub fn is_known(&self) -> bool {
         !matches!(self.lens, LensModel::Unknown(_))
     }
 
-    /// Pixel of a point (camera frame, m); `None` where the lens does not see.
+    /// Returns the pixel of a point (camera frame, m); `None` if the point is outside the lens's view.
     #[inline]
     #[must_use]
     pub fn project(&self, point_m: &Vector3<f64>) -> Option<Vector2<f64>> {
@@ -161,7 +161,7 @@ impl CameraModel {
         }
     }
 
-    /// The same of a point less than `within_rad` off the axis; `None` for others.
+    /// Returns the pixel of a point less than `within_rad` off the axis; `None` for other points.
     #[inline]
     #[must_use]
     pub fn project_within(&self, point_m: &Vector3<f64>, within_rad: f64) -> Option<Vector2<f64>> {
@@ -176,7 +176,7 @@ impl CameraModel {
         }
     }
 
-    /// Whether a pixel sees anything: whether [`Self::unproject`] has a direction for it.
+    /// Returns true if a pixel has a bearing by [`Self::unproject`].
     #[must_use]
     pub fn sees(&self, pixel_px: &Vector2<f64>) -> bool {
         match (&self.port, &self.lens) {
@@ -185,7 +185,7 @@ impl CameraModel {
         }
     }
 
-    /// Projection and d(pixel)/d(point), px/m; `None` where the lens does not see.
+    /// Returns projection and d(pixel)/d(point), px/m; `None` if the point is outside the lens's view.
     #[inline]
     #[must_use]
     pub fn project_with_jacobian(&self, point_m: &Vector3<f64>) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
@@ -199,15 +199,16 @@ impl CameraModel {
         }
     }
 
-    /// The direction (camera frame, unit) that a pixel sees; `None` where no point is projected to it. Behind a window
-    /// rays do not meet in one point: it is that of the ray's point a metre away.
+    /// Returns the bearing (camera frame, unit) of a pixel; `None` if no point is projected to it. Behind a window rays
+    /// do not meet in one point: the bearing is that of the ray's point at 1 m.
     #[must_use]
     pub fn unproject(&self, pixel_px: &Vector2<f64>) -> Option<Unit<Vector3<f64>>> {
         let direction = of_lens!(self, lens => lens.unproject(pixel_px))?;
         self.port.as_ref().map_or(Some(direction), |port| port.direction_in_water(&direction))
     }
 
-    /// Derivatives of a point's pixel by [`Self::intrinsics`]; `None` where the lens does not see.
+    /// Returns the derivatives of a point's pixel by [`Self::intrinsics`]; `None` if the point is outside the lens's
+    /// view.
     #[must_use]
     pub fn by_intrinsics(&self, point_m: &Vector3<f64>) -> Option<SMatrix<f64, 2, 8>> {
         let direction = self.port.map_or(Some(*point_m), |port| port.direction_in_air(point_m))?;
@@ -222,7 +223,7 @@ impl CameraModel {
         [fx, fy, cx, cy, a, b, c, d]
     }
 
-    /// The same camera with other [`Self::intrinsics`].
+    /// Returns the camera with other [`Self::intrinsics`].
     #[must_use]
     pub fn with_intrinsics(&self, [fx, fy, cx, cy, k @ ..]: [f64; 8]) -> Self {
         let mut other = *self;
@@ -266,7 +267,7 @@ impl CameraModel {
         of_lens!(self, lens => lens.distortion.to_vec())
     }
 
-    /// The model's name, as ROS and Kalibr have it.
+    /// Returns the model's name as used by ROS and Kalibr.
     #[must_use]
     pub fn name(&self) -> &'static str {
         match self.lens {
@@ -276,7 +277,7 @@ impl CameraModel {
         }
     }
 
-    /// Half of the field of view in front of the window; nothing beyond it is seen.
+    /// Half of the field of view in front of the window; points beyond it are not projected.
     #[must_use]
     pub fn max_view_angle_rad(&self) -> f64 {
         let angle_rad = match &self.lens {
@@ -290,13 +291,13 @@ impl CameraModel {
         }
     }
 
-    /// Whether the projected radius grows with the angle, so that pixels have one bearing.
+    /// Returns true if the projected radius grows with the angle, so that each pixel has one bearing.
     #[must_use]
     pub fn is_monotonic(&self) -> bool {
         of_lens!(self, lens => lens.is_monotonic())
     }
 
-    /// Whether a pixel lies in the image.
+    /// Returns true if a pixel lies in the image.
     #[inline]
     #[must_use]
     pub fn contains(&self, pixel_px: &Vector2<f64>) -> bool {

@@ -1,31 +1,30 @@
-//! How well a detector finds a tag's corners, and whether it finds the tag, from how the tag lies in the image.
+//! Noise of a tag's corners and chance of its detection, by the tag's position and size in the image.
 //!
-//! A side is an edge between black and white. One pixel of its length places it to `s_e sqrt(b)`, where b is the blur's
-//! standard deviation across it: the bound for a step blurred by a Gaussian in white noise n has the variance
+//! A side is an edge between black and white. One pixel of its length locates it to `s_e sqrt(b)`, where b is the
+//! blur's standard deviation across it. The bound for a step blurred by a Gaussian in white noise n has the variance
 //! `2 sqrt(pi) b (n/c)^2` (matched filter). The contrast c falls with the range, so that s_e grows as `exp(a range)`. A
-//! line through L such pixels is known at its ends to `4 s_e^2 b / L`, and a corner is where two such lines meet: with
-//! their normals as the rows of N, its covariance is `N^-1 diag(v_1, v_2) N^-T` and a floor. Short and slanted sides
-//! make it large by themselves. Tags are found with a chance that is logistic in their shortest side and in their
+//! line through L such pixels is known at its ends to `4 s_e^2 b / L`, and a corner is the intersection of two such
+//! lines. With their normals as the rows of N, its covariance is `N^-1 diag(v_1, v_2) N^-T` and a floor. Short and
+//! slanted sides make it large by themselves. The chance of detection is logistic in the tag's shortest side and in its
 //! range.
 
 use nalgebra::{Matrix2, Vector2};
 
 /// Corner covariances and chance of detection in one kind of water. The constants are fitted by
-/// `armcal-lab detection --repeats 2` to tags of 0.15 m under the lamps that it says, with a camera of 1224 x 1024
-/// pixels.
+/// `armcal-lab detection --repeats 2` to tags of 0.15 m under its lamps, with a camera of 1224 x 1024 pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CornerNoise {
-    /// How well 1 px of an edge's length is placed at range 0, per root of the blur: px.
+    /// Standard deviation of an edge's position by 1 px of its length at range 0, per root of the blur: px.
     pub edge_std_px: f64,
-    /// Relative growth of that with the range, 1/m.
+    /// Relative growth of `edge_std_px` with the range, 1/m.
     pub contrast_loss_per_m: f64,
-    /// Of each coordinate, whatever the edges; px.
+    /// Standard deviation of each coordinate regardless of the edges, px.
     pub floor_std_px: f64,
-    /// Chance that a tag is found.
+    /// Chance that a tag is detected.
     pub chance: DetectionChance,
 }
 
-/// `1/(1 + exp(-(side - half_side)/side_width))` times the same with the range falling.
+/// Chance of detection: `1/(1 + exp(-(side - half_side)/side_width))` times the same function of the range, falling.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DetectionChance {
     /// Shortest side of a tag in the image at which the chance is 1/2, as far as the side matters.
@@ -40,7 +39,7 @@ pub struct DetectionChance {
 
 /// Standard deviation of the blur of a camera and a tag at rest: lens (0.5 px) and pixel.
 const SHARP_PX: f64 = 0.58;
-/// A side shorter than this in the image places nothing.
+/// Shortest side in the image, px, that has a position.
 const MIN_SIDE_PX: f64 = 1.0;
 
 impl CornerNoise {
@@ -66,8 +65,8 @@ impl CornerNoise {
         chance: DetectionChance { half_side_px: 41.86, side_width_px: 7.39, half_range_m: 0.89, range_width_m: 0.3 },
     };
 
-    /// Covariance of each corner, px2, for corners in the order of a detection. `blur_px`: how far the image moved
-    /// while the shutter was open.
+    /// Returns the covariance of each corner, px2, for corners in the order of a detection. `blur_px` is the image's
+    /// motion during the exposure.
     #[must_use]
     pub fn covariances_px2(&self, corners_px: &[[f64; 2]; 4], range_m: f64, blur_px: f64) -> [Matrix2<f64>; 4] {
         let blur_std_px = SHARP_PX.hypot(blur_px / 12.0_f64.sqrt());
@@ -83,7 +82,8 @@ impl CornerNoise {
 }
 
 impl DetectionChance {
-    /// Chance, 0..1, for a tag whose shortest side in the image and distance from the camera are these.
+    /// Returns the chance of detection, 0..1, of a tag with this shortest side in the image and this distance from the
+    /// camera.
     #[must_use]
     pub fn of(&self, shortest_side_px: f64, range_m: f64) -> f64 {
         let logistic = |x: f64| 1.0 / (1.0 + (-x).exp());
@@ -92,14 +92,14 @@ impl DetectionChance {
     }
 }
 
-/// Covariance of the point where two lines meet whose places across themselves have the variances v1 and v2.
+/// Covariance of the intersection of two lines whose positions across themselves have the variances v1 and v2.
 fn intersection(along_1: &Vector2<f64>, v1: f64, along_2: &Vector2<f64>, v2: f64) -> Matrix2<f64> {
-    /// Lines nearer to parallel than this meet nowhere in particular.
+    /// Smallest sine between two lines; closer to parallel they have no definite intersection.
     const MIN_SIN: f64 = 0.02;
     let unit = |v: &Vector2<f64>| v / v.norm().max(1e-12);
     let (d1, d2) = (unit(along_1), unit(along_2));
     let sin = (d1.x * d2.y - d1.y * d2.x).abs().max(MIN_SIN);
-    // A line that gives by one across itself moves the point by 1/sin along the other.
+    // A line moved by one across itself moves the point by 1/sin along the other.
     (d2 * d2.transpose() * v1 + d1 * d1.transpose() * v2) / (sin * sin)
 }
 
@@ -114,7 +114,7 @@ mod tests {
 
     #[test]
     fn a_corner_is_where_its_sides_meet() {
-        // Lines moved at random across themselves, intersected.
+        // Two lines are moved at random across themselves and intersected.
         let (along_1, along_2) = (Vector2::new(3.0, 1.0), Vector2::new(-1.0, 2.0));
         let (n1, n2) = (Vector2::new(-1.0, 3.0).normalize(), Vector2::new(2.0, 1.0).normalize());
         let rows = Matrix2::from_rows(&[n1.transpose(), n2.transpose()]);
@@ -131,7 +131,7 @@ mod tests {
             noise().covariances_px2(corners, range_m, blur_px).iter().map(Matrix2::trace).sum::<f64>()
         };
         let plain = trace(&square, 1.0, 0.0);
-        // By hand: each coordinate 4 s^2 b / 40 and the floor.
+        // Expected value by hand: each coordinate has 4 s^2 b / 40 and the floor.
         let by_hand = 8.0 * (4.0 * 0.01 * 1.0_f64.exp() * SHARP_PX / 40.0 + 1e-4);
         assert!((plain - by_hand).abs() < 1e-12, "{plain} {by_hand}");
         assert!(trace(&square, 2.0, 0.0) > 2.0 * plain);

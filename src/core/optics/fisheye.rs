@@ -2,28 +2,29 @@
 
 use nalgebra::{Matrix2x3, SMatrix, SVector, Unit, Vector2, Vector3};
 
-/// `theta_d = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8)`, `pixel = f * theta_d * (x, y)/r + c`,
-/// where theta is the angle from the optical axis (z) and r = |(x, y)|. Pixel centres at whole numbers.
+/// Equidistant lens: `theta_d = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8)`,
+/// `pixel = f * theta_d * (x, y)/r + c`. Theta is the angle from the optical axis (z) and r = |(x, y)|. Pixel centres
+/// are at integers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fisheye {
     /// Focal lengths along x and y.
     pub focal_px: [f64; 2],
     /// Principal point, x and y.
     pub center_px: [f64; 2],
-    /// k1, k2, k3, k4.
+    /// Distortion coefficients k1, k2, k3, k4.
     pub distortion: [f64; 4],
     /// Columns and rows.
     pub resolution_px: [u32; 2],
-    /// Half of the field of view; nothing beyond it is seen.
+    /// Half of the field of view; points beyond it are not projected.
     pub max_view_angle_rad: f64,
 }
 
-/// So far outside of the field of view points still have derivatives.
+/// Angle beyond the field of view within which points still have derivatives, rad.
 const BEYOND_RAD: f64 = 0.05;
 
 impl Fisheye {
-    /// A lens of which no field of view is given: as far from the axis as the projected radius grows, but no farther
-    /// than half as far again as the image's corners, nor than 172 deg.
+    /// Builds a lens whose field of view is not given. The view extends as far from the axis as the projected radius
+    /// grows. It ends at most at 1.5 times the radius of the image's corners and at 172 deg.
     #[must_use]
     pub fn with_widest_view(
         focal_px: [f64; 2],
@@ -63,7 +64,8 @@ impl Fisheye {
         1.0 + t2 * (3.0 * k1 + t2 * (5.0 * k2 + t2 * (7.0 * k3 + t2 * 9.0 * k4)))
     }
 
-    /// Whether the projected radius grows with the angle over the whole field of view, so that pixels have one bearing.
+    /// Returns true if the projected radius grows with the angle over the whole field of view, so that each pixel has
+    /// one bearing.
     #[must_use]
     pub fn is_monotonic(&self) -> bool {
         (0..=200).all(|i| self.distorted_slope(self.max_view_angle_rad * f64::from(i) / 200.0) > 0.0)
@@ -77,7 +79,7 @@ impl Fisheye {
         self.project_at(point_m, r, r.atan2(point_m.z))
     }
 
-    /// The same where the distance from the axis and the angle are known.
+    /// Projects a point whose distance from the axis and angle are known.
     #[inline]
     pub(super) fn project_at(&self, point_m: &Vector3<f64>, r: f64, theta: f64) -> Option<Vector2<f64>> {
         if theta > self.max_view_angle_rad || point_m.norm_squared() < 1e-18 {
@@ -91,8 +93,8 @@ impl Fisheye {
         ))
     }
 
-    /// Projection and its Jacobian d(pixel)/d(point), px/m. Points up to 0.05 rad outside of the field of view have a
-    /// pixel, too, as far as the radius grows: an estimate that moves a corner across its edge meets no wall there.
+    /// Returns projection and d(pixel)/d(point), px/m. Points up to 0.05 rad outside the field of view also have a
+    /// pixel, if the radius grows there. So an estimate can move a corner across the edge of the view.
     #[must_use]
     pub fn project_with_jacobian(&self, point_m: &Vector3<f64>) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
         let (x, y, z) = (point_m.x, point_m.y, point_m.z);
@@ -111,7 +113,7 @@ impl Fisheye {
             return Some((pixel, Matrix2x3::new(fx * scale, 0.0, 0.0, 0.0, fy * scale, 0.0)));
         }
         let (ux, uy) = (x / r, y / r);
-        // With theta = atan2(r, z): along the radius, across it (theta_d / r), and along the axis.
+        // Derivatives with theta = atan2(r, z): along the radius, across it (theta_d / r), and along the axis.
         let slope = self.distorted_slope(theta);
         let (along, axial) = (slope * z / d2, -slope * r / d2);
         let both = (along - scale) * ux * uy;
@@ -126,7 +128,7 @@ impl Fisheye {
         Some((pixel, jacobian))
     }
 
-    /// d(pixel)/d(fx, fy, cx, cy, k1, k2, k3, k4).
+    /// Returns d(pixel)/d(fx, fy, cx, cy, k1, k2, k3, k4).
     pub(super) fn by_intrinsics(&self, point_m: &Vector3<f64>) -> Option<SMatrix<f64, 2, 8>> {
         let r = point_m.x.hypot(point_m.y);
         let theta = r.atan2(point_m.z);
@@ -149,7 +151,7 @@ impl Fisheye {
         Some(SMatrix::from_rows(&[row(ux, 0), row(uy, 1)]))
     }
 
-    /// The direction (camera frame, unit) that a pixel sees; `None` beyond the field of view.
+    /// Returns the bearing (camera frame, unit) of a pixel; `None` beyond the field of view.
     #[must_use]
     pub fn unproject(&self, pixel_px: &Vector2<f64>) -> Option<Unit<Vector3<f64>>> {
         let ([mx, my], theta_d) = self.radius_seen(pixel_px)?;
@@ -158,7 +160,7 @@ impl Fisheye {
         Some(Unit::new_normalize(Vector3::new(mx * scale, my * scale, theta.cos())))
     }
 
-    /// A pixel over the focal lengths, and its distance from the axis there; `None` beyond the field of view.
+    /// Returns a pixel over the focal lengths, and its distance from the axis there; `None` beyond the field of view.
     pub(super) fn radius_seen(&self, pixel_px: &Vector2<f64>) -> Option<([f64; 2], f64)> {
         let mx = (pixel_px.x - self.center_px[0]) / self.focal_px[0];
         let my = (pixel_px.y - self.center_px[1]) / self.focal_px[1];
@@ -167,7 +169,7 @@ impl Fisheye {
         is_seen.then_some(([mx, my], theta_d))
     }
 
-    /// Inverts [`Self::distorted`] by Newton's method kept inside a shrinking bracket, so that it cannot run away.
+    /// Inverts [`Self::distorted`] by Newton's method inside a shrinking bracket, so that it cannot diverge.
     fn undistorted(&self, theta_d: f64) -> f64 {
         let (mut low, mut high) = (0.0, self.max_view_angle_rad);
         let mut theta = theta_d.min(high);
@@ -188,7 +190,7 @@ impl Fisheye {
         theta
     }
 
-    /// Whether a pixel lies in the image.
+    /// Returns true if a pixel lies in the image.
     #[inline]
     #[must_use]
     pub fn contains(&self, pixel_px: &Vector2<f64>) -> bool {

@@ -1,31 +1,31 @@
 //! Refraction by a flat window between lens and water.
 //!
-//! A ray of tangent u in air (from the lens's pupil, about the optical axis, which is the window's normal) has the sine
-//! `s = u / sqrt(1 + u^2)` times the index in each layer, and reaches at depth z the radius
+//! The lens's pupil is on the optical axis, which is the window's normal. A ray of tangent u in air has the sine
+//! `s = u / sqrt(1 + u^2)` times the index in each layer. At depth z it reaches the radius
 //! `r = d u + t s / sqrt(ng^2 - s^2) + (z - d - t) s / sqrt(nw^2 - s^2)` (Snell; the axial camera of Agrawal et al.
-//! 2012). Solved for u by Newton's method; its derivatives by r and z follow from the same equation.
+//! 2012). Newton's method solves for u; its derivatives by r and z follow from the same equation.
 
 use nalgebra::{Matrix3, Unit, Vector3};
 
-/// A plane window before the lens.
+/// A plane window in front of the lens.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FlatPort {
-    /// From the lens's pupil to the window.
+    /// Distance from the lens's pupil to the window.
     pub distance_m: f64,
-    /// Of the window.
+    /// Thickness of the window.
     pub thickness_m: f64,
     /// Refractive index of the window over that of air.
     pub glass_index: f64,
-    /// The same of the water.
+    /// Refractive index of the water over that of air.
     pub water_index: f64,
 }
 
-/// Where rays through the port are taken for rays from the pupil: at this distance, m.
+/// Range at which rays through the port are treated as rays from the pupil, m.
 const USUAL_RANGE_M: f64 = 1.0;
 /// Largest tangent in air: half a milliradian from grazing.
 const STEEPEST: f64 = 2000.0;
 
-/// A ray in air that reaches a point, and how its tangent changes.
+/// A ray in air that reaches a point, and the derivatives of its tangent.
 struct Ray {
     /// Tangent over the point's radius.
     tangent_per_m: f64,
@@ -34,7 +34,7 @@ struct Ray {
 }
 
 impl FlatPort {
-    /// Radius at a depth beyond the window that a ray of tangent `u` reaches, and d/du.
+    /// Returns the radius that a ray of tangent `u` reaches at a depth beyond the window, and d/du.
     fn radius(&self, u: f64, wet_m: f64) -> [f64; 2] {
         let sine = u / (1.0 + u * u).sqrt();
         let sine_slope = (1.0 + u * u).powf(-1.5);
@@ -46,7 +46,7 @@ impl FlatPort {
         })
     }
 
-    /// `None` for a point that is not in the water or that no ray reaches.
+    /// Returns the ray that reaches a point; `None` if the point is not in the water or no ray reaches it.
     fn ray(&self, radius_m: f64, depth_m: f64) -> Option<Ray> {
         let wet_m = depth_m - self.distance_m - self.thickness_m;
         if wet_m.partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater) || self.radius(STEEPEST, wet_m)[0] < radius_m {
@@ -77,14 +77,14 @@ impl FlatPort {
         Some(Ray { tangent_per_m, by_radius: 1.0 / slope, by_depth })
     }
 
-    /// Direction in air, at unit depth, of the ray from a point in the water (camera frame, m) to the lens.
+    /// Returns the direction in air, at unit depth, of the ray from a point in the water (camera frame, m) to the lens.
     #[must_use]
     pub fn direction_in_air(&self, point_m: &Vector3<f64>) -> Option<Vector3<f64>> {
         let ray = self.ray(point_m.x.hypot(point_m.y), point_m.z)?;
         Some(Vector3::new(point_m.x * ray.tangent_per_m, point_m.y * ray.tangent_per_m, 1.0))
     }
 
-    /// The same with d(direction)/d(point).
+    /// Returns the direction in air, at unit depth, with d(direction)/d(point).
     #[must_use]
     pub fn direction_with_jacobian(&self, point_m: &Vector3<f64>) -> Option<(Vector3<f64>, Matrix3<f64>)> {
         let (x, y) = (point_m.x, point_m.y);
@@ -106,8 +106,9 @@ impl FlatPort {
         Some((Vector3::new(x * across, y * across, 1.0), jacobian))
     }
 
-    /// From the pupil to where a ray of `direction` in air is a metre away: rays through a window do not meet in one
-    /// point, so that this is near for other ranges, and exact for that one. `None` for a ray that leaves no window.
+    /// Returns the direction from the pupil to the point at 1 m on the ray of `direction` in air. Rays through a window
+    /// do not meet in one point, so the direction is exact at 1 m and approximate at other ranges. `None` for a ray
+    /// that does not pass the window.
     #[must_use]
     pub fn direction_in_water(&self, direction: &Unit<Vector3<f64>>) -> Option<Unit<Vector3<f64>>> {
         let sine = direction.x.hypot(direction.y);
@@ -129,7 +130,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Snell's law in vectors at a plane across z.
+    /// Applies Snell's law in vectors at a plane across z.
     fn refracted(direction: &Vector3<f64>, from: f64, to: f64) -> Vector3<f64> {
         let (ratio, normal) = (from / to, -Vector3::z());
         let cos_in = -normal.dot(direction);

@@ -1,10 +1,10 @@
 //! Camera models: projection of points to pixels, and bearings of pixels.
 //!
 //! `Fisheye` is the equidistant model of Kannala and Brandt (2006, eq. 6 to the fourth odd term), as in OpenCV's
-//! `cv::fisheye` and Kalibr's `equidistant`. `Radtan` is Brown's pinhole model, `CameraModel` either of them, with or
-//! without a window before it (`FlatPort`). `square`
-//! computes the pose of a tag from its four corners for any [`Lens`], `board` that of a chessboard from the corners
-//! that were seen, `tag_family` has the printed patterns. Oracle: OpenCV (tests/oracle).
+//! `cv::fisheye` and Kalibr's `equidistant`. `Radtan` is Brown's pinhole model. `CameraModel` is either of them, with
+//! or without a window in front of it (`FlatPort`). `square` computes the pose of a tag from its four corners for any
+//! [`Lens`]. `board` computes that of a chessboard from its detected corners. `tag_family` has the printed patterns.
+//! Oracle: OpenCV (tests/oracle).
 
 mod board;
 mod camera;

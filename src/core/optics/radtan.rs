@@ -2,34 +2,34 @@
 
 use nalgebra::{Matrix2, Matrix2x3, SMatrix, Unit, Vector2, Vector3};
 
-/// Brown's model (1971) as OpenCV's `projectPoints`, ROS's `plumb_bob` and Kalibr's `radtan` write it: with
-/// `(a, b) = (x, y)/z` and `r^2 = a^2 + b^2`,
+/// Brown's model (1971) as in OpenCV's `projectPoints`, ROS's `plumb_bob` and Kalibr's `radtan`.
+/// With `(a, b) = (x, y)/z` and `r^2 = a^2 + b^2`:
 /// `a' = a (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 a b + p2 (r^2 + 2 a^2)`,
 /// `b' = b (1 + k1 r^2 + k2 r^4 + k3 r^6) + p1 (r^2 + 2 b^2) + 2 p2 a b`, `pixel = f * (a', b') + c`.
-/// Pixel centres at whole numbers. All zero is the plain pinhole.
+/// Pixel centres are at integers. With all coefficients zero it is the plain pinhole.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Radtan {
     /// Focal lengths along x and y.
     pub focal_px: [f64; 2],
     /// Principal point, x and y.
     pub center_px: [f64; 2],
-    /// k1, k2, p1, p2, k3: the order of OpenCV.
+    /// Distortion coefficients k1, k2, p1, p2, k3: the order of OpenCV.
     pub distortion: [f64; 5],
     /// Columns and rows.
     pub resolution_px: [u32; 2],
-    /// Largest r that is seen: up to there the distorted radius grows, so that a pixel has one bearing.
+    /// Largest r in view: up to there the distorted radius grows, so that each pixel has one bearing.
     max_radius: f64,
 }
 
-/// Nothing beyond 79 deg from the axis is seen by a pinhole.
+/// Largest radius in the view of a pinhole: 79 deg from the axis.
 const WIDEST_RADIUS: f64 = 5.0;
 const RADIUS_STEPS: u32 = 2000;
-/// How far beyond the image's corners a projection is still followed, over the corners' own radius.
+/// Largest radius of a projection, over the radius of the image's farthest corner.
 const MARGIN: f64 = 1.5;
 
 impl Radtan {
-    /// The lens, with its range of unique bearings, searched from the axis outwards to half as far again as the image's
-    /// corners.
+    /// Builds the lens with its range of unique bearings, searched from the axis outwards to 1.5 times the radius of
+    /// the image's corners.
     #[must_use]
     pub fn new(focal_px: [f64; 2], center_px: [f64; 2], distortion: [f64; 5], resolution_px: [u32; 2]) -> Self {
         let mut lens = Self { focal_px, center_px, distortion, resolution_px, max_radius: 0.0 };
@@ -47,13 +47,13 @@ impl Radtan {
         lens
     }
 
-    /// Tangent of the largest angle from the axis that is seen.
+    /// Tangent of the largest angle from the axis in view.
     #[must_use]
     pub fn max_radius(&self) -> f64 {
         self.max_radius
     }
 
-    /// Whether the projected radius grows as far as is seen.
+    /// Returns true if the projected radius grows over the whole view.
     #[must_use]
     pub fn is_monotonic(&self) -> bool {
         (0..=200).all(|i| self.radial_slope((self.max_radius * f64::from(i) / 200.0).powi(2)) > 0.0)
@@ -64,18 +64,18 @@ impl Radtan {
         1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
     }
 
-    /// d(r radial)/dr.
+    /// Returns d(r radial)/dr.
     fn radial_slope(&self, r2: f64) -> f64 {
         let [k1, k2, _, _, k3] = self.distortion;
         1.0 + r2 * (3.0 * k1 + r2 * (5.0 * k2 + r2 * 7.0 * k3))
     }
 
-    /// Distorted coordinates of `(a, b)` and their Jacobian.
+    /// Returns the distorted coordinates of `(a, b)` and their Jacobian.
     fn distort(&self, a: f64, b: f64) -> (Vector2<f64>, Matrix2<f64>) {
         let [k1, k2, p1, p2, k3] = self.distortion;
         let r2 = a * a + b * b;
         let radial = self.radial(r2);
-        // d radial / d(r^2).
+        // The derivative d radial / d(r^2).
         let slope = k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3);
         let value = Vector2::new(
             a * radial + 2.0 * p1 * a * b + p2 * (r2 + 2.0 * a * a),
@@ -91,7 +91,7 @@ impl Radtan {
         (value, jacobian)
     }
 
-    /// `(x, y)/z` of a point that is seen.
+    /// Returns `(x, y)/z` of a point in view.
     fn normalized(&self, point_m: &Vector3<f64>) -> Option<(f64, f64)> {
         if point_m.z.partial_cmp(&1e-9) != Some(std::cmp::Ordering::Greater) {
             return None;
@@ -108,7 +108,7 @@ impl Radtan {
         Some(Vector2::new(self.focal_px[0] * d.x + self.center_px[0], self.focal_px[1] * d.y + self.center_px[1]))
     }
 
-    /// Projection and its Jacobian d(pixel)/d(point), px/m.
+    /// Returns projection and d(pixel)/d(point), px/m.
     #[must_use]
     pub fn project_with_jacobian(&self, point_m: &Vector3<f64>) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
         let (a, b) = self.normalized(point_m)?;
@@ -121,7 +121,7 @@ impl Radtan {
         Some((pixel, focal * of_distortion * of_division))
     }
 
-    /// d(pixel)/d(fx, fy, cx, cy, k1, k2, p1, p2).
+    /// Returns d(pixel)/d(fx, fy, cx, cy, k1, k2, p1, p2).
     pub(super) fn by_intrinsics(&self, point_m: &Vector3<f64>) -> Option<SMatrix<f64, 2, 8>> {
         let (a, b) = self.normalized(point_m)?;
         let (d, _) = self.distort(a, b);
@@ -137,7 +137,7 @@ impl Radtan {
         ]))
     }
 
-    /// The direction (camera frame, unit) that a pixel sees; `None` beyond the range of unique bearings.
+    /// Returns the bearing (camera frame, unit) of a pixel; `None` beyond the range of unique bearings.
     #[must_use]
     pub fn unproject(&self, pixel_px: &Vector2<f64>) -> Option<Unit<Vector3<f64>>> {
         let seen = Vector2::new(
@@ -148,7 +148,7 @@ impl Radtan {
             return None;
         }
         let mut at = self.radially_undistorted(&seen)?;
-        // The tangential part is a small correction: Newton's method from the radial answer.
+        // The tangential part is a small correction: Newton's method starts at the radial solution.
         for _ in 0..20 {
             let (value, jacobian) = self.distort(at.x, at.y);
             let step = jacobian.try_inverse()? * (seen - value);
@@ -242,7 +242,7 @@ mod tests {
         assert!(lens().project(&Vector3::new(9.0, 0.0, 1.0)).is_none());
         assert!(lens().unproject(&Vector2::new(1e5, 0.0)).is_none());
         assert!(lens().unproject(&Vector2::new(f64::NAN, 0.0)).is_none());
-        // Every pixel of the image has one.
+        // Every pixel of the image has a bearing.
         for (x, y) in [(0.0, 0.0), (1279.0, 0.0), (0.0, 1023.0), (1279.0, 1023.0)] {
             assert!(lens().unproject(&Vector2::new(x, y)).is_some());
         }

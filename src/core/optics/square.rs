@@ -1,9 +1,10 @@
 //! The pose of a square tag from its four corner pixels.
 //!
-//! A homography between the tag's plane and the bearings (turned so that the tag lies ahead, which keeps fisheye
-//! angles beyond 90 deg regular) gives the start; Levenberg-Marquardt on the pixels refines it. A square seen nearly
-//! head-on has two poses that fit almost equally well (Collins and Bartoli 2014): both are refined, the better one is
-//! taken, and the ratio of their costs is reported. The tag's centre hardly depends on which one it is.
+//! A homography between the tag's plane and the bearings gives the initial guess; Levenberg-Marquardt on the pixels
+//! refines it. The bearings are turned so that the tag lies ahead, which keeps fisheye angles beyond 90 deg regular. A
+//! square viewed nearly head-on has two poses that fit almost equally well (Collins and Bartoli 2014). Both are
+//! refined, the better one is taken, and the ratio of their costs is reported. The tag's centre hardly depends on this
+//! choice.
 
 use nalgebra::{Isometry3, Matrix2x6, Matrix3, Matrix6, Point3, Rotation3, SMatrix, SVector, Translation3};
 use nalgebra::{UnitQuaternion, Vector2, Vector3, Vector6};
@@ -12,12 +13,12 @@ use super::camera::Lens;
 use crate::numeric::{Damping, LeastSquares, Outcome, Proposal, StopRule, minimize};
 use crate::spatial::{Camera, Pose, Tag, skew};
 
-/// A tag's pose in the camera frame, and how well it fits.
+/// Pose of a tag in the camera frame, with its residual and covariance.
 #[derive(Clone, Copy, Debug)]
 pub struct SquarePose {
-    /// The z axis of the tag points out of its printed side.
+    /// Pose of the tag; its z axis points out of the printed side.
     pub camera_from_tag: Pose<Camera, Tag>,
-    /// Root mean square over the 8 corner coordinates, px.
+    /// Root mean square residual over the 8 corner coordinates, px.
     pub rms_px: f64,
     /// Cost of the other solution over this one's, 1 or more; near 1 the tilt is ambiguous.
     pub ambiguity: f64,
@@ -25,7 +26,7 @@ pub struct SquarePose {
     pub covariance_unit_px: Matrix6<f64>,
 }
 
-/// Why corners have no pose.
+/// Reason why corners have no pose.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum SquareError {
@@ -43,20 +44,20 @@ pub fn square_corners(size_m: f64) -> [Point3<f64>; 4] {
     [[-h, -h], [h, -h], [h, h], [-h, h]].map(|[x, y]| Point3::new(x, y, 0.0))
 }
 
-/// Solves for the pose of a tag of `size_m` whose corners are seen at `corners_px`.
+/// Solves for the pose of a tag of `size_m` whose corners have the pixels `corners_px`.
 ///
 /// # Errors
-/// [`SquareError`] when the pixels have no bearing or no square fits them.
+/// [`SquareError`] if a pixel has no bearing or no square fits them.
 pub fn solve_square(lens: &impl Lens, size_m: f64, corners_px: &[[f64; 2]; 4]) -> Result<SquarePose, SquareError> {
     let (best, other) = both(lens, &square_corners(size_m), corners_px)?;
     best.pose(other.map(|o| o.cost)).ok_or(SquareError::Degenerate)
 }
 
-/// Both poses that a square seen at `corners_px` may have, the better one first; the second is `None` where there is
-/// none but the first.
+/// Returns both poses that a square with corners at `corners_px` may have, the better one first. The second is `None`
+/// if there is only one.
 ///
 /// # Errors
-/// As [`solve_square`].
+/// The errors of [`solve_square`].
 pub fn solve_square_both(
     lens: &impl Lens,
     size_m: f64,
@@ -65,14 +66,15 @@ pub fn solve_square_both(
     let corners_tag = square_corners(size_m);
     let (best, other) = both(lens, &corners_tag, corners_px)?;
     let differs = |o: &Refined| o.pose.rotation.angle_to(&best.pose.rotation) > SAME_SOLUTION_RAD;
-    // Both starts may have led to one; the mirror image of the answer is a better start than that of the homography.
+    // Both starts may have led to one pose. The mirror image of the result is a better start than that of the
+    // homography.
     let other = other.filter(differs);
     let other = other.or_else(|| refine(lens, flipped(&best.pose), &corners_tag, corners_px).filter(differs));
     let first = best.pose(other.as_ref().map(|o| o.cost)).ok_or(SquareError::Degenerate)?;
     Ok((first, other.and_then(|o| o.pose(Some(best.cost)))))
 }
 
-/// The better solution first.
+/// Returns both solutions, the better one first.
 fn both(
     lens: &impl Lens,
     corners_tag: &[Point3<f64>; 4],
@@ -93,10 +95,11 @@ fn both(
     }
 }
 
-/// Two solutions nearer to each other than this are one.
+/// Angle between two solutions below which they count as one.
 const SAME_SOLUTION_RAD: f64 = 1e-4;
 
-/// Homography of the square by the direct linear transform, with bearings turned so that their mean is the z axis.
+/// Computes the square's homography by the direct linear transform, with bearings turned so that their mean is the z
+/// axis.
 fn start_from_homography(
     bearings: &[Vector3<f64>; 4],
     corners_tag: &[Point3<f64>; 4],
@@ -121,7 +124,7 @@ fn start_from_homography(
     pose_of_homography(&h, &turn)
 }
 
-/// The pose by a homography whose last number is 1, of bearings turned by `turn`.
+/// Returns the pose by a homography whose last number is 1, of bearings turned by `turn`.
 pub(super) fn pose_of_homography(
     h: &SVector<f64, 8>,
     turn: &UnitQuaternion<f64>,
@@ -141,7 +144,7 @@ pub(super) fn pose_of_homography(
     Ok(Isometry3::from_parts(Translation3::identity(), turn.inverse()) * ahead)
 }
 
-/// The mirror solution: the tag's normal reflected about the line of sight.
+/// Returns the mirror solution: the tag's normal reflected about the line of sight.
 pub(super) fn flipped(pose: &Isometry3<f64>) -> Isometry3<f64> {
     let sight = pose.translation.vector.normalize();
     let normal = pose.rotation * Vector3::z();
@@ -152,13 +155,13 @@ pub(super) fn flipped(pose: &Isometry3<f64>) -> Isometry3<f64> {
 
 pub(super) struct Refined {
     pub pose: Isometry3<f64>,
-    /// Sum of squares, px^2.
+    /// Sum of squared residuals, px^2.
     pub cost: f64,
     normal: Matrix6<f64>,
 }
 
 impl Refined {
-    /// `None` where the corners do not determine it.
+    /// Returns the pose with its covariance; `None` if the corners do not determine it.
     fn pose(&self, other_cost: Option<f64>) -> Option<SquarePose> {
         Some(SquarePose {
             camera_from_tag: Pose::from_isometry(self.pose),
@@ -170,7 +173,7 @@ impl Refined {
 }
 
 const DAMPING: Damping = Damping { first: 1e-4, min: 1e-12, max: 1e8, down: 0.1, up: 10.0, min_after_rejection: 0.0 };
-/// A twist of this length (m, rad) moves no corner.
+/// Rule that stops at a twist (m, rad) too small to move a corner.
 const STOP: StopRule = StopRule { step_length: 1e-12, ..StopRule::after(30) };
 
 struct Refinement<'a, L> {
@@ -209,7 +212,7 @@ impl<L: Lens> LeastSquares for Refinement<'_, L> {
     }
 }
 
-/// A tag is printed on one side: its z axis must point towards the camera.
+/// Refines a tag's pose. A tag is printed on one side, so its z axis must point towards the camera.
 fn refine(
     lens: &impl Lens,
     start: Isometry3<f64>,
@@ -220,7 +223,7 @@ fn refine(
     refine_points(lens, start, corners_tag, corners_px).filter(|found| faces_camera(&found.pose))
 }
 
-/// The pose of points, from either side, that is nearest to `start`; `None` where they do not determine it.
+/// Returns the pose of points, from either side, that is nearest to `start`; `None` if they do not determine it.
 pub(super) fn refine_points(
     lens: &impl Lens,
     start: Isometry3<f64>,
@@ -243,7 +246,8 @@ struct Linearized {
     gradient: Vector6<f64>,
 }
 
-/// Residual = measured - predicted; Jacobian of the prediction for a perturbation on the right, pose * exp(xi).
+/// Linearizes the residual, measured - predicted. The Jacobian is that of the prediction for a perturbation on the
+/// right, pose * exp(xi).
 fn linearize(
     lens: &impl Lens,
     pose: &Isometry3<f64>,
@@ -279,7 +283,7 @@ mod tests {
             x in -0.8f64..0.8, y in -0.8f64..0.8, z in 0.3f64..1.5,
             tilt in 0.2f64..0.9, azimuth in -3.0f64..3.0, spin in -3.0f64..3.0,
         ) {
-            // z of the tag towards the camera, tilted away from the line of sight.
+            // The tag's z axis points towards the camera, tilted away from the line of sight.
             let sight = Vector3::new(x, y, z);
             let facing = UnitQuaternion::rotation_between(&Vector3::z(), &-sight).expect("not opposite");
             let lean = UnitQuaternion::from_scaled_axis(Vector3::new(azimuth.cos(), azimuth.sin(), 0.0) * tilt);

@@ -1,7 +1,7 @@
 //! The printed patterns of the AprilTag families (Olson 2011; Wang and Olson 2016; Krogius et al. 2019).
 //!
-//! Older families have their bits within a black border. Of the newer ones the border has two rings, black about white,
-//! with bits within and beyond it. The AprilTag library reads every tag back, id and corners.
+//! Older families have their bits within a black border. The border of the newer families has two rings, black around
+//! white, with bits within and beyond it. The AprilTag library reads back every tag, id and corners.
 
 mod codes;
 mod layout;
@@ -13,11 +13,10 @@ use codes::codes;
 pub use layout::MAX_PRINT_CELLS;
 use layout::{LayoutCell, bit_places};
 
-/// A family of tags. A tag's size is the side of its border square: the edge on which the border's black and white
-/// meet.
+/// A family of tags. A tag's size is the side of its border square: the edge between the border's black and white.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum TagFamily {
-    /// 30 tags of 4 x 4 cells. Ids differ in 5 bits: what is no tag is often read as one.
+    /// 30 tags of 4 x 4 cells. Ids differ in 5 bits, so false detections are frequent.
     Tag16h5,
     /// 35 tags of 5 x 5 cells.
     Tag25h9,
@@ -28,7 +27,7 @@ pub enum TagFamily {
     Circle21h7,
     /// 65535 round tags.
     Circle49h12,
-    /// 42211 tags whose middle is free for something else.
+    /// 42211 tags with a free middle.
     Custom48h12,
     /// 2115 tags.
     Standard41h12,
@@ -36,7 +35,7 @@ pub enum TagFamily {
     Standard52h13,
 }
 
-/// The cells of one tag as printed, all that belongs to it.
+/// All printed cells of one tag.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TagCells {
     n: usize,
@@ -44,18 +43,18 @@ pub struct TagCells {
 }
 
 impl TagCells {
-    /// Rows from the top, each from the left: white, black, or nothing printed.
+    /// Returns the rows from the top, each from the left: white, black, or nothing printed.
     pub fn rows(&self) -> impl DoubleEndedIterator<Item = &[Option<bool>]> {
         self.rows[..self.n].iter().map(|row| &row[..self.n])
     }
 
-    /// Cells along a side.
+    /// Number of cells along a side.
     #[must_use]
     pub fn n(&self) -> usize {
         self.n
     }
 
-    /// Whether a cell is white; `None` beside the tag and where nothing is printed.
+    /// Returns true if a cell is white; `None` outside the tag and if nothing is printed.
     #[must_use]
     pub fn get(&self, row: usize, column: usize) -> Option<bool> {
         self.rows.get(row)?.get(column).copied().flatten()
@@ -63,7 +62,7 @@ impl TagCells {
 }
 
 impl TagFamily {
-    /// All that are supported.
+    /// All supported families.
     pub const ALL: [Self; 8] = [
         Self::Tag16h5,
         Self::Tag25h9,
@@ -75,13 +74,13 @@ impl TagFamily {
         Self::Standard52h13,
     ];
 
-    /// As files call it: 36h11, Standard41h12.
+    /// Returns the name in files: 36h11, Standard41h12.
     #[must_use]
     pub fn name(self) -> &'static str {
         &self.long_name()["tag".len()..]
     }
 
-    /// As messages and frames call it, and the AprilTag library: tag36h11, tagStandard41h12.
+    /// Returns the name in messages, frames and the AprilTag library: tag36h11, tagStandard41h12.
     #[must_use]
     pub fn long_name(self) -> &'static str {
         match self {
@@ -96,13 +95,13 @@ impl TagFamily {
         }
     }
 
-    /// How many tags the family has.
+    /// Number of tags of the family.
     #[must_use]
     pub fn n_tags(self) -> usize {
         codes(self).len()
     }
 
-    /// Cells along a side of the border square.
+    /// Number of cells along a side of the border square.
     #[must_use]
     pub fn n_cells(self) -> usize {
         match self {
@@ -113,7 +112,7 @@ impl TagFamily {
         }
     }
 
-    /// Cells that belong to the tag beyond the border square, on each side: one white ring, or black and bits.
+    /// Number of the tag's cells beyond the border square, on each side: one white ring, or black and bits.
     #[must_use]
     pub fn n_margin_cells(self) -> usize {
         match self {
@@ -123,7 +122,7 @@ impl TagFamily {
         }
     }
 
-    /// The cells of tag `id`; `None` for an id that the family does not have.
+    /// Returns the cells of tag `id`; `None` for an id that the family does not have.
     #[must_use]
     pub fn cells(self, id: u32) -> Option<TagCells> {
         let code = *codes(self).get(id as usize)?;
@@ -151,7 +150,7 @@ impl fmt::Display for TagFamily {
 impl FromStr for TagFamily {
     type Err = String;
 
-    /// With or without `tag` in front.
+    /// Parses a family's name, with or without the prefix `tag`.
     fn from_str(text: &str) -> Result<Self, String> {
         let found = Self::ALL.into_iter().find(|family| text == family.name() || text == family.long_name());
         found.ok_or_else(|| {
@@ -169,7 +168,7 @@ mod tests {
         cells.rows().flatten().fold(0, |bits, cell| bits << 1 | u128::from(cell.unwrap_or(false)))
     }
 
-    /// By a quarter.
+    /// Returns the cells turned by a quarter turn.
     fn turned(cells: &TagCells) -> TagCells {
         let last = cells.n() - 1;
         let mut out = *cells;
@@ -181,8 +180,8 @@ mod tests {
         out
     }
 
-    /// Codes of a family, turned in all ways, differ in as many bits as its name says. Of large families every 499th is
-    /// held against all.
+    /// Codes of a family, in all four rotations, differ in the number of bits in its name. Of large families every
+    /// 499th code is compared with all.
     #[test]
     fn any_two_tags_of_a_family_differ_in_the_bits_of_its_name() {
         for (family, n_tags, distance) in [
@@ -215,7 +214,7 @@ mod tests {
         }
     }
 
-    /// The border square: within its edge one colour all around, beyond it the other.
+    /// The border square has one colour all around within its edge, and the other colour beyond it.
     #[test]
     fn the_border_is_where_black_and_white_meet() {
         for family in TagFamily::ALL {
@@ -231,7 +230,7 @@ mod tests {
             assert!(ring(margin, n).iter().all(|cell| *cell == Some(!is_classic)), "{family}");
             assert!(ring(margin - 1, n + 2).iter().all(|cell| *cell == Some(is_classic)), "{family}");
         }
-        // A round tag has no corners, and one is free in the middle.
+        // A round tag has no corners; a custom tag has a free middle.
         let nothing_at = |family: TagFamily, at: usize| family.cells(0).expect("an id").get(at, at).is_none();
         assert!(nothing_at(TagFamily::Circle21h7, 0) && nothing_at(TagFamily::Custom48h12, 5));
     }

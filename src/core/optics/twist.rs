@@ -1,16 +1,16 @@
-//! How a pixel moves with the camera that sees it.
+//! Motion of a pixel caused by a motion of the camera.
 
 use nalgebra::{Matrix2x3, Vector3};
 
-/// Rows of d(pixel)/d(xi), pixels by metres and radians: the camera's pose perturbed on the right by
-/// `xi = (rho, omega)` moves a point p of its frame by `-rho - omega x p`. `by_point`: d(pixel)/d(point) of the lens at
-/// `point`.
+/// Returns the rows of d(pixel)/d(xi), px/m and px/rad. The camera's pose, perturbed on the right by
+/// `xi = (rho, omega)`, moves a point p of its frame by `-rho - omega x p`. `by_point` is d(pixel)/d(point) of the lens
+/// at `point`.
 #[must_use]
 pub fn image_jacobian(by_point: &Matrix2x3<f64>, point: &Vector3<f64>) -> [[f64; 6]; 2] {
     let p = point;
     std::array::from_fn(|axis| {
         let a = [by_point[(axis, 0)], by_point[(axis, 1)], by_point[(axis, 2)]];
-        // a . (-rho - omega x p): -a, and a x p for omega.
+        // The product a . (-rho - omega x p) gives -a for rho, and a x p for omega.
         [-a[0], -a[1], -a[2], a[1] * p.z - a[2] * p.y, a[2] * p.x - a[0] * p.z, a[0] * p.y - a[1] * p.x]
     })
 }

@@ -1,4 +1,5 @@
-//! `allowed_pairs` of robot.toml: parts that touch by design, which neither planning nor the simulator keeps apart.
+//! `allowed_pairs` of robot.toml: parts that touch by design, between which neither planning nor the simulator keeps a
+//! distance.
 
 use crate::codes::Code;
 use std::path::Path;
@@ -7,7 +8,7 @@ use super::body::LinkBody;
 use super::error::FileIssue;
 use super::vehicle::Vehicle;
 
-/// Links that may touch another link of the arm or a part of the vehicle.
+/// Pairs of links, or of a link and a part of the vehicle, that may touch.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct AllowedPairs(Vec<[String; 2]>);
 
@@ -23,13 +24,13 @@ impl AllowedPairs {
         Ok(Self(pairs))
     }
 
-    /// Whether two parts may touch, in either order.
+    /// Returns true if two parts may touch, in either order.
     #[must_use]
     pub fn has(&self, a: &str, b: &str) -> bool {
         self.0.iter().any(|[first, second]| (first == a && second == b) || (first == b && second == a))
     }
 
-    /// That every name is one of the arm's links or one of the vehicle's parts.
+    /// Checks that every name is one of the arm's links or one of the vehicle's parts.
     pub(super) fn check_names(&self, file: &Path, bodies: &[LinkBody], vehicle: &Vehicle) -> Result<(), FileIssue> {
         let is_known = |name: &String| {
             bodies.iter().any(|body| body.name == *name) || vehicle.parts.iter().any(|part| part.name == *name)

@@ -7,12 +7,13 @@ use super::urdf::UrdfModel;
 use super::urdf_file::{JointType, Range, UrdfJoint};
 use crate::joints::MAX_JOINTS;
 
-/// Joints before a place where a chain branches, at the least, for what follows to be taken for fingers; and joints of
-/// its own that make another chain another arm.
+/// Minimum number of joints before a branch of the chain for the following joints to count as fingers. Also the minimum
+/// number of its own joints that makes another chain another arm.
 const FEW_JOINTS: usize = 3;
-/// Branches next to each other that only a hand has: a parallelogram has two rods.
+/// Number of branches next to each other that only a hand has: a parallelogram has two rods.
 const MANY_FINGERS: usize = 3;
-/// A slide of less travel at the end of an arm is a gripper's jaw, m. Assumed: the strokes of SCARA arms begin there.
+/// Travel of a slide at the end of an arm below which it is a gripper's jaw, m. Assumed: the strokes of SCARA arms
+/// begin there.
 const JAW_TRAVEL_M: f64 = 0.12;
 
 /// Links that a user names.
@@ -28,27 +29,27 @@ pub(super) struct Ends<'a> {
 pub(super) struct FoundArm {
     pub base: String,
     pub tip: String,
-    /// `None` where no link of the chain is called a camera.
+    /// Link that is called a camera; `None` if the chain has none.
     pub camera: Option<String>,
-    /// Joints on the same way that were taken for those of a gripper or of what carries the arm.
+    /// Joints on the same path that were taken for those of a gripper or of the arm's carrier.
     pub left_out: Vec<String>,
 }
 
-/// One chain of joints.
+/// A chain of joints that may be the arm.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Candidate {
     base: String,
     /// Numbers of the joints.
     joints: Vec<usize>,
     tip: String,
-    /// Numbers of the joints on the same way that are not the arm's.
+    /// Numbers of the joints on the same path that are not the arm's.
     left_out: Vec<usize>,
 }
 
 /// Returns the arm of `urdf` between the links that the user names, as far as they are named.
 ///
 /// # Errors
-/// [`RobotError`] where there is none, where there are several and no tip is named, or where a named link is missing.
+/// [`RobotError`] if there is none, if there are several and no tip is named, or if a named link is missing.
 pub(super) fn find_arm(urdf: &UrdfModel, ends: &Ends<'_>) -> Result<FoundArm, RobotError> {
     check_named(urdf, ends)?;
     check_roots(urdf, ends)?;
@@ -80,7 +81,7 @@ fn check_named(urdf: &UrdfModel, ends: &Ends<'_>) -> Result<(), RobotError> {
     Ok(())
 }
 
-/// Asks for an option where moving joints are on several trees: one of them may be a torn part of the other.
+/// Requests an option if moving joints are on several trees: one of them may be a detached part of the other.
 fn check_roots(urdf: &UrdfModel, ends: &Ends<'_>) -> Result<(), RobotError> {
     if ends.base.is_some() || ends.tip.is_some() {
         return Ok(());
@@ -105,7 +106,7 @@ fn root_of<'a>(urdf: &'a UrdfModel, link: &'a str) -> &'a str {
     path(urdf, link).first().map_or(link, |joint| urdf.robot.joints[*joint].parent.as_str())
 }
 
-/// Returns the longest candidate, where no other one is an arm of its own.
+/// Returns the longest candidate, if no other one is an arm of its own.
 fn single_arm<'a>(urdf: &UrdfModel, candidates: &'a [Candidate], ends: &Ends<'_>) -> Result<&'a Candidate, RobotError> {
     let Some(best) = candidates.first() else {
         let problem = match (ends.base, ends.tip) {
@@ -165,8 +166,8 @@ fn path(urdf: &UrdfModel, link: &str) -> Vec<usize> {
     path
 }
 
-/// Returns the longest chain on the way from the root to `leaf`: the last one to a leaf that was named, the first one
-/// from a base that was named.
+/// Returns the longest chain on the path from the root to `leaf`. It is the last one to a named leaf, or the first one
+/// from a named base.
 fn candidate(urdf: &UrdfModel, leaf: &str, ends: &Ends<'_>) -> Option<Candidate> {
     let mut path = path(urdf, leaf);
     if let Some(base) = ends.base {
@@ -188,7 +189,7 @@ fn candidate(urdf: &UrdfModel, leaf: &str, ends: &Ends<'_>) -> Option<Candidate>
             joints.pop();
         }
     }
-    // What carries too long an arm on slides is not of the arm.
+    // Slides that carry too long an arm do not belong to the arm.
     while ends.base.is_none()
         && joints.len() > MAX_JOINTS
         && let Some(slide) = joints.iter().position(|joint| is_slide(urdf, *joint))
@@ -204,7 +205,7 @@ fn candidate(urdf: &UrdfModel, leaf: &str, ends: &Ends<'_>) -> Option<Candidate>
 }
 
 /// Cuts the path at joints of several degrees of freedom and returns the base and the joints of one piece. Between two
-/// named links nothing is cut, so that such a joint refuses.
+/// named links nothing is cut, so that such a joint is refused.
 fn piece(urdf: &UrdfModel, path: &[usize], root: String, ends: &Ends<'_>) -> Option<(String, Vec<usize>)> {
     let mut pieces = vec![(root, Vec::new())];
     for &joint in path {
@@ -223,7 +224,7 @@ fn piece(urdf: &UrdfModel, path: &[usize], root: String, ends: &Ends<'_>) -> Opt
     }
 }
 
-/// Links that are fixed to `link`, itself included, each with the number of joints between.
+/// Links that are fixed to `link`, including itself, each with the number of joints between.
 fn fixed_to<'a>(urdf: &'a UrdfModel, link: &'a str) -> Vec<(usize, &'a str)> {
     let mut found = vec![(0, link)];
     let mut at = 0;
@@ -235,8 +236,8 @@ fn fixed_to<'a>(urdf: &'a UrdfModel, link: &'a str) -> Vec<(usize, &'a str)> {
     found
 }
 
-/// Returns true where the first `n` joints carry a hand: joints of similar number next to those that follow. A short
-/// branch next to a longer chain is a balancer or a cable guide, and so is one that follows a joint of the arm.
+/// Returns true if the first `n` joints carry a hand: joints of similar number next to those that follow. A short
+/// branch next to a longer chain is a balancer or a cable guide; so is one that follows a joint of the arm.
 fn is_hand_after(urdf: &UrdfModel, joints: &[usize], n: usize) -> bool {
     let n_following = joints.len() - n;
     if n_following > n {
@@ -259,7 +260,7 @@ fn is_hand_after(urdf: &UrdfModel, joints: &[usize], n: usize) -> bool {
     longest >= n_following || (longest + 1 == n_following && (longest > 1 || lengths.len() > 1))
 }
 
-/// Returns the largest number of moving joints on a way from `joint` on, itself included.
+/// Returns the largest number of moving joints on a path from `joint` on, including itself.
 fn n_joints_from(urdf: &UrdfModel, joint: usize) -> usize {
     let mut most = 0;
     let mut open = vec![(joint, 0)];
@@ -275,7 +276,7 @@ fn n_joints_from(urdf: &UrdfModel, joint: usize) -> usize {
     most
 }
 
-/// The link farthest along fixed joints, no camera's where there is another.
+/// Returns the link farthest along fixed joints, preferably not a camera's.
 fn deepest_fixed(urdf: &UrdfModel, link: &str) -> String {
     let found = fixed_to(urdf, link);
     let no_camera = found.iter().filter(|(_, name)| !is_camera(name));
@@ -288,7 +289,7 @@ fn is_camera(link: &str) -> bool {
     name.contains("camera") || name.contains("optical")
 }
 
-/// A link on the chain that is called a camera; one with an optical frame first, then the most distal.
+/// Returns a link on the chain that is called a camera: preferably one with an optical frame, then the most distal.
 fn camera_link(urdf: &UrdfModel, arm: &Candidate) -> Option<String> {
     let carried = arm.joints.iter().rev().flat_map(|joint| fixed_to(urdf, &urdf.robot.joints[*joint].child));
     let cameras: Vec<&str> = carried.map(|(_, name)| name).filter(|name| is_camera(name)).collect();

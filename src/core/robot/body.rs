@@ -11,19 +11,19 @@ pub const GRAVITY_M_S2: f64 = 9.80665;
 /// Mass and shapes of everything that moves with one joint, fixed children included, in that joint's link frame.
 #[derive(Clone, Debug)]
 pub struct LinkBody {
-    /// The link that the joint moves, or the base link.
+    /// Name of the link that the joint moves, or of the base link.
     pub name: String,
-    /// 0 where the URDF gives no mass.
+    /// Mass; 0 if the URDF gives none.
     pub mass_kg: f64,
-    /// Centre of mass.
+    /// Centre of mass in the link's frame.
     pub com_m: Vector3<f64>,
-    /// About the centre of mass, axes of the link.
+    /// Inertia about the centre of mass, axes of the link.
     pub inertia_kg_m2: Matrix3<f64>,
-    /// A link of it whose inertia is not positive definite, so that it cannot be simulated.
+    /// Name of a link of the body whose inertia is not positive definite, so that it cannot be simulated.
     pub bad_inertia: Option<String>,
-    /// To display; without the jaws of a gripper.
+    /// Shapes for display, without the jaws of a gripper.
     pub visuals: Vec<PlacedShape>,
-    /// For clearance and contact.
+    /// Shapes for clearance and contact.
     pub collisions: Vec<PlacedShape>,
 }
 
@@ -40,7 +40,7 @@ impl LinkBody {
         }
     }
 
-    /// Adds a rigid part; `inertia` about its centre of mass in the axes of `body_from_com` (parallel axis theorem).
+    /// Adds a rigid part; `inertia` is about its centre of mass in the axes of `body_from_com` (parallel axis theorem).
     pub(super) fn add_mass(&mut self, mass_kg: f64, body_from_com: &Isometry3<f64>, inertia: &Matrix3<f64>) {
         let rotation = body_from_com.rotation.to_rotation_matrix();
         let part = rotation * inertia * rotation.transpose();
@@ -54,8 +54,8 @@ impl LinkBody {
         self.mass_kg = total;
     }
 
-    /// Centre of the collision shapes' volume in the link's frame, where buoyancy acts; every shape is symmetric about
-    /// its own centre. `None` without a shape.
+    /// Returns the centre of the collision shapes' volume in the link's frame, where buoyancy acts. Every shape is
+    /// symmetric about its own centre. `None` without a shape.
     #[must_use]
     pub fn volume_centroid_m(&self) -> Option<Vector3<f64>> {
         let mut moment = Vector3::zeros();
@@ -68,7 +68,7 @@ impl LinkBody {
         (volume > 0.0).then(|| moment / volume)
     }
 
-    /// Weight less buoyancy, where the water carries `buoyancy_fraction` of the weight.
+    /// Returns the weight less buoyancy, if the water carries `buoyancy_fraction` of the weight.
     pub(super) fn load(&self, buoyancy_fraction: f64) -> LinkLoad {
         let weight_n = GRAVITY_M_S2 * self.mass_kg;
         let buoyancy_n = buoyancy_fraction * weight_n;

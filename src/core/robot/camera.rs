@@ -25,26 +25,26 @@ pub struct CameraSpec {
     pub name: String,
     /// Nominal `link_from_camera` on the link that carries it.
     pub mount: Attachment,
-    /// Nominal lens; [`CameraModel::unknown`] where the folder gives none.
+    /// Nominal lens; [`CameraModel::unknown`] if the folder gives none.
     pub lens: CameraModel,
-    /// One sigma of each coordinate of a detected corner; 0.3 px where the folder gives none (assumed).
+    /// Standard deviation of each coordinate of a detected corner; 0.3 px if the folder gives none (assumed).
     pub corner_std_px: f64,
-    /// How well the lens is known.
+    /// Prior standard deviations of the lens parameters.
     pub lens_priors: LensPriors,
-    /// One sigma per axis of the mount's error.
+    /// Standard deviation of the mount's position error, per axis.
     pub mount_std_m: f64,
-    /// One sigma per axis of the mount's rotation error.
+    /// Standard deviation of the mount's rotation error, per axis.
     pub mount_std_rad: f64,
 }
 
-/// One sigma of a lens as it was measured; the defaults are those of a usual calibration by a board (assumed).
+/// Standard deviations of a calibrated lens; the defaults are those of a usual calibration with a board (assumed).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LensPriors {
-    /// Of the focal length, relative.
+    /// Relative standard deviation of the focal length.
     pub focal_std: f64,
-    /// Of the centre along each axis.
+    /// Standard deviation of the centre along each axis.
     pub center_std_px: f64,
-    /// Of each coefficient.
+    /// Standard deviation of each distortion coefficient.
     pub distortion_std: f64,
 }
 
@@ -59,7 +59,7 @@ impl Default for LensPriors {
 pub(super) struct CameraFile {
     /// Name of the camera.
     pub(super) name: String,
-    /// Link of the URDF that carries the camera; one that no joint moves: the camera stands still.
+    /// Link of the URDF that carries the camera; if no joint moves the link, the camera is stationary.
     pub(super) link: String,
     /// Position of the camera in the frame of that link; absent: at its origin.
     #[schemars(inner(range(min = -1e4, max = 1e4)))]
@@ -83,34 +83,34 @@ pub(super) struct CameraFile {
     /// Half of the field of view of `equidistant`; that of a pinhole follows from its image.
     #[schemars(range(min = 0.1, max = 3.0))]
     max_view_angle_rad: Option<f64>,
-    /// Flat window between lens and water; the lens is then that in air, without it that in its medium.
+    /// Flat window between lens and water. With it the lens is calibrated in air, without it in its medium.
     port: Option<PortFile>,
-    /// Noise of a tag's corner, one sigma per coordinate; absent: 0.3 px.
+    /// Noise of a tag's corner, standard deviation per coordinate; absent: 0.3 px.
     #[schemars(range(min = 1e-3, max = 100.0))]
     corner_std_px: Option<f64>,
-    /// Relative sigma of the focal length; absent: 0.0025 (assumed).
+    /// Relative standard deviation of the focal length; absent: 0.0025 (assumed).
     #[schemars(range(min = 0.0, max = 0.1))]
     focal_std: Option<f64>,
-    /// Sigma of the principal point, per axis; absent: 1 px (assumed).
+    /// Standard deviation of the principal point, per axis; absent: 1 px (assumed).
     #[schemars(range(min = 0.0, max = 100.0))]
     center_std_px: Option<f64>,
-    /// Sigma of each distortion coefficient; absent: 0.001 (assumed).
+    /// Standard deviation of each distortion coefficient; absent: 0.001 (assumed).
     #[schemars(range(min = 0.0, max = 1.0))]
     distortion_std: Option<f64>,
-    /// Sigma of the camera's position in its link, per axis.
+    /// Standard deviation of the camera's position in its link, per axis.
     #[schemars(range(min = 0.0, max = 1.0))]
     mount_std_m: f64,
-    /// Sigma of the camera's attitude in its link, per axis.
+    /// Standard deviation of the camera's attitude in its link, per axis.
     #[schemars(range(min = 0.0, max = 1.0))]
     mount_std_rad: f64,
 }
 
 /// Keys of a lens: all of them, or none for a camera that gives poses and no images.
 pub(super) const LENS_KEYS: [&str; 5] = ["model", "resolution_px", "focal_px", "center_px", "distortion"];
-/// Of a usual detector, px. Assumed.
+/// Corner noise of a usual detector, px. Assumed.
 const CORNER_STD_PX: f64 = 0.3;
 
-/// A lens as the file gives it.
+/// A lens as stated in the file.
 struct LensFile<'a> {
     model: &'a str,
     resolution_px: [u32; 2],
@@ -120,11 +120,11 @@ struct LensFile<'a> {
     max_view_angle_rad: Option<f64>,
 }
 
-/// The table of a camera: its file and its name there.
+/// The table of a camera: its file and the table's name.
 #[derive(Clone, Copy)]
 pub(super) struct CameraTable<'a> {
     pub file: &'a Path,
-    /// `camera`, or `further_camera` with its number.
+    /// Name of the table: `camera`, or `further_camera` with its number.
     pub name: &'a str,
 }
 
@@ -139,7 +139,7 @@ impl CameraTable<'_> {
 }
 
 impl CameraFile {
-    /// The mount on a link whose frame is at `link`: the link's own frame, but where the file says more.
+    /// Returns the mount on a link whose frame is at `link`: the link's own frame, unless the file states a pose.
     ///
     /// # Errors
     /// [`FileIssue`] naming the key.
@@ -155,7 +155,7 @@ impl CameraFile {
         Ok(Attachment { link_from_frame: link.link_from_frame * place.isometry(), ..link })
     }
 
-    /// `None` where none of the keys of a lens is there.
+    /// Returns the lens keys; `None` if the file has none of them.
     fn lens(&self, table: CameraTable<'_>) -> Result<Option<LensFile<'_>>, FileIssue> {
         let given = (&self.model, self.resolution_px, self.focal_px, self.center_px, &self.distortion);
         if let (Some(model), Some(resolution_px), Some(focal_px), Some(center_px), Some(distortion)) = given {
@@ -172,7 +172,7 @@ impl CameraFile {
     }
 }
 
-/// A flat window before the lens.
+/// A flat window in front of the lens.
 #[derive(Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct PortFile {

@@ -1,7 +1,7 @@
 //! Reader of COLLADA (.dae) meshes: triangles and polygons with the transforms of their nodes, in metres.
 //!
-//! Coordinates keep the axes of the file, whatever its `up_axis` says: RViz and MoveIt read a URDF's meshes so, and
-//! that is what drawings are checked with. Materials, normals, lights and animations are not looked at.
+//! Coordinates keep the axes of the file, regardless of its `up_axis`: RViz and MoveIt read a URDF's meshes in this
+//! way, and users check a URDF with them. Materials, normals, lights and animations are ignored.
 
 use std::collections::BTreeMap;
 use std::rc::Rc;
@@ -11,23 +11,23 @@ use nalgebra::{Matrix4, Point3, Rotation3, Translation3, Unit, Vector3, Vector4}
 use super::triangles::{MAX_VERTICES, Mesh, MeshBuilder, max_triangles, too_many_triangles};
 use super::xml_tree::{Element, XmlLimits, XmlTree};
 
-/// Limit of nodes and instances that are visited, each as often as it is instanced.
+/// Limit of nodes and instances that are visited, counted once per instance.
 const MAX_NODES: usize = 10_000;
-/// Limit of nodes within each other, through instances, too.
+/// Limit of the nesting of nodes, including through instances.
 const MAX_DEPTH: usize = 64;
 
-/// Limit of the visited nodes' elements, each as often as its node is visited.
+/// Limit of the visited nodes' elements, counted once per visit.
 const MAX_VISITED_ELEMENTS: usize = 1_000_000;
-/// Limit of numbers in the lists of positions, each as often as it is named.
+/// Limit of numbers in the lists of positions, counted once per reference.
 const MAX_NUMBERS: usize = 3 * MAX_VERTICES;
 
-/// Limits of a document: a mesh of many parts has some thousands of elements.
+/// Limits of a document: a mesh of many parts has a few thousand elements.
 const XML_LIMITS: XmlLimits = XmlLimits { elements: 200_000, namespaces: 32 };
 
 /// Reads a COLLADA document.
 ///
 /// # Errors
-/// A sentence, whatever the bytes are.
+/// A sentence, for any bytes.
 pub(super) fn collada(bytes: &[u8]) -> Result<Mesh, String> {
     let text = std::str::from_utf8(bytes).map_err(|_| "not a text in UTF-8, as a COLLADA must be".to_owned())?;
     let tree = XmlTree::parse(text, XML_LIMITS)?;
@@ -57,19 +57,19 @@ type Triangle = [[f64; 3]; 3];
 struct Document<'a> {
     tree: &'a XmlTree,
     ids: BTreeMap<&'a str, usize>,
-    /// Triangles of each geometry that was used, in its own coordinates.
+    /// Triangles of each geometry used, in its own coordinates.
     soups: BTreeMap<usize, Vec<Triangle>>,
-    /// Positions of each `vertices` that was used.
+    /// Positions of each `vertices` element used.
     positions: BTreeMap<usize, Rc<Vec<[f64; 3]>>>,
-    /// Numbers that they were read from.
+    /// Number of the numbers that they were read from.
     n_numbers: usize,
     max_triangles: usize,
-    /// In all of `soups`.
+    /// Number of triangles in all of `soups`.
     n_triangles: usize,
     mesh: MeshBuilder,
 }
 
-/// Where a node stands.
+/// Position of a node in the traversal.
 #[derive(Clone, Copy)]
 struct Visit {
     element: usize,
@@ -81,7 +81,7 @@ impl<'a> Document<'a> {
     fn read(mut self) -> Result<Mesh, String> {
         let unit = Matrix4::new_scaling(self.meters_per_unit()?);
         let Some(scene) = self.scene()? else {
-            // Without a scene, every geometry stands where it was drawn.
+            // Without a scene, every geometry has its own coordinates.
             let tree = self.tree;
             for geometry in tree.named("geometry") {
                 self.place(geometry, &unit)?;
@@ -121,7 +121,7 @@ impl<'a> Document<'a> {
         }
     }
 
-    /// The element that `attribute` of an element refers to.
+    /// Returns the element that `attribute` of an element refers to.
     fn target(&self, at: usize, attribute: &str) -> Result<usize, String> {
         let element = self.tree.element(at);
         let Some(url) = element.attribute(attribute) else {
@@ -188,7 +188,7 @@ impl<'a> Document<'a> {
         Ok(parent_from_node)
     }
 
-    /// Adds a geometry where an instance of it stands.
+    /// Adds a geometry at the pose of an instance.
     fn place(&mut self, geometry: usize, scene_from_geometry: &Matrix4<f64>) -> Result<(), String> {
         if !self.soups.contains_key(&geometry) {
             let soup = self.soup(geometry)?;
@@ -230,7 +230,7 @@ impl<'a> Document<'a> {
                 .attribute("offset")
                 .map_or(Ok(0), |offset| offset.trim().parse())
                 .map_err(|_| "the offset of an input is no number".to_owned())?;
-            // Real files have some four inputs.
+            // Real files have about four inputs.
             if offset >= 64 {
                 return Err(format!("the offset {offset} of an input is beyond 63"));
             }
@@ -260,7 +260,7 @@ impl<'a> Document<'a> {
         Ok(())
     }
 
-    /// The `p` of a primitive; of a polygon with holes its outline.
+    /// Returns the `p` elements of a primitive; for a polygon with holes only its outline.
     fn index_lists(&self, primitive: usize) -> Vec<usize> {
         let children = self.tree.children(primitive);
         children
@@ -272,7 +272,7 @@ impl<'a> Document<'a> {
             .collect()
     }
 
-    /// Positions that a `vertices` element names; read once, however many primitives name it.
+    /// Returns the positions of a `vertices` element, which is read once for any number of primitives.
     fn positions(&mut self, vertices: usize) -> Result<Rc<Vec<[f64; 3]>>, String> {
         if let Some(known) = self.positions.get(&vertices) {
             return Ok(Rc::clone(known));
@@ -319,18 +319,18 @@ impl<'a> Document<'a> {
     }
 }
 
-/// How corners make triangles.
+/// Rule that forms triangles of corners.
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
     Triangles,
-    /// Polygons one after another, their numbers of corners apart.
+    /// Polygons one after another, with their numbers of corners in a separate list.
     Polylist,
-    /// One polygon or fan in each list.
+    /// One polygon or fan per list.
     Fans,
     Strips,
 }
 
-/// Triangles of a geometry, within what its file may still have.
+/// Triangles of a geometry, within the remaining limit of its file.
 struct Soup {
     triangles: Vec<Triangle>,
     room: usize,
@@ -338,7 +338,7 @@ struct Soup {
     max: usize,
 }
 
-/// A corner of a primitive, or why it cannot be read.
+/// A corner of a primitive, or the reason why it cannot be read.
 type Corner = Result<[f64; 3], String>;
 
 impl Soup {
@@ -348,7 +348,7 @@ impl Soup {
         Ok(())
     }
 
-    /// Adds a polygon as a fan about its first corner; nothing of fewer than three corners.
+    /// Adds a polygon as a fan about its first corner; adds nothing for fewer than three corners.
     fn add_fan(&mut self, mut corners: impl Iterator<Item = Corner>) -> Result<(), String> {
         let Some(first) = corners.next().transpose()? else { return Ok(()) };
         let Some(mut last) = corners.next().transpose()? else { return Ok(()) };
@@ -362,7 +362,7 @@ impl Soup {
 }
 
 impl Kind {
-    /// Adds a list of corners, which are read as they are used.
+    /// Adds a list of corners, which are read when they are used.
     fn add(
         self,
         mut corners: impl Iterator<Item = Corner>,
@@ -405,7 +405,7 @@ fn numbers<const N: usize>(element: &Element) -> Result<[f64; N], String> {
         .ok_or_else(|| format!("a `{}` needs {N} finite numbers", element.name))
 }
 
-/// The numbers in the text of an element of this name.
+/// Reads the numbers in the text of an element of this name.
 fn indices<'a>(text: &'a str, name: &'a str) -> impl Iterator<Item = Result<usize, String>> + 'a {
     let words = text.split_ascii_whitespace();
     words.map(move |word| word.parse().map_err(|_| format!("`{word}` in a `{name}` is no index")))
@@ -426,7 +426,7 @@ mod tests {
     fn nodes_and_unit_put_every_kind_of_face_in_its_place() {
         let mesh = read(SCENE).expect("it reads");
         assert_eq!(mesh.triangles.len(), 4, "one triangle, two of a polylist, one polygon");
-        // Doubled along x, turned from x to y, 50 mm up, 1 m along x; the axes stay those of the file.
+        // Doubled along x, turned from x to y, 50 mm up, 1 m along x; the axes remain those of the file.
         let mut expected = vec![[1.0, 0.0, 0.05], [1.0, 0.2, 0.05], [0.9, 0.0, 0.05], [1.0, 0.0, 0.15]];
         for vertex in mesh.vertices {
             let is_it = |at: &[f64; 3]| (0..3).all(|k| (at[k] - vertex[k]).abs() < 1e-12);
@@ -487,11 +487,11 @@ mod tests {
         let long = "0 1 2 ".repeat(600_000);
         let kinds = ["triangles", "trifans", "tristrips"];
         let mut told = kinds.map(|kind| read(&list(kind, &long)).expect_err("refused")).to_vec();
-        // 60,000 numbers, read once for all primitives.
+        // The 60,000 numbers are read once for all primitives.
         let many = of_primitives(&format!("<triangles>{INPUT}</triangles>").repeat(2_000));
         let positions = "0 0 0 ".repeat(20_000);
         assert!(read(&many.replace("0 0 0 ", &positions)).is_ok_and(|mesh| mesh.triangles.is_empty()));
-        // Read for each of the vertices that names them.
+        // The numbers are read for each of the vertices that refers to them.
         let vertices =
             |k: usize| format!("<vertices id=\"v{k}\"><input semantic=\"POSITION\" source=\"#p\"/></vertices>");
         let of = |k: usize| format!("{}<triangles>{}</triangles>", vertices(k), INPUT.replace("#v", &format!("#v{k}")));
@@ -500,7 +500,7 @@ mod tests {
         insta::assert_snapshot!("collada_counts", told.join("\n"));
     }
 
-    /// Each node instances the next one ten times.
+    /// Returns a document in which each node instances the next one ten times.
     fn multiplied() -> String {
         let mut nodes = String::new();
         for level in 0..20 {

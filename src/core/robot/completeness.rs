@@ -1,4 +1,4 @@
-//! What robot.toml lacks, all of it at once.
+//! Missing keys of robot.toml, all of them at once.
 
 use crate::codes::Code;
 use std::cell::LazyCell;
@@ -44,8 +44,8 @@ const GRIPPER_KEYS: [&str; 5] = ["jaws", "opens_along", "rest_opening_m", "openi
 const TAG_KEYS: [&str; 7] =
     ["id", "family", "size_m", "position_m", "quaternion_wxyz", "position_std_m", "rotation_std_rad"];
 
-/// Checks that `robot` has every key that all commands need. `joints` gives the moving joints of the URDF, where that
-/// can be read; it is asked only when something is missing.
+/// Checks that `robot` has every key that all commands need. `joints` gives the moving joints of the URDF, if it can be
+/// read; it is called only if something is missing.
 ///
 /// # Errors
 /// [`FileIssue`] naming all missing keys, and all joints without a sensor.
@@ -104,7 +104,7 @@ fn tables<'a>(robot: &'a Table, name: &str) -> Vec<&'a Table> {
     robot.get(name).and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_table).collect()
 }
 
-/// The missing keys of one table.
+/// Describes the missing keys of one table.
 fn missing_in(place: &str, table: &Table, keys: &[&str]) -> Option<String> {
     let missing: Vec<&str> = keys.iter().filter(|key| !table.contains_key(**key)).copied().collect();
     (!missing.is_empty()).then(|| format!("{place}{}", missing.join(", ")))

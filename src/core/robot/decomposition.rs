@@ -1,8 +1,8 @@
 //! Convex parts of a mesh by parry's V-HACD, within a budget.
 //!
-//! V-HACD works on voxels, 64 along the longest side, and tries planes that cut them; it cannot be stopped on its way.
-//! A mesh that is no body (a soup of triangles) fills the box with surface and takes minutes, so two counts that its
-//! work grows with are looked at first; and the pieces into which voxels cut triangles, which become the hulls.
+//! V-HACD works on voxels, 64 along the longest side, and tries planes that cut them; it cannot be interrupted. A mesh
+//! that is not a body (a soup of triangles) fills the box with surface and takes minutes. So two counts that determine
+//! its work are checked first, and the pieces into which voxels cut triangles, which become the hulls.
 
 use std::collections::BTreeSet;
 
@@ -18,15 +18,15 @@ use super::triangles::Mesh;
 const MAX_HULLS: u32 = 32;
 /// Limit of tests of a triangle against a voxel; a million small triangles make 6e7.
 const MAX_TESTS: f64 = 1e8;
-/// Limit of pieces of triangles in voxels, each some 12 us and 0.8 kB; a body of 200,000 small triangles has as many.
+/// Limit of pieces of triangles in voxels, each about 12 us and 0.8 kB; a body of 200,000 small triangles has as many.
 const MAX_PIECES: f64 = 400_000.0;
 /// Limit of voxels with surface in them; a cube has 24,000.
 const MAX_SURFACE_VOXELS: usize = 60_000;
 
-/// Hulls of a convex decomposition of the mesh.
+/// Returns the hulls of a convex decomposition of the mesh.
 ///
 /// # Errors
-/// [`HullError`] where it has no body, or one that takes too much work.
+/// [`HullError`] if the mesh has no body, or one that takes too much work.
 pub(super) fn decomposed(mesh: &Mesh) -> Result<Vec<CenteredHull>, HullError> {
     // A flat mesh has no voxels to decompose.
     Hull::centered(&mesh.vertices)?;
@@ -52,7 +52,7 @@ pub(super) fn decomposed(mesh: &Mesh) -> Result<Vec<CenteredHull>, HullError> {
     Ok(hulls)
 }
 
-/// The triangles, each once: a face that a file repeats adds nothing but work.
+/// Returns the triangles, each once: a face that a file repeats adds only work.
 fn without_repetitions(mesh: &Mesh) -> Vec<[u32; 3]> {
     let mut known = BTreeSet::new();
     let is_new = |triangle: &&[u32; 3]| {
@@ -78,7 +78,7 @@ fn check_work(
     let side_m = of_corners(&mesh.vertices).max() / f64::from(parameters.resolution);
     let tests = triangles.iter().map(|triangle| {
         let size_m = of_corners(&triangle.map(|corner| mesh.vertices[corner as usize]));
-        // The voxels that it touches, and one more on either side.
+        // Number of voxels that the triangle touches, and one more on either side.
         size_m.map(|length_m| (length_m / side_m).ceil() + 2.0).product()
     });
     let too_complex = |what, n, max| Err(HullError::TooComplex { what, n, max });
@@ -98,8 +98,8 @@ fn check_work(
     }
 }
 
-/// About how many voxels of this side cut something from a triangle: as many as its area has squares, and half as many
-/// as its edges have lengths.
+/// Returns the approximate number of voxels of this side that cut a triangle. It is the number of squares in its area
+/// plus half the number of lengths in its edges.
 fn pieces(corners: [[f64; 3]; 3], side_m: f64) -> f64 {
     let [a, b, c] = corners.map(Vector3::from);
     let area_m2 = (b - a).cross(&(c - a)).norm() / 2.0;
@@ -113,7 +113,7 @@ mod tests {
     use crate::stats::stream_rng;
     use rand::RngExt;
 
-    /// `n` triangles anywhere in a cube of 1 m, of sides up to `side_m`.
+    /// Returns a mesh of `n` triangles anywhere in a cube of 1 m, with sides up to `side_m`.
     fn soup(n: u32, side_m: f64) -> Mesh {
         let mut rng = stream_rng(1, "soup");
         let mut mesh = Mesh::default();
@@ -127,8 +127,8 @@ mod tests {
         mesh
     }
 
-    /// An angle of two plates, with every face `n` times; each time by vertices of its own, `step_m` further, where
-    /// that is not zero.
+    /// Returns an angle of two plates, with every face `n` times. Each repetition has its own vertices, shifted by
+    /// `step_m` if that is not zero.
     fn angle(n: u32, step_m: f64) -> Mesh {
         let outline = [[0.0, 0.0], [1.0, 0.0], [1.0, 0.2], [0.2, 0.2], [0.2, 1.0], [0.0, 1.0]];
         let faces = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]];

@@ -1,4 +1,4 @@
-//! The arm with what stands around it as one URDF, for viewers: the vehicle and the tags as further links.
+//! The arm and its surroundings as one URDF, for viewers: the vehicle and the tags as further links.
 
 use std::fmt::Write as _;
 
@@ -16,26 +16,26 @@ use super::vehicle::Vehicle;
 const VEHICLE: &str = "vehicle";
 /// Thickness of a drawn tag, m: its face is at the tag's frame.
 const TAG_THICKNESS_M: f64 = 0.004;
-/// Of a drawn tag.
+/// Colour of a drawn tag.
 const TAG_RGB: [u8; 3] = [245, 245, 235];
 
-/// What a viewer draws of an arm and its surroundings as belief knows them.
+/// Geometry that a viewer draws of an arm and its surroundings, as the estimator knows them.
 #[derive(Clone, Debug)]
 pub struct Described {
-    /// The robot's URDF with links for vehicle and tags; for arms without names in the way.
+    /// URDF of the robot with links for vehicle and tags, except those whose name a link of the arm has.
     pub urdf: String,
-    /// Frames that never move: the arm's on the vehicle, fixed links, tags.
+    /// Frames that never move: the arm's mount on the vehicle, fixed links, tags.
     pub fixed: Vec<FixedFrame>,
 }
 
-/// The frame of a tag by its family and number: tag36h11:7.
+/// Returns the name of a tag's frame by its family and id, such as tag36h11:7.
 #[must_use]
 pub fn tag_frame_name(family: TagFamily, id: u32) -> String {
     format!("{}:{id}", family.long_name())
 }
 
 impl Described {
-    /// Of an arm bolted onto a vehicle, with the tags whose poses the arm is given, as surveyed.
+    /// Describes an arm on a vehicle, with the surveyed tags whose poses the arm is given.
     #[must_use]
     pub fn new(robot: &Robot, vehicle: &Vehicle, tree: &FrameTree) -> Self {
         let names = tree.names();
@@ -47,7 +47,7 @@ impl Described {
             let parent_from_child = vehicle.vehicle_from_base.isometry() * tree.base_from_root;
             fixed.push(FixedFrame { parent: VEHICLE.to_owned(), child: tree.root.clone(), parent_from_child });
         }
-        // The link that carries the tags; its frame is that of the tags.
+        // Finds the link that carries the tags: its frame is that of the tags.
         let fixed_to =
             || robot.links.iter().find(|(_, place)| **place == robot.tag_frame).map(|(name, _)| name.as_str());
         let carrier = robot.tag_link().or_else(fixed_to);
@@ -87,7 +87,7 @@ fn add_link(text: &mut String, name: &str, shapes: &[&PlacedShape]) {
                 format!("<cylinder radius=\"{radius_m}\" length=\"{length_m}\"/>")
             }
             Shape::Sphere { radius_m } => format!("<sphere radius=\"{radius_m}\"/>"),
-            // A URDF knows meshes as files alone.
+            // A URDF refers to meshes only as files.
             Shape::Hull(_) => continue,
         };
         let [r, g, b] = placed.color_rgb.map(|part| f64::from(part) / 255.0);

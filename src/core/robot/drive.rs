@@ -1,6 +1,6 @@
 //! Expected oil consumption and tracking errors of the arm's drives.
 //!
-//! `[hydraulics]` and `[motion]` of robot.toml, both optional. Belief uses them; the simulator reads neither.
+//! `[hydraulics]` and `[motion]` of robot.toml, both optional. The estimator uses them; the simulator reads neither.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use serde::Deserialize;
 use super::error::FileIssue;
 use super::urdf::UrdfModel;
 
-/// The drives by their datasheets.
+/// Properties of the drives by their datasheets.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DriveSpec {
     /// Oil flow shared by all joints, L/min; `None`: unlimited.
@@ -52,7 +52,7 @@ pub(super) struct HydraulicsFile {
     pump_l_per_min: f64,
 }
 
-/// 3000 psi, the upper end of the datasheets: the pressure at which a joint gives the URDF's effort.
+/// Supply pressure: 3000 psi, the upper end of the datasheets, at which a joint gives the URDF's effort.
 const SUPPLY_PRESSURE_PA: f64 = 2.07e7;
 const L_PER_M3: f64 = 1e3;
 

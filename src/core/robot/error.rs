@@ -16,15 +16,15 @@ mod toml_errors;
 pub struct FileIssue {
     /// Class of the problem.
     pub code: Code,
-    /// The file with the wrong value.
+    /// File with the wrong value.
     pub file: PathBuf,
-    /// The value's place in the file, dotted.
+    /// Dotted path of the value in the file.
     pub key: String,
-    /// End of a sentence that begins with the key.
+    /// Problem as the end of a sentence that begins with the key.
     pub problem: String,
 }
 
-/// Why a robot folder or vehicle file was refused.
+/// Reason why a robot folder or vehicle file was refused.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum RobotError {
@@ -59,20 +59,20 @@ pub enum RobotError {
 }
 
 impl FileIssue {
-    /// Returns the problem with the value at `key`, of the class `code`.
+    /// Returns the issue of the value at `key`, of the class `code`.
     #[must_use]
     pub fn new(code: Code, file: &Path, key: impl Into<String>, problem: impl Into<String>) -> Self {
         Self { code, file: file.to_owned(), key: key.into(), problem: problem.into() }
     }
 
-    /// Returns the problem of a text's reader with the table at `key`, classed by its words.
+    /// Returns the issue of the table at `key` that a text's reader reported, classed by its words.
     #[must_use]
     pub fn syntax(file: &Path, key: impl Into<String>, problem: impl Into<String>) -> Self {
         let problem = problem.into();
         Self::new(syntax_code(&problem), file, key, problem)
     }
 
-    /// One issue of `file` for several; `None` where there are none.
+    /// Merges several issues of `file` into one; `None` if there are none.
     pub(super) fn all(file: &Path, issues: &[Self]) -> Option<Self> {
         match issues {
             [] => None,
@@ -112,12 +112,12 @@ pub fn read_text(file: &Path) -> Result<String, RobotError> {
     read(file, FileKind::Text)
 }
 
-/// The same for a table of rows, which may be longer.
+/// Reads a table of rows, which may be longer than other text files; the error names the file.
 pub fn read_table(file: &Path) -> Result<String, RobotError> {
     read(file, FileKind::Table)
 }
 
-/// The same for a text file of a robot folder: a path may lead out of the folder, a link in it may not.
+/// Reads a text file of a robot folder. Its path may lead out of the folder; a link in the folder may not.
 pub(super) fn read_in(folder: &Path, file: &Path) -> Result<String, RobotError> {
     files::check_within(folder, file).map_err(|source| RobotError::Unreadable { file: file.to_owned(), source })?;
     read_text(file)

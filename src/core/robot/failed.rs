@@ -3,13 +3,13 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What is wrong with a joint or its sensor.
+/// Fault of a joint or its sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FailedKind {
-    /// The joint is stuck at an unknown angle, whatever its sensor reads.
+    /// The joint is stuck at an unknown angle, regardless of its sensor's readings.
     Locked,
-    /// The joint was not moved while its sensor read one angle: it may be sound.
+    /// The joint was not moved, and its sensor read one angle: it may be intact.
     NotMoved,
     /// The sensor's output does not depend on the joint angle.
     Dead,
@@ -20,10 +20,10 @@ pub enum FailedKind {
 }
 
 impl FailedKind {
-    /// Every kind that a user may declare, once.
+    /// All kinds that a user may declare, each once.
     pub const ALL: [Self; 4] = [Self::Locked, Self::Dead, Self::Stuck, Self::Jumps];
 
-    /// As files and the command line write it.
+    /// Returns the name that files and the command line use.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -35,7 +35,7 @@ impl FailedKind {
         }
     }
 
-    /// After a name, in a sentence.
+    /// Returns the predicate that follows a name in a sentence.
     #[must_use]
     pub fn predicate(self) -> &'static str {
         match self {
@@ -53,7 +53,7 @@ impl FailedKind {
         matches!(self, Self::Locked | Self::NotMoved)
     }
 
-    /// The kind of that name.
+    /// Returns the kind of that name.
     #[must_use]
     pub fn of_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.name() == name)
@@ -65,12 +65,12 @@ impl FailedKind {
 pub struct FailedJoint {
     /// Index of the joint, base first.
     pub joint: usize,
-    /// What is wrong with it.
+    /// Fault of the joint or its sensor.
     pub kind: FailedKind,
 }
 
 impl FailedJoint {
-    /// By the names of joint and kind, for an arm with the joints `names`.
+    /// Builds the declaration from the names of joint and kind, for an arm with the joints `names`.
     ///
     /// # Errors
     /// The wrong name and the allowed ones.

@@ -44,13 +44,13 @@ struct RobotFile {
     name: String,
     /// Serial number; the report has it.
     serial: Option<String>,
-    /// Path of the URDF, from the folder of this file.
+    /// Path of the URDF, relative to the folder of this file.
     urdf: PathBuf,
     /// Link of the URDF that is the base frame.
     base_link: String,
-    /// Number of the tag next to the base; `run` and `plan` need it, here or from the vehicle.
+    /// Id of the tag next to the base; `run` and `plan` need it, here or from the vehicle.
     base_tag: Option<u32>,
-    /// Link that carries the tags, whose poses are then in its frame: for a camera that stands still.
+    /// Link that carries the tags, for a stationary camera; the tags' poses are then in its frame.
     tag_link: Option<String>,
     /// Joint angles from which a run starts, base first; `run` and `plan` need them, here or from the vehicle.
     #[schemars(inner(range(min = -100.0, max = 100.0)))]
@@ -58,7 +58,7 @@ struct RobotFile {
     /// Collision meshes of the URDF; `run` and `plan` refuse an arm whose meshes are ignored.
     #[serde(default)]
     collision_meshes: CollisionMeshes,
-    /// Pairs of links, or of a link and a part of the vehicle, that touch by design and are not kept apart.
+    /// Pairs of links, or of a link and a part of the vehicle, that touch by design: no clearance is kept between them.
     #[serde(default)]
     allowed_pairs: Vec<[String; 2]>,
     /// Weight of the displaced sea water over that of the arm.
@@ -78,7 +78,7 @@ struct RobotFile {
     /// Tracking error of the arm against its set-points.
     #[serde(default)]
     motion: MotionSpec,
-    /// Sigmas of the geometry and loads.
+    /// Standard deviations of the geometry and loads.
     #[serde(default)]
     #[schemars(with = "GeometryTable")]
     geometry: GeometryPriors,
@@ -118,7 +118,7 @@ impl ToolFile {
 
 const TIP_RGB: [u8; 3] = [200, 205, 215];
 
-/// Of a Titan: 100 kg in air, 78 kg in sea water.
+/// Buoyancy fraction of a Titan: 100 kg in air, 78 kg in sea water.
 fn default_buoyancy_fraction() -> f64 {
     0.22
 }
@@ -129,8 +129,8 @@ pub fn robot_schema() -> serde_json::Value {
     schema_of::<RobotFile>(Kind::Robot)
 }
 
-/// Reads a robot folder: robot.toml, the URDF that it names, the collision meshes that this names, and
-/// self_collision.toml. One of another URDF is left out and becomes a planning issue.
+/// Reads a robot folder: robot.toml, the URDF that it names, the collision meshes that the URDF names, and
+/// self_collision.toml. A self_collision.toml of another URDF is left out and becomes a planning issue.
 ///
 /// # Errors
 /// [`RobotError`] naming file, key and allowed range.
@@ -144,7 +144,7 @@ pub fn load(folder: &Path) -> Result<Robot, RobotError> {
     Ok(robot)
 }
 
-/// Reads a robot folder without its self_collision.toml, which may belong to another URDF.
+/// Reads a robot folder without self_collision.toml, which may belong to another URDF.
 ///
 /// # Errors
 /// [`RobotError`] naming file, key and allowed range.
@@ -153,7 +153,7 @@ pub fn load_without_pairs(folder: &Path) -> Result<Robot, RobotError> {
     robot_of(folder, raw, urdf, Meshes::Read)
 }
 
-/// Reads the attachments of a recording in `folder`: the URDF's meshes are not among them, nor is self_collision.toml.
+/// Reads the attachments of a recording in `folder`, which include neither the URDF's meshes nor self_collision.toml.
 ///
 /// # Errors
 /// [`RobotError`] naming file, key and allowed range.
@@ -179,7 +179,7 @@ fn read_files(folder: &Path) -> Result<(RobotFile, UrdfModel), RobotError> {
     Ok((raw, urdf))
 }
 
-/// The chain's joints as far as a robot.toml that lacks keys tells them.
+/// Returns the chain's joints as far as an incomplete robot.toml determines them.
 fn chain_joints(folder: &Path, robot: &toml::Table) -> Option<Vec<(String, JointKind)>> {
     let text = |table: &toml::Table, key: &str| Some(table.get(key)?.as_str()?.to_owned());
     let link = |name: &str| text(robot.get(name)?.as_table()?, "link");
@@ -190,7 +190,7 @@ fn chain_joints(folder: &Path, robot: &toml::Table) -> Option<Vec<(String, Joint
     Some(chain.joints().iter().map(|joint| (joint.name.clone(), joint.kind)).collect())
 }
 
-/// What planning needs and `raw` does not give.
+/// Returns the data that planning needs and `raw` lacks.
 fn planning_issues(file: &Path, raw: &RobotFile, camera: &CameraSpec, arm: &UrdfChain<'_>) -> Vec<FileIssue> {
     let mut issues = Vec::new();
     if raw.stowed_rad.is_none() {
@@ -292,7 +292,7 @@ fn robot_of(folder: &Path, raw: RobotFile, urdf: UrdfModel, meshes: Meshes) -> R
     })
 }
 
-/// Returns the stowed angles of the file, or the middle of each joint's range.
+/// Returns the stowed angles of the file, or else the middle of each joint's range.
 fn stowed_or_middle(
     file: &Path,
     stowed_rad: Option<&[f64]>,
@@ -313,8 +313,8 @@ fn check_cameras(
     Ok((camera, further))
 }
 
-/// Checks the tag on the gripper beside the others. Those that the arm carries are for a camera that stands still, and
-/// that one is for a camera that moves.
+/// Checks the tag on the gripper against the other tags. Tags that the arm carries require a stationary camera, a tag
+/// on the gripper a moving one.
 fn check_gripper_tag(
     file: &Path,
     tag: &GripperTag,
@@ -328,7 +328,7 @@ fn check_gripper_tag(
     tag.check_beside(file, tags, family)
 }
 
-/// The frame of the tags that the arm carries on `link`.
+/// Returns the frame of the tags that the arm carries on `link`.
 fn check_tag_link(
     file: &Path,
     link: &str,
@@ -351,7 +351,7 @@ fn file_name(urdf: &Path) -> String {
     urdf.file_name().map_or_else(|| "robot.urdf".to_owned(), |name| name.to_string_lossy().into_owned())
 }
 
-/// Where collision meshes may be: beside the URDF, and beside robot.toml.
+/// Returns the folders of collision meshes: that of the URDF and that of robot.toml.
 fn mesh_folders(urdf: &UrdfModel, folder: &Path) -> MeshFolders {
     MeshFolders { folders: [urdf.file.parent().unwrap_or(folder).to_owned(), folder.to_owned()] }
 }
@@ -369,14 +369,15 @@ fn loads(geometry: &GeometryPriors, bodies: &[LinkBody], buoyancy_fraction: f64,
     loads
 }
 
-/// The ball about the tool point, the last of its link's shapes.
+/// Adds the ball about the tool point, as the last of its link's shapes.
 fn add_tip(body: &mut LinkBody, owner_from_shape: Isometry3<f64>, radius_m: f64) {
     let tip = PlacedShape { owner_from_shape, shape: Shape::Sphere { radius_m }, color_rgb: TIP_RGB };
     body.visuals.push(tip.clone());
     body.collisions.push(tip);
 }
 
-/// The URDF that robot.toml names, or else a file of that name beside robot.toml, as in the attachments of a recording.
+/// Reads the URDF that robot.toml names, or else a file of that name next to robot.toml, as in the attachments of a
+/// recording.
 fn read_urdf(folder: &Path, urdf: &Path) -> Result<UrdfModel, RobotError> {
     let named = folder.join(urdf);
     let beside = urdf.file_name().map(|name| folder.join(name));

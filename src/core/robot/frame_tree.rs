@@ -1,4 +1,4 @@
-//! The links of a URDF as a tree of frames, for viewers: which hang on each other, and which move.
+//! The links of a URDF as a tree of frames, for viewers: their parents, and which of them move.
 
 use std::collections::BTreeSet;
 
@@ -9,25 +9,25 @@ use super::nominal::Robot;
 use super::urdf::UrdfModel;
 use crate::kinematics::{Attachment, LinkPoses};
 
-/// Every link of an arm's URDF, once as a child; the root alone is none.
+/// Tree of the links of an arm's URDF; each link except the root is a child once.
 #[derive(Clone, Debug)]
 pub struct FrameTree {
-    /// The link on which all others hang.
+    /// Name of the root link, the ancestor of all others.
     pub root: String,
-    /// Pose of the root in the base frame, other joints between them at zero.
+    /// Pose of the root in the base frame, with other joints between them at zero.
     pub base_from_root: Isometry3<f64>,
-    /// Links that keep their place on their parents: on fixed joints, or at zero of joints that are not the arm's.
+    /// Links that are fixed to their parents: on fixed joints, or at zero of joints that are not the arm's.
     pub fixed: Vec<FixedFrame>,
     /// Links that the arm's joints move, base first.
     pub moving: Vec<MovingFrame>,
 }
 
-/// A frame that keeps its place on its parent.
+/// A frame that is fixed to its parent.
 #[derive(Clone, Debug)]
 pub struct FixedFrame {
-    /// The parent link.
+    /// Name of the parent link.
     pub parent: String,
-    /// The link itself.
+    /// Name of the link itself.
     pub child: String,
     /// Pose of the child in the parent's frame.
     pub parent_from_child: Isometry3<f64>,
@@ -36,18 +36,18 @@ pub struct FixedFrame {
 /// A link that a joint of the arm moves.
 #[derive(Clone, Debug)]
 pub struct MovingFrame {
-    /// The parent link in the URDF.
+    /// Name of the parent link in the URDF.
     pub parent: String,
-    /// The link itself.
+    /// Name of the link itself.
     pub child: String,
-    /// Where the parent link is on the chain.
+    /// Attachment of the parent link to the chain.
     parent_place: Attachment,
     /// Number of joints from the base to the child.
     body: usize,
 }
 
 impl MovingFrame {
-    /// Pose of the child in its parent's frame where the arm's links are at `poses`.
+    /// Pose of the child in its parent's frame, with the arm's links at `poses`.
     #[must_use]
     pub fn parent_from_child(&self, poses: &LinkPoses) -> Isometry3<f64> {
         poses.frame(&self.parent_place).inv_mul(poses.link(self.body))
@@ -55,10 +55,10 @@ impl MovingFrame {
 }
 
 impl FrameTree {
-    /// The tree of an arm's URDF.
+    /// Builds the tree of an arm's URDF.
     ///
     /// # Errors
-    /// [`RobotError`] where the URDF is none; that of a loaded robot is one.
+    /// [`RobotError`] if the URDF is invalid; that of a loaded robot is valid.
     pub fn of(robot: &Robot) -> Result<Self, RobotError> {
         let urdf = UrdfModel::parse(&robot.folder.join(&robot.urdf_name), robot.urdf_text.clone())?;
         let (mut root, mut base_from_root) = (robot.base_link.as_str(), Isometry3::identity());
@@ -97,7 +97,7 @@ mod tests {
     use crate::joints::JointAngles;
     use crate::robot::load;
 
-    /// From the base along the tree alone, each link comes to where the kinematics have it.
+    /// The tree leads from the base to the pose of each link that the kinematics give.
     #[test]
     fn frames_lead_to_every_link_of_every_robot() {
         for name in ["titan4", "kraft-predator"] {

@@ -1,4 +1,4 @@
-//! How well the drawing is known: standard deviations of link geometry, tool point and compliances.
+//! Prior standard deviations of the nominal model: link geometry, tool point and compliances.
 
 use std::path::Path;
 
@@ -9,28 +9,28 @@ use serde::Deserialize;
 use super::error::FileIssue;
 use crate::codes::Code;
 
-/// One sigma of each axis, about the drawing. `[geometry]` of robot.toml; the defaults are those of a machined arm that
-/// was never bent (assumed): they weigh explanations, and are no statement on which an uncertainty could be based.
+/// Prior standard deviations about the nominal model, per axis: `[geometry]` of robot.toml. The defaults are those of a
+/// machined arm that was never bent (assumed). They weigh explanations; no uncertainty may be based on them.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(from = "GeometryTable")]
 pub struct GeometryPriors {
-    /// Of each joint's place in its parent link, m.
+    /// Standard deviation of each joint's position in its parent link, m.
     pub link_position_std_m: f64,
-    /// Of each joint's attitude in its parent link, rad.
+    /// Standard deviation of each joint's attitude in its parent link, rad.
     pub link_rotation_std_rad: f64,
-    /// Of the tool point in its link, m.
+    /// Standard deviation of the tool point in its link, m.
     pub tool_position_std_m: f64,
-    /// Of how much each joint turns behind its sensor under a torque, rad/(N m).
+    /// Standard deviation of each joint's compliance behind its sensor, rad/(N m).
     pub joint_compliance_std_rad_per_nm: f64,
-    /// Of how much the base turns on what carries it, about each of its axes, rad/(N m).
+    /// Standard deviation of the mount's compliance about each axis of the base, rad/(N m).
     pub mount_compliance_std_rad_per_nm: f64,
-    /// Of a load in the gripper, weight less buoyancy, N.
+    /// Standard deviation of a load in the gripper, weight less buoyancy, N.
     pub tool_load_std_n: f64,
-    /// Against gravity, in the base frame; of any length.
+    /// Direction against gravity, in the base frame; of any length.
     pub up: [f64; 3],
     /// Distances between tags, measured without the camera.
     pub tag_distances: Vec<TagDistance>,
-    /// The sigmas that robot.toml states.
+    /// Standard deviations that robot.toml states.
     pub stated: StatedGeometry,
 }
 
@@ -38,52 +38,52 @@ pub struct GeometryPriors {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TagDistance {
-    /// Numbers of the two tags.
+    /// Ids of the two tags.
     pub tags: [u32; 2],
-    /// From centre to centre, by tape or laser.
+    /// Distance between the centres, by tape or laser.
     #[schemars(range(min = 1e-3, max = 1e3))]
     pub distance_m: f64,
-    /// Sigma of it.
+    /// Standard deviation of the distance.
     #[schemars(range(min = 1e-6, max = 1.0))]
     pub std_m: f64,
 }
 
-/// True for each sigma that robot.toml states; the others are defaults.
+/// Flags of the standard deviations that robot.toml states; the others are defaults.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StatedGeometry {
-    /// `link_position_std_m`.
+    /// True if `link_position_std_m` is stated.
     pub link_position: bool,
-    /// `link_rotation_std_rad`.
+    /// True if `link_rotation_std_rad` is stated.
     pub link_rotation: bool,
-    /// `tool_position_std_m`.
+    /// True if `tool_position_std_m` is stated.
     pub tool_position: bool,
 }
 
-/// `[geometry]` as it is written.
+/// `[geometry]` as written in the file.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct GeometryTable {
-    /// Sigma of each joint's position in its parent link, per axis; absent: 0.0005, not included in U95.
+    /// Standard deviation of each joint's position in its parent link, per axis; absent: 0.0005, not included in U95.
     #[schemars(range(min = 0.0, max = 1.0))]
     link_position_std_m: Option<f64>,
-    /// Sigma of each joint's attitude in its parent link, per axis; absent: 0.0005, not included in U95.
+    /// Standard deviation of each joint's attitude in its parent link, per axis; absent: 0.0005, not included in U95.
     #[schemars(range(min = 0.0, max = 1.0))]
     link_rotation_std_rad: Option<f64>,
-    /// Sigma of the tool point in its link, per axis; absent: 0.0005, not included in U95.
+    /// Standard deviation of the tool point in its link, per axis; absent: 0.0005, not included in U95.
     #[schemars(range(min = 0.0, max = 1.0))]
     tool_position_std_m: Option<f64>,
-    /// Sigma of each joint's compliance behind its sensor.
+    /// Standard deviation of each joint's compliance behind its sensor.
     #[schemars(range(min = 0.0, max = 1e-2))]
     joint_compliance_std_rad_per_nm: f64,
-    /// Sigma of the mount's compliance, about each axis of the base.
+    /// Standard deviation of the mount's compliance, about each axis of the base.
     #[schemars(range(min = 0.0, max = 1e-2))]
     mount_compliance_std_rad_per_nm: f64,
-    /// Sigma of a load in the gripper, weight less buoyancy.
+    /// Standard deviation of a load in the gripper, weight less buoyancy.
     #[schemars(range(min = 0.0, max = 1e5))]
     tool_load_std_n: f64,
     /// Direction against gravity in the base frame, of any length.
     up: [f64; 3],
-    /// Distances between tags that were measured without the camera; used where the views show both tags.
+    /// Distances between tags that were measured without the camera; used if the views show both tags.
     tag_distance: Vec<TagDistance>,
 }
 

@@ -18,11 +18,12 @@ use crate::kinematics::Attachment;
 /// The jaws and their motion.
 #[derive(Clone, Debug)]
 pub struct GripperSpec {
-    /// The first opens along `opens_along`, the second against it.
+    /// The two jaws: the first opens along `opens_along`, the second against it.
     pub jaws: [Jaw; 2],
-    /// Direction in which the first jaw opens, axes of the link that carries them; the second moves the other way.
+    /// Direction in which the first jaw opens, in the axes of the link that carries the jaws; the second moves the
+    /// other way.
     pub opens_along: Unit<Vector3<f64>>,
-    /// The link that carries them, as the number of joints before it.
+    /// Link that carries the jaws, as the number of joints proximal to it.
     pub body: usize,
     /// Opening in the URDF.
     pub rest_opening_m: f64,
@@ -35,9 +36,9 @@ pub struct GripperSpec {
 /// The visual shapes of one jaw.
 #[derive(Clone, Debug)]
 pub struct Jaw {
-    /// Its link in the URDF.
+    /// Name of the jaw's link in the URDF.
     pub name: String,
-    /// In the frame of the link that carries it, at the rest opening.
+    /// Shapes in the frame of the link that carries the jaw, at the rest opening.
     pub visuals: Vec<PlacedShape>,
 }
 

@@ -1,6 +1,6 @@
 //! `[gripper_tag]` of robot.toml: a tag distal to the camera, in view of it.
 //!
-//! It is not a tag of the survey and does not locate the base. It measures the joints between camera and tool.
+//! It is not a tag of the survey and does not locate the base. It constrains the joints between camera and tool.
 
 use crate::codes::Code;
 use std::path::Path;
@@ -19,28 +19,28 @@ use crate::spatial::{Link, Pose, Tag};
 /// A tag on a link distal to the camera.
 #[derive(Clone, Copy, Debug)]
 pub struct GripperTag {
-    /// What is printed on it, as on the surveyed tags.
+    /// Family of the tag, which is also that of the surveyed tags.
     pub family: TagFamily,
-    /// Number in the family; none of the surveyed tags has it.
+    /// Id of the tag in its family; no surveyed tag has the same id.
     pub id: u32,
     /// Side of the black square, m.
     pub size_m: f64,
     /// Nominal `link_from_tag` on the link that carries it.
     pub mount: Attachment,
-    /// One sigma per axis of the tag's pose.
+    /// Standard deviation of the tag's position, per axis.
     pub position_std_m: f64,
-    /// One sigma per axis of the tag's rotation.
+    /// Standard deviation of the tag's rotation, per axis.
     pub rotation_std_rad: f64,
 }
 
 impl GripperTag {
-    /// The joints between the camera and this tag.
+    /// Joints between the camera and this tag.
     #[must_use]
     pub fn joints(&self, camera_mount: &Attachment) -> std::ops::Range<usize> {
         camera_mount.n_joints..self.mount.n_joints
     }
 
-    /// Checks that it is of the surveyed tags' family, and that none of `tags` has the same id.
+    /// Checks that the tag is of the surveyed tags' family, and that none of `tags` has the same id.
     ///
     /// # Errors
     /// [`FileIssue`] with the id.
@@ -69,7 +69,7 @@ impl GripperTag {
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct GripperTagFile {
-    /// Number of the tag.
+    /// Id of the tag.
     id: u32,
     /// Family of the tag, such as `36h11`.
     family: String,
@@ -83,10 +83,10 @@ pub(super) struct GripperTagFile {
     position_m: [f64; 3],
     /// Attitude of the tag in that link.
     quaternion_wxyz: [f64; 4],
-    /// Sigma of the position, per axis.
+    /// Standard deviation of the position, per axis.
     #[schemars(range(min = 0.0, max = 1.0))]
     position_std_m: f64,
-    /// Sigma of the attitude, per axis.
+    /// Standard deviation of the attitude, per axis.
     #[schemars(range(min = 0.0, max = 1.0))]
     rotation_std_rad: f64,
 }

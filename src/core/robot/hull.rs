@@ -15,7 +15,7 @@ const THINNEST_M: f64 = 1e-4;
 /// A convex body with its corners, m.
 #[derive(Clone, Debug)]
 pub struct Hull {
-    /// The points that it was made from; some may lie inside.
+    /// Points that the hull was made from; some may lie inside.
     points_m: Vec<[f64; 3]>,
     corners_m: Vec<[f64; 3]>,
     /// Corners of each outer triangle, counter-clockwise from outside.
@@ -36,7 +36,7 @@ struct Outline {
     triangles: Vec<[u32; 3]>,
 }
 
-/// Why points have no convex body.
+/// Reason why points have no convex body.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum HullError {
@@ -51,17 +51,17 @@ pub enum HullError {
 }
 
 impl PartialEq for Hull {
-    /// Equal points have equal hulls.
+    /// Returns true for equal points, which have equal hulls.
     fn eq(&self, other: &Self) -> bool {
         self.points_m == other.points_m
     }
 }
 
 impl Hull {
-    /// The hull of `points_m`, which must be finite.
+    /// Builds the hull of `points_m`, which must be finite.
     ///
     /// # Errors
-    /// [`HullError`] where they lie in one plane, are too many, or have no convex body.
+    /// [`HullError`] if the points lie in one plane, are too many, or have no convex body.
     pub fn new(points_m: &[[f64; 3]]) -> Result<Arc<Self>, HullError> {
         let Outline { corners_m, triangles } = outline(points_m)?;
         if corners_m.len() > MAX_HULL_POINTS {
@@ -79,7 +79,7 @@ impl Hull {
         }))
     }
 
-    /// The hull's corners alone, relative to their centre.
+    /// Returns only the hull's corners, relative to their centre.
     pub(super) fn centered(points_m: &[[f64; 3]]) -> Result<CenteredHull, HullError> {
         let Outline { corners_m, .. } = outline(points_m)?;
         let bound = |pick: fn(f64, f64) -> f64, start: f64| {
@@ -91,7 +91,7 @@ impl Hull {
         Ok(CenteredHull { points_m, center_m })
     }
 
-    /// Its corners alone, in the frame of the points that it was made from.
+    /// Returns the hull's corners in the frame of the points that it was made from.
     #[must_use]
     pub fn corners_m(&self) -> &[[f64; 3]] {
         &self.corners_m
@@ -103,19 +103,19 @@ impl Hull {
         &self.triangles
     }
 
-    /// The shape for parry and rapier.
+    /// Returns the shape for parry and rapier.
     #[must_use]
     pub fn shape(&self) -> SharedShape {
         self.shape.clone()
     }
 
-    /// Radius of the smallest sphere about the origin that contains it, m.
+    /// Radius of the smallest sphere about the origin that contains the hull, m.
     #[must_use]
     pub fn radius_m(&self) -> f64 {
         self.radius_m
     }
 
-    /// Sides of its bounding box along the axes, m.
+    /// Sides of the hull's bounding box along the axes, m.
     #[must_use]
     pub fn box_m(&self) -> [f64; 3] {
         let half = self.shape.compute_local_aabb().half_extents();
@@ -123,7 +123,7 @@ impl Hull {
     }
 }
 
-/// Corners and triangles of the hull. Checks first for points on which parry would panic.
+/// Returns corners and triangles of the hull, after a check for points on which parry would panic.
 fn outline(points_m: &[[f64; 3]]) -> Result<Outline, HullError> {
     let thickness_m = thickness_m(points_m);
     if thickness_m < THINNEST_M {
@@ -134,7 +134,7 @@ fn outline(points_m: &[[f64; 3]]) -> Result<Outline, HullError> {
     Ok(Outline { corners_m: corners.iter().map(|p| p.to_array()).collect(), triangles })
 }
 
-/// Extent along the direction in which the points spread least, m.
+/// Returns the extent along the direction in which the points spread least, m.
 fn thickness_m(points_m: &[[f64; 3]]) -> f64 {
     if points_m.is_empty() {
         return 0.0;

@@ -12,7 +12,7 @@ pub use super::stated_angle::StatedAngle;
 use crate::kinematics::{Chain, ChainJoint, JointKind};
 use crate::units::Unit;
 
-/// Kind of joint sensor; it selects the effects that belief models.
+/// Kind of a joint sensor; it selects the effects that the estimator models.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SensorKind {
@@ -24,63 +24,63 @@ pub enum SensorKind {
     Resolver,
 }
 
-/// A joint sensor by its datasheet: `angle = center + wrap(counts - counts(center)) / counts_per_rad`.
+/// Datasheet of a joint sensor: `angle = center + wrap(counts - counts(center)) / counts_per_rad`.
 ///
-/// A slide's figures are in metres wherever a name says rad: `counts_per_rad` are counts per metre.
+/// For a slide, figures are in metres although their names say rad: `counts_per_rad` are counts per metre.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointSensorSpec {
     /// Name of the joint in the URDF.
     pub joint: String,
-    /// Whether the joint turns or slides.
+    /// Type of motion of the joint: rotation or translation.
     pub moves: JointKind,
-    /// See [`SensorKind`].
+    /// Kind of the sensor.
     pub kind: SensorKind,
-    /// The reading at angle zero.
+    /// Reading at angle zero.
     pub offset_counts: f64,
-    /// Negative where the reading falls as the angle grows.
+    /// Counts per radian; negative if the reading falls as the angle grows.
     pub counts_per_rad: f64,
-    /// The reading repeats after so many counts, at least the joint's range.
+    /// Counts after which the reading repeats, at least the joint's range.
     pub wrap_counts: f64,
-    /// The middle of the joint's range, about which gain errors are defined.
+    /// Middle of the joint's range, about which gain errors are defined.
     pub center_rad: f64,
-    /// Half of the joint's range; pi for a joint without limits, 1 m for a slide without.
+    /// Half of the joint's range; pi for a joint without limits, 1 m for a slide without limits.
     pub half_range_rad: f64,
-    /// One sigma of the relative gain error.
+    /// Standard deviation of the relative gain error.
     pub gain_std: f64,
-    /// One sigma of the offset error.
+    /// Standard deviation of the offset error.
     pub offset_std_rad: f64,
     /// Largest relative gain error that planning allows for.
     pub gain_bound: f64,
     /// Largest offset error that planning allows for.
     pub offset_bound_rad: f64,
-    /// One sigma of a single reading.
+    /// Standard deviation of a single reading.
     pub noise_std_counts: f64,
-    /// One sigma of the error left by gain and offset: nonlinearity, temperature, wear.
+    /// Standard deviation of the error left by gain and offset: nonlinearity, temperature, wear.
     pub linearity_std_rad: f64,
-    /// One sigma of the offset's change with the oil temperature.
+    /// Standard deviation of the offset's change with the oil temperature.
     pub temperature_std_rad_per_k: f64,
-    /// One sigma of the offset's drift in one hour, a random walk.
+    /// Standard deviation of the offset's drift in one hour, a random walk.
     pub drift_std_rad_per_sqrt_h: f64,
-    /// Largest rate that the joint is driven at.
+    /// Largest rate at which the joint is driven.
     pub max_rate_rad_s: f64,
-    /// Line from its readings to its angle; `None`: they are counts.
+    /// Line from readings to the joint's angle; `None`: readings are counts.
     pub stated: Option<StatedAngle>,
 }
 
 impl JointSensorSpec {
-    /// How the joint's coordinate is shown to people: degrees, or millimetres of a slide.
+    /// Returns the unit in which the joint's coordinate is shown: degrees, or millimetres for a slide.
     #[must_use]
     pub fn unit(&self) -> Unit {
         self.moves.unit()
     }
 
-    /// Whether the joint turns within a range of less than a turn, or slides.
+    /// Returns true if the joint turns within a range of less than a turn, or slides.
     #[must_use]
     pub fn is_limited(&self) -> bool {
         self.moves.is_slide() || self.half_range_rad < 0.999 * std::f64::consts::PI
     }
 
-    /// Recorded number at an angle, before it wraps: counts, or in the unit of stated angles.
+    /// Returns the recorded number at an angle, before it wraps: counts, or in the unit of stated angles.
     #[must_use]
     pub fn recorded(&self, angle_rad: f64) -> f64 {
         match &self.stated {
@@ -89,7 +89,7 @@ impl JointSensorSpec {
         }
     }
 
-    /// The angle that a recorded number means.
+    /// Returns the angle of a recorded number.
     #[must_use]
     pub fn angle_rad(&self, recorded: f64) -> f64 {
         match &self.stated {
@@ -98,7 +98,7 @@ impl JointSensorSpec {
         }
     }
 
-    /// The same sensor with `ratio` times as many counts per radian; the reading in the middle of the range stays.
+    /// Returns the sensor with `ratio` times as many counts per radian and the same reading in the middle of the range.
     #[must_use]
     pub fn with_scale(&self, ratio: f64) -> Self {
         let counts_per_rad = ratio * self.counts_per_rad;
@@ -112,7 +112,7 @@ impl JointSensorSpec {
 pub(super) struct SensorFile {
     /// Name of the joint in the URDF.
     pub(super) joint: String,
-    /// Kind of the sensor; it selects the effects that the estimate models.
+    /// Kind of the sensor; it selects the effects that the estimator models.
     kind: SensorKind,
     /// Reading at angle zero.
     #[schemars(range(min = -1e9, max = 1e9))]
@@ -120,31 +120,32 @@ pub(super) struct SensorFile {
     /// Counts after which the reading repeats, at least the joint's range.
     #[schemars(range(min = 1.0, max = 1e12))]
     wrap_counts: f64,
-    /// Relative sigma of the gain; 0 holds it fixed.
+    /// Relative standard deviation of the gain; 0 holds it fixed.
     #[schemars(range(min = 0.0, max = 10.0))]
     gain_std: f64,
     /// Largest relative gain error that planning allows for.
     #[schemars(range(min = 0.0, max = 0.5))]
     gain_bound: f64,
-    /// Noise of one reading, one sigma; it also distinguishes a still joint from a moving one.
+    /// Noise of one reading, standard deviation; it also distinguishes a still joint from a moving one.
     #[schemars(range(min = 0.0, max = 1e6))]
     noise_std_counts: f64,
-    /// Counts per degree of the joint, of size 0.001 at least; negative where the reading falls as the angle grows.
+    /// Counts per degree of the joint, at least 0.001 in absolute value; negative if the reading falls as the angle
+    /// grows.
     #[schemars(range(min = -1e9, max = 1e9))]
     scale_counts_per_deg: Option<f64>,
-    /// Sigma of the offset; 0 holds it fixed.
+    /// Standard deviation of the offset; 0 holds it fixed.
     #[schemars(range(min = 0.0, max = 6.3))]
     offset_std_rad: Option<f64>,
     /// Largest offset that planning allows for.
     #[schemars(range(min = 0.0, max = 3.2))]
     offset_bound_rad: Option<f64>,
-    /// Sigma of the error left by gain and offset; it enters the predicted tool error.
+    /// Standard deviation of the error left by gain and offset; it enters the predicted tool error.
     #[schemars(range(min = 0.0, max = 1.0))]
     linearity_std_rad: Option<f64>,
-    /// Sigma of the offset's change with the oil temperature.
+    /// Standard deviation of the offset's change with the oil temperature.
     #[schemars(range(min = 0.0, max = 0.1))]
     temperature_std_rad_per_k: Option<f64>,
-    /// Sigma of the offset's random walk in one hour.
+    /// Standard deviation of the offset's random walk in one hour.
     #[schemars(range(min = 0.0, max = 0.1))]
     drift_std_rad_per_sqrt_h: Option<f64>,
     /// Largest rate at which the joint is driven.
@@ -156,19 +157,19 @@ pub(super) struct SensorFile {
     /// Counts per millimetre of a slide.
     #[schemars(range(min = -1e9, max = 1e9))]
     scale_counts_per_mm: Option<f64>,
-    /// Sigma of a slide's offset.
+    /// Standard deviation of a slide's offset.
     #[schemars(range(min = 0.0, max = 10.0))]
     offset_std_m: Option<f64>,
     /// Largest offset of a slide that planning allows for.
     #[schemars(range(min = 0.0, max = 10.0))]
     offset_bound_m: Option<f64>,
-    /// Sigma of the error left by gain and offset of a slide.
+    /// Standard deviation of the error left by gain and offset of a slide.
     #[schemars(range(min = 0.0, max = 1.0))]
     linearity_std_m: Option<f64>,
-    /// Sigma of a slide's offset change with the oil temperature.
+    /// Standard deviation of a slide's offset change with the oil temperature.
     #[schemars(range(min = 0.0, max = 0.1))]
     temperature_std_m_per_k: Option<f64>,
-    /// Sigma of a slide's offset walk in one hour.
+    /// Standard deviation of a slide's offset walk in one hour.
     #[schemars(range(min = 0.0, max = 0.1))]
     drift_std_m_per_sqrt_h: Option<f64>,
     /// Largest rate at which a slide is driven.
@@ -179,14 +180,14 @@ pub(super) struct SensorFile {
     displacement_l_per_m: Option<f64>,
 }
 
-/// A key whose unit is that of the joint: of one that turns, and of a slide.
+/// A key with the unit of its joint: its name for a joint that turns, and for a slide.
 struct UnitKey {
     names: [&'static str; 2],
     of_file: fn(&SensorFile) -> [Option<f64>; 2],
     allowed: [RangeInclusive<f64>; 2],
-    /// Where the file has none; `None`: it must have one.
+    /// Defaults if the file has no value; `None`: the file must have one.
     usual: Option<[f64; 2]>,
-    /// Whether the size alone is to be within `allowed`.
+    /// True if only the absolute value must be within `allowed`.
     is_signed: bool,
 }
 
@@ -218,7 +219,7 @@ const LINEARITY: UnitKey = UnitKey {
     usual: None,
     is_signed: false,
 };
-/// 0.02 deg per kelvin; of a metre of steel 0.01 mm, twice that.
+/// Temperature coefficient: 0.02 deg per kelvin; for a slide 0.02 mm per kelvin, twice that of a metre of steel.
 const TEMPERATURE: UnitKey = UnitKey {
     names: ["temperature_std_rad_per_k", "temperature_std_m_per_k"],
     of_file: |s| [s.temperature_std_rad_per_k, s.temperature_std_m_per_k],
@@ -226,7 +227,7 @@ const TEMPERATURE: UnitKey = UnitKey {
     usual: Some([0.00035, 0.00002]),
     is_signed: false,
 };
-/// 0.02 deg, or 0.02 mm, in one hour.
+/// Drift: 0.02 deg, or 0.02 mm, in one hour.
 const DRIFT: UnitKey = UnitKey {
     names: ["drift_std_rad_per_sqrt_h", "drift_std_m_per_sqrt_h"],
     of_file: |s| [s.drift_std_rad_per_sqrt_h, s.drift_std_m_per_sqrt_h],
@@ -251,7 +252,7 @@ const DISPLACEMENT: UnitKey = UnitKey {
 const UNIT_KEYS: [&UnitKey; 8] =
     [&SCALE, &OFFSET_STD, &OFFSET_BOUND, &LINEARITY, &TEMPERATURE, &DRIFT, &MAX_RATE, &DISPLACEMENT];
 
-/// One sensor's table in its file, and the joint that it belongs to.
+/// Table of one sensor in its file, and the joint that it belongs to.
 struct OfJoint<'a> {
     file: &'a Path,
     table: &'a SensorFile,
@@ -259,7 +260,7 @@ struct OfJoint<'a> {
 }
 
 impl OfJoint<'_> {
-    /// Which of a [`UnitKey`]'s two is meant.
+    /// Returns the index of the applicable entry of a [`UnitKey`].
     fn unit(&self) -> usize {
         usize::from(self.kind.is_slide())
     }
@@ -272,7 +273,7 @@ impl OfJoint<'_> {
         FileIssue::check_range(self.file, &self.key(name), value, range)
     }
 
-    /// Refuses keys in the unit of a joint of the other kind.
+    /// Refuses keys in the unit of the other kind of joint.
     fn check_units(&self) -> Result<(), FileIssue> {
         let (own, other) = (self.unit(), 1 - self.unit());
         let is_wrong = |key: &&&UnitKey| (key.of_file)(self.table)[other].is_some();
@@ -284,7 +285,7 @@ impl OfJoint<'_> {
         Err(FileIssue::new(Code::KeyUnknown, self.file, self.key(first.names[other]), problem))
     }
 
-    /// The figure as the file has it, if it has one.
+    /// Returns the figure in the file, if it has one.
     fn given(&self, key: &UnitKey) -> Result<Option<f64>, FileIssue> {
         let Some(value) = (key.of_file)(self.table)[self.unit()] else { return Ok(None) };
         let name = key.names[self.unit()];
@@ -329,7 +330,7 @@ pub(super) fn check_sensors(
     raw.iter().zip(chain.joints()).map(|(s, joint)| check_sensor(file, s, joint)).collect()
 }
 
-/// Half of the range of a joint without limits: half a turn; of a slide 1 m, assumed, the order of an arm's reach.
+/// Half of the range of a joint without limits: half a turn; for a slide 1 m, assumed, the order of an arm's reach.
 fn free_half_range(kind: JointKind) -> f64 {
     match kind {
         JointKind::Revolute => std::f64::consts::PI,
@@ -377,14 +378,14 @@ fn check_sensor(file: &Path, s: &SensorFile, joint: &ChainJoint) -> Result<Joint
     })
 }
 
-/// Oil per radian of each joint (per metre of a slide), where the file says it.
+/// Returns the oil per radian of each joint (per metre of a slide), if the file states it.
 pub(super) fn displacements(file: &Path, sensors: &[SensorFile], chain: &Chain) -> Result<Vec<Option<f64>>, FileIssue> {
     let of_joint =
         |(table, joint): (&SensorFile, &ChainJoint)| OfJoint { file, table, kind: joint.kind }.given(&DISPLACEMENT);
     sensors.iter().zip(chain.joints()).map(of_joint).collect()
 }
 
-/// The name that others have for a joint: its own, or the only one that begins or ends with it.
+/// Returns the name that others have for a joint: its own, or the only one that begins or ends with it.
 #[must_use]
 pub fn likely_name<'a>(joint: &str, names: &'a std::collections::BTreeSet<String>) -> Option<&'a String> {
     if let Some(same) = names.get(joint) {

@@ -10,14 +10,14 @@ use serde::{Deserialize, Serialize};
 use super::error::FileIssue;
 use super::part::check_place;
 
-/// A white light on a vehicle, in the vehicle's frame.
+/// A white light on a vehicle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VehicleLight {
     /// Name in the vehicle's file.
     pub name: String,
-    /// Position of the source.
+    /// Position of the source in the vehicle's frame.
     pub position_m: Point3<f64>,
-    /// Axis of the beam, away from the source.
+    /// Axis of the beam in the vehicle's frame, away from the source.
     pub direction: Unit<Vector3<f64>>,
     /// Luminous flux.
     pub flux_lm: f64,

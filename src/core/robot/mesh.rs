@@ -6,7 +6,7 @@ use super::collada::collada;
 use super::triangles::{MAX_VERTICES, Mesh, MeshBuilder};
 use crate::files::{self, FileKind};
 
-/// Why a file is not a mesh.
+/// Reason why a file is not a mesh.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum MeshError {
     #[error("cannot be read: {0}")]
@@ -17,7 +17,7 @@ pub(super) enum MeshError {
     Content(String),
 }
 
-/// Header and number of triangles of a binary STL.
+/// Length of header and number of triangles of a binary STL.
 const STL_HEADER: usize = 84;
 const STL_TRIANGLE: usize = 50;
 
@@ -25,12 +25,12 @@ fn extension(file: &Path) -> Option<String> {
     file.extension().map(|e| e.to_string_lossy().to_ascii_lowercase())
 }
 
-/// Whether a file of this name is one of the formats that are read.
+/// Returns true if a file of this name has one of the formats that are read.
 pub(super) fn is_readable(file: &Path) -> bool {
     matches!(extension(file).as_deref(), Some("stl" | "obj" | "dae"))
 }
 
-/// Whether it is one of the formats that other meshes are converted to.
+/// Returns true if a file of this name has one of the formats that other meshes are converted to.
 pub(super) fn is_plain(file: &Path) -> bool {
     matches!(extension(file).as_deref(), Some("stl" | "obj"))
 }
@@ -38,7 +38,7 @@ pub(super) fn is_plain(file: &Path) -> bool {
 /// Reads `file` by its extension.
 ///
 /// # Errors
-/// [`MeshError`], whatever the bytes are.
+/// [`MeshError`], for any bytes.
 pub(super) fn read(file: &Path) -> Result<Mesh, MeshError> {
     let parse = match extension(file).as_deref() {
         Some("stl") => stl,
@@ -53,7 +53,7 @@ pub(super) fn read(file: &Path) -> Result<Mesh, MeshError> {
     Ok(mesh)
 }
 
-/// A binary file may also begin with `solid`; its length distinguishes it.
+/// Reads an STL. A binary file may also begin with `solid`; its length distinguishes it.
 fn stl(bytes: &[u8]) -> Result<Mesh, String> {
     let declared = bytes.get(STL_HEADER - 4..STL_HEADER).map(|n| u32::from_le_bytes([n[0], n[1], n[2], n[3]]) as usize);
     let length = declared.and_then(|n| n.checked_mul(STL_TRIANGLE)?.checked_add(STL_HEADER));
@@ -121,7 +121,7 @@ fn obj(bytes: &[u8]) -> Result<Mesh, String> {
                 if corners.len() < 3 {
                     return Err(format!("line {}: a face of {} corners", n + 1, corners.len()));
                 }
-                // A polygon as a fan about its first corner.
+                // A polygon becomes a fan about its first corner.
                 for pair in corners[1..].windows(2) {
                     builder.add([corners[0], pair[0], pair[1]])?;
                 }
@@ -132,7 +132,7 @@ fn obj(bytes: &[u8]) -> Result<Mesh, String> {
     Ok(builder.finish())
 }
 
-/// `7`, `7/1/2` or, counted from the end, `-1`.
+/// Returns the corner of an index such as `7`, `7/1/2` or, counted from the end, `-1`.
 fn obj_corner(word: &str, vertices: &[[f64; 3]], line: usize) -> Result<[f64; 3], String> {
     let index: Option<i64> = word.split('/').next().and_then(|first| first.parse().ok());
     let at = index.and_then(|index| match index {

@@ -1,4 +1,4 @@
-//! The nominal arm and vehicle: values from drawings, datasheets and surveys.
+//! The nominal arm and vehicle: values of the URDF, datasheets and surveys.
 //!
 //! `load` reads a robot folder (robot.toml and its URDF) into a checked `Robot`; `load_vehicle` reads a `Vehicle`.
 //! Shapes are convex, meshes are convex hulls. As-built values are in `sim`, estimates in `calib`.

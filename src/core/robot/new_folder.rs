@@ -1,4 +1,4 @@
-//! A robot folder for a URDF: robot.toml with what was read, what was assumed, and what is left to fill in.
+//! A robot folder for a URDF: robot.toml with the values read, the values assumed, and those left to fill in.
 
 use crate::codes::Code;
 use std::collections::BTreeMap;
@@ -18,61 +18,61 @@ use crate::kinematics::{Chain, ChainJoint, JointKind};
 use crate::optics::{CameraModel, LensModel};
 use crate::schema::first_line;
 
-/// What a robot folder is made from.
+/// Inputs of a new robot folder.
 #[derive(Clone, Copy, Debug)]
 pub struct NewRobot<'a> {
-    /// The URDF.
+    /// Path of the URDF.
     pub urdf: &'a Path,
-    /// Its text, where that is no longer the file's.
+    /// Text of the URDF, if it differs from the file's.
     pub text: Option<&'a str>,
-    /// Link whose frame is the base frame; the root, or what stands on a root called `world`.
+    /// Link whose frame is the base frame; `None`: the root, or the child of a root called `world`.
     pub base: Option<&'a str>,
-    /// Link of the tool; the end of the longest chain of joints.
+    /// Link of the tool; `None`: the end of the longest chain of joints.
     pub tip: Option<&'a str>,
-    /// Link whose frame is the camera's, x right, y down, z forward.
+    /// Link whose frame is the camera's: x right, y down, z forward.
     pub camera: Option<&'a str>,
-    /// The camera's lens, and the words that say where it is from.
+    /// Description of the lens's source, and the camera's lens.
     pub lens: Option<(&'a str, &'a CameraModel)>,
-    /// Links that overlap or are near each other at nearly every pose.
+    /// Links that overlap or are close to each other at nearly every configuration.
     pub touching: &'a [[String; 2]],
-    /// Angles at which the arm is clear of itself, rad (m of slides), base first.
+    /// Configuration without self-collision, rad (m of slides), base first.
     pub clear_rad: Option<&'a [f64]>,
 }
 
-/// What the folder says of the collision meshes.
+/// Treatment of the collision meshes.
 #[derive(Clone, Copy, Debug)]
 pub enum DraftedMeshes<'a> {
-    /// They are copied and read.
+    /// The meshes are copied and read.
     Read,
-    /// They cannot all be read, and why.
+    /// Some meshes cannot be read; the text is the reason.
     Ignored(&'a str),
 }
 
-/// A file of the folder.
+/// A file of the new folder.
 #[derive(Clone, Debug)]
 pub struct NewFile {
-    /// Below the folder.
+    /// Path relative to the folder.
     pub path: PathBuf,
-    /// What it holds.
+    /// Content of the file.
     pub bytes: Vec<u8>,
 }
 
 /// The files of a new robot folder.
 #[derive(Clone, Debug)]
 pub struct DraftedRobot {
-    /// The URDF, its collision meshes and robot.toml, the last.
+    /// Files: the URDF, its collision meshes and, last, robot.toml.
     pub files: Vec<NewFile>,
-    /// Joints that were taken for those of a gripper, or of what carries the arm, and left out.
+    /// Joints that were left out because they seem to belong to a gripper or to the arm's carrier.
     pub left_out: Vec<String>,
 }
 
-/// Folders above the URDF's in which packages are looked for.
+/// Number of folders above the URDF's in which packages are searched for.
 const MAX_ANCESTORS: usize = 8;
 
-/// Returns the files of a robot folder. Collision meshes are looked for in the URDF's folder and in those above it.
+/// Returns the files of a robot folder. Collision meshes are searched for in the URDF's folder and in those above it.
 ///
 /// # Errors
-/// [`RobotError`] for a URDF that cannot be read, that has no arm, or several and no tip is named.
+/// [`RobotError`] for a URDF that cannot be read, that has no arm, or that has several arms and no tip is named.
 pub fn draft_robot(wanted: &NewRobot<'_>, meshes: DraftedMeshes<'_>) -> Result<DraftedRobot, RobotError> {
     let (urdf, arm) = read_arm(wanted)?;
     let camera = arm.camera.as_deref().unwrap_or(&arm.tip);
@@ -87,7 +87,7 @@ pub fn draft_robot(wanted: &NewRobot<'_>, meshes: DraftedMeshes<'_>) -> Result<D
     Ok(DraftedRobot { files, left_out: arm.left_out })
 }
 
-/// The URDF, and the arm in it.
+/// Returns the URDF, and the arm in it.
 fn read_arm(wanted: &NewRobot<'_>) -> Result<(UrdfModel, FoundArm), RobotError> {
     let text = wanted.text.map_or_else(|| read_text(wanted.urdf), |text| Ok(text.to_owned()))?;
     let urdf = UrdfModel::parse(wanted.urdf, text)?;
@@ -95,15 +95,15 @@ fn read_arm(wanted: &NewRobot<'_>) -> Result<(UrdfModel, FoundArm), RobotError> 
     Ok((urdf, arm))
 }
 
-/// Bytes of all collision meshes that are copied: they are in memory together.
+/// Limit of the bytes of all copied collision meshes, which are in memory together.
 const MAX_MESH_BYTES: u64 = 500_000_000;
 
-/// The collision meshes that are found, each once, where the reader of robot folders looks for them.
+/// Returns the collision meshes found, each once, at the paths where the reader of robot folders searches for them.
 fn mesh_files(arm: &UrdfChain<'_>, urdf: &Path) -> Result<Vec<NewFile>, RobotError> {
     let mut found: BTreeMap<PathBuf, PathBuf> = BTreeMap::new();
     for mesh in arm.collision_meshes().iter().take(MAX_COLLISION_SHAPES) {
         let Some(source) = mesh_source(urdf, mesh.name) else { continue };
-        // Formats come after their conversions, so the first place has the source's extension or none is read.
+        // Formats come after their conversions; so the first path has the source's extension, or no path is read.
         let extension = source.extension().unwrap_or_default();
         let place = places(mesh.name).into_iter().next().unwrap_or_default().with_extension(extension);
         found.insert(place, source);
@@ -122,7 +122,7 @@ fn mesh_files(arm: &UrdfChain<'_>, urdf: &Path) -> Result<Vec<NewFile>, RobotErr
     found.into_iter().map(read).collect()
 }
 
-/// The file of a mesh beside the URDF, as its path says, or in a package above it; `None` where there is none that is
+/// Returns the file of a mesh by its path, relative to the URDF or in a package above it. `None` if no such file can be
 /// read.
 fn mesh_source(urdf: &Path, name: &str) -> Option<PathBuf> {
     let folder = urdf.parent().unwrap_or(Path::new("."));
@@ -141,7 +141,7 @@ fn mesh_source(urdf: &Path, name: &str) -> Option<PathBuf> {
     sources.into_iter().find(|file| mesh::is_readable(file) && file.is_file())
 }
 
-/// What robot.toml is written from.
+/// Data that robot.toml is written from.
 struct Draft<'a> {
     wanted: &'a NewRobot<'a>,
     urdf: &'a UrdfModel,
@@ -152,12 +152,12 @@ struct Draft<'a> {
     meshes: DraftedMeshes<'a>,
 }
 
-/// A TOML string.
+/// Returns a text as a TOML string.
 fn quoted(text: &str) -> String {
     Value::from(text).to_string()
 }
 
-/// On one line of a comment.
+/// Returns a text for one line of a comment.
 fn on_line(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }
@@ -273,7 +273,7 @@ impl Draft<'_> {
         );
     }
 
-    /// Whether no joint of the arm moves the camera.
+    /// Returns true if no joint of the arm moves the camera.
     fn stands_still(&self, link: &str) -> bool {
         let arm = UrdfChain { urdf: self.urdf, base_link: &self.arm.base, chain: self.chain };
         arm.attachment(link).is_ok_and(|attachment| attachment.n_joints == 0)

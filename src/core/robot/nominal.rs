@@ -23,12 +23,12 @@ use crate::joints::JointAngles;
 use crate::kinematics::{Attachment, Chain, ChainJoint, LinkPoses};
 use crate::optics::TagFamily;
 
-/// The nominal arm: drawing, datasheets and survey.
+/// The nominal arm: URDF, datasheets and survey.
 #[derive(Clone, Debug)]
 pub struct Robot {
-    /// Name in robot.toml.
+    /// Name of the arm in robot.toml.
     pub name: String,
-    /// Serial number of the arm, for reports; `None` where robot.toml has none.
+    /// Serial number of the arm, for reports; `None` if robot.toml has none.
     pub serial: Option<String>,
     /// Folder of robot.toml.
     pub folder: PathBuf,
@@ -38,49 +38,49 @@ pub struct Robot {
     pub urdf_text: String,
     /// Parts of the URDF that were skipped, by link or joint.
     pub urdf_warnings: Vec<Warning>,
-    /// Largest torque of each joint by the URDF, N m (N of a slide), base first; 0 where it states none.
+    /// Largest torque of each joint by the URDF, N m (N of a slide), base first; 0 if it states none.
     pub efforts_n_m: Vec<f64>,
     /// Link of the URDF whose frame is the base frame.
     pub base_link: String,
     /// Moving joints from the base link to tool and camera.
     pub chain: Chain,
-    /// Bodies 0..=n_joints: base first.
+    /// Rigid bodies 0..=n_joints, base first.
     pub bodies: Vec<LinkBody>,
     /// Links that can come near each other; `None` without a self_collision.toml.
     pub self_pairs: Option<SelfPairs>,
     /// Parts that touch by design.
     pub allowed_pairs: AllowedPairs,
-    /// One per joint, base first.
+    /// Joint sensors, one per joint, base first.
     pub sensors: Vec<JointSensorSpec>,
     /// Oil consumption and tracking error of the drives.
     pub drive: DriveSpec,
-    /// How well the drawing is known.
+    /// Prior standard deviations of the nominal model.
     pub geometry: GeometryPriors,
-    /// The tool point.
+    /// Tool point and tip.
     pub tool: ToolSpec,
-    /// `None` where the tool is no gripper.
+    /// Gripper; `None` if the tool is not a gripper.
     pub gripper: Option<GripperSpec>,
-    /// A tag distal to the camera.
+    /// Tag distal to the camera.
     pub gripper_tag: Option<GripperTag>,
     /// Lens and mount of the wrist camera.
     pub camera: CameraSpec,
-    /// Cameras beside it, which see the same tags past no joint that it does not. Recordings may have them; the arm is
-    /// planned for by the first alone.
+    /// Cameras in addition to the first, which see the same tags through none but the first camera's joints. Recordings
+    /// may have them; planning uses only the first camera.
     pub further_cameras: Vec<CameraSpec>,
-    /// Tags by survey, with those whose pose is unknown; without the tag on the gripper.
+    /// Surveyed tags, including those with unknown poses, without the tag on the gripper.
     pub tags: Vec<SurveyedTag>,
-    /// The frame that the tags' poses are in: the base's, or one that the arm moves before a camera that stands still.
+    /// Frame of the tags' poses: the base's, or one that the arm moves in front of a stationary camera.
     pub tag_frame: Attachment,
-    /// What is printed on the tags.
+    /// Family of the tags.
     pub tag_family: TagFamily,
-    /// Every link of the URDF that the arm carries, by name.
+    /// All links of the URDF that the arm carries, by name.
     pub links: BTreeMap<String, Attachment>,
-    /// Id of the tag beside the base; one of `tags` where there are any, `None` where there are none.
+    /// Id of the tag next to the base; one of `tags`, `None` if there are none.
     pub base_tag: Option<u32>,
-    /// Joint angles in which the arm is stowed, rad. Where robot.toml names none, the middle of each joint's range: a
-    /// start for what needs any angles, and no place to plan from (`planning_issues`).
+    /// Stowed configuration, rad. If robot.toml states none, it is the middle of each joint's range: usable as a start
+    /// if any angles will do, but not for planning (`planning_issues`).
     pub stowed: JointAngles,
-    /// What planning needs and the folder does not give; empty for an arm that `run` and `plan` can move.
+    /// Data that planning needs and the folder lacks; empty for an arm that `run` and `plan` can move.
     pub planning_issues: Vec<FileIssue>,
     /// Weight of the displaced sea water divided by the arm's weight.
     pub buoyancy_fraction: f64,
@@ -88,12 +88,12 @@ pub struct Robot {
     pub failed: Vec<FailedJoint>,
 }
 
-/// Keys of what planning may lack.
+/// Keys of data that planning may lack.
 pub(super) const STOWED: &str = "stowed_rad";
 pub(super) const BASE_TAG: &str = "base_tag";
 pub(super) const TAG_LINK: &str = "tag_link";
 
-/// That the camera's lens is missing.
+/// Returns the issue of a missing camera lens.
 pub(super) fn lens_issue(file: &Path) -> FileIssue {
     let problem = format!("is missing; images and the corners of tags need it: add {}", LENS_KEYS.join(", "));
     FileIssue::new(Code::KeyMissing, file, "[camera] lens", problem)
@@ -102,9 +102,9 @@ pub(super) fn lens_issue(file: &Path) -> FileIssue {
 /// `[tool]` of robot.toml.
 #[derive(Clone, Debug)]
 pub struct ToolSpec {
-    /// The tool point, axes of the link that carries it.
+    /// Pose of the tool point, in the axes of the link that carries it.
     pub mount: Attachment,
-    /// Of a ball about the tool point, which touches first; `None` where nobody says what touches.
+    /// Radius of a ball about the tool point that touches first; `None` if robot.toml does not state it.
     pub tip_radius_m: Option<f64>,
 }
 
@@ -115,13 +115,13 @@ impl Robot {
         self.chain.n_joints()
     }
 
-    /// How many joints, from the base on, move camera and tags against each other.
+    /// Number of joints, from the base on, that move camera and tags relative to each other.
     #[must_use]
     pub fn n_seen_joints(&self) -> usize {
         self.n_joints_seen_by(&self.camera)
     }
 
-    /// Farthest that the tool's point can be from the first joint, m: the links' lengths in one line.
+    /// Largest distance of the tool point from the first joint, m: the links' lengths in one line.
     #[must_use]
     pub fn reach_m(&self) -> f64 {
         let joints = &self.chain.joints()[..self.tool.mount.n_joints];
@@ -131,46 +131,46 @@ impl Robot {
         links_m.chain(slides_m).sum::<f64>() + self.tool.mount.link_from_frame.translation.vector.norm()
     }
 
-    /// All cameras, the first one first.
+    /// Returns all cameras, the first one first.
     pub fn cameras(&self) -> impl Iterator<Item = &CameraSpec> {
         std::iter::once(&self.camera).chain(&self.further_cameras)
     }
 
-    /// The camera of that number, the first's being 0.
+    /// Returns the camera of that number; the first has number 0.
     ///
     /// # Panics
-    /// Where there is none of that number.
+    /// If there is no camera of that number.
     #[must_use]
     pub fn camera_at(&self, number: usize) -> &CameraSpec {
         number.checked_sub(1).map_or(&self.camera, |further| &self.further_cameras[further])
     }
 
-    /// How many joints, from the base on, move a camera and the tags against each other.
+    /// Number of joints, from the base on, that move a camera and the tags relative to each other.
     #[must_use]
     pub fn n_joints_seen_by(&self, camera: &CameraSpec) -> usize {
         camera.mount.n_joints.max(self.tag_frame.n_joints)
     }
 
-    /// The frame of the tags in the base's, at these angles by the sensors. Tags beside the arm do not bend with its
-    /// base.
+    /// Returns the pose of the tags' frame in the base frame, at these angles of the sensors. Tags around the arm do
+    /// not move when its base bends.
     #[must_use]
     pub fn base_from_tags(&self, angles: &JointAngles) -> Isometry3<f64> {
         if self.is_watched() { self.chain.frame(angles, &self.tag_frame) } else { Isometry3::identity() }
     }
 
-    /// The same where the links are at `poses`, whose frame is the base's.
+    /// Returns the pose of the tags' frame in the base frame, with the links at `poses`, which are in the base frame.
     #[must_use]
     pub fn base_from_tags_at(&self, poses: &LinkPoses) -> Isometry3<f64> {
         if self.is_watched() { poses.frame(&self.tag_frame) } else { Isometry3::identity() }
     }
 
-    /// The camera in the frame of the tags, at these angles by the sensors.
+    /// Returns the pose of the camera in the frame of the tags, at these angles of the sensors.
     #[must_use]
     pub fn tags_from_camera(&self, angles: &JointAngles) -> Isometry3<f64> {
         self.tags_from(&self.camera, angles)
     }
 
-    /// The same of any of its cameras.
+    /// Returns the pose of any of the cameras in the frame of the tags, at these angles of the sensors.
     #[must_use]
     pub fn tags_from(&self, camera: &CameraSpec, angles: &JointAngles) -> Isometry3<f64> {
         if !self.is_watched() {
@@ -179,25 +179,25 @@ impl Robot {
         self.chain.link_poses(angles).in_frame(&self.tag_frame).frame(&camera.mount)
     }
 
-    /// The link that carries the tags before a camera that stands still; `None` for tags beside the arm.
+    /// Returns the link that carries the tags in front of a stationary camera; `None` for tags around the arm.
     #[must_use]
     pub fn tag_link(&self) -> Option<&str> {
         if !self.is_watched() {
             return None;
         }
-        // Links fixed to one that a joint moves may have its frame, too: the moved one is meant.
+        // Links fixed to a link that a joint moves may have its frame too; the moved link is the result.
         let moved = &self.bodies[self.tag_frame.n_joints].name;
         let carries = |name: &&String| self.links.get(*name) == Some(&self.tag_frame);
         std::iter::once(moved).chain(self.links.keys()).find(carries).map(String::as_str)
     }
 
-    /// Whether the camera stands still beside the arm, which carries the tags (eye-to-hand).
+    /// Returns true if the camera is stationary and the arm carries the tags (eye-to-hand).
     #[must_use]
     pub fn is_watched(&self) -> bool {
         self.tag_frame.n_joints > self.camera.mount.n_joints
     }
 
-    /// The surveyed tag with this id; `None` for the tag on the gripper, too.
+    /// Returns the surveyed tag with this id; `None` also for the tag on the gripper.
     #[must_use]
     pub fn tag(&self, id: u32) -> Option<&SurveyedTag> {
         self.tags.iter().find(|tag| tag.id == id)
@@ -209,7 +209,7 @@ impl Robot {
         self.sensors.iter().map(|s| s.joint.clone()).collect()
     }
 
-    /// The same arm with the tags of `survey`.
+    /// Returns the arm with the tags of `survey`.
     #[must_use]
     pub fn with_survey(mut self, survey: TagSurvey) -> Self {
         self.planning_issues.retain(|issue| issue.key != BASE_TAG);
@@ -220,12 +220,12 @@ impl Robot {
         self
     }
 
-    /// The arm on `vehicle`: with the vehicle's tags and its stowed configuration of this arm, where it has any. An arm
-    /// that carries tags before a camera that stands still keeps them.
+    /// Returns the arm on `vehicle`: with the vehicle's tags and its stowed configuration of this arm, if it has any.
+    /// An arm that carries tags in front of a stationary camera keeps them.
     ///
     /// # Errors
-    /// [`RobotError`] naming the vehicle's file when it has another number of stowed angles, and robot.toml when it
-    /// names a part in `allowed_pairs` that neither has.
+    /// [`RobotError`] naming the vehicle's file if it has a wrong number of stowed angles. [`RobotError`] naming
+    /// robot.toml if its `allowed_pairs` contain a part that neither arm nor vehicle has.
     pub fn mounted_on(mut self, vehicle: &Vehicle) -> Result<Self, RobotError> {
         self.allowed_pairs.check_names(&self.folder.join("robot.toml"), &self.bodies, vehicle)?;
         if let Some(stowed_rad) = vehicle.stowed_rad.get(&self.name) {
@@ -233,7 +233,7 @@ impl Robot {
             self.stowed = check_stowed(&vehicle.file, &key, stowed_rad, self.n_joints())?;
             self.planning_issues.retain(|issue| issue.key != STOWED);
         }
-        // Of tags that do not move a camera that stands still tells nothing.
+        // Stationary tags give a stationary camera no information.
         let Some(survey) = vehicle.survey.as_ref().filter(|_| !self.is_watched()) else { return Ok(self) };
         if let Some(tag) = &self.gripper_tag {
             tag.check_beside(&vehicle.file, &survey.tags, survey.family)?;
@@ -241,7 +241,7 @@ impl Robot {
         Ok(self.with_survey(survey.clone()))
     }
 
-    /// The same arm with `scale` times the linearity error of its sensors.
+    /// Returns the arm with `scale` times the linearity error of its sensors.
     #[must_use]
     pub fn with_linearity(mut self, scale: f64) -> Self {
         for sensor in &mut self.sensors {
@@ -250,7 +250,7 @@ impl Robot {
         self
     }
 
-    /// The same arm with an estimated camera mount and its covariance (translation m, rotation rad).
+    /// Returns the arm with an estimated camera mount and its covariance (translation m, rotation rad).
     #[must_use]
     pub fn with_camera_at(mut self, link_from_camera: Isometry3<f64>, covariance: &Matrix6<f64>) -> Self {
         let rms = |from: usize| ((0..3).map(|k| covariance[(from + k, from + k)]).sum::<f64>() / 3.0).max(0.0).sqrt();
@@ -259,7 +259,7 @@ impl Robot {
         self
     }
 
-    /// The tags around the arm.
+    /// Returns the survey of the tags around the arm.
     #[must_use]
     pub fn survey(&self) -> TagSurvey {
         TagSurvey {
@@ -273,7 +273,7 @@ impl Robot {
     /// Checks that the arm can be simulated: each moving body has mass and an inertia.
     ///
     /// # Errors
-    /// [`RobotError::ZeroMass`] or [`RobotError::Value`] naming the first link that has not.
+    /// [`RobotError::ZeroMass`] or [`RobotError::Value`] naming the first link without them.
     pub fn require_masses(&self) -> Result<(), RobotError> {
         let file = self.folder.join(&self.urdf_name);
         for body in &self.bodies[1..] {
@@ -294,24 +294,24 @@ impl Robot {
         Ok(())
     }
 
-    /// Checks that paths can be planned for the arm and views seen by its camera.
+    /// Checks that paths and views can be planned for the arm and its camera.
     ///
     /// # Errors
-    /// [`FileIssue`] naming all that the folder lacks for it, and what to add.
+    /// [`FileIssue`] naming all missing data of the folder, and the keys to add.
     pub fn require_planning(&self) -> Result<(), FileIssue> {
         FileIssue::all(&self.folder.join("robot.toml"), &self.planning_issues).map_or(Ok(()), Err)
     }
 
-    /// The first joint that slides.
+    /// Returns the first joint that slides.
     #[must_use]
     pub fn first_slide(&self) -> Option<&ChainJoint> {
         self.chain.joints().iter().find(|joint| joint.kind.is_slide())
     }
 
-    /// Checks that all joints turn, for `what`, which knows no slides.
+    /// Checks that all joints turn, because the command `what` does not support slides.
     ///
     /// # Errors
-    /// [`FileIssue`] naming the URDF, the first slide and what does work.
+    /// [`FileIssue`] naming the URDF, the first slide and the commands that support it.
     pub fn require_turning(&self, what: &str) -> Result<(), FileIssue> {
         let Some(slide) = self.first_slide() else { return Ok(()) };
         let problem = format!("is prismatic, and {what} knows no slides yet: `armcal calibrate` on a recording does");
@@ -323,7 +323,7 @@ impl Robot {
         ))
     }
 
-    /// Checks that the camera's lens is known: tags' corners mean nothing without it.
+    /// Checks that the camera's lens is known, which the corners of tags require.
     ///
     /// # Errors
     /// [`FileIssue`] naming the keys to add.
@@ -331,10 +331,10 @@ impl Robot {
         if self.camera.lens.is_known() { Ok(()) } else { Err(lens_issue(&self.folder.join("robot.toml"))) }
     }
 
-    /// The same of the further camera of that name, if there is one.
+    /// Checks that the lens of the further camera of that name is known, if there is one.
     ///
     /// # Errors
-    /// As [`Self::require_lens`].
+    /// The errors of [`Self::require_lens`].
     pub fn require_further_lens(&self, name: &str) -> Result<(), FileIssue> {
         let Some(_) = self.further_cameras.iter().find(|camera| camera.name == name && !camera.lens.is_known()) else {
             return Ok(());
@@ -343,7 +343,8 @@ impl Robot {
         Err(FileIssue { key: format!("[[further_camera]] `{name}` lens"), ..issue })
     }
 
-    /// The same arm with these joints declared to have failed. A later declaration of a joint replaces an earlier one.
+    /// Returns the arm with these joints declared to have failed. A later declaration of a joint replaces an earlier
+    /// one.
     #[must_use]
     pub fn with_failed(mut self, failed: &[FailedJoint]) -> Self {
         for declared in failed {

@@ -13,10 +13,10 @@ use super::mesh;
 use super::shape::{PlacedShape, Shape};
 use crate::spatial::{Pose, Vehicle as VehicleFrame};
 
-/// One convex part, placed in its owner's frame.
+/// A convex part, placed in its owner's frame.
 #[derive(Clone, Debug)]
 pub struct Part {
-    /// Name in its file; parts of a decomposed mesh are numbered.
+    /// Name of the part in its file; parts of a decomposed mesh are numbered.
     pub name: String,
     /// Shape, pose and colour.
     pub placed: PlacedShape,
@@ -26,7 +26,7 @@ pub struct Part {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Convex {
-    /// One hull around the whole mesh.
+    /// A single hull around the whole mesh.
     #[default]
     Hull,
     /// Several hulls that leave concavities free.
@@ -58,7 +58,7 @@ pub struct PartFile {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(inner(inner(range(min = -1e4, max = 1e4))))]
     points_m: Option<Vec<[f64; 3]>>,
-    /// Mesh file (STL, OBJ, DAE), from the folder of this file.
+    /// Mesh file (STL, OBJ, DAE), relative to the folder of this file.
     #[serde(skip_serializing_if = "Option::is_none")]
     file: Option<PathBuf>,
     /// Metres per unit of the mesh; absent: 1.
@@ -79,7 +79,7 @@ pub struct PartFile {
     color_rgb: [u8; 3],
 }
 
-/// Limit of the shapes of one list.
+/// Maximum number of shapes of one list.
 pub const MAX_PARTS: usize = 256;
 
 fn no_rotation() -> [f64; 4] {
@@ -90,13 +90,13 @@ fn grey() -> [u8; 3] {
     [140, 140, 140]
 }
 
-/// Checks that coordinates are within 10 km: farther away is a mistake.
+/// Checks that coordinates are within 10 km: larger ones are a mistake.
 pub(super) fn check_place(file: &Path, key: &str, position_m: &[f64; 3]) -> Result<(), FileIssue> {
     position_m.iter().try_for_each(|&value| FileIssue::check_range(file, key, value, -1e4..=1e4).map(|_| ()))
 }
 
-/// The parts of `raw`, a list `table` of `file`, and the same list without mesh files: meshes as hulls with their
-/// points, for a recording.
+/// Returns the parts of `raw`, a list `table` of `file`. Also returns the same list without mesh files for a recording:
+/// meshes become hulls with their points.
 ///
 /// # Errors
 /// [`RobotError`] naming file and key; for meshes, both files.
@@ -176,7 +176,7 @@ impl PartFile {
         ))
     }
 
-    /// The part itself, or the hulls of its mesh.
+    /// Returns the part itself, or the hulls of its mesh.
     fn without_files(&self, file: &Path, table: &str) -> Result<Vec<Self>, RobotError> {
         if !self.is_mesh() {
             return Ok(vec![self.clone()]);
@@ -223,7 +223,7 @@ mod tests {
     use super::*;
     use parry3d::math::Vec3;
 
-    /// An L of two bars 1 m long and 0.2 m thick, in mm, as OBJ.
+    /// An angle of two bars 1 m long and 0.2 m thick, in mm, as OBJ.
     const ANGLE_MM: &str = "v 0 0 0\nv 1000 0 0\nv 1000 200 0\nv 200 200 0\nv 200 1000 0\nv 0 1000 0\n\
         v 0 0 200\nv 1000 0 200\nv 1000 200 200\nv 200 200 200\nv 200 1000 200\nv 0 1000 200\n\
         f 4 3 2 1\nf 6 5 4 1\nf 7 8 9 10\nf 7 10 11 12\n\
@@ -249,7 +249,7 @@ mod tests {
         )
     }
 
-    /// Distance of a point (owner's frame) from the nearest part, m.
+    /// Returns the distance of a point (owner's frame) from the nearest part, m.
     fn distance_m(parts: &[Part], point: [f64; 3]) -> f64 {
         let at = parry3d::math::Pose3::from_translation(Vec3::from_array(point));
         let ball = parry3d::shape::SharedShape::ball(1e-6);
@@ -262,7 +262,7 @@ mod tests {
         parts.iter().map(distance).fold(f64::INFINITY, f64::min)
     }
 
-    /// A point of the mesh's frame in the owner's frame.
+    /// Returns a point of the mesh's frame in the owner's frame.
     fn placed([x, y, z]: [f64; 3]) -> [f64; 3] {
         [1.0 - y, 2.0 + x, 3.0 + z]
     }
@@ -293,7 +293,7 @@ mod tests {
         }
     }
 
-    /// The list in a recording has the same bodies, to the last bit, and needs no file.
+    /// The list in a recording has the same bodies, bit for bit, and needs no file.
     #[test]
     fn the_list_without_files_stands_for_the_same_parts() {
         for convex in ["hull", "decomposed"] {
@@ -339,7 +339,7 @@ mod tests {
         ]
         .map(|text| {
             let told = parts(&text).expect_err("refused").to_string();
-            // The folder has another name each time.
+            // The name of the folder differs each time.
             let words = told.split(' ').map(|word| word.rsplit_once('/').map_or(word, |(_, name)| name));
             words.collect::<Vec<_>>().join(" ")
         });

@@ -17,7 +17,7 @@ use super::nominal::Robot;
 use super::self_pairs::{SelfPair, SelfPairs};
 use crate::document::{VERSION, parse_file};
 
-/// Its name in a robot folder.
+/// Name of the file in a robot folder.
 pub const SELF_COLLISION_FILE: &str = "self_collision.toml";
 
 #[derive(Deserialize, Serialize, JsonSchema)]
@@ -44,7 +44,7 @@ struct SelfCollisionFile {
 struct PairFile {
     /// Names of the two links.
     links: [String; 2],
-    /// Least distance found.
+    /// Smallest distance found.
     nearest_m: f64,
 }
 
@@ -55,10 +55,10 @@ pub fn self_collision_schema() -> serde_json::Value {
 }
 
 impl SelfPairs {
-    /// The text of the file for this robot.
+    /// Returns the text of the file for this robot.
     ///
     /// # Errors
-    /// [`FileIssue`] where it has no TOML form.
+    /// [`FileIssue`] if it has no TOML form.
     pub fn to_toml(&self, file: &Path, robot: &Robot) -> Result<String, FileIssue> {
         let name = |body: usize| robot.bodies[body].name.clone();
         let raw = SelfCollisionFile {
@@ -87,15 +87,15 @@ impl SelfPairs {
     }
 }
 
-/// What a robot folder holds of its file.
+/// Content of the file in a robot folder.
 pub(super) enum Stored {
     Pairs(SelfPairs),
-    /// Of another URDF: nothing may be planned with it.
+    /// Pairs of another URDF: planning must not use them.
     Stale(FileIssue),
     None,
 }
 
-/// Reads the file of a robot folder where there is one.
+/// Reads the file of a robot folder, if there is one.
 pub(super) fn read(folder: &Path, urdf_text: &str, bodies: &[LinkBody]) -> Result<Stored, RobotError> {
     let file = folder.join(SELF_COLLISION_FILE);
     if !file.exists() {

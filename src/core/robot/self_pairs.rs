@@ -3,9 +3,9 @@
 /// Pairs of links that come near each other, over all configurations that planning considers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SelfPairs {
-    /// Seed and number of the random configurations.
+    /// Seed of the random configurations.
     pub seed: u64,
-    /// See `seed`.
+    /// Number of the random configurations.
     pub n: u64,
     /// Smallest distance of all other pairs, m.
     pub near_m: f64,
@@ -23,7 +23,7 @@ pub struct SelfPair {
 }
 
 impl SelfPairs {
-    /// Whether two bodies can come nearer than `SelfPairs::near_m`.
+    /// Returns true if two bodies can come closer than `SelfPairs::near_m`.
     #[must_use]
     pub fn has(&self, inner: usize, outer: usize) -> bool {
         self.pairs.iter().any(|pair| pair.bodies == [inner, outer])

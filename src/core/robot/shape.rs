@@ -11,28 +11,28 @@ use super::hull::Hull;
 /// A convex shape about its own centre, lengths in m. Cylinders and capsules lie along z, as in URDF.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
-    /// Edges along the axes.
+    /// A box with its edges along the axes.
     Box {
-        /// Whole lengths of the edges along x, y, z.
+        /// Full lengths of the edges along x, y, z.
         size_m: [f64; 3],
     },
-    /// Its ends are flat.
+    /// A cylinder along z with flat ends.
     Cylinder {
         /// Radius about z.
         radius_m: f64,
-        /// Whole length along z.
+        /// Full length along z.
         length_m: f64,
     },
-    /// `length_m` is the distance between the centres of the caps.
+    /// A capsule along z.
     Capsule {
-        /// Of the body and of the caps.
+        /// Radius of the body and of the caps.
         radius_m: f64,
-        /// Whole length is this and two radii.
+        /// Distance between the centres of the caps; the full length is this plus two radii.
         length_m: f64,
     },
-    /// About the centre.
+    /// A sphere about the centre.
     Sphere {
-        /// Half of the diameter.
+        /// Radius of the sphere.
         radius_m: f64,
     },
     /// Convex hull of a mesh.
@@ -46,7 +46,7 @@ pub struct PlacedShape {
     pub owner_from_shape: Isometry3<f64>,
     /// The shape about its own centre.
     pub shape: Shape,
-    /// For display: red, green, blue.
+    /// Colour for display: red, green, blue.
     pub color_rgb: [u8; 3],
 }
 
@@ -60,7 +60,7 @@ impl PlacedShape {
 }
 
 impl Shape {
-    /// The same shape for parry and rapier; [`Shape::axis_fix`] turns its axis to that of URDF.
+    /// Returns the shape for parry and rapier; [`Shape::axis_fix`] turns its axis to that of URDF.
     #[must_use]
     pub fn to_parry(&self) -> SharedShape {
         match *self {
@@ -72,7 +72,7 @@ impl Shape {
         }
     }
 
-    /// Parry's cylinder lies along y, URDF's along z: the rotation to apply on the right of the shape's pose.
+    /// Returns the rotation to apply on the right of the shape's pose: parry's cylinder lies along y, URDF's along z.
     #[must_use]
     pub fn axis_fix(&self) -> Isometry3<f64> {
         match self {
@@ -81,7 +81,7 @@ impl Shape {
         }
     }
 
-    /// Radius of the smallest sphere about the shape's centre that contains it, m.
+    /// Radius of the smallest sphere about the shape's centre that contains the shape, m.
     #[must_use]
     pub fn bounding_radius_m(&self) -> f64 {
         match *self {
@@ -93,7 +93,7 @@ impl Shape {
         }
     }
 
-    /// Sides of its bounding box along the shape's axes, m.
+    /// Sides of the shape's bounding box along its axes, m.
     #[must_use]
     pub fn box_m(&self) -> [f64; 3] {
         match *self {
@@ -114,13 +114,13 @@ impl Shape {
                 vec![("radius_m", radius_m), ("length_m", length_m)]
             }
             Self::Sphere { radius_m } => vec![("radius_m", radius_m)],
-            // A hull's points are checked where it is made.
+            // A hull's points are checked when it is built.
             Self::Hull(_) => Vec::new(),
         }
     }
 }
 
-/// The same pose in parry's and rapier's types.
+/// Converts a pose to the type of parry and rapier.
 #[must_use]
 pub fn parry_pose(isometry: &Isometry3<f64>) -> Pose3 {
     let t = isometry.translation.vector;

@@ -1,18 +1,18 @@
-//! Joint readings that are recorded as angles, and not as raw counts.
+//! Joint readings that are recorded as angles rather than raw counts.
 
-/// Line from a joint's angle to its recorded number: `angle = unit_rad factor (recorded - zero)`; of a slide, m.
+/// Line from a joint's recorded number to its angle: `angle = unit_rad factor (recorded - zero)`; for a slide, m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StatedAngle {
-    /// One of the unit that the input map states.
+    /// Radians of one unit that the input map states.
     pub unit_rad: f64,
-    /// Angle over reading, as the input map corrects it; 1 where it does not.
+    /// Ratio of angle to reading by the input map; 1 if it states none.
     pub factor: f64,
     /// Recorded number at angle zero.
     pub zero: f64,
 }
 
 impl StatedAngle {
-    /// The angle that a recorded number means.
+    /// Returns the angle of a recorded number.
     #[must_use]
     pub fn angle_rad(&self, recorded: f64) -> f64 {
         self.unit_rad * self.factor * (recorded - self.zero)

@@ -19,21 +19,21 @@ pub const MAX_TAGS: usize = 5_000;
 /// A tag with a surveyed pose, or with an unknown one.
 #[derive(Clone, Debug)]
 pub struct SurveyedTag {
-    /// Number in the family of its survey.
+    /// Id of the tag in the family of its survey.
     pub id: u32,
-    /// Side of the black square. NaN where it is unknown, for a landmark used by its position or pose alone.
+    /// Side of the black square. NaN if it is unknown, for a landmark of which only position or pose is used.
     pub size_m: f64,
-    /// From a drawing at best where the pose is unknown. In the frame of [`TagSurvey::frame`], which is the base's but
-    /// before a camera that stands still.
+    /// Pose of the tag; a nominal pose at best if it is unknown. It is in the frame of [`TagSurvey::frame`], which
+    /// differs from the base's only in front of a stationary camera.
     pub base_from_tag: Pose<Base, Tag>,
-    /// One sigma per axis; infinite where the pose is unknown.
+    /// Standard deviation of the position, per axis; infinite if the pose is unknown.
     pub position_std_m: f64,
-    /// One sigma per axis of the rotation; infinite where the pose is unknown.
+    /// Standard deviation of the rotation, per axis; infinite if the pose is unknown.
     pub rotation_std_rad: f64,
 }
 
 impl SurveyedTag {
-    /// Whether its pose is known.
+    /// Returns true if the tag's pose is known.
     #[must_use]
     pub fn is_known(&self) -> bool {
         self.position_std_m.is_finite() && self.rotation_std_rad.is_finite()
@@ -43,39 +43,39 @@ impl SurveyedTag {
 /// The part of a survey that the arm may use.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum MapKnowledge {
-    /// The poses of all tags.
+    /// The poses of all tags are known.
     #[default]
     Known,
-    /// The poses of these tags and of the base tag; of the others only the size.
+    /// The poses of these tags and of the base tag are known; of the others only the size.
     Partly(Vec<u32>),
-    /// The pose of the base tag; of the others only the size.
+    /// The pose of the base tag is known; of the others only the size.
     Unknown,
 }
 
 /// Standard deviations of the base tag's pose that replace those of its file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BaseTagStd {
-    /// One sigma per axis; `None` keeps the file's.
+    /// Standard deviation of the position, per axis; `None` keeps the file's.
     pub position_std_m: Option<f64>,
-    /// One sigma per axis; `None` keeps the file's.
+    /// Standard deviation of the rotation, per axis; `None` keeps the file's.
     pub rotation_std_rad: Option<f64>,
 }
 
 /// All tags around an arm.
 #[derive(Clone, Debug)]
 pub struct TagSurvey {
-    /// The tag beside the base; the replay shows it. `None` where there are no tags.
+    /// Id of the tag next to the base, which the replay shows; `None` if there are no tags.
     pub base_tag: Option<u32>,
-    /// The frame that the poses are in.
+    /// Frame of the poses.
     pub frame: Attachment,
-    /// What is printed on all of them; `None` where the source of the survey does not say.
+    /// Family of all tags; `None` if the source of the survey does not state it.
     pub family: Option<TagFamily>,
-    /// Each id once; the base tag is one of them.
+    /// Surveyed tags, each id once; the base tag is one of them.
     pub tags: Vec<SurveyedTag>,
 }
 
 impl TagSurvey {
-    /// The survey with these tags alone. Without the base tag, the first of them takes its role.
+    /// Returns the survey with only these tags. Without the base tag, the first of them takes its role.
     pub fn only(&self, ids: &[u32]) -> Result<Self, String> {
         let known: Vec<u32> = self.tags.iter().map(|tag| tag.id).collect();
         match ids.iter().find(|id| !known.contains(id)) {
@@ -88,7 +88,7 @@ impl TagSurvey {
         Ok(Self { base_tag, tags, ..*self })
     }
 
-    /// The survey limited to `knowledge`: the other tags get infinite standard deviations.
+    /// Returns the survey limited to `knowledge`: the other tags get infinite standard deviations.
     pub fn with_knowledge(mut self, knowledge: &MapKnowledge, base: BaseTagStd) -> Result<Self, String> {
         let known: &[u32] = match knowledge {
             MapKnowledge::Partly(known) => known,
@@ -114,7 +114,7 @@ impl TagSurvey {
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct TagFile {
-    /// Number of the tag.
+    /// Id of the tag.
     id: u32,
     /// Family of the tag, such as `36h11`; one for all tags of an arm.
     family: String,
@@ -126,10 +126,10 @@ pub(super) struct TagFile {
     position_m: [f64; 3],
     /// Attitude of the tag in its owner's frame: x right, y up as printed, z out of the tag.
     quaternion_wxyz: [f64; 4],
-    /// Sigma of the surveyed position, per axis.
+    /// Standard deviation of the surveyed position, per axis.
     #[schemars(range(min = 0.0, max = 1.0))]
     position_std_m: f64,
-    /// Sigma of the surveyed attitude, per axis.
+    /// Standard deviation of the surveyed attitude, per axis.
     #[schemars(range(min = 0.0, max = 1.0))]
     rotation_std_rad: f64,
 }

@@ -1,17 +1,17 @@
-//! How much a TOML text may hold: each key and value costs a hundred times its bytes once it is parsed.
+//! Limits on the size of a TOML text: each key and value costs a hundred times its bytes once it is parsed.
 
-/// Limit of keys, those of tables included.
+/// Limit of keys, including those of tables.
 const MAX_KEYS: usize = 100_000;
 /// Limit of values in lists, and of lists and tables.
 const MAX_VALUES: usize = 1_000_000;
 
-/// Counts keys and values from above, those in comments and strings included.
+/// Counts keys and values; the count is an upper bound, because it includes comments and strings.
 ///
 /// # Errors
-/// A sentence, where there are more than the limits.
+/// A sentence, if there are more than the limits.
 pub(super) fn check_entries(text: &str) -> Result<(), String> {
     let (mut n_keys, mut n_values) = (0, 0);
-    // Of the key or number that is being read.
+    // Dots of the key or number that is being read.
     let mut n_dots = 0;
     let (mut at_line_start, mut in_header) = (true, false);
     for byte in text.bytes() {

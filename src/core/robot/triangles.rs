@@ -2,33 +2,33 @@
 
 use std::collections::BTreeMap;
 
-/// Triangles with shared corners, in the file's own unit; those of COLLADA, which names it, in metres.
+/// Triangles with shared corners, in the file's own unit; those of COLLADA, which states its unit, in metres.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Mesh {
     pub vertices: Vec<[f64; 3]>,
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// Limit of a mesh's triangles, degenerate ones among them.
+/// Limit of a mesh's triangles, including degenerate ones.
 const MAX_TRIANGLES: usize = 1_000_000;
-/// Limit of its vertices: as many as triangles of their own have.
+/// Limit of a mesh's vertices: the number that triangles without shared corners have.
 pub(super) const MAX_VERTICES: usize = 3 * MAX_TRIANGLES;
-/// Triangles that every file may have, and bytes of each triangle beyond that: a file may show one part many times. A
-/// triangle takes up to 250 bytes of memory; in a file it has 12 at least.
+/// Number of triangles that is allowed for every file, and bytes of each triangle beyond that, because a file may show
+/// one part many times. A triangle takes up to 250 bytes of memory, and at least 12 in a file.
 const ALWAYS_ALLOWED_TRIANGLES: usize = 200_000;
 const MIN_BYTES_PER_TRIANGLE: usize = 10;
 
-/// Triangles that a file of `bytes` may have.
+/// Returns the maximum number of triangles of a file of `bytes`.
 pub(super) fn max_triangles(bytes: usize) -> usize {
     MAX_TRIANGLES.min(ALWAYS_ALLOWED_TRIANGLES + bytes / MIN_BYTES_PER_TRIANGLE)
 }
 
-/// The error for a file of more than [`max_triangles`].
+/// Error for a file of more than [`max_triangles`].
 pub(super) fn too_many_triangles(max: usize) -> String {
     format!("more than {max} triangles; use a coarser mesh")
 }
 
-/// Mesh in the making; equal corners share one vertex.
+/// An unfinished mesh; equal corners share one vertex.
 pub(super) struct MeshBuilder {
     mesh: Mesh,
     number: BTreeMap<[u64; 3], u32>,
@@ -37,7 +37,7 @@ pub(super) struct MeshBuilder {
 }
 
 impl MeshBuilder {
-    /// An empty mesh of a file of so many bytes.
+    /// Builds an empty mesh for a file of this number of bytes.
     pub fn of_file(bytes: usize) -> Self {
         let max_triangles = max_triangles(bytes);
         Self { mesh: Mesh::default(), number: BTreeMap::new(), n_added: 0, max_triangles }
@@ -46,7 +46,7 @@ impl MeshBuilder {
     /// Adds a triangle.
     ///
     /// # Errors
-    /// A sentence, where there are too many or one has no place.
+    /// A sentence, if there are too many triangles or one has no position.
     pub fn add(&mut self, corners: [[f64; 3]; 3]) -> Result<(), String> {
         if self.n_added == self.max_triangles {
             return Err(too_many_triangles(self.max_triangles));
@@ -71,7 +71,7 @@ impl MeshBuilder {
         Ok(())
     }
 
-    /// What was added.
+    /// Returns the mesh of the added triangles.
     pub fn finish(self) -> Mesh {
         self.mesh
     }

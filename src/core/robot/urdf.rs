@@ -18,11 +18,12 @@ pub(super) mod notes;
 
 /// Limit of an arm's collision shapes, so that planning places them without allocating.
 pub const MAX_COLLISION_SHAPES: usize = 64;
-/// Joints between a link and the root of its tree; those of a humanoid have some thirty.
+/// Maximum number of joints between a link and the root of its tree; those of a humanoid have about thirty.
 const MAX_JOINTS_UP: usize = 200;
-/// Joints of a URDF; a humanoid with its hands has about 100. The search for an arm compares each with the others.
+/// Maximum number of joints of a URDF; a humanoid with its hands has about 100. The search for an arm compares each
+/// with the others.
 const MAX_URDF_JOINTS: usize = 1000;
-/// Grey, for shapes without a material.
+/// Grey colour of shapes without a material.
 const UNPAINTED_RGB: [u8; 3] = [160; 3];
 
 /// A checked URDF file: a tree of links.
@@ -31,11 +32,11 @@ pub(super) struct UrdfModel {
     pub file: PathBuf,
     pub text: String,
     pub robot: UrdfFile,
-    /// Child link -> joint index; the first joint that holds the link.
+    /// Joint index by child link; the first joint that holds the link.
     pub joint_of_child: BTreeMap<String, usize>,
-    /// Child link -> the second joint that holds it: a closed chain.
+    /// Second joint that holds a child link, by link: a closed chain.
     closing: BTreeMap<String, usize>,
-    /// Names that several joints have.
+    /// Names that are shared by several joints.
     repeated: BTreeSet<String>,
 }
 
@@ -47,7 +48,7 @@ pub(super) struct UrdfChain<'a> {
     pub chain: &'a Chain,
 }
 
-/// The shape of an element that needs no file; `None` for a mesh.
+/// Returns the shape of an element that needs no file; `None` for a mesh.
 fn primitive(element: &ShapeElement) -> Option<&Shape> {
     match &element.shape {
         UrdfShape::Primitive(shape) => Some(shape),
@@ -65,12 +66,12 @@ fn placed(element: &ShapeElement, shape: Shape, body_from_link: &Isometry3<f64>,
 }
 
 impl UrdfModel {
-    /// The joint of that name; the first one where several have it.
+    /// Returns the joint of that name; the first one if several have it.
     pub(super) fn joint(&self, name: &str) -> Option<&UrdfJoint> {
         self.robot.joints.iter().find(|joint| joint.name == name)
     }
 
-    /// Largest torque of a joint, N m; 0 where the file gives none.
+    /// Returns the largest torque of a joint, N m; 0 if the file gives none.
     pub(super) fn effort_n_m(&self, joint: &str) -> f64 {
         self.joint(joint).map_or(0.0, |joint| joint.effort)
     }
@@ -105,7 +106,7 @@ impl UrdfModel {
         Ok(model)
     }
 
-    /// Fills the tables of joints. What is ambiguous matters on the chain only, and is skipped elsewhere.
+    /// Fills the tables of joints. Ambiguous joints matter only on the chain, and are skipped elsewhere.
     fn connect(&mut self) {
         let mut places = BTreeMap::new();
         for (idx, joint) in self.robot.joints.iter().enumerate() {
@@ -150,7 +151,8 @@ impl UrdfModel {
         Ok(())
     }
 
-    /// Goes from a link to the root of its tree; an error is the link after `n` joints, with more above it.
+    /// Follows the joints from a link to the root of its tree. The error is the link after `n` joints, if more are
+    /// above it.
     fn go_up<'a>(&'a self, link: &'a str, n: usize) -> Result<(), &'a str> {
         let mut at = link;
         for _ in 0..=n {
@@ -160,7 +162,7 @@ impl UrdfModel {
         Err(at)
     }
 
-    /// Adds links that only joints name, where the joints leave no doubt about the link.
+    /// Adds links that only joints name, if the joints leave no doubt about the link.
     fn add_implied_links(&mut self) -> Result<(), RobotError> {
         let defined: BTreeSet<String> = self.robot.links.iter().map(|link| link.name.clone()).collect();
         let parents = self.robot.joints.iter().map(|joint| joint.parent.clone());
@@ -172,7 +174,7 @@ impl UrdfModel {
                 if defined.contains(link) || added.contains_key(link) {
                     continue;
                 }
-                // A wrong name tears the tree apart.
+                // A wrong name splits the tree.
                 if n_roots > 1 {
                     return Err(RobotError::MissingLink {
                         file: self.file.clone(),
@@ -203,17 +205,17 @@ impl UrdfModel {
         self.robot.skipped.extend(notes);
     }
 
-    /// Links that no joint holds and from which joints lead on.
+    /// Returns the links that no joint holds and that are the parent of a joint.
     pub fn roots(&self) -> impl Iterator<Item = &str> {
         let parents: BTreeSet<&str> = self.robot.joints.iter().map(|joint| joint.parent.as_str()).collect();
         let links = self.robot.links.iter().map(|link| link.name.as_str());
         links.filter(move |link| !self.joint_of_child.contains_key(*link) && parents.contains(link))
     }
 
-    /// Joint indices from `base` down to `tip`.
+    /// Returns the joint indices from `base` down to `tip`.
     ///
     /// # Errors
-    /// [`RobotError::NoChain`] where `base` is not above `tip`, [`RobotError::Loop`] in a closed chain.
+    /// [`RobotError::NoChain`] if `base` is not above `tip`, [`RobotError::Loop`] in a closed chain.
     pub fn path(&self, base: &str, tip: &str) -> Result<Vec<usize>, RobotError> {
         let no_chain = || RobotError::NoChain { file: self.file.clone(), from: base.to_owned(), to: tip.to_owned() };
         let mut path = Vec::new();
@@ -245,11 +247,11 @@ impl UrdfModel {
         Ok(())
     }
 
-    /// The chain of moving joints from `base` that carries every link named in `tips`.
+    /// Returns the chain of moving joints from `base` that carries every link named in `tips`.
     ///
     /// # Errors
-    /// [`RobotError::NoChain`] when no single chain carries all tips, [`RobotError::JointKind`] for other joints, and
-    /// for joints whose frame or axis is wrong.
+    /// [`RobotError::NoChain`] if no single chain carries all tips, [`RobotError::JointKind`] for other joints, and for
+    /// joints whose frame or axis is wrong.
     pub fn chain(&self, base: &str, tips: &[&str]) -> Result<Chain, RobotError> {
         let mut longest: Vec<usize> = Vec::new();
         for tip in tips {
@@ -328,7 +330,7 @@ impl UrdfModel {
         self.robot.links.iter().any(|link| link.name == name)
     }
 
-    /// Adds mass and collision shapes; collision meshes where `meshes` are read.
+    /// Adds mass and collision shapes; collision meshes if `meshes` are read.
     fn add_link(
         &self,
         body: &mut LinkBody,
@@ -343,7 +345,7 @@ impl UrdfModel {
             let body_from_com = body_from_link * inertial.origin.isometry();
             body.add_mass(inertial.mass_kg, &body_from_com, &inertial.inertia_kg_m2);
         }
-        // Drawn where a link has nothing else.
+        // Colour of a link's shapes, if the link has nothing else to show.
         let color_rgb = link.visual.iter().find_map(|visual| visual.color_rgb).unwrap_or(UNPAINTED_RGB);
         for collision in &link.collision {
             let shape = match (named_mesh(link, collision), meshes) {
@@ -364,7 +366,7 @@ impl UrdfModel {
         Ok(())
     }
 
-    /// Adds the shapes to display; nothing is drawn of a mesh.
+    /// Adds the shapes to display; meshes are not shown.
     fn add_visuals(&self, body: &mut LinkBody, link: &UrdfLink, body_from_link: &Isometry3<f64>) {
         for visual in &link.visual {
             let Some(shape) = primitive(visual) else { continue };
@@ -375,10 +377,10 @@ impl UrdfModel {
 }
 
 impl UrdfChain<'_> {
-    /// Pose of the frame of `link` on the chain.
+    /// Returns the pose of the frame of `link` on the chain.
     ///
     /// # Errors
-    /// [`RobotError::NoChain`] when the chain does not carry the link.
+    /// [`RobotError::NoChain`] if the chain does not carry the link.
     pub fn attachment(&self, link: &str) -> Result<Attachment, RobotError> {
         let mut n_joints = 0;
         let mut link_from_frame = Isometry3::identity();
@@ -398,13 +400,13 @@ impl UrdfChain<'_> {
         Ok(Attachment { n_joints, link_from_frame })
     }
 
-    /// Every link that the chain carries, by name.
+    /// Returns all links that the chain carries, by name.
     pub fn attachments(&self) -> BTreeMap<String, Attachment> {
         let links = self.urdf.robot.links.iter();
         links.filter_map(|link| Some((link.name.clone(), self.attachment(&link.name).ok()?))).collect()
     }
 
-    /// Visual shapes of the link `name`, in the frame of the chain's link that carries it.
+    /// Returns the visual shapes of the link `name`, in the frame of the chain's link that carries it.
     ///
     /// # Errors
     /// [`RobotError`] for a link that the chain does not carry, or for invalid shapes.
@@ -417,9 +419,9 @@ impl UrdfChain<'_> {
         Ok(body.visuals)
     }
 
-    /// Bodies 0..=n: the base with everything fixed to it, then one per joint of the chain. The links in `apart` move
-    /// by themselves; their visual shapes are omitted. Collision meshes are left out where `meshes` is `None`, and all
-    /// collision shapes where more of them than planning takes need no file.
+    /// Returns the bodies 0..=n: the base with everything fixed to it, then one per joint of the chain. The links in
+    /// `apart` move by themselves; their visual shapes are omitted. Collision meshes are left out if `meshes` is
+    /// `None`. All collision shapes are left out if more of them need no file than planning can take.
     ///
     /// # Errors
     /// [`RobotError::Value`] for invalid numbers, shapes or meshes; all meshes without a file at once.
@@ -445,12 +447,12 @@ impl UrdfChain<'_> {
         Ok(bodies)
     }
 
-    /// Shapes on the chain that need no file.
+    /// Returns the number of shapes on the chain that need no file.
     pub fn n_primitives(&self) -> usize {
         self.links().flat_map(|link| &link.collision).filter(|element| primitive(element).is_some()).count()
     }
 
-    /// Before any mesh is read: the number of shapes, and whether the meshes are there.
+    /// Checks, before any mesh is read, the number of shapes and the presence of the meshes.
     fn check_collisions(&self, folders: &MeshFolders) -> Result<(), RobotError> {
         let named = self.collision_meshes();
         let n_shapes = self.n_primitives() + named.len();
@@ -478,12 +480,12 @@ impl UrdfChain<'_> {
         Err(FileIssue::new(Code::MeshUnusable, &self.urdf.file, "collision meshes", problem).into())
     }
 
-    /// The links that the chain carries.
+    /// Returns the links that the chain carries.
     pub fn links(&self) -> impl Iterator<Item = &UrdfLink> {
         self.urdf.robot.links.iter().filter(|link| self.attachment(&link.name).is_ok())
     }
 
-    /// The collision meshes of the chain's links.
+    /// Returns the collision meshes of the chain's links.
     pub fn collision_meshes(&self) -> Vec<NamedMesh<'_>> {
         let mut named = Vec::new();
         for link in self.links() {
@@ -497,7 +499,7 @@ impl UrdfChain<'_> {
 mod tests {
     use super::*;
 
-    /// Links one below the other, or all below the first.
+    /// Parses links one below the other, or all below the first.
     fn parsed(n: usize, parent: impl Fn(usize) -> usize) -> Result<UrdfModel, RobotError> {
         let link = |k: usize| format!("<link name=\"l{k}\"/>");
         let joint = |k: usize| {

@@ -1,7 +1,7 @@
-//! Links and joints of a URDF file, with what was skipped.
+//! Links and joints of a URDF file, with a list of the skipped parts.
 //!
-//! Values that kinematics need and that are wrong become defects of their joint: they refuse the file where the joint
-//! is on the arm's chain. Everything else that is wrong is skipped, and the skip is noted by link or joint.
+//! Wrong values that kinematics need become defects of their joint: they refuse the file if the joint is on the arm's
+//! chain. Every other wrong part is skipped, and the skip is noted by link or joint.
 
 use super::xml_tree::{Place, XmlLimits, XmlTree};
 
@@ -34,7 +34,7 @@ impl UrdfFile {
     /// Reads the text of a URDF.
     ///
     /// # Errors
-    /// A sentence with line and column, where the text is no URDF or where a joint names no links.
+    /// A sentence with line and column, if the text is no URDF or if a joint names no links.
     pub fn parse(text: &str) -> Result<Self, String> {
         refuse_no_xml(text)?;
         let tree = XmlTree::parse(text, XML_LIMITS)?;
@@ -80,7 +80,7 @@ impl UrdfFile {
     }
 }
 
-/// Refuses what is no XML at all.
+/// Refuses a text that is not XML at all.
 fn refuse_no_xml(text: &str) -> Result<(), String> {
     let start = text.trim_start_matches(|c: char| c.is_whitespace() || c == '\u{feff}');
     if start.starts_with("version https://git-lfs") {
@@ -115,7 +115,7 @@ fn refuse_other_roots(tree: &XmlTree) -> Result<(), String> {
     Ok(())
 }
 
-/// The remedy for a robot description with another root element.
+/// Returns the remedy for a robot description with another root element.
 fn conversion(root: &str) -> &'static str {
     match root {
         "sdf" => "It is SDF. Convert it with the Python package `rod`: `rod -f ARM.sdf -o ARM.urdf`",
@@ -128,8 +128,8 @@ fn conversion(root: &str) -> &'static str {
     }
 }
 
-/// Refuses a file that only xacro can expand. What an expanded file has left over, such as unused definitions and calls
-/// of macros that are defined nowhere, is skipped.
+/// Refuses a file that only xacro can expand. Remains in an expanded file, such as unused definitions and calls of
+/// undefined macros, are skipped.
 fn refuse_xacro(tree: &XmlTree) -> Result<(), String> {
     let advice = "Run xacro first: `xacro ARM.urdf.xacro > ARM.urdf`";
     let has_joints = tree.children(0).any(|at| tree.element(at).prefix.is_empty() && tree.element(at).name == "joint");
@@ -161,7 +161,7 @@ fn is_of_urdf(tree: &XmlTree, at: usize) -> bool {
 }
 
 impl UrdfLink {
-    /// A link that only a joint names.
+    /// Builds a link that only a joint names.
     pub fn implied(name: &str, place: Place) -> Self {
         Self { name: name.to_owned(), place, inertial: None, visual: Vec::new(), collision: Vec::new(), lost: None }
     }

@@ -13,37 +13,37 @@ use super::part::check_place;
 use super::shape::Shape;
 use crate::files::check_within;
 
-/// What becomes of the collision meshes of a URDF. `collision_meshes` of robot.toml.
+/// Use of the collision meshes of a URDF: `collision_meshes` of robot.toml.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum CollisionMeshes {
-    /// Each is read as its convex hull.
+    /// Each mesh is read as its convex hull.
     #[default]
     Hull,
-    /// None is read; planning is refused.
+    /// No mesh is read; planning is refused.
     Ignore,
 }
 
-/// A mesh as the URDF names it.
+/// A mesh as referenced by the URDF.
 #[derive(Clone, Copy)]
 pub(super) struct NamedMesh<'a> {
     pub link: &'a str,
     pub name: &'a str,
-    /// Metres per unit of the file along each axis; negative where it mirrors.
+    /// Metres per unit of the file along each axis; negative if it mirrors.
     pub scale: [f64; 3],
 }
 
-/// Where meshes are looked for.
+/// Folders in which meshes are searched for.
 pub(super) struct MeshFolders {
-    /// The URDF's own folder, and that of robot.toml.
+    /// Folders of the URDF and of robot.toml.
     pub folders: [PathBuf; 2],
 }
 
 impl MeshFolders {
-    /// The file of a mesh.
+    /// Returns the file of a mesh.
     ///
     /// # Errors
-    /// What to do: the end of a sentence that begins with the mesh's name.
+    /// The remedy: the end of a sentence that begins with the mesh's name.
     pub fn find(&self, name: &str) -> Result<PathBuf, String> {
         let places = places(name);
         for folder in &self.folders {
@@ -63,7 +63,7 @@ impl MeshFolders {
         })
     }
 
-    /// The convex hull of a mesh, m, about the centre that comes with it.
+    /// Returns the convex hull of a mesh, m, about its centre, and that centre.
     ///
     /// # Errors
     /// [`FileIssue`] naming `urdf`, the link and the mesh.
@@ -84,8 +84,9 @@ impl MeshFolders {
     }
 }
 
-/// Where a mesh may lie below a folder: the whole path that the URDF names, that without its first folder (the
-/// package), its file name; for other formats those of a converted file come first. None leads out of the folder.
+/// Returns the candidate paths of a mesh below a folder: the whole path in the URDF, the path without its first folder
+/// (the package), and the file name. For other formats, the paths of a converted file come first. None leads out of the
+/// folder.
 pub(super) fn places(name: &str) -> Vec<PathBuf> {
     let path = name.split_once("://").map_or(name, |(_, rest)| rest);
     let mut parts: Vec<&str> = Vec::new();

@@ -20,9 +20,9 @@ use crate::spatial::{Base, Pose, Vehicle as VehicleFrame};
 /// The nominal vehicle.
 #[derive(Clone, Debug)]
 pub struct Vehicle {
-    /// The file that it was read from.
+    /// File that the vehicle was read from.
     pub file: PathBuf,
-    /// Name in its file.
+    /// Name of the vehicle in its file.
     pub name: String,
     /// Dry mass without the arm.
     pub mass_kg: f64,
@@ -30,33 +30,33 @@ pub struct Vehicle {
     pub vehicle_from_base: Pose<VehicleFrame, Base>,
     /// Convex shapes in the vehicle's frame.
     pub parts: Vec<Part>,
-    /// The tags that it carries; `None`: those of robot.toml are valid.
+    /// Tags that the vehicle carries; `None`: those of robot.toml are valid.
     pub survey: Option<TagSurvey>,
-    /// Lights in the vehicle's frame; empty where the file has none.
+    /// Lights in the vehicle's frame; empty if the file has none.
     pub lights: Vec<VehicleLight>,
     /// Stowed configurations on this vehicle by the robot's name; they replace those of robot.toml.
     pub stowed_rad: BTreeMap<String, Vec<f64>>,
-    /// Needed by a free vehicle; `None` where the file has none.
+    /// Properties of a free vehicle; `None` if the file has none.
     pub dynamics: Option<VehicleDynamics>,
-    /// Station-keeping errors; the default's where the file has none.
+    /// Station-keeping errors; the defaults if the file has none.
     pub station_keeping: StationKeeping,
     /// The file's text for a recording, with meshes replaced by hulls.
     pub text: String,
 }
 
-/// Station-keeping errors, one sigma: centre of mass along each axis, and roll, pitch and yaw.
+/// Station-keeping errors, standard deviations: centre of mass along each axis, and roll, pitch and yaw.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StationKeeping {
-    /// Per axis.
+    /// Standard deviation of the position, per axis.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub position_std_m: f64,
-    /// Per angle.
+    /// Standard deviation of the attitude, per angle.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub attitude_std_rad: f64,
 }
 
-/// 3 cm and half a degree, assumed.
+/// Assumed values: 3 cm and 0.5 deg.
 impl Default for StationKeeping {
     fn default() -> Self {
         Self { position_std_m: 0.03, attitude_std_rad: 0.0087 }
@@ -79,25 +79,26 @@ pub struct VehicleDynamics {
     /// Moments of inertia about x, y, z, without the water.
     #[schemars(inner(range(min = 0.1, max = 1e8)))]
     pub inertia_kg_m2: [f64; 3],
-    /// Mass of the water that moves along x, y, z with it.
+    /// Mass of the water that moves along x, y, z with the vehicle.
     #[schemars(inner(range(min = 0.0, max = 1e7)))]
     pub added_mass_kg: [f64; 3],
-    /// Inertia of the water that turns about x, y, z with it.
+    /// Inertia of the water that turns about x, y, z with the vehicle.
     #[schemars(inner(range(min = 0.0, max = 1e8)))]
     pub added_inertia_kg_m2: [f64; 3],
-    /// Only its height matters: the vehicle is ballasted so that it floats level with the arm stowed.
+    /// Centre of buoyancy. Only its height matters: the vehicle is ballasted so that it floats level with the arm
+    /// stowed.
     #[schemars(inner(range(min = -10.0, max = 10.0)))]
     pub center_of_buoyancy_m: [f64; 3],
-    /// N s/m and N m s/rad.
+    /// Linear drag, N s/m and N m s/rad.
     #[schemars(inner(range(min = 0.0, max = 1e7)))]
     pub drag_linear: [f64; 6],
-    /// N s2/m2 and N m s2/rad2.
+    /// Quadratic drag, N s2/m2 and N m s2/rad2.
     #[schemars(inner(range(min = 0.0, max = 1e7)))]
     pub drag_quadratic: [f64; 6],
-    /// Of all thrusters together; 0 on axes without authority.
+    /// Largest force of all thrusters together along x, y, z; 0 on axes without authority.
     #[schemars(inner(range(min = 0.0, max = 1e6)))]
     pub thrust_max_n: [f64; 3],
-    /// Of all thrusters together about x, y, z; 0 on axes without authority.
+    /// Largest moment of all thrusters together about x, y, z; 0 on axes without authority.
     #[schemars(inner(range(min = 0.0, max = 1e6)))]
     pub moment_max_n_m: [f64; 3],
 }
@@ -131,7 +132,7 @@ struct VehicleFile {
     /// Dry mass without the arm.
     #[schemars(range(min = 1.0, max = 1e7))]
     mass_kg: f64,
-    /// Number of the tag that defines the frame of the tags.
+    /// Id of the tag that defines the frame of the tags.
     #[serde(skip_serializing_if = "Option::is_none")]
     base_tag: Option<u32>,
     /// Stowed joint angles on this vehicle, by the robot's name.

@@ -1,14 +1,14 @@
 //! Elements of a bounded XML text, each with its line and column.
 //!
 //! A pull parser reads the text within the given limits, which are checked before anything is stored; nothing is read
-//! by recursion. Document types that declare anything are refused, and so are entities other than XML's own. The text
-//! after the root element is not read.
+//! by recursion. Document types with declarations are refused, and so are entities other than XML's own. The text after
+//! the root element is not read.
 
 use quick_xml::Reader;
 use quick_xml::escape::unescape;
 use quick_xml::events::{BytesStart, Event};
 
-/// Limit of elements within each other: a URDF nests five deep, extensions for simulators about ten.
+/// Limit of the nesting of elements: a URDF has five levels, extensions for simulators about ten.
 const MAX_DEPTH: usize = 64;
 /// Limit of an element's attributes: those of URDF and COLLADA have 8 at most.
 const MAX_ATTRIBUTES: usize = 32;
@@ -16,13 +16,13 @@ const MAX_ATTRIBUTES: usize = 32;
 /// Limits of one format that depend on its content.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct XmlLimits {
-    /// Elements of a file.
+    /// Maximum number of elements of a file.
     pub elements: usize,
-    /// Namespace declarations of a file.
+    /// Maximum number of namespace declarations of a file.
     pub namespaces: usize,
 }
 
-/// Place of an element in its file, both counted from 1; the column in characters.
+/// Position of an element in its file, both counted from 1; the column in characters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Place {
     pub line: usize,
@@ -44,12 +44,12 @@ pub(super) struct Element {
     /// Start of the element's tag.
     pub place: Place,
     attributes: Vec<(String, String)>,
-    /// All of its own text; entities are left out.
+    /// All of the element's own text; entities are left out.
     pub text: String,
     children: Vec<usize>,
 }
 
-/// Turns byte offsets that never fall into lines and columns; each byte is read once.
+/// Converts ascending byte offsets to lines and columns; each byte is read once.
 #[derive(Debug, Default)]
 struct LineCounter {
     at: usize,
@@ -66,7 +66,7 @@ impl LineCounter {
                 self.n_lines += 1;
                 self.n_characters = 0;
             } else if *byte & 0xC0 != 0x80 {
-                // Continuation bytes of UTF-8 begin no character.
+                // Continuation bytes of UTF-8 do not begin a character.
                 self.n_characters += 1;
             }
         }
@@ -76,7 +76,7 @@ impl LineCounter {
 }
 
 impl Element {
-    /// The value of an attribute.
+    /// Returns the value of an attribute.
     pub fn attribute(&self, name: &str) -> Option<&str> {
         self.attributes.iter().find(|(key, _)| key == name).map(|(_, value)| value.as_str())
     }
@@ -109,7 +109,7 @@ impl Element {
     }
 }
 
-/// Names that other parsers accept, too.
+/// Checks that other parsers accept the name too.
 fn checked_name(bytes: &[u8]) -> Result<&str, String> {
     let name = text_of(bytes)?;
     let is_name = name.starts_with(|first: char| first.is_alphabetic() || first == '_')
@@ -125,7 +125,7 @@ fn text_of(bytes: &[u8]) -> Result<&str, String> {
     std::str::from_utf8(bytes).map_err(|error| error.to_string())
 }
 
-/// The elements of a text in the order of their starts; the root is the first.
+/// Elements of a text in the order of their starts; the root is the first.
 #[derive(Debug)]
 pub(super) struct XmlTree {
     elements: Vec<Element>,
@@ -137,7 +137,7 @@ impl XmlTree {
     /// Reads a text up to the end of its root element.
     ///
     /// # Errors
-    /// A sentence with line and column, where `text` is not well-formed or beyond a limit.
+    /// A sentence with line and column, if `text` is not well-formed or exceeds a limit.
     pub fn parse(text: &str, limits: XmlLimits) -> Result<Self, String> {
         // The reader does not count a byte order mark.
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);

@@ -1,4 +1,4 @@
-//! The figures that an `assert` step may hold a run against.
+//! Figures of a run that an `assert` step can limit.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -13,43 +13,43 @@ use crate::units::Unit;
 /// A figure of a run, as routines and summary.json name it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 pub enum AssertFigure {
-    /// Held-out views of the last calibration, root mean square.
+    /// Root mean square over the held-out views of the last calibration, m.
     #[serde(rename = "held_out_rms_m")]
     HeldOutRms,
-    /// The same in the image.
+    /// Root mean square over the held-out views of the last calibration, px.
     #[serde(rename = "held_out_rms_px")]
     HeldOutReprojection,
-    /// 95th percentile over the task's targets, by the last calibration itself.
+    /// 95th percentile of the tool error over the task's targets, as the last calibration predicts it.
     #[serde(rename = "predicted_tool_error_m")]
     PredictedToolError,
-    /// Since the start.
+    /// Simulated time since the start.
     #[serde(rename = "simulated_s")]
     SimulatedTime,
-    /// Median over the targets of the last reach.
+    /// Median tool error over the targets of the last reach.
     #[serde(rename = "tool_error_m")]
     ToolError,
     /// Median distance between target and tool in the last reach.
     #[serde(rename = "reach_error_m")]
     ReachError,
-    /// The worst of the last reach.
+    /// Largest distance between target and tool in the last reach.
     #[serde(rename = "reach_error_max_m")]
     WorstReachError,
-    /// Between the arm and anything else, since the start.
+    /// Smallest clearance between the arm and anything else since the start.
     #[serde(rename = "clearance_m")]
     Clearance,
-    /// Since the start.
+    /// Number of contacts since the start.
     #[serde(rename = "contacts")]
     Contacts,
-    /// Targets within the tolerance in the last reach, at least.
+    /// Targets within the tolerance in the last reach; the limit is a minimum.
     #[serde(rename = "hits")]
     Hits,
-    /// Targets given up since the start.
+    /// Number of targets abandoned since the start.
     #[serde(rename = "targets_skipped")]
     TargetsSkipped,
-    /// Views captured since the start, at least.
+    /// Views captured since the start; the limit is a minimum.
     #[serde(rename = "poses")]
     Poses,
-    /// Poses given up since the start.
+    /// Number of poses abandoned since the start.
     #[serde(rename = "poses_skipped")]
     PosesSkipped,
 }
@@ -57,7 +57,7 @@ pub enum AssertFigure {
 /// Largest limit, in the unit of its figure.
 pub(super) const MAX_LIMIT: f64 = 1e9;
 
-/// What must have happened before there is a figure.
+/// Event that must precede a figure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Needs {
     Nothing,
@@ -66,7 +66,7 @@ pub enum Needs {
 }
 
 impl AssertFigure {
-    /// As routines name it.
+    /// Returns the key that routines use.
     #[must_use]
     pub const fn key(self) -> &'static str {
         match self {
@@ -86,7 +86,7 @@ impl AssertFigure {
         }
     }
 
-    /// Unit of its value and limit.
+    /// Unit of the figure's value and limit.
     #[must_use]
     pub const fn unit(self) -> Unit {
         match self {
@@ -102,7 +102,7 @@ impl AssertFigure {
         }
     }
 
-    /// What must have happened before it has a value.
+    /// Returns the event that must precede the figure's value.
     #[must_use]
     pub const fn needs(self) -> Needs {
         match self {
@@ -117,7 +117,7 @@ impl AssertFigure {
         }
     }
 
-    /// Clearance, hits and poses are to be at least their limits, all else at most.
+    /// Returns true if the limit holds. It is a minimum for clearance, hits and poses, and a maximum for all others.
     #[must_use]
     pub fn holds(self, value: f64, limit: f64) -> bool {
         match self {
@@ -133,7 +133,7 @@ impl fmt::Display for AssertFigure {
     }
 }
 
-/// What an `assert` step holds the run against: figures with their limits, in the order of [`AssertFigure`].
+/// Limits of an `assert` step: figures with their limits, in the order of [`AssertFigure`].
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(transparent)]
 pub struct AssertLimits(BTreeMap<AssertFigure, f64>);
@@ -144,20 +144,20 @@ impl AssertLimits {
         self.0.iter().map(|(figure, limit)| (*figure, *limit))
     }
 
-    /// Whether no figure has a limit.
+    /// Returns true if no figure has a limit.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// Whether any of its figures needs `what` to have happened.
+    /// Returns true if any of the figures needs the event `what`.
     #[must_use]
     pub fn need(&self, what: Needs) -> bool {
         self.0.keys().any(|figure| figure.needs() == what)
     }
 }
 
-/// A table with one key per figure.
+/// The schema is a table with one key per figure.
 impl JsonSchema for AssertLimits {
     fn schema_name() -> Cow<'static, str> {
         "AssertLimits".into()

@@ -8,7 +8,7 @@ use serde::Deserialize;
 
 use crate::robot::FileIssue;
 
-/// The table `[camera]` of a routine.
+/// Allowed values of `mode`.
 const MODES: [&str; 2] = ["geometric", "rendered"];
 
 #[derive(Default, Deserialize, JsonSchema)]
@@ -20,7 +20,7 @@ pub(super) struct CameraFile {
 }
 
 impl CameraFile {
-    /// The table `[world]` with the mode in `[world.camera]`: only the simulator reads it.
+    /// Returns the table `[world]` with the mode in `[world.camera]`; only the simulator reads it.
     pub(super) fn into_world(self, file: &Path, mut world: toml::Table) -> Result<toml::Table, FileIssue> {
         let Some(mode) = self.mode else { return Ok(world) };
         if !MODES.contains(&mode.as_str()) {

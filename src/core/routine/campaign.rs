@@ -1,4 +1,4 @@
-//! What a routine says about being run many times: `[campaign]` and `[regress]`.
+//! Settings of many runs of a routine: `[campaign]` and `[regress]`.
 
 use crate::codes::Code;
 use std::collections::BTreeMap;
@@ -23,7 +23,7 @@ pub struct SeedRange {
 }
 
 impl SeedRange {
-    /// `None` where `last` is below `first`.
+    /// Returns the range; `None` if `last` is below `first`.
     #[must_use]
     pub fn new(first: u64, last: u64) -> Option<Self> {
         (first <= last).then_some(Self { first, last })
@@ -35,7 +35,7 @@ impl SeedRange {
         self.first..=self.last
     }
 
-    /// Whether the range has this seed.
+    /// Returns true if the range contains this seed.
     #[must_use]
     pub fn contains(self, seed: u64) -> bool {
         self.seeds().contains(&seed)
@@ -59,50 +59,49 @@ impl fmt::Display for SeedRange {
     }
 }
 
-/// `[campaign]`: which seeds, and which settings each of them meets.
+/// `[campaign]`: the seeds, and the settings that each of them runs with.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CampaignSettings {
-    /// `None` where the command line must give them.
+    /// Seeds; `None` if the command line must give them.
     pub seeds: Option<SeedRange>,
     /// Keys with their values, sorted by key; the full product is run.
     pub matrix: Vec<(String, Vec<Value>)>,
-    /// Of keys of the matrix: how often each of its values occurs, over the others. Empty: all points are of equal
-    /// worth.
+    /// Relative frequencies of the values, by key of the matrix. Empty: all points have equal weight.
     pub weights: Vec<(String, Vec<f64>)>,
 }
 
-/// `[regress]`: how much worse than the baseline is still the same.
+/// `[regress]`: tolerated deterioration against the baseline.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RegressSettings {
-    /// Limits of new over baseline, typical of the pairs.
+    /// Limit of the tool error, new over baseline, typical of the pairs.
     #[schemars(range(min = 1.0, max = 1000.0))]
     pub tool_error_ratio: f64,
-    /// The same of the distance between target and tool.
+    /// Limit of the distance between target and tool, new over baseline, typical of the pairs.
     #[schemars(range(min = 1.0, max = 1000.0))]
     pub reach_error_ratio: f64,
-    /// The same of the fit's residual in the image.
+    /// Limit of the fit's residual in the image, new over baseline, typical of the pairs.
     #[schemars(range(min = 1.0, max = 1000.0))]
     pub residual_ratio: f64,
-    /// The same of the held-out tags' position error.
+    /// Limit of the held-out tags' position error, new over baseline, typical of the pairs.
     #[schemars(range(min = 1.0, max = 1000.0))]
     pub held_out_ratio: f64,
-    /// The same of the scatter of corners within a capture.
+    /// Limit of the scatter of corners within a capture, new over baseline, typical of the pairs.
     #[schemars(range(min = 1.0, max = 1000.0))]
     pub corner_scatter_ratio: f64,
-    /// The same of the simulated time.
+    /// Limit of the simulated time, new over baseline, typical of the pairs.
     #[schemars(range(min = 1.0, max = 1000.0))]
     pub time_ratio: f64,
-    /// Limit of poses captured, baseline over new.
+    /// Limit of the number of poses captured, baseline over new, typical of the pairs.
     #[schemars(range(min = 1.0, max = 1000.0))]
     pub poses_ratio: f64,
-    /// How much nearer than the baseline the arm may come to anything, typical of the pairs, m.
+    /// Limit of the loss of clearance, baseline less new, typical of the pairs, m.
     #[schemars(range(min = 1e-6, max = 10.0))]
     pub clearance_drop_m: f64,
-    /// Limits of the new value itself, median over the seeds, m.
+    /// Limit of the new tool error, median over the seeds, m; absent: no limit.
     #[schemars(range(min = 1e-6, max = 10.0))]
     pub tool_error_m: Option<f64>,
-    /// The same of the distance between target and tool; `None` sets no limit.
+    /// Limit of the new distance between target and tool, median over the seeds, m; absent: no limit.
     #[schemars(range(min = 1e-6, max = 10.0))]
     pub reach_error_m: Option<f64>,
 }
@@ -152,7 +151,7 @@ impl RegressSettings {
     }
 }
 
-/// Of a setting over the others.
+/// Smallest weight of a setting, relative to the others.
 const MIN_WEIGHT: f64 = 1e-9;
 
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
@@ -190,7 +189,7 @@ impl CampaignFile {
     }
 }
 
-/// Numbers above zero, one for each value that the matrix gives the key.
+/// Reads the weights: one positive number for each value that the matrix gives the key.
 fn weights_of(
     key: &str,
     values: &[Value],
@@ -212,7 +211,7 @@ fn weights_of(
     Ok((key.to_owned(), weights))
 }
 
-/// Dotted keys stand quoted or not: unquoted ones are tables in tables.
+/// Collects the keys of a table. Dotted keys may be quoted; unquoted ones are nested tables.
 fn flatten(table: &Table, prefix: &str, into: &mut Vec<(String, Vec<Value>)>) -> Result<(), (String, String)> {
     for (key, value) in table {
         let key = format!("{prefix}{key}");

@@ -1,4 +1,4 @@
-//! A checked routine and the arm that it is for.
+//! A checked routine and its arm.
 
 use crate::codes::Code;
 use std::path::PathBuf;
@@ -19,48 +19,48 @@ use crate::robot::{self, BaseTagStd, FailedJoint, FileIssue, MapKnowledge, Robot
 pub struct Routine {
     /// The routine's file.
     pub file: PathBuf,
-    /// Letters, digits, - and _: it names the output folder.
+    /// Name of the routine (letters, digits, - and _); it names the output folder.
     pub name: String,
-    /// Who runs it, for reports; in no recording.
+    /// Name of the operator; reports have it, recordings do not.
     pub operator: Option<String>,
     /// Folder of robot.toml, relative to the working directory.
     pub robot_folder: PathBuf,
     /// The vehicle's file, relative to the working directory.
     pub vehicle_file: PathBuf,
-    /// Of everything random in a run: the truth, and the plan's samples.
+    /// Seed of everything random in a run: the truth, and the plan's samples.
     pub seed: u64,
     /// Method of every calibration in the script.
     pub method: Method,
     /// Seafloor and obstacles that planning knows.
     pub scene: Scene,
-    /// The only tags that are there; all of the vehicle's or the robot's where it says nothing.
+    /// Ids of the tags that are present; `None`: all tags of the vehicle or the robot.
     pub tags: Option<Vec<u32>>,
-    /// How much of the tags' places is known.
+    /// Knowledge of the tags' poses.
     pub map: MapKnowledge,
     /// Replacements of the base tag's standard deviations.
     pub base_tag_std: BaseTagStd,
     /// Joints that are declared to have failed, by name and kind.
     pub failed_joints: Vec<FailedJointEntry>,
-    /// The scene alone, as TOML, to travel with a recording.
+    /// The scene as TOML, to travel with a recording.
     pub scene_toml: String,
     /// Settings of the captures; a step may change its own.
     pub capture: CaptureSettings,
     /// Targets and tolerance.
     pub task: TaskSettings,
-    /// What to do, in order.
+    /// Steps of the script, in order.
     pub steps: Vec<Step>,
-    /// The truth's settings, unread.
+    /// Settings of the simulated truth, unread.
     pub world: toml::Table,
-    /// What breaks at the script's `fault` steps, unread.
+    /// Faults that occur at the script's `fault` steps, unread.
     pub faults: Vec<toml::Table>,
-    /// What `armcal campaign` runs; a single run does not look at it.
+    /// Settings of `armcal campaign`; a single run ignores them.
     pub campaign: CampaignSettings,
-    /// What `armcal regress` lets pass.
+    /// Limits of `armcal regress`.
     pub regress: RegressSettings,
 }
 
 impl Routine {
-    /// Reads the robot and its vehicle, with the tags that the routine says are there.
+    /// Reads the robot and its vehicle, with the tags that the routine states as present.
     ///
     /// # Errors
     /// [`RoutineError`] naming file, key and allowed range.
@@ -101,7 +101,7 @@ impl Routine {
         self.failed_joints.iter().enumerate().map(of).collect()
     }
 
-    /// What only robot and vehicle can tell: whether the steps fit them.
+    /// Checks that the steps fit robot and vehicle.
     ///
     /// # Errors
     /// [`RoutineError`] naming the step.
@@ -159,10 +159,10 @@ impl Routine {
     }
 }
 
-/// A point this near to a part's surface lies on it, m.
+/// Largest distance of a point that lies on a part's surface, m.
 const ON_SURFACE_M: f64 = 0.005;
 
-/// Why the arm cannot touch that plane; `None` where it may.
+/// Reason why the arm cannot touch that plane; `None` if it can.
 fn touch_problem(settings: &TouchSettings, robot: &Robot, vehicle: &Vehicle) -> Option<String> {
     let Some(radius_m) = robot.tool.tip_radius_m else {
         return Some(format!(
@@ -188,13 +188,13 @@ fn touch_problem(settings: &TouchSettings, robot: &Robot, vehicle: &Vehicle) -> 
     })
 }
 
-/// `[[failed_joint]]`.
+/// `[[failed_joint]]` of a routine.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FailedJointEntry {
     /// Name of the joint in the URDF.
     pub joint: String,
-    /// `locked`, `dead`, `stuck` or `jumps`.
+    /// Kind of failure: `locked`, `dead`, `stuck` or `jumps`.
     #[schemars(extend("enum" = ["locked", "dead", "stuck", "jumps"]))]
     pub kind: String,
 }

@@ -3,7 +3,7 @@
 use crate::codes::{Code, Coded};
 use crate::robot::{FileIssue, RobotError};
 
-/// Why a routine was refused.
+/// Reason why a routine was refused.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum RoutineError {

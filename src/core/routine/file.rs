@@ -30,11 +30,11 @@ struct RoutineFile {
     _kind: Option<Kind>,
     /// Name of the routine (letters, digits, - and _); it names the output folder.
     name: String,
-    /// Name of the operator; the report has it, no recording.
+    /// Name of the operator; reports have it, recordings do not.
     operator: Option<String>,
-    /// Robot folder, from the folder of this file.
+    /// Robot folder, relative to the folder of this file.
     robot: PathBuf,
-    /// Vehicle file, from the folder of this file.
+    /// Vehicle file, relative to the folder of this file.
     vehicle: Option<PathBuf>,
     /// Seed of everything random; `run --seed N` replaces it.
     #[serde(default = "first_seed")]
@@ -48,7 +48,7 @@ struct RoutineFile {
     /// Obstacles fixed in the world.
     #[serde(default)]
     obstacle: Vec<PartFile>,
-    /// Settings of every capture step that does not say otherwise.
+    /// Default settings of every capture step.
     #[serde(default)]
     capture: CaptureSettings,
     /// Targets and tolerance.
@@ -108,7 +108,7 @@ pub fn load(file: &Path) -> Result<Routine, RoutineError> {
 /// Reads a routine file with some keys replaced.
 ///
 /// # Errors
-/// [`RoutineError`] naming file, key and allowed range, or the override that has no place in a routine.
+/// [`RoutineError`] naming file, key and allowed range, or the override that no key of a routine accepts.
 pub fn load_with(file: &Path, overrides: &Overrides) -> Result<Routine, RoutineError> {
     let raw: RoutineFile = read_with(file, &overrides.set)?;
     let check = |key: &str, value: f64, range| FileIssue::check_range(file, key, value, range);

@@ -9,12 +9,12 @@ use serde::{Deserialize, Serialize};
 pub enum Method {
     /// Nominal end stops against the readings there (Williams 1991); needs no camera.
     JointLimits,
-    /// The paper's first method: least spread of every landmark's positions; needs no map, and cannot find the first
-    /// offset.
+    /// First method of the paper: smallest spread of every landmark's positions. It needs no map, and cannot determine
+    /// the first offset.
     MinimumVariance,
-    /// The paper's proposed method: least sum of distances to known landmarks.
+    /// Proposed method of the paper: smallest sum of distances to known landmarks.
     MinimumDistance,
-    /// Maximum a posteriori over all that the measurements depend on.
+    /// Maximum a posteriori estimate over all parameters of the measurements.
     #[default]
     Bundle,
 }

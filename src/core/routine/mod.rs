@@ -1,8 +1,8 @@
-//! Routines: scripts in TOML that say which arm does what.
+//! Routines: scripts in TOML that state the arm and its steps.
 //!
 //! `load` reads and checks a routine (`Routine`); paths in it are relative to the routine's own file. `load_with`
 //! replaces keys (`--set`). The tables `[world]` and those of `fault` steps stay unread: only the simulator may know
-//! them. `[campaign]` and `[regress]` are for many runs of one routine.
+//! them. `[campaign]` and `[regress]` apply to many runs of one routine.
 
 mod assert_figure;
 mod camera_mode;

@@ -1,6 +1,6 @@
-//! Keys of a routine replaced from outside: `--set capture.poses=20`.
+//! Overrides: keys of a routine replaced from outside, such as `--set capture.poses=20`.
 //!
-//! An override is put into the routine's table before it is read, so it passes the same checks as the file itself.
+//! Overrides are written into the routine's table before it is read, so they pass the same checks as the file itself.
 
 use crate::codes::Code;
 use std::fmt;
@@ -16,19 +16,19 @@ use crate::kind::Kind;
 use crate::robot::{FileIssue, parse_toml, read_text};
 use crate::text::with_nearest;
 
-/// One key and its new value.
+/// An override: a key and its new value.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Override {
     /// Dotted path into the routine; a number counts within a list, from 0.
     pub key: String,
-    /// It replaces the file's, whatever type that has.
+    /// New value, which replaces the file's value of any type.
     pub value: Value,
 }
 
-/// All that replaces parts of a routine.
+/// Overrides of a routine.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Overrides {
-    /// In the order given: the last one of a key holds.
+    /// Overrides in the given order: the last one of a key applies.
     pub set: Vec<Override>,
     /// Folder of another robot, relative to the working directory.
     pub robot: Option<PathBuf>,
@@ -38,7 +38,7 @@ pub struct Overrides {
 
 impl Override {
     /// # Errors
-    /// What is wrong with the key.
+    /// The problem of the key.
     pub fn new(key: &str, value: Value) -> Result<Self, String> {
         let is_plain =
             |part: &str| !part.is_empty() && part.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-');
@@ -66,7 +66,7 @@ impl Override {
     }
 }
 
-/// What lies under `part`; made where a table lacks it.
+/// Returns the value under `part`, and inserts it if a table lacks it.
 fn child<'a>(at: &'a mut Value, part: &str, key: &str) -> Result<&'a mut Value, String> {
     match at {
         Value::Table(table) => Ok(table.entry(part).or_insert_with(|| Value::Table(Table::new()))),
@@ -79,7 +79,7 @@ fn child<'a>(at: &'a mut Value, part: &str, key: &str) -> Result<&'a mut Value, 
     }
 }
 
-/// A TOML value; what is none but a plain word is a string.
+/// Parses a TOML value; a plain word is a string.
 fn parse_value(text: &str) -> Result<Value, String> {
     match toml::from_str::<Table>(&format!("value = {text}")) {
         Ok(mut table) if table.len() == 1 => table.remove("value").ok_or_else(|| format!("`{text}` is no value")),
@@ -102,7 +102,7 @@ impl FromStr for Override {
     }
 }
 
-/// `KEY=VALUE`, which reads back as the same override.
+/// Writes `KEY=VALUE`, which parses as the same override.
 impl fmt::Display for Override {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.value {
@@ -114,10 +114,10 @@ impl fmt::Display for Override {
     }
 }
 
-/// The table of a routine file with overrides in place, not yet checked.
+/// Returns the table of a routine file with overrides applied, not yet checked.
 ///
 /// # Errors
-/// [`RoutineError`] where the file is no TOML or an override has no place in it.
+/// [`RoutineError`] if the file is no TOML or no key accepts an override.
 pub fn effective_table(file: &Path, set: &[Override]) -> Result<Table, RoutineError> {
     let mut table: Table = parse_toml(file, &read_text(file)?)?;
     check_head(Kind::Routine, file, &table)?;
@@ -128,14 +128,14 @@ pub fn effective_table(file: &Path, set: &[Override]) -> Result<Table, RoutineEr
     Ok(table)
 }
 
-/// Reads a routine file as `T`, with overrides in place.
+/// Reads a routine file as `T`, with overrides applied.
 pub(super) fn read_with<T: DeserializeOwned>(file: &Path, set: &[Override]) -> Result<T, RoutineError> {
     let read_alone = || -> Result<T, RoutineError> { Ok(parse_file(Kind::Routine, file, &read_text(file)?)?) };
     if set.is_empty() {
         return read_alone();
     }
     effective_table(file, set)?.try_into().map_err(|error: toml::de::Error| {
-        // What is wrong without the overrides, too, is told with its line.
+        // A problem that exists without the overrides is reported with its line.
         read_alone().err().unwrap_or_else(|| {
             let given: Vec<String> = set.iter().map(|one| format!("--set {one}")).collect();
             let problem = with_nearest(&error.to_string().trim().replace('\n', " "));

@@ -17,7 +17,7 @@ use crate::schema::schema_of;
 pub struct Scene {
     /// Height of the seafloor in the world frame; `None` in open water.
     pub seafloor_z_m: Option<f64>,
-    /// Their poses are in the world frame.
+    /// Obstacles with poses in the world frame.
     pub obstacles: Vec<Part>,
 }
 
@@ -41,7 +41,7 @@ impl SceneFile {
         Self { version: VERSION, kind: Kind::Scene, site, obstacle }
     }
 
-    /// The scene, and itself without the files of meshes.
+    /// Returns the scene, and this file without the files of meshes.
     pub(super) fn check(self, file: &Path) -> Result<(Scene, Self), RoutineError> {
         if let Some(z) = self.site.seafloor_z_m {
             FileIssue::check_range(file, "site.seafloor_z_m", z, -1e4..=0.0)?;
@@ -57,7 +57,7 @@ pub fn scene_schema() -> serde_json::Value {
     schema_of::<SceneFile>(Kind::Scene)
 }
 
-/// Reads the scene that travelled with a recording.
+/// Reads the scene that travels with a recording.
 ///
 /// # Errors
 /// [`RoutineError`] naming file, key and allowed range.

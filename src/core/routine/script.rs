@@ -1,4 +1,4 @@
-//! `[[step]]` tables to checked steps: each by itself, then what no step can do before another one did something.
+//! Conversion of `[[step]]` tables to checked steps: each alone, then the order of steps that depend on each other.
 
 use crate::codes::Code;
 use std::path::Path;
@@ -31,7 +31,7 @@ pub(super) fn standard(capture: CaptureSettings, task: &TaskSettings) -> Vec<Ste
 const NAMES: &str =
     "move, reach, work, grip, capture, identify, stops, touch, calibrate, recalibrate, wait, fault, assert";
 
-/// The lines at which the `[[step]]` tables of a routine begin; none where it is no TOML.
+/// Returns the lines at which the `[[step]]` tables of a routine begin; none if it is no TOML.
 pub(super) fn step_lines(file: &Path, text: &str) -> Vec<usize> {
     #[derive(Deserialize)]
     struct Steps {
@@ -42,19 +42,19 @@ pub(super) fn step_lines(file: &Path, text: &str) -> Vec<usize> {
     steps.iter().map(|step| 1 + text[..step.span().start].matches('\n').count()).collect()
 }
 
-/// How messages call steps: `line 41: step 3`.
+/// Names of steps in messages: `line 41: step 3`.
 #[derive(Clone, Copy)]
 struct StepNames<'a>(&'a [usize]);
 
 impl StepNames<'_> {
-    /// The step at `index`, from 0.
+    /// Returns the name of the step at `index`, from 0.
     fn name(self, index: usize) -> String {
         let line = self.0.get(index).map_or_else(String::new, |line| format!("line {line}: "));
         format!("{line}step {}", index + 1)
     }
 }
 
-/// Steps in order, and the tables of the faults in order, unread.
+/// Steps in order, and the unread tables of the faults in order.
 pub(super) struct Script {
     pub steps: Vec<Step>,
     pub faults: Vec<toml::Table>,
@@ -155,7 +155,7 @@ impl StepReader<'_> {
         Ok(Step::Reach(ReachSettings { targets: self.targets(targets, task)?, touch }))
     }
 
-    /// Numbers of the task's targets; all of them where none are named.
+    /// Returns the numbers of the task's targets; all of them if none are named.
     fn targets(&self, targets: Option<Vec<usize>>, task: &TaskSettings) -> Result<Vec<usize>, FileIssue> {
         let n = task.targets_m.len();
         let targets = targets.unwrap_or_else(|| (0..n).collect());
@@ -268,7 +268,7 @@ impl StepReader<'_> {
     }
 }
 
-/// What no step can do before another one did something.
+/// Checks that each step follows the steps that it depends on.
 fn check_order(file: &Path, names: StepNames<'_>, steps: &[Step]) -> Result<(), FileIssue> {
     let (mut captures, mut calibrations, mut reaches, mut moved) = (0, 0, 0, false);
     for (index, step) in steps.iter().enumerate() {
@@ -359,7 +359,7 @@ mod tests {
         assert_eq!((capture.poses, capture.held_out), (7, CaptureSettings::default().held_out));
     }
 
-    /// The last of every three tasks passes tags, by one posture after the other, and none does in a gap.
+    /// The last of every three tasks passes tags, with one configuration after the other, and none does in a gap.
     #[test]
     fn work_passes_tags_in_a_third_of_its_tasks_and_in_no_gap() {
         let text = "[[step]]\ndo = \"work\"\ntasks = 12\nlooks_rad = [[0.1], [0.2]]\ngaps_s = [[1200.0, 3600.0]]\n";
@@ -371,7 +371,7 @@ mod tests {
         assert_eq!(WorkSettings { looks_rad: Vec::new(), ..work.clone() }.look_of(8), None);
     }
 
-    /// Each with its line, its step, and the likeliest name.
+    /// Each mistake is reported with its line, its step, and the likeliest name.
     #[test]
     fn mistakes_are_named_by_step_key_and_what_would_be_right() {
         let misnamed = format!("# a comment\n{LOOP}\n[[step]]\ndo = \"wait\"\nsecond = 3.0\n");

@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use crate::robot::FileIssue;
 
-/// How views are captured.
+/// Settings of the capture of views.
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CaptureSettings {
@@ -19,63 +19,63 @@ pub struct CaptureSettings {
     #[serde(default = "CaptureSettings::default_held_out")]
     #[schemars(range(min = 0, max = 1000))]
     pub held_out: u32,
-    /// Tags that a planned view must be expected to see.
+    /// Tags that a planned view must be predicted to detect.
     #[serde(default = "CaptureSettings::default_min_tags")]
     #[schemars(range(min = 1, max = 100))]
     pub min_tags: u32,
-    /// Free water kept between the arm and everything else, beyond the sensors' error.
+    /// Minimum clearance between the arm and everything else, beyond the sensors' error.
     #[serde(default = "CaptureSettings::default_clearance_m")]
     #[schemars(range(min = 0.0, max = 1.0))]
     pub clearance_m: f64,
-    /// How long the settled arm is watched.
+    /// Time that the settled arm is recorded.
     #[serde(default = "CaptureSettings::default_dwell_s")]
     #[schemars(range(min = 0.2, max = 60.0))]
     pub dwell_s: f64,
-    /// What the views are chosen for.
+    /// Criterion of the choice of views.
     #[serde(default)]
     pub criterion: PoseCriterion,
-    /// After so many views, the running estimate renews margins and remaining poses; 0: planned once.
+    /// Views after which the interim estimate updates margins and remaining poses; 0: planned once.
     #[serde(default = "CaptureSettings::default_replan_every")]
     #[schemars(range(min = 0, max = 1000))]
     pub replan_every: u32,
-    /// No more views once the predicted tool error at the task (root mean square) is below this.
+    /// Predicted tool error at the task (root mean square) below which no more views are captured.
     #[serde(default)]
     #[schemars(range(min = 1e-5, max = 1.0))]
     pub stop_at_tool_error_m: Option<f64>,
-    /// No more views after so long, by the arm's clock.
+    /// Time by the arm's clock after which no more views are captured.
     #[serde(default)]
     #[schemars(range(min = 1.0, max = 1e6))]
     pub max_time_s: Option<f64>,
-    /// What is kept clear beyond `clearance_m`.
+    /// Margin added to `clearance_m`.
     #[serde(default)]
     pub margins: Margins,
 }
 
-/// What makes one view better than another.
+/// Criterion by which views are compared.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PoseCriterion {
-    /// Least predicted tool error at the task (the test-pose criterion of Klimchik et al. 2014).
+    /// Smallest predicted tool error at the task (the test-pose criterion of Klimchik et al. 2014).
     #[default]
     ToolError,
-    /// Least volume of the parameters' uncertainty.
+    /// Smallest volume of the parameters' uncertainty.
     DOptimal,
-    /// Least sum of the parameters' variances, in units of their priors.
+    /// Smallest sum of the parameters' variances, in units of their priors.
     AOptimal,
-    /// Least of the largest variance, in units of their priors.
+    /// Smallest maximum of the variances, in units of their priors.
     EOptimal,
-    /// Any that see enough tags and keep clear; to compare with.
+    /// Any views that detect enough tags and keep the clearance; for comparison.
     Random,
 }
 
-/// For which arms the clearance is kept.
+/// Arms for which the clearance is kept.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Margins {
-    /// Every arm that the present belief allows.
+    /// Every arm that the present estimate allows.
     #[default]
     Belief,
-    /// The believed arm alone; to compare with, never on a real arm.
+    /// Only the estimated arm; for comparison, never on a real arm.
     Off,
 }
 
@@ -102,7 +102,7 @@ impl CaptureSettings {
 }
 
 impl CaptureSettings {
-    /// `prefix` goes before the keys in messages.
+    /// Checks the settings; `prefix` precedes the keys in messages.
     pub(super) fn check(&self, file: &Path, prefix: &str) -> Result<(), FileIssue> {
         let check =
             |key: &str, value: f64, range| FileIssue::check_range(file, &format!("{prefix}{key}"), value, range);
@@ -139,11 +139,11 @@ impl Default for CaptureSettings {
     }
 }
 
-/// What the arm is calibrated for.
+/// Task that the arm is calibrated for.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TaskSettings {
-    /// How near the tool must come to count as a hit.
+    /// Largest distance between tool and target that counts as a hit.
     #[schemars(range(min = 1e-4, max = 1.0))]
     pub tolerance_m: f64,
     /// Tool positions in the base frame.

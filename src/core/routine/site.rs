@@ -1,4 +1,4 @@
-//! `[site]` of a routine: the seafloor, the tags that are there, and how much of their places is known.
+//! `[site]` of a routine: the seafloor, the tags that are present, and the knowledge of their poses.
 
 use crate::codes::Code;
 use std::path::Path;
@@ -14,26 +14,26 @@ pub(super) struct SiteFile {
     /// Height of the seafloor in the world frame; absent: open water.
     #[schemars(range(min = -1e4, max = 0.0))]
     pub(super) seafloor_z_m: Option<f64>,
-    /// Numbers of the tags that are there; absent: all of the vehicle's (or robot's).
+    /// Ids of the tags that are present; absent: all of the vehicle's (or robot's).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) tags: Option<Vec<u32>>,
-    /// Tags whose place is known.
+    /// Tags with known poses.
     #[serde(skip_serializing_if = "Option::is_none")]
     map: Option<MapFile>,
-    /// Numbers of the tags whose place is known; with map = "partly".
+    /// Ids of the tags with known poses; with map = "partly".
     #[serde(skip_serializing_if = "Option::is_none")]
     known_tags: Option<Vec<u32>>,
-    /// Sigma of the base tag's position, where better known than its file says.
+    /// Standard deviation of the base tag's position, if better known than its file states.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1.0))]
     base_tag_position_std_m: Option<f64>,
-    /// Sigma of the base tag's attitude, where better known than its file says.
+    /// Standard deviation of the base tag's attitude, if better known than its file states.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1.0))]
     base_tag_rotation_std_rad: Option<f64>,
 }
 
-/// How much of the tags' places is known, as files write it.
+/// Tags with known poses, as files write it.
 #[derive(Clone, Copy, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 enum MapFile {

@@ -8,46 +8,46 @@ use super::assert_figure::AssertLimits;
 use super::settings::CaptureSettings;
 use crate::streams::PriorSource;
 
-/// One step of a routine's script.
+/// A step of a routine's script.
 #[derive(Clone, Debug)]
 pub enum Step {
-    /// Goes somewhere by a certified path.
+    /// Moves the arm to a goal by a certified path.
     Move(MoveGoal),
-    /// Reaches for targets of the task under the sensors believed in.
+    /// Reaches for targets of the task by the present sensor models.
     Reach(ReachSettings),
-    /// Works: targets of the task at times, tags seen by chance, rest between.
+    /// Works: reaches targets of the task at times, detects tags by chance, and rests in between.
     Work(WorkSettings),
     /// Opens or closes the gripper: 0 closed, 1 open.
     Grip {
-        /// 0..1 of the largest opening.
+        /// Share of the largest opening, 0..1.
         opening: f64,
     },
-    /// Plans views, visits them and records what is seen.
+    /// Plans views, visits them and records the detections.
     Capture(CaptureSettings),
-    /// Moves one joint a little and measures with the camera how many counts a radian has.
+    /// Moves one joint a little and measures with the camera the counts per radian.
     Identify(IdentifySettings),
     /// Drives joints to their nominal end stops and records the readings there.
     Stops(StopsSettings),
     /// Touches a surveyed surface with the tool and records where the arm feels it.
     Touch(TouchSettings),
-    /// Estimates the sensors from what was captured.
+    /// Estimates the sensors from the captured views.
     Calibrate(CalibrateSettings),
-    /// The arm rests while the world goes on.
+    /// Rests the arm while the world goes on.
     Wait {
-        /// By the arm's clock.
+        /// Time by the arm's clock.
         seconds: f64,
     },
-    /// Something breaks: number `number` of the routine's faults, which only the simulator reads.
+    /// Triggers number `number` of the routine's faults, which only the simulator reads.
     Fault {
-        /// From 0.
+        /// Number of the fault, from 0.
         number: usize,
     },
-    /// Notes whether figures of the run keep their limits.
+    /// Records whether figures of the run keep their limits.
     Assert(AssertLimits),
 }
 
 impl Step {
-    /// As routines name it.
+    /// Returns the name that routines use.
     #[must_use]
     pub fn name(&self) -> &'static str {
         match self {
@@ -68,76 +68,77 @@ impl Step {
     }
 }
 
-/// Where a `move` goes.
+/// Goal of a `move`.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MoveGoal {
     /// The stowed pose of robot.toml.
     Stowed,
-    /// Believed joint angles, rad, base first.
+    /// Estimated joint angles, rad, base first.
     Angles(Vec<f64>),
 }
 
-/// Which targets a `reach` tries.
+/// Targets of a `reach`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReachSettings {
     /// Numbers of the task's targets, from 0.
     pub targets: Vec<usize>,
-    /// Whether the jaws close on each of them.
+    /// True if the jaws close on each target.
     pub touch: bool,
 }
 
-/// What working means.
+/// Settings of a `work` step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WorkSettings {
-    /// How many.
+    /// Number of tasks.
     pub tasks: u32,
-    /// From the start of one task to that of the next.
+    /// Time from the start of one task to that of the next.
     pub every_s: f64,
     /// Numbers of the task's targets, from 0, taken in turn.
     pub targets: Vec<usize>,
-    /// Where the arm rests between tasks.
+    /// Configuration of the arm between tasks.
     pub rest: MoveGoal,
-    /// Believed joint angles at which the work passes tags, rad, base first, taken in turn.
+    /// Estimated joint angles of configurations that pass tags, rad, base first, taken in turn.
     pub looks_rad: Vec<Vec<f64>>,
-    /// The last of so many tasks goes to its target by the next of them.
+    /// Interval of tasks that pass tags: the last of every `look_every` tasks goes to its target by the next
+    /// configuration.
     pub look_every: u32,
-    /// How long the arm stays there; it does not stop where this is 0.
+    /// Time that the arm stays at such a configuration; 0: it does not stop.
     pub look_s: f64,
-    /// Since the start of the step: what begins in one of these spans passes no tags.
+    /// Spans [from, to] since the start of the step; tasks that begin in one of them pass no tags.
     pub gaps_s: Vec<[f64; 2]>,
-    /// No joint is driven faster.
+    /// Largest rate of every joint.
     pub rate_rad_s: Option<f64>,
-    /// What it works by.
+    /// Sensor models that the arm works by.
     pub belief: WorkBelief,
-    /// Calibration poses that are asked for at once where a task would miss its tolerance; none for 0.
+    /// Number of calibration poses requested at once if a task would miss its tolerance; 0: none.
     pub poses: u32,
 }
 
-/// What sensors a work step believes in.
+/// Source of the sensor models of a work step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum WorkBelief {
-    /// Those of the last accepted calibration.
+    /// The last accepted calibration.
     #[default]
     Calibration,
-    /// The online belief, by all that was recorded until then.
+    /// The online estimate from everything recorded until then.
     Online,
 }
 
 impl WorkSettings {
-    /// Time of the whole step.
+    /// Returns the duration of the whole step.
     #[must_use]
     pub fn duration_s(&self) -> f64 {
         f64::from(self.tasks) * self.every_s
     }
 
-    /// Number of the target of task `number` (from 0).
+    /// Returns the number of the target of task `number` (from 0).
     #[must_use]
     pub fn target_of(&self, number: u32) -> usize {
         self.targets[number as usize % self.targets.len()]
     }
 
-    /// Number of the posture by which task `number` (from 0) passes tags, if it does.
+    /// Returns the index of the configuration by which task `number` (from 0) passes tags, if it does.
     #[must_use]
     pub fn look_of(&self, number: u32) -> Option<usize> {
         let at_s = f64::from(number) * self.every_s;
@@ -148,49 +149,49 @@ impl WorkSettings {
     }
 }
 
-/// How the scale of one sensor is measured.
+/// Settings of the measurement of one sensor's scale.
 #[derive(Clone, Debug, PartialEq)]
 pub struct IdentifySettings {
     /// Name of the joint in the URDF.
     pub joint: String,
-    /// The joint turns at most this many times as far as the datasheet's scale says, either way round.
+    /// Largest ratio of the joint's rotation to that by the datasheet's scale, in either direction.
     pub gain_max: f64,
-    /// First excursion, raw counts either way.
+    /// First excursion in either direction, raw counts.
     pub travel_counts: f64,
-    /// Excursion once the scale is roughly known, rad either way.
+    /// Excursion in either direction once the scale is roughly known, rad.
     pub swing_rad: f64,
     /// Views of the second excursion.
     pub views: u32,
 }
 
-/// Which joints are driven to their end stops.
+/// Settings of the joints' motion to their end stops.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StopsSettings {
-    /// By name; all that have stops where none is named.
+    /// Names of the joints; empty: all that have stops.
     pub joints: Vec<String>,
-    /// How long the readings at a stop are averaged.
+    /// Time over which the readings at a stop are averaged.
     pub dwell_s: f64,
 }
 
 /// A plane that the tool's tip touches.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TouchSettings {
-    /// The vehicle's part that carries it.
+    /// Part of the vehicle that carries the plane.
     pub part: String,
-    /// Where it is touched, base frame.
+    /// Point of contact, base frame.
     pub point_m: [f64; 3],
-    /// Out of the surface, unit length, base frame.
+    /// Unit normal out of the surface, base frame.
     pub normal: [f64; 3],
-    /// One sigma along the normal: of the survey and of what is felt.
+    /// Standard deviation along the normal, of the survey and the contact together.
     pub std_m: f64,
-    /// From this far on the tip comes slowly.
+    /// Distance from the surface at which the slow approach begins.
     pub approach_m: f64,
-    /// How long the arm rests there.
+    /// Time that the arm rests in contact.
     pub dwell_s: f64,
 }
 
 impl TouchSettings {
-    /// The place that is touched, and so far out of the surface, base frame.
+    /// Returns the point at distance `out_m` out of the surface from the point of contact, base frame.
     #[must_use]
     pub fn point_at(&self, out_m: f64) -> Point3<f64> {
         Point3::from(self.point_m) + Vector3::from(self.normal) * out_m
@@ -200,32 +201,32 @@ impl TouchSettings {
 /// Settings of `calibrate` and `recalibrate`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CalibrateSettings {
-    /// Fresh for `calibrate`, warm for `recalibrate`.
+    /// Prior of the calibration: fresh for `calibrate`, warm for `recalibrate`.
     pub prior: PriorSource,
-    /// Captured views that it uses.
+    /// Captured views that the calibration uses.
     pub views: CalibrateViews,
-    /// What happens if it is refused.
+    /// Action after a refusal.
     pub on_refusal: OnRefusal,
 }
 
-/// Which captured views a calibration uses.
+/// Captured views that a calibration uses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CalibrateViews {
-    /// Those since the last calibration.
+    /// Views since the last calibration.
     #[default]
     New,
-    /// Every one since the start.
+    /// All views since the start.
     All,
 }
 
-/// What happens after a refused calibration; the arm keeps the sensors that it believed in either way.
+/// Action after a refused calibration; in either case the arm keeps its previous sensor models.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum OnRefusal {
-    /// The script ends there.
+    /// The script ends.
     #[default]
     Stop,
-    /// The script goes on.
+    /// The script continues.
     Continue,
 }

@@ -12,7 +12,7 @@ use crate::schema::tagged;
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct MoveKeys {
-    /// `stowed`.
+    /// Goal: `stowed`.
     #[schemars(extend("const" = "stowed"))]
     pub to: Option<String>,
     /// Estimated joint angles, base first.
@@ -26,7 +26,7 @@ pub(super) struct MoveKeys {
 pub(super) struct ReachKeys {
     /// Numbers of the task's targets, from 0; absent: all.
     pub targets: Option<Vec<usize>>,
-    /// True: the jaws close on each target.
+    /// True if the jaws close on each target.
     #[serde(default)]
     pub touch: bool,
 }
@@ -42,20 +42,20 @@ pub(super) struct WorkKeys {
     #[serde(default = "ten_minutes")]
     #[schemars(range(min = 1.0, max = 1e5))]
     pub every_s: f64,
-    /// Numbers of the task's targets, from 0, in turn; absent: all.
+    /// Numbers of the task's targets, from 0, taken in turn; absent: all.
     pub targets: Option<Vec<usize>>,
     /// Estimated joint angles between tasks, base first; absent: stowed.
     #[schemars(inner(range(min = -100.0, max = 100.0)))]
     pub rest_rad: Option<Vec<f64>>,
-    /// Configurations that pass tags, in turn.
+    /// Configurations that pass tags, taken in turn.
     #[serde(default)]
     #[schemars(inner(inner(range(min = -100.0, max = 100.0))))]
     pub looks_rad: Vec<Vec<f64>>,
-    /// The last of so many tasks passes tags.
+    /// Interval of tasks that pass tags: the last of every `look_every` does.
     #[serde(default = "three")]
     #[schemars(range(min = 1, max = 10_000))]
     pub look_every: u32,
-    /// Time that the arm stays there; 0: it passes.
+    /// Time that the arm stays at such a configuration; 0: it does not stop.
     #[serde(default = "one_second")]
     #[schemars(range(min = 0.0, max = 600.0))]
     pub look_s: f64,
@@ -66,10 +66,10 @@ pub(super) struct WorkKeys {
     /// Largest rate of every joint; absent: their own.
     #[schemars(range(min = 0.01, max = 10.0))]
     pub rate_rad_s: Option<f64>,
-    /// Sensors that the arm works by.
+    /// Sensor models that the arm works by.
     #[serde(default)]
     pub belief: WorkBelief,
-    /// Calibration poses before a task that would miss its tolerance.
+    /// Number of calibration poses before a task that would miss its tolerance.
     #[serde(default = "two")]
     #[schemars(range(min = 0, max = 20))]
     pub poses: u32,
@@ -84,7 +84,7 @@ pub(super) struct GripKeys {
     pub opening: f64,
 }
 
-/// Keys of `capture`, each as in `[capture]`, and from there where it is absent.
+/// Keys of `capture`; an absent key has its value in `[capture]`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct CaptureKeys {
@@ -124,7 +124,7 @@ impl CaptureKeys {
 pub(super) struct IdentifyKeys {
     /// Name of the joint in the URDF.
     pub joint: String,
-    /// The joint turns at most this many times as far as the datasheet's scale says.
+    /// Largest ratio of the joint's rotation to that by the datasheet's scale.
     #[serde(default = "four")]
     #[schemars(range(min = 1.0, max = 20.0))]
     pub gain_max: f64,
@@ -166,7 +166,7 @@ pub(super) struct TouchKeys {
     pub point_m: [f64; 3],
     /// Direction out of the surface, base frame, of length 1.
     pub normal: [f64; 3],
-    /// Sigma along the normal, of the survey and the contact together.
+    /// Standard deviation along the normal, of the survey and the contact together.
     #[serde(default = "one_millimetre")]
     #[schemars(range(min = 1e-5, max = 0.1))]
     pub std_m: f64,
@@ -174,7 +174,7 @@ pub(super) struct TouchKeys {
     #[serde(default = "ten_centimetres")]
     #[schemars(range(min = 0.05, max = 0.5))]
     pub approach_m: f64,
-    /// Time that the arm rests there.
+    /// Time that the arm rests in contact.
     #[serde(default = "one_second")]
     #[schemars(range(min = 0.2, max = 60.0))]
     pub dwell_s: f64,
@@ -184,7 +184,7 @@ pub(super) struct TouchKeys {
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct CalibrateKeys {
-    /// Captured views that it uses.
+    /// Captured views that the calibration uses.
     #[serde(default)]
     pub views: CalibrateViews,
     /// Action after a refusal.
@@ -232,7 +232,7 @@ fn sixty() -> f64 {
     60.0
 }
 
-/// Returns the schema of the list of steps. Keys of `fault` beside its kind are the simulator's.
+/// Returns the schema of the list of steps. Keys of `fault` other than its kind belong to the simulator.
 pub(super) fn schema(generator: &mut SchemaGenerator) -> Schema {
     let fault = json_schema!({ "properties": { "kind": { "type": "string" } }, "required": ["kind"] });
     let mut capture = CaptureSettings::json_schema(generator);

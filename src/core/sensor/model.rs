@@ -1,58 +1,58 @@
-//! One sensor, and all sensors of an arm.
+//! Model of one joint sensor, and of all joint sensors of an arm.
 
 use crate::joints::{JointAngles, JointCounts};
 use crate::robot::{JointSensorSpec, Robot};
 use crate::time::Stamp;
 
-/// Terms of the smooth nonlinearity of each sensor.
+/// Number of terms of each sensor's smooth nonlinearity.
 pub const N_SHAPE: usize = 12;
 
-/// What calibration adds to the datasheet. With the travel t from the middle of the range, the angle is
+/// Correction of the datasheet by calibration. With the travel t from the middle of the range, the angle is the sum of
 /// `center + (gain + gain_per_k T) t + offset + sum_h nonlinearity_h phi_h(t / half_range)` and
-/// `offset_per_k T + offset_per_mpa P + drift h + half_backlash a + bump(t)`, with T (K), P (MPa) and h (hours) the
-/// [`ConditionChange`] from the calibration's reference and a the side that the joint came from.
+/// `offset_per_k T + offset_per_mpa P + drift h + half_backlash a + bump(t)`. T (K), P (MPa) and h (hours) are the
+/// [`ConditionChange`] from the calibration's reference; a is the side from which the joint came.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Correction {
     /// Factor on the nominal travel; 1 is the datasheet.
     pub gain: f64,
-    /// Added to the angle, rad.
+    /// Offset added to the angle, rad.
     pub offset_rad: f64,
     /// Coefficients beyond gain and offset.
     pub terms: Terms,
 }
 
-/// All beyond gain and offset; zero is a straight sensor that nothing disturbs.
+/// Terms beyond gain and offset; all zero for a linear sensor that no condition affects.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Terms {
     /// Coefficients of [`nonlinearity_basis`].
     pub nonlinearity_rad: [f64; N_SHAPE],
-    /// Change of the offset with the oil temperature.
+    /// Change of the offset with the oil temperature, rad/K.
     pub offset_rad_per_k: f64,
-    /// 1/K.
+    /// Change of the gain with the oil temperature, 1/K.
     pub gain_per_k: f64,
-    /// Change of the offset with the ambient pressure.
+    /// Change of the offset with the ambient pressure, rad/MPa.
     pub offset_rad_per_mpa: f64,
-    /// Change of the offset with time.
+    /// Change of the offset with time, rad/h.
     pub drift_rad_per_h: f64,
-    /// Half of the play between joint and sensor shaft.
+    /// Half of the backlash between joint and sensor shaft.
     pub half_backlash_rad: f64,
-    /// A worn spot of the sensor's track.
+    /// Worn spot of the sensor's track.
     pub bump: Bump,
 }
 
 /// A local bump of a sensor's curve: it adds `height exp(-(t - at)^2 / 2 width^2)` to the angle at travel t.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Bump {
-    /// Travel from the middle of the range at its top.
+    /// Travel from the middle of the range at the top of the bump.
     pub at_rad: f64,
-    /// Its standard width; at most 0 where there is none.
+    /// Standard width of the bump; at most 0 if there is no bump.
     pub width_rad: f64,
-    /// Added to the angle at its top.
+    /// Angle added at the top of the bump.
     pub height_rad: f64,
 }
 
 impl Bump {
-    /// The share of its height at a travel from the middle of the range: 1 at its top.
+    /// Returns the share of the height at a travel from the middle of the range; 1 at the top.
     #[must_use]
     pub fn share(&self, travel_rad: f64) -> f64 {
         if self.width_rad <= 0.0 {
@@ -63,7 +63,7 @@ impl Bump {
 }
 
 impl Terms {
-    /// Whether there are none.
+    /// Returns true if all terms are zero.
     #[must_use]
     pub fn are_zero(&self) -> bool {
         *self == Self::default()
@@ -76,13 +76,13 @@ impl Default for Correction {
     }
 }
 
-/// Half-width of the interval that [`nonlinearity_basis`] lives on, in half ranges: beyond the joint's own, for the
+/// Half-width of the domain of [`nonlinearity_basis`], in half ranges. It exceeds the joint's range because the
 /// functions vanish at its ends.
 const SHAPE_DOMAIN: f64 = 1.25;
 
 /// Smooth functions over the joint's range: `phi_h(x) = sin(pi h (x + L) / 2 L) / sqrt(L)`, h = 1.., L = 1.25, x in
-/// -1..1; with the prior variances of [`shape_prior`] a Gaussian process by its eigenfunctions (Solin and Sarkka 2020,
-/// eq. 6). Constant outside.
+/// -1..1. With the prior variances of [`shape_prior`] they are the eigenfunctions of a Gaussian process (Solin and
+/// Sarkka 2020, eq. 6). They are constant outside.
 #[must_use]
 #[inline]
 pub fn nonlinearity_basis(x: f64) -> [f64; N_SHAPE] {
@@ -108,18 +108,18 @@ pub fn shape_prior(length: f64) -> [f64; N_SHAPE] {
     })
 }
 
-/// How far things are from a calibration's reference.
+/// Change of the conditions from a calibration's reference.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ConditionChange {
-    /// Oil temperature above the reference's.
+    /// Oil temperature above the reference's, K.
     pub oil_k: f64,
-    /// Ambient pressure above the reference's.
+    /// Ambient pressure above the reference's, MPa.
     pub pressure_mpa: f64,
-    /// Time since the reference; negative before it.
+    /// Time since the reference, hours; negative before it.
     pub elapsed_h: f64,
 }
 
-/// What a reading depends on besides the angle; `None` is unknown and counts as the reference's.
+/// Conditions of a reading, apart from the angle; `None` is unknown and counts as the reference's.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Conditions {
     /// Oil temperature, degrees Celsius.
@@ -131,7 +131,7 @@ pub struct Conditions {
 }
 
 impl Conditions {
-    /// From `reference` to here.
+    /// Returns the change of the conditions from `reference` to these.
     #[must_use]
     pub fn departure_from(&self, reference: &Self) -> ConditionChange {
         let difference = |a: Option<f64>, b: Option<f64>| a.zip(b).map_or(0.0, |(a, b)| a - b);
@@ -144,8 +144,8 @@ impl Conditions {
 }
 
 impl Correction {
-    /// The angle at `travel_rad` from the middle of the range; `approach` is -1, 0 (unknown) or 1: the way that the
-    /// joint moved.
+    /// Returns the angle at `travel_rad` from the middle of the range. `approach` is the direction in which the joint
+    /// moved: -1, 0 (unknown) or 1.
     #[must_use]
     pub fn angle_rad(
         &self,
@@ -173,7 +173,7 @@ impl Correction {
 }
 
 impl Correction {
-    /// d(angle)/d(travel) at `travel_rad` from the middle of the range, over two milliradians.
+    /// Returns d(angle)/d(travel) at `travel_rad` from the middle of the range, as a difference over 2 mrad.
     #[must_use]
     pub fn slope(&self, spec: &JointSensorSpec, travel_rad: f64, departure: &ConditionChange) -> f64 {
         const STEP_RAD: f64 = 1e-3;
@@ -182,23 +182,23 @@ impl Correction {
     }
 }
 
-/// A joint sensor as believed.
+/// Model of a joint sensor: datasheet and estimated correction.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SensorModel {
     /// Datasheet.
     pub spec: JointSensorSpec,
-    /// What calibration adds to it.
+    /// Correction of the datasheet by calibration.
     pub correction: Correction,
 }
 
 impl SensorModel {
-    /// The datasheet's sensor, without a correction.
+    /// Returns the datasheet's sensor, without a correction.
     #[must_use]
     pub fn nominal(spec: &JointSensorSpec) -> Self {
         Self { spec: spec.clone(), correction: Correction::default() }
     }
 
-    /// Travel from the middle of the range by the datasheet, rad; the word wraps about that middle.
+    /// Returns the datasheet's travel from the middle of the range, rad; the word wraps about that middle.
     #[must_use]
     pub fn nominal_travel_rad(&self, counts: f64) -> f64 {
         let spec = &self.spec;
@@ -206,25 +206,25 @@ impl SensorModel {
         wrap_symmetric(counts - center_counts, spec.wrap_counts) / spec.counts_per_rad
     }
 
-    /// The angle that `counts` mean, rad.
+    /// Returns the angle that `counts` mean under the reference's conditions, rad.
     #[must_use]
     pub fn angle_rad(&self, counts: f64) -> f64 {
         self.angle_under_rad(counts, &ConditionChange::default())
     }
 
-    /// The angle that `counts` mean away from the reference, rad.
+    /// Returns the angle that `counts` mean under conditions that differ from the reference, rad.
     #[must_use]
     pub fn angle_under_rad(&self, counts: f64, departure: &ConditionChange) -> f64 {
         self.correction.angle_rad(&self.spec, self.nominal_travel_rad(counts), departure, 0.0)
     }
 
-    /// The reading at `angle_rad`, 0..wrap, not rounded: the inverse of [`Self::angle_rad`].
+    /// Returns the reading at `angle_rad`, 0..wrap, not rounded: the inverse of [`Self::angle_rad`].
     #[must_use]
     pub fn counts(&self, angle_rad: f64) -> f64 {
         self.counts_under(angle_rad, &ConditionChange::default())
     }
 
-    /// The inverse of [`Self::angle_under_rad`].
+    /// Returns the inverse of [`Self::angle_under_rad`].
     #[must_use]
     pub fn counts_under(&self, angle_rad: f64, departure: &ConditionChange) -> f64 {
         let spec = &self.spec;
@@ -233,7 +233,8 @@ impl SensorModel {
         counts.rem_euclid(spec.wrap_counts)
     }
 
-    /// The datasheet's travel at `angle_rad`, rad: the inverse of [`Correction::angle_rad`] with the approach unknown.
+    /// Returns the datasheet's travel at `angle_rad`, rad: the inverse of [`Correction::angle_rad`] with the approach
+    /// unknown.
     #[must_use]
     pub fn travel_under_rad(&self, angle_rad: f64, departure: &ConditionChange) -> f64 {
         /// The nonlinearity's slope is a few hundredths of the gain, so that each step gains a digit or two.
@@ -253,14 +254,14 @@ impl SensorModel {
         travel
     }
 
-    /// Least and greatest slope of the angle over the range, relative to the gain; 1 and 1 for a straight sensor.
-    /// Readings have one angle, and [`Self::counts`] finds it, where both lie well within 0 .. 2.
+    /// Returns the smallest and largest slope of the angle over the range, relative to the gain; 1 and 1 for a linear
+    /// sensor. If both lie well within 0 to 2, each reading has one angle and [`Self::counts`] finds it.
     #[must_use]
     pub fn slope_over_gain(&self) -> (f64, f64) {
         if self.correction.terms.are_zero() {
             return (1.0, 1.0);
         }
-        /// Chords of the range; the fastest of the functions has five periods in it.
+        /// Number of chords of the range; the fastest of the functions has five periods in it.
         const CHORDS: usize = 64;
         let end_rad = self.spec.half_range_rad;
         let angle = |n: usize| {
@@ -273,7 +274,7 @@ impl SensorModel {
     }
 }
 
-/// `value` modulo `period`, in -period/2 .. period/2.
+/// Returns `value` modulo `period`, in -period/2 .. period/2.
 #[must_use]
 pub fn wrap_symmetric(value: f64, period: f64) -> f64 {
     let half = 0.5 * period;
@@ -283,52 +284,52 @@ pub fn wrap_symmetric(value: f64, period: f64) -> f64 {
 /// The sensors of an arm, base first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ArmSensors {
-    /// One per joint.
+    /// Sensor models, one per joint.
     pub models: Vec<SensorModel>,
-    /// What the corrections' terms are counted from.
+    /// Reference conditions of the corrections' terms.
     pub reference: Conditions,
 }
 
 impl ArmSensors {
-    /// The datasheet's model of every joint.
+    /// Returns the datasheet's model of every joint.
     #[must_use]
     pub fn nominal(robot: &Robot) -> Self {
         Self { models: robot.sensors.iter().map(SensorModel::nominal).collect(), reference: Conditions::default() }
     }
 
-    /// The datasheet's travel of every joint, rad.
+    /// Returns the datasheet's travel of every joint, rad.
     #[must_use]
     pub fn travel_rad(&self, counts: &JointCounts) -> JointAngles {
         JointAngles::from_fn(self.models.len(), |j| self.models[j].nominal_travel_rad(counts[j]))
     }
 
-    /// Whether any sensor is more than a straight line.
+    /// Returns true if any sensor has terms beyond gain and offset.
     #[must_use]
     pub fn have_terms(&self) -> bool {
         self.models.iter().any(|model| !model.correction.terms.are_zero())
     }
 
-    /// Angles by readings that were taken under `conditions`.
+    /// Returns the angles of readings that were taken under `conditions`.
     #[must_use]
     pub fn angles_under(&self, counts: &JointCounts, conditions: &Conditions) -> JointAngles {
         let departure = conditions.departure_from(&self.reference);
         JointAngles::from_fn(self.models.len(), |j| self.models[j].angle_under_rad(counts[j], &departure))
     }
 
-    /// Readings at `angles` under `conditions`.
+    /// Returns the readings at `angles` under `conditions`.
     #[must_use]
     pub fn counts_under(&self, angles: &JointAngles, conditions: &Conditions) -> JointCounts {
         let departure = conditions.departure_from(&self.reference);
         JointCounts::from_fn(self.models.len(), |j| self.models[j].counts_under(angles[j], &departure))
     }
 
-    /// Angles under the reference's conditions.
+    /// Returns the angles under the reference's conditions.
     #[must_use]
     pub fn angles(&self, counts: &JointCounts) -> JointAngles {
         JointAngles::from_fn(self.models.len(), |j| self.models[j].angle_rad(counts[j]))
     }
 
-    /// Readings under the reference's conditions.
+    /// Returns the readings under the reference's conditions.
     #[must_use]
     pub fn counts(&self, angles: &JointAngles) -> JointCounts {
         JointCounts::from_fn(self.models.len(), |j| self.models[j].counts(angles[j]))

@@ -25,7 +25,7 @@ frame!(
     Base
 );
 frame!(
-    /// One link of the arm, as the URDF defines it (origin on its parent joint).
+    /// A link of the arm, as the URDF defines it (origin on its parent joint).
     Link
 );
 frame!(

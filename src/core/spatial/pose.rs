@@ -36,19 +36,21 @@ pub struct Point<A: Frame> {
 }
 
 impl<A: Frame, B: Frame> Pose<A, B> {
-    /// Equal frames.
+    /// Returns the pose of two equal frames.
     #[must_use]
     pub fn identity() -> Self {
         Self::from_isometry(Isometry3::identity())
     }
 
-    /// Names the frames of a raw isometry. The caller vouches for them: used at the edges (files, physics, recursion).
+    /// Returns the pose with named frames of a raw isometry. The caller vouches for the frames: used at the edges
+    /// (files, physics, recursion).
     #[must_use]
     pub fn from_isometry(isometry: Isometry3<f64>) -> Self {
         Self { isometry, frames: PhantomData }
     }
 
-    /// From a position (m) and a quaternion `[w, x, y, z]`, which is normalised here; `None` if it has no direction.
+    /// Builds a pose of a position (m) and a quaternion `[w, x, y, z]`, which it normalises; `None` if it has no
+    /// direction.
     #[must_use]
     pub fn from_position_quaternion_wxyz(position_m: [f64; 3], wxyz: [f64; 4]) -> Option<Self> {
         let quaternion = Quaternion::new(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
@@ -60,26 +62,26 @@ impl<A: Frame, B: Frame> Pose<A, B> {
         Some(Self::from_isometry(Isometry3::from_parts(Translation3::from(Vector3::from(position_m)), rotation)))
     }
 
-    /// From a position (m) and fixed-axis roll, pitch, yaw (rad), the convention of URDF.
+    /// Builds a pose of a position (m) and fixed-axis roll, pitch, yaw (rad), the convention of URDF.
     #[must_use]
     pub fn from_position_rpy(position_m: [f64; 3], rpy_rad: [f64; 3]) -> Self {
         let rotation = UnitQuaternion::from_euler_angles(rpy_rad[0], rpy_rad[1], rpy_rad[2]);
         Self::from_isometry(Isometry3::from_parts(Translation3::from(Vector3::from(position_m)), rotation))
     }
 
-    /// `b_from_a`.
+    /// Returns the inverse, `b_from_a`.
     #[must_use]
     pub fn inverse(&self) -> Pose<B, A> {
         Pose::from_isometry(self.isometry.inverse())
     }
 
-    /// The raw isometry, for the physics engine, the file formats and inner loops.
+    /// Returns the raw isometry, for the physics engine, the file formats and inner loops.
     #[must_use]
     pub fn isometry(&self) -> &Isometry3<f64> {
         &self.isometry
     }
 
-    /// The origin of `B` in `A`.
+    /// Returns the origin of `B` in `A`.
     #[must_use]
     pub fn origin(&self) -> Point<A> {
         Point::from_vector(self.isometry.translation.vector)
@@ -91,14 +93,14 @@ impl<A: Frame, B: Frame> Pose<A, B> {
         self.isometry.rotation
     }
 
-    /// Rotation of `a_from_b` as w, x, y, z, unit.
+    /// Returns the unit quaternion of `a_from_b` as w, x, y, z.
     #[must_use]
     pub fn quaternion_wxyz(&self) -> [f64; 4] {
         let q = self.isometry.rotation;
         [q.w, q.i, q.j, q.k]
     }
 
-    /// `self * exp(xi)`, with `xi` = (translation m, rotation rad) in frame `B`.
+    /// Returns `self * exp(xi)`, with `xi` = (translation m, rotation rad) in frame `B`.
     #[must_use]
     pub fn perturbed(&self, xi: &Vector6<f64>) -> Self {
         Self::from_isometry(self.isometry * exp(xi))
@@ -106,31 +108,31 @@ impl<A: Frame, B: Frame> Pose<A, B> {
 }
 
 impl<A: Frame> Point<A> {
-    /// From coordinates in frame `A`.
+    /// Builds a point of its coordinates in frame `A`, m.
     #[must_use]
     pub fn new(x_m: f64, y_m: f64, z_m: f64) -> Self {
         Self::from_vector(Vector3::new(x_m, y_m, z_m))
     }
 
-    /// From a vector of coordinates; the caller vouches for the frame.
+    /// Builds a point of a vector of coordinates, m; the caller vouches for the frame.
     #[must_use]
     pub fn from_vector(vector_m: Vector3<f64>) -> Self {
         Self { coords: Point3::from(vector_m), frame: PhantomData }
     }
 
-    /// From x, y, z; the caller vouches for the frame.
+    /// Builds a point of x, y, z, m; the caller vouches for the frame.
     #[must_use]
     pub fn from_array(xyz_m: [f64; 3]) -> Self {
         Self::from_vector(Vector3::from(xyz_m))
     }
 
-    /// The coordinates as a raw vector, m.
+    /// Returns the coordinates as a raw vector, m.
     #[must_use]
     pub fn vector(&self) -> Vector3<f64> {
         self.coords.coords
     }
 
-    /// The coordinates x, y, z, m.
+    /// Returns the coordinates x, y, z, m.
     #[must_use]
     pub fn to_array(self) -> [f64; 3] {
         self.coords.coords.into()
@@ -157,8 +159,8 @@ impl<A: Frame, B: Frame> Mul<Point<B>> for Pose<A, B> {
     }
 }
 
-/// The adjoint of a pose: maps a twist (translation, rotation) of frame B to frame A, `exp(Ad xi) = X exp(xi) X^-1`
-/// (Barfoot, eq. 7.46 with the halves exchanged).
+/// Returns the adjoint of a pose, which maps a twist (translation, rotation) of frame B to frame A.
+/// `exp(Ad xi) = X exp(xi) X^-1` (Barfoot, eq. 7.46 with the halves exchanged).
 #[must_use]
 pub fn adjoint(a_from_b: &Isometry3<f64>) -> Matrix6<f64> {
     let rotation = *a_from_b.rotation.to_rotation_matrix().matrix();
@@ -169,7 +171,7 @@ pub fn adjoint(a_from_b: &Isometry3<f64>) -> Matrix6<f64> {
     out
 }
 
-/// The cross-product matrix: `skew(a) * b = a x b`.
+/// Returns the cross-product matrix: `skew(a) * b = a x b`.
 #[must_use]
 #[inline]
 pub fn skew(v: &Vector3<f64>) -> Matrix3<f64> {
@@ -186,7 +188,7 @@ pub fn exp(xi: &Vector6<f64>) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::from(translation), UnitQuaternion::from_scaled_axis(phi))
 }
 
-/// The inverse of [`exp`], for rotations below pi.
+/// Returns the inverse of [`exp`], for rotations below pi.
 #[must_use]
 pub fn log(isometry: &Isometry3<f64>) -> Vector6<f64> {
     let phi = isometry.rotation.scaled_axis();

@@ -1,30 +1,30 @@
-//! How sure a median is: the percentile bootstrap.
+//! Percentile bootstrap: the confidence interval of a median.
 
 use rand::RngExt;
 
 use super::{quantile, stream_rng};
 
-/// Where a figure lies with the asked coverage.
+/// Interval of a figure with the requested coverage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
     /// Lower end, in the unit of the samples.
     pub low: f64,
-    /// Upper end.
+    /// Upper end, in the unit of the samples.
     pub high: f64,
 }
 
-/// Resamples; the interval's ends then hold to about 1 % of its coverage.
+/// Number of resamples; the interval's ends then hold to about 1 % of its coverage.
 const RESAMPLES: usize = 2000;
 
-/// The interval that holds the median of the population that `samples` were drawn from, with probability `coverage`
-/// (0..1), by the percentile bootstrap: medians of samples drawn from the samples. The draws are the same each time.
-/// `None` for no samples.
+/// Returns the interval that holds the population's median with probability `coverage` (0..1), by the percentile
+/// bootstrap. It takes the medians of samples drawn from `samples`. The draws are the same each time. `None` for no
+/// samples.
 #[must_use]
 pub fn median_interval(samples: &[f64], coverage: f64) -> Option<Interval> {
     if samples.is_empty() {
         return None;
     }
-    // Sorted, so that the order of the samples does not matter.
+    // Sorted, so that the order of the samples does not change the result.
     let mut sorted = samples.to_vec();
     sorted.sort_by(f64::total_cmp);
     let mut rng = stream_rng(0, "bootstrap of the median");
@@ -40,7 +40,7 @@ pub fn median_interval(samples: &[f64], coverage: f64) -> Option<Interval> {
     Some(Interval { low: quantile(&medians, tail)?, high: quantile(&medians, 1.0 - tail)? })
 }
 
-/// Of one value or more, which it reorders; in linear time, for thousands of resamples.
+/// Returns the median of one or more values, which it reorders; in linear time, for thousands of resamples.
 fn median(values: &mut [f64]) -> f64 {
     let middle = values.len() / 2;
     let is_even = values.len().is_multiple_of(2);
@@ -75,9 +75,9 @@ mod tests {
         assert_eq!(median_interval(&[], 0.95), None);
     }
 
-    /// For an odd number the resampled median is an order statistic, whose distribution is binomial: P(median of the
-    /// resample is at most the k-th of nine) = P(five or more of nine draws with p = k/9), which is 0.0015, 0.030,
-    /// 0.145, 0.38 for k = 1 to 4. The low end is the first k that passes the tail.
+    /// For an odd number of samples the resampled median is an order statistic, whose distribution is binomial.
+    /// P(median of the resample is at most the k-th of nine) = P(five or more of nine draws with p = k/9). That is
+    /// 0.0015, 0.030, 0.145, 0.38 for k = 1 to 4. The low end is the first k that passes the tail.
     #[test]
     fn ends_are_the_order_statistics_that_the_binomial_gives() {
         let samples: Vec<f64> = (1..=9).map(f64::from).collect();
@@ -90,7 +90,7 @@ mod tests {
         }
     }
 
-    /// 95 % of intervals of normal samples hold the true median; the percentile bootstrap is known to come near.
+    /// About 95 % of intervals of normal samples hold the true median; the percentile bootstrap is known to come near.
     #[test]
     fn intervals_hold_the_true_median_about_as_often_as_asked() {
         let held = (0..400)

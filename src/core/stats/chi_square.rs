@@ -1,8 +1,8 @@
 //! The chi-square distribution: how likely a sum of squares is by chance.
 
-/// Probability that a chi-square variable of `dof` degrees of freedom exceeds `x`: `Q(dof/2, x/2)`, the regularized
-/// incomplete gamma function by its series below `a + 1` and by Lentz's continued fraction above (Press et al.,
-/// Numerical Recipes, 6.2). Not a number where `x` is none; 1 without degrees of freedom.
+/// Returns the probability that a chi-square variable of `dof` degrees of freedom exceeds `x`: `Q(dof/2, x/2)`. It is
+/// the regularized incomplete gamma function: its series below `a + 1` and Lentz's continued fraction above (Press et
+/// al., Numerical Recipes, 6.2). NaN if `x` is NaN; 1 without degrees of freedom.
 #[must_use]
 pub fn chi_square_above(x: f64, dof: usize) -> f64 {
     above(x, dof, ln_gamma_of_half(dof))
@@ -21,10 +21,10 @@ fn above(x: f64, dof: usize, ln_gamma: f64) -> f64 {
     if x < a + 1.0 { 1.0 - scale * series(a, x) } else { scale * continued_fraction(a, x) }
 }
 
-/// What a chi-square variable of `dof` degrees of freedom stays below with probability `p`, 0 < p < 1; by bisection.
+/// Returns the `p`-quantile of a chi-square variable of `dof` degrees of freedom, 0 < p < 1, by bisection.
 #[must_use]
 pub fn chi_square_quantile(p: f64, dof: usize) -> f64 {
-    /// Halvings of the bracket: to the last digits.
+    /// Number of bisections of the bracket: to the last digits.
     const STEPS: usize = 80;
     if dof == 0 {
         return 0.0;
@@ -42,7 +42,7 @@ pub fn chi_square_quantile(p: f64, dof: usize) -> f64 {
     0.5 * (low + high)
 }
 
-/// `ln Gamma(dof / 2)`, by the recurrence from 1 or 1/2.
+/// Returns `ln Gamma(dof / 2)`, by the recurrence from 1 or 1/2.
 pub(super) fn ln_gamma_of_half(dof: usize) -> f64 {
     let (mut at, mut value) = if dof.is_multiple_of(2) { (1.0, 0.0) } else { (0.5, 0.5 * std::f64::consts::PI.ln()) };
     while at < 0.5 * dof as f64 {

@@ -1,8 +1,8 @@
-//! Statistics shared by truth and belief.
+//! Statistics shared by simulator and estimator.
 //!
-//! Named random streams (seed = hash of master seed and name, so that adding a sensor does not shift the others) and
-//! the summaries of samples that reports use, with the bootstrap's interval of a median, that of a
-//! rate that is looked at again and again, and Wilcoxon's of how far pairs moved.
+//! Named random streams: the seed is a hash of master seed and name, so that adding a sensor does not shift the others.
+//! Summaries of samples for reports, the bootstrap's interval of a median, the confidence sequence of a rate, and
+//! Wilcoxon's interval of the shift of pairs.
 
 mod bootstrap;
 mod chi_square;

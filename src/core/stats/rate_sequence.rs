@@ -1,24 +1,24 @@
-//! The rate of an event over runs, with an interval that holds however often one looks.
+//! Rate of an event over runs, with an interval that holds however often one looks.
 //!
-//! A confidence sequence: the chance that the interval misses the true rate at any time at all is at most one minus its
-//! level, so that a campaign may stop as soon as the interval is narrow enough. By Ville's inequality for the ratio of
-//! the mixture of all rates under Jeffreys' prior, Beta(1/2, 1/2), to the likelihood of one rate (Robbins 1970; the
-//! mixture's predictions are those of Krichevsky and Trofimov 1981).
+//! A confidence sequence: the chance that the interval ever misses the true rate is at most one minus its level. So a
+//! campaign may stop as soon as the interval is narrow enough. It follows from Ville's inequality for the ratio of the
+//! mixture's likelihood to the likelihood of one rate (Robbins 1970). The mixture is that of all rates under Jeffreys'
+//! prior, Beta(1/2, 1/2); its predictions are those of Krichevsky and Trofimov 1981.
 
 /// Counts of runs with and without an event.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RateSequence {
     n_events: u64,
     n_runs: u64,
-    /// Log of the mixture's likelihood of what was counted.
+    /// Log of the mixture's likelihood of the counts.
     ln_mixture: f64,
 }
 
-/// Bisections of an interval's end: to the last bits.
+/// Number of bisections of an interval's end: to the last bits.
 const BISECTIONS: usize = 60;
 
 impl RateSequence {
-    /// After so many runs, so many of them with the event; their order does not matter.
+    /// Returns the sequence after `n_runs` runs, `n_events` of them with the event; their order does not matter.
     #[must_use]
     pub fn of_counts(n_events: u64, n_runs: u64) -> Self {
         let mut sequence = Self::default();
@@ -33,24 +33,24 @@ impl RateSequence {
         self.n_events += 1;
     }
 
-    /// Counts one more run that had it not.
+    /// Counts one more run without the event.
     pub fn add_without(&mut self) {
         self.add(self.n_runs - self.n_events);
     }
 
-    /// One more of which there were so many.
+    /// Counts one more run, of whose outcome there were `n_alike` before.
     fn add(&mut self, n_alike: u64) {
         self.ln_mixture += ((n_alike as f64 + 0.5) / (self.n_runs as f64 + 1.0)).ln();
         self.n_runs += 1;
     }
 
-    /// Runs with the event, and all runs.
+    /// Returns the number of runs with the event, and of all runs.
     #[must_use]
     pub fn counts(&self) -> [u64; 2] {
         [self.n_events, self.n_runs]
     }
 
-    /// The interval of the rate at `level`, 0.95 for 95 %.
+    /// Returns the interval of the rate at `level`, 0.95 for 95 %.
     #[must_use]
     pub fn interval(&self, level: f64) -> [f64; 2] {
         let most = -(1.0 - level).ln();
@@ -81,8 +81,8 @@ mod tests {
     use super::*;
     use crate::stats::stream_rng;
 
-    /// Looks after each of 2000 runs, 300 times over: at most 5 % of sequences may ever miss the truth. Equal counts
-    /// have one interval.
+    /// Looks after each of 2000 runs, 300 times over: at most 5 % of sequences may ever miss the truth. Sequences with
+    /// equal counts share one interval.
     #[test]
     fn the_interval_holds_however_often_one_looks() {
         let mut intervals: HashMap<[u64; 2], [f64; 2]> = HashMap::new();
@@ -107,8 +107,7 @@ mod tests {
         }
     }
 
-    /// Against the closed form: the mixture's likelihood of s events in n runs is
-    /// B(s + 1/2, n - s + 1/2) / B(1/2, 1/2).
+    /// The closed form of the mixture's likelihood of s events in n runs is B(s + 1/2, n - s + 1/2) / B(1/2, 1/2).
     #[test]
     fn its_ends_are_where_the_ratio_says() {
         // 1 event in 3 runs: B(1.5, 2.5) / B(0.5, 0.5) = (pi / 16) / pi.

@@ -3,7 +3,7 @@
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// The generator of the stream `name` under `master_seed`; the same on every platform.
+/// Returns the generator of the stream `name` under `master_seed`; the same on every platform.
 #[must_use]
 pub fn stream_rng(master_seed: u64, name: &str) -> ChaCha8Rng {
     let mut hasher = blake3::Hasher::new();

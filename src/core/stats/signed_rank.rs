@@ -1,28 +1,28 @@
-//! How far pairs moved, beyond doubt: the Hodges-Lehmann estimate and Wilcoxon's interval about it.
+//! Shift of paired samples: the Hodges-Lehmann estimate and Wilcoxon's interval about it.
 //!
-//! Both are order statistics of the Walsh averages, the means of all pairs of samples with each one itself (Hodges and
-//! Lehmann 1963; Hollander, Wolfe and Chicken, Nonparametric Statistical Methods, 3.2 and 3.3). For differences of
-//! pairs whose two sides are exchangeable they are symmetric about zero, so that the interval holds exactly, whatever
-//! else their distribution is. Of normal samples the median needs 57 % more for the same certainty.
+//! Both are order statistics of the Walsh averages: the means of all pairs of samples, including each sample paired
+//! with itself. Sources: Hodges and Lehmann 1963; Hollander, Wolfe and Chicken, Nonparametric Statistical Methods, 3.2
+//! and 3.3. Differences of pairs whose two sides are exchangeable are symmetric about zero. So the interval holds
+//! exactly for any such distribution. For normal samples the median needs 57 % more samples for the same precision.
 
 use super::Interval;
 
-/// Where samples lie.
+/// Location of samples, with its interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Location {
     /// The median of the Walsh averages, in the unit of the samples.
     pub estimate: f64,
-    /// About it, in the same unit.
+    /// Interval about the estimate, in the same unit.
     pub interval: Interval,
 }
 
-/// Beyond so many samples the rank sum is taken as normal, with the correction for continuity: its tail of 0.001 is
-/// then right to 1 %.
+/// Largest number of samples with an exact rank sum. Beyond it the rank sum is taken as normal with continuity
+/// correction: its tail of 0.001 is then right to 1 %.
 const EXACT_UP_TO: usize = 120;
 
-/// Location of `samples` with an interval that misses on either side with a chance of at most `tail`. With so few
-/// samples that no interval does (2^-n above `tail`), it goes from the least to the largest. `None` for no samples, or
-/// where any is not finite.
+/// Returns the location of `samples` with an interval that misses on either side with a chance of at most `tail`. If
+/// the samples are too few for such an interval (2^-n above `tail`), it extends from the smallest to the largest.
+/// `None` for no samples, or if any is not finite.
 #[must_use]
 pub fn signed_rank_location(samples: &[f64], tail: f64) -> Option<Location> {
     if samples.is_empty() || samples.iter().any(|value| !value.is_finite()) {
@@ -39,19 +39,19 @@ pub fn signed_rank_location(samples: &[f64], tail: f64) -> Option<Location> {
     })
 }
 
-/// The `rank`-th Walsh average, from 1, of ascending samples: the least number that so many do not exceed, by bisection
-/// over the bits of numbers.
+/// Returns the `rank`-th Walsh average, from 1, of ascending samples. It is the smallest number that at least `rank`
+/// averages do not exceed, by bisection over the bits of numbers.
 fn walsh_average(sorted: &[f64], rank: usize) -> f64 {
     let (mut low, mut high) = (ordered(sorted[0]), ordered(sorted[sorted.len() - 1]));
     while low < high {
-        // Rounded down, on either side of zero.
+        // The middle is rounded down, on either side of zero.
         let middle = (low & high) + ((low ^ high) >> 1);
         if n_up_to(sorted, of_ordered(middle)) >= rank { high = middle } else { low = middle + 1 }
     }
     of_ordered(low)
 }
 
-/// Walsh averages up to `limit`.
+/// Returns the number of Walsh averages up to `limit`.
 fn n_up_to(sorted: &[f64], limit: f64) -> usize {
     let mut end = sorted.len();
     let mut n = 0;
@@ -67,7 +67,7 @@ fn n_up_to(sorted: &[f64], limit: f64) -> usize {
     n
 }
 
-/// Integers in the order of the numbers.
+/// Returns an integer that has the order of the numbers.
 fn ordered(value: f64) -> i64 {
     let bits = (value + 0.0).to_bits() as i64;
     if bits < 0 { bits ^ i64::MAX } else { bits }
@@ -78,7 +78,7 @@ fn of_ordered(key: i64) -> f64 {
     f64::from_bits(bits as u64)
 }
 
-/// The largest rank sum that is at most so likely not to be exceeded; 0 where there is none.
+/// Returns the largest rank sum that is not exceeded with a chance of at most `tail`; 0 if there is none.
 fn ranks_beyond(n: usize, tail: f64) -> usize {
     if n > EXACT_UP_TO {
         let n = n as f64;
@@ -102,7 +102,7 @@ fn ranks_beyond(n: usize, tail: f64) -> usize {
     within.count().saturating_sub(1)
 }
 
-/// What a normal variable exceeds with the chance `tail`, by bisection.
+/// Returns the number that a standard normal variable exceeds with the chance `tail`, by bisection.
 fn normal_quantile_above(tail: f64) -> f64 {
     let above = |x: f64| if x > 0.0 { 0.5 * super::chi_square_above(x * x, 1) } else { 0.5 };
     let (mut low, mut high) = (0.0, 40.0);
@@ -121,7 +121,7 @@ mod tests {
     use super::*;
     use crate::stats::{quantile, stream_rng};
 
-    /// All Walsh averages, ascending, one by one.
+    /// Returns all Walsh averages, ascending, one by one.
     fn averages(samples: &[f64]) -> Vec<f64> {
         let pairs = samples.iter().enumerate().flat_map(|(k, a)| samples[k..].iter().map(move |b| 0.5 * (a + b)));
         let mut all: Vec<f64> = pairs.collect();
@@ -172,8 +172,8 @@ mod tests {
         assert_eq!((few.low, few.high), (-1.0, 3.0), "three samples say no more");
     }
 
-    /// Differences that are symmetric with heavy tails: each end misses the truth as often as asked, and is nearer to
-    /// it than the median's would be.
+    /// Differences that are symmetric with heavy tails: each end misses the truth as often as requested, and is nearer
+    /// to it than the median's would be.
     #[test]
     fn each_end_misses_as_seldom_as_asked() {
         let (n_trials, tail) = (2000, 0.05);
@@ -186,7 +186,7 @@ mod tests {
             missed[0] += u32::from(interval.low > 0.7);
             missed[1] += u32::from(interval.high < 0.7);
         }
-        // 100 are expected, 9.7 of one sigma.
+        // Expected are 100 misses with a standard deviation of 9.7.
         assert!(missed.iter().all(|n| (60..=130).contains(n)), "{missed:?} of {n_trials}");
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::stats::chi_square::ln_gamma_of_half;
 
-/// The distribution with so many degrees of freedom.
+/// Student's t distribution with `dof` degrees of freedom.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StudentT {
     dof: usize,
@@ -11,15 +11,15 @@ pub struct StudentT {
 }
 
 impl StudentT {
-    /// A sum over the degrees of freedom: not for each value again.
+    /// Computes `ln_beta` once: it is a sum over the degrees of freedom.
     #[must_use]
     pub fn new(dof: usize) -> Self {
         Self { dof, ln_beta: ln_gamma_of_half(dof) + ln_gamma_of_half(1) - ln_gamma_of_half(dof + 1) }
     }
 
-    /// Probability that a t variable exceeds `t`: half of `I_x(dof/2, 1/2)`, `x = dof / (dof + t^2)`, for `t > 0`; the
-    /// regularized incomplete beta function by its continued fraction (Press et al., Numerical Recipes, 6.4). Not a
-    /// number without degrees of freedom, or where `t` is none.
+    /// Returns the probability that a t variable exceeds `t`. For `t > 0` it is half of `I_x(dof/2, 1/2)`,
+    /// `x = dof / (dof + t^2)`: the regularized incomplete beta function by its continued fraction (Press et al.,
+    /// Numerical Recipes, 6.4). NaN without degrees of freedom, or if `t` is NaN.
     #[must_use]
     pub fn above(&self, t: f64) -> f64 {
         if self.dof == 0 || t.is_nan() {
@@ -30,7 +30,7 @@ impl StudentT {
         if t > 0.0 { side } else { 1.0 - side }
     }
 
-    /// `I_x(dof/2, 1/2)`.
+    /// Returns `I_x(dof/2, 1/2)`.
     fn incomplete_beta_half(&self, x: f64) -> f64 {
         let (a, b) = (0.5 * self.dof as f64, 0.5);
         if x <= 0.0 || x >= 1.0 {
@@ -45,7 +45,7 @@ impl StudentT {
     }
 }
 
-/// Of `I_x(a, b)`, by Lentz's method.
+/// Returns the continued fraction of `I_x(a, b)`, by Lentz's method.
 fn continued_fraction(a: f64, b: f64, x: f64) -> f64 {
     const TINY: f64 = 1e-300;
     const MAX_TERMS: usize = 10_000;

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 pub struct Summary {
     /// Number of samples, one or more.
     pub n: usize,
-    /// Mean of the middle two for an even number.
+    /// Median; the mean of the middle two for an even number.
     pub median: f64,
     /// 95th percentile, interpolated.
     pub p95: f64,
@@ -17,7 +17,7 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// `None` for no samples.
+    /// Returns the summary of `samples`; `None` if there are none.
     #[must_use]
     pub fn of(samples: &[f64]) -> Option<Self> {
         let max = samples.iter().copied().reduce(f64::max)?;
@@ -25,7 +25,7 @@ impl Summary {
     }
 }
 
-/// The `q`-quantile (0..=1) by linear interpolation between order statistics; `None` for no samples.
+/// Returns the `q`-quantile (0..=1) by linear interpolation between order statistics; `None` for no samples.
 #[must_use]
 pub fn quantile(samples: &[f64], q: f64) -> Option<f64> {
     let mut sorted = samples.to_vec();

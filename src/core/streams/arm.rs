@@ -12,20 +12,20 @@ pub trait Sink {
     /// When the message cannot be kept (disk full, closed stream).
     fn record(&mut self, log_time: Stamp, message: &Message) -> Result<(), SinkError>;
 
-    /// Keeps messages that are not there yet, before all that is recorded after this call. A sink that does not wait
-    /// holds those back.
+    /// Keeps messages that are not available yet, before everything recorded after this call. A sink that does not wait
+    /// holds the later messages back.
     ///
     /// # Errors
-    /// As [`Self::record`], and where the messages do not come.
+    /// The errors of [`Self::record`], and [`LateError`](super::LateError) if the work for the messages failed.
     fn record_late(&mut self, log_time: Stamp, messages: LateMessages) -> Result<(), SinkError> {
         messages.wait()?.iter().try_for_each(|message| self.record(log_time, message))
     }
 }
 
-/// Why a sink did not keep a message, free of any file format.
+/// Error of a sink that did not keep a message, free of any file format.
 pub type SinkError = Box<dyn std::error::Error + Send + Sync>;
 
-/// Why an arm did not carry out a command.
+/// Error of a command that an arm did not carry out.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum ArmError {
@@ -39,7 +39,7 @@ pub enum ArmError {
     NotFinite { at_s: f64 },
     #[error("fault number {number} cannot be brought about: the arm knows {known}")]
     NoSuchFault { number: usize, known: usize },
-    /// The arm, or what guards it, has stopped; it takes no further set-points.
+    /// The arm, or its guard, has stopped; the arm takes no further set-points.
     #[error("the arm was stopped: {why}")]
     Stopped { why: String, code: Code },
     #[error("the connection to the arm: {0}")]
@@ -80,11 +80,11 @@ pub trait Arm {
     /// Length of a control period, s.
     fn period_s(&self) -> f64;
 
-    /// Lets at least `seconds` pass with the arm at rest; an arm may send fewer messages meanwhile than [`Self::step`]
+    /// Lets at least `seconds` pass with the arm at rest. Meanwhile an arm may send fewer messages than [`Self::step`]
     /// does.
     ///
     /// # Errors
-    /// As [`Self::step`].
+    /// The errors of [`Self::step`].
     fn idle(&mut self, seconds: f64, sink: &mut dyn Sink) -> Result<(), ArmError> {
         let until = self.now().plus_s(seconds);
         while self.now() < until {
@@ -93,8 +93,8 @@ pub trait Arm {
         Ok(())
     }
 
-    /// Commands the opening of the jaws, from 0 (closed) to 1 (open). An arm without jaws returns an error, or else a
-    /// script could not tell a touch from nothing.
+    /// Commands the opening of the jaws, from 0 (closed) to 1 (open). An arm without jaws returns an error; otherwise a
+    /// script could not distinguish a touch from no touch.
     ///
     /// # Errors
     /// [`ArmError::NoGripper`], [`ArmError::Opening`].

@@ -1,39 +1,39 @@
-//! Messages of work that goes on beside the loop, such as a search for tags in an image.
+//! Messages of work that runs parallel to the loop, such as a search for tags in an image.
 
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
 use super::message::Message;
 
-/// Why the work came to nothing, for people.
+/// Reason why the work failed, for people.
 pub type LateError = Box<dyn std::error::Error + Send + Sync>;
 
-/// Messages that come when the work for them is done, in one go.
+/// Messages that arrive all at once when the work for them is done.
 #[derive(Debug)]
 pub struct LateMessages(Receiver<Result<Vec<Message>, LateError>>);
 
-/// Where the work leaves its messages.
+/// Sender through which the work delivers its messages.
 pub type LateSender = std::sync::mpsc::Sender<Result<Vec<Message>, LateError>>;
 
 impl LateMessages {
-    /// Both ends.
+    /// Returns both ends of the channel.
     #[must_use]
     pub fn pair() -> (LateSender, Self) {
         let (sender, receiver) = channel();
         (sender, Self(receiver))
     }
 
-    /// Waits for them.
+    /// Waits for the messages and returns them.
     ///
     /// # Errors
-    /// Why there are none.
+    /// The reason why there are none.
     pub fn wait(&self) -> Result<Vec<Message>, LateError> {
         self.0.recv().unwrap_or_else(|_| Err(Self::abandoned()))
     }
 
-    /// Without waiting; `None` where the work goes on.
+    /// Returns the messages without waiting; `None` while the work goes on.
     ///
     /// # Errors
-    /// Why there are none.
+    /// The reason why there are none.
     pub fn take_finished(&self) -> Option<Result<Vec<Message>, LateError>> {
         match self.0.try_recv() {
             Ok(messages) => Some(messages),

@@ -11,11 +11,11 @@ pub enum Message {
     JointSensors(JointSensorSample),
     /// Set-points sent to the arm's controller.
     JointCommand(JointCommand),
-    /// The same joints in radians, under the belief of that moment.
+    /// Joint angles in radians, under the estimate of that moment.
     JointStates(JointStateBelief),
     /// AprilTags seen in one camera image.
     Detections(TagDetections),
-    /// What the detector saw in one camera image and did not take for a tag.
+    /// Candidates in one camera image that the detector rejected.
     Rejects(DetectionRejects),
     /// One camera image, compressed.
     Image(CameraImage),
@@ -25,17 +25,17 @@ pub enum Message {
     Pressure(PressureSample),
     /// The vehicle's attitude sensor.
     Attitude(Attitude),
-    /// How far the gripper is open, as measured.
+    /// Measured opening of the gripper.
     Gripper(GripperSample),
-    /// How far the gripper is told to open.
+    /// Commanded opening of the gripper.
     GripperCommand(GripperCommand),
-    /// What the arm is calibrated for.
+    /// Task that the arm is calibrated for.
     Task(ReachTask),
-    /// Where the tags are, where the vehicle says it and not the robot's file.
+    /// Poses of the tags, if the vehicle states them instead of the robot's file.
     Survey(RecordedSurvey),
-    /// The tool against a surveyed surface.
+    /// Contact of the tool with a surveyed surface.
     Touch(ToolTouch),
-    /// A span of the recording that means something.
+    /// A span of the recording with a meaning.
     Mark(Mark),
     /// A line of text for people.
     Log(LogLine),
@@ -46,7 +46,7 @@ pub enum Message {
 pub struct JointSensorSample {
     /// Sender's clock.
     pub stamp: Stamp,
-    /// One per joint, base first.
+    /// Raw readings, one per joint, base first.
     pub counts: JointCounts,
 }
 
@@ -55,54 +55,54 @@ pub struct JointSensorSample {
 pub struct JointCommand {
     /// Sender's clock.
     pub stamp: Stamp,
-    /// One per joint, base first.
+    /// Raw set-points, one per joint, base first.
     pub counts: JointCounts,
 }
 
-/// Angles of all joints under the belief of the moment.
+/// Angles of all joints under the estimate of the moment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointStateBelief {
     /// Sender's clock.
     pub stamp: Stamp,
-    /// One per joint, base first, rad.
+    /// Angles, one per joint, base first, rad.
     pub angles: JointAngles,
 }
 
-/// All tags of one image.
+/// All tags detected in one image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TagDetections {
     /// Time of the exposure.
     pub stamp: Stamp,
-    /// In the detector's order; empty where it saw none.
+    /// Tags in the detector's order; empty if it detected none.
     pub tags: Vec<TagDetection>,
 }
 
-/// One tag in one image. Corners in raw (distorted) pixels: bottom left, bottom right, top right, top left as printed,
-/// that is tag-frame (-s/2, -s/2), (s/2, -s/2), (s/2, s/2), (-s/2, s/2).
+/// Detection of one tag in one image. Corners are in raw (distorted) pixels: bottom left, bottom right, top right, top
+/// left as printed. In the tag's frame they are (-s/2, -s/2), (s/2, -s/2), (s/2, s/2), (-s/2, s/2).
 #[derive(Clone, Debug, PartialEq)]
 pub struct TagDetection {
     /// Number in the family of the arm's tags.
     pub id: u32,
-    /// Order and frame: see above.
+    /// Corners, px; [`TagDetection`] gives their order and frame.
     pub corners_px: [[f64; 2]; 4],
-    /// The detector's decision margin, larger is surer; as apriltag gives it.
+    /// Decision margin of the detector, as apriltag gives it; a larger one is more certain.
     pub decision_margin: f64,
 }
 
-/// Why a detector did not believe what it saw.
+/// Reason why a detector rejected a candidate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum RejectReason {
     /// More bits are wrong than the code may have corrected.
     WrongBits,
-    /// Black and white are too near each other.
+    /// The grey levels of black and white are too similar.
     LowContrast,
     /// The sides are too short in the image.
     TooSmall,
-    /// The image about the edges is not that of a square tag.
+    /// The image near the edges is not that of a square tag.
     PoorEdges,
-    /// The same id at two places of one image: neither can be trusted.
+    /// The same id appears twice in one image, so neither detection can be trusted.
     SeenTwice,
-    /// A corner has no bearing in the lens model, or lies outside of the image.
+    /// A corner has no bearing in the lens model, or lies outside the image.
     OutOfView,
     /// No tag with this id belongs to the vehicle or the arm.
     UnknownId,
@@ -120,7 +120,7 @@ impl RejectReason {
         Self::UnknownId,
     ];
 
-    /// As recordings write it.
+    /// Returns the name that recordings use.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -135,23 +135,23 @@ impl RejectReason {
     }
 }
 
-/// Something like a tag that was not taken for one.
+/// A candidate that resembles a tag and was rejected.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DetectionReject {
-    /// As decoded, right or wrong.
+    /// Decoded id, right or wrong.
     pub id: u32,
-    /// As a [`TagDetection`]'s.
+    /// Corners, px, in the order of [`TagDetection`].
     pub corners_px: [[f64; 2]; 4],
-    /// The first check that it failed.
+    /// First check that the candidate failed.
     pub reason: RejectReason,
 }
 
-/// What was rejected in one image.
+/// Rejected candidates of one image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DetectionRejects {
     /// Time of the exposure.
     pub stamp: Stamp,
-    /// In the detector's order.
+    /// Candidates in the detector's order.
     pub rejects: Vec<DetectionReject>,
 }
 
@@ -164,36 +164,36 @@ pub struct CameraImage {
     pub jpeg: Vec<u8>,
 }
 
-/// What a thermometer measures.
+/// Quantity that a thermometer measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Thermometer {
     /// Hydraulic oil of the arm.
     Oil,
-    /// Sea water about the vehicle.
+    /// Sea water around the vehicle.
     Water,
 }
 
-/// One reading of a thermometer.
+/// A reading of a thermometer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TemperatureSample {
     /// Sender's clock.
     pub stamp: Stamp,
-    /// What is measured.
+    /// The measured medium.
     pub thermometer: Thermometer,
     /// Degrees Celsius.
     pub temperature_c: f64,
-    /// Noise of a reading; 0 where it is unknown.
+    /// Variance of a reading; 0 if it is unknown.
     pub variance_c2: f64,
 }
 
-/// One reading of the depth sensor.
+/// A reading of the depth sensor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PressureSample {
     /// Sender's clock.
     pub stamp: Stamp,
     /// Absolute pressure.
     pub pressure_pa: f64,
-    /// Noise of a reading; 0 where it is unknown.
+    /// Variance of a reading; 0 if it is unknown.
     pub variance_pa2: f64,
 }
 
@@ -204,9 +204,9 @@ pub struct Attitude {
     pub stamp: Stamp,
     /// `world_from_vehicle`, unit.
     pub quaternion_wxyz: [f64; 4],
-    /// In the vehicle's axes.
+    /// Angular velocity in the vehicle's axes.
     pub angular_velocity_rad_s: [f64; 3],
-    /// In the vehicle's axes, +g upwards at rest.
+    /// Specific force in the vehicle's axes, +g upwards at rest.
     pub specific_force_m_s2: [f64; 3],
 }
 
@@ -215,44 +215,45 @@ pub struct Attitude {
 pub struct GripperSample {
     /// Sender's clock.
     pub stamp: Stamp,
-    /// Measured.
+    /// Measured gap.
     pub opening_m: f64,
 }
 
-/// The gap between the jaws that they are driven to.
+/// The commanded gap between the jaws.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GripperCommand {
     /// Sender's clock.
     pub stamp: Stamp,
-    /// Set-point.
+    /// Commanded gap.
     pub opening_m: f64,
 }
 
-/// Positions that the tool is to reach, in the base frame, and how near counts as a hit.
+/// Positions that the tool is to reach, in the base frame, and the distance that counts as a hit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReachTask {
     /// Sender's clock.
     pub stamp: Stamp,
-    /// In the order by which marks number them.
+    /// Targets in the order in which marks number them, base frame, m.
     pub targets_m: Vec<[f64; 3]>,
     /// Largest distance that counts as a hit.
     pub tolerance_m: f64,
 }
 
-/// Tags as surveyed before the dive: what belief takes for known.
+/// Tags as surveyed before the dive, which the estimator takes as known.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RecordedSurvey {
     /// Sender's clock.
     pub stamp: Stamp,
-    /// The link that carries the tags before a camera that stands still, in whose frame they are; `None`: the base's.
+    /// The link that carries the tags in front of a stationary camera; the tags are in its frame. `None`: the base's
+    /// link.
     pub link: Option<String>,
-    /// The tag beside the base; one of `tags`.
+    /// Id of the tag next to the base; one of `tags`.
     pub base_tag: u32,
-    /// Each id once.
+    /// Surveyed tags, each id once.
     pub tags: Vec<RecordedTag>,
 }
 
-/// One tag of a survey: its pose in the survey's frame as numbers, that they come out of a file as they went in.
+/// A surveyed tag: its pose in the survey's frame as plain numbers, so that a file returns exactly what it was given.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RecordedTag {
     /// Number in the family of the arm's tags.
@@ -261,119 +262,121 @@ pub struct RecordedTag {
     pub size_m: f64,
     /// Origin of the tag in the survey's frame.
     pub position_m: [f64; 3],
-    /// Of the tag's axes in that frame, unit.
+    /// Orientation of the tag's axes in the survey's frame, unit quaternion.
     pub quaternion_wxyz: [f64; 4],
-    /// Infinite, as the rotation's, where only the tag's size is known; the pose is then the identity.
+    /// Standard deviation per axis. Infinite, like the rotation's, if only the tag's size is known; the pose is then
+    /// the identity.
     pub position_std_m: f64,
-    /// One sigma per axis, as the position's.
+    /// Standard deviation of the rotation, per axis like the position's.
     pub rotation_std_rad: f64,
 }
 
-/// The tool's tip rested against a surveyed plane, felt by the arm or its pilot: `normal . (tool - point) = tip_radius`
-/// within one sigma, by the joint sensors' readings from `stamp` on for `duration_s`.
+/// Contact of the tool's tip with a surveyed plane, felt by the arm or its pilot.
+/// `normal . (tool - point) = tip_radius` holds within one standard deviation, by the joint sensors' readings from
+/// `stamp` on for `duration_s`.
 ///
-/// A tip in a socket is three of these with normals at right angles and no radius.
+/// A tip in a socket is three contacts with normals at right angles and no radius.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ToolTouch {
-    /// When the tip began to rest there.
+    /// Start of the contact.
     pub stamp: Stamp,
-    /// How long it did.
+    /// Duration of the contact.
     pub duration_s: f64,
     /// Name of the surface, for people.
     pub surface: String,
     /// Any point of the plane, base frame.
     pub point_m: [f64; 3],
-    /// Out of the surface, unit length, base frame.
+    /// Unit normal out of the surface, base frame.
     pub normal: [f64; 3],
-    /// Of a ball about the tool point; zero for a tip that is the tool point.
+    /// Radius of a ball about the tool point; zero if the tip is the tool point.
     pub tip_radius_m: f64,
-    /// One sigma along the normal: the surface's survey and what is felt of it.
+    /// Standard deviation along the normal: the surface's survey and the sense of contact.
     pub std_m: f64,
 }
 
-/// Which share of the data a captured view belongs to.
+/// Share of the data that a captured view belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum CaptureSet {
-    /// The fit uses it.
+    /// The fit uses the view.
     Fit,
-    /// The fit never sees it; the verdict rests on it.
+    /// The fit never sees the view; the verdict depends on it.
     HeldOut,
 }
 
-/// What a calibration starts from.
+/// Prior that a calibration starts from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum PriorSource {
     /// The datasheet.
     Fresh,
-    /// The last accepted calibration of the same recording; what the new views do not determine keeps its value.
+    /// The last accepted calibration of the same recording; it keeps the values that the new views do not determine.
     Warm,
 }
 
-/// Under which sensors a target was reached for.
+/// Sensor models under which the tool went to a target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ReachAttempt {
-    /// The datasheet's.
+    /// The datasheet's sensor models.
     Before,
-    /// Calibrated ones.
+    /// Calibrated sensor models.
     After,
 }
 
-/// What the arm is doing, for people who watch.
+/// Activity of the arm, for people who watch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Phase {
-    /// Plans paths and views.
+    /// Planning of paths and views.
     Plan,
-    /// On the way.
+    /// Motion along a path.
     Move,
-    /// Waits for the arm to come to rest.
+    /// Wait for the arm to come to rest.
     Settle,
-    /// Records a view at rest.
+    /// Recording of a view at rest.
     Capture,
-    /// Estimates the sensors.
+    /// Estimation of the sensors.
     Calibrate,
-    /// Goes to a target of the task.
+    /// Motion to a target of the task.
     Reach,
-    /// The arm rests while the world goes on.
+    /// Rest of the arm while the world goes on.
     Wait,
-    /// The script has ended.
+    /// End of the script.
     Done,
 }
 
-/// What a span of a recording was for.
+/// Purpose of a span of a recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MarkKind {
     /// The arm stood still over the mark's span: detections and readings in it belong together.
     Capture {
-        /// Whether the fit may use the view.
+        /// Set that the view belongs to: fitted or held out.
         set: CaptureSet,
         /// Number of the view in the recording, from 0.
         pose_idx: u32,
     },
-    /// The arm stood still, and since the first such view of `joint_idx` no other joint was told to move: what the
-    /// camera's turn against the readings says about the sensor's scale.
+    /// The arm stood still; since the first such view of `joint_idx` no other joint was commanded to move. The camera's
+    /// rotation against the readings then measures the sensor's scale.
     Identify {
         /// Index of the joint, base first.
         joint_idx: u32,
     },
-    /// The joint stood at one of its nominal end stops, where the drawing has this angle.
+    /// The joint stood at one of its nominal end stops, whose nominal angle is given.
     Stop {
         /// Index of the joint, base first.
         joint_idx: u32,
         /// Nominal angle of the stop.
         angle_rad: f64,
     },
-    /// Somebody declared that this joint, or its sensor, has failed; it holds for the whole recording.
+    /// Somebody declared that this joint or its sensor has failed; it applies to the whole recording.
     Failed(FailedJoint),
     /// A calibration from the views captured within the span.
     Calibrate(PriorSource),
     /// The arm came to rest for a target.
     Reach {
-        /// Under which sensors.
+        /// Sensor models under which the arm moved.
         attempt: ReachAttempt,
         /// Number of the task's target, from 0.
         target_idx: u32,
     },
-    /// The jaws closed on a target, from wide open.
+    /// The jaws closed on a target, starting wide open.
     Touch {
         /// Number of the task's target, from 0.
         target_idx: u32,
@@ -385,18 +388,18 @@ pub enum MarkKind {
 /// A span `start..=end` by the joint sensors' clock.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mark {
-    /// First instant.
+    /// First instant of the span.
     pub start: Stamp,
-    /// Last instant, not before `start`.
+    /// Last instant of the span, not before `start`.
     pub end: Stamp,
-    /// What was done in it.
+    /// Purpose of the span.
     pub kind: MarkKind,
 }
 
 /// Severity of a log line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum LogLevel {
-    /// Of use to developers alone.
+    /// Useful to developers only.
     Debug,
     /// The normal course of things.
     Info,
@@ -413,7 +416,7 @@ pub struct LogLine {
     pub stamp: Stamp,
     /// Severity.
     pub level: LogLevel,
-    /// Part of the program that says it.
+    /// Part of the program that writes the line.
     pub name: String,
     /// The message itself.
     pub text: String,

@@ -1,4 +1,4 @@
-//! A survey of tags on its way into a recording and out of it.
+//! Conversion of a survey of tags to and from a recording's message.
 
 use super::message::{RecordedSurvey, RecordedTag};
 use crate::kinematics::Attachment;
@@ -7,11 +7,11 @@ use crate::spatial::{Base, Pose, Tag};
 use crate::time::Stamp;
 
 impl RecordedSurvey {
-    /// The message of `survey`, which has tags, at `stamp`, with the link that carries them, if one does; unknown poses
-    /// become the identity.
+    /// Returns the message of `survey`, which has tags, at `stamp`. `link` carries the tags, if a link does. Unknown
+    /// poses become the identity.
     #[must_use]
     pub fn new(stamp: Stamp, survey: &TagSurvey, link: Option<&str>) -> Self {
-        // Of an unknown tag's place not even the drawing goes into a recording: nobody can use it by mistake.
+        // Not even the nominal pose of an unknown tag is recorded, so that nobody can use it by mistake.
         let unknown = Pose::<Base, Tag>::from_position_rpy([0.0; 3], [0.0; 3]);
         let tag = |tag: &SurveyedTag| {
             let pose = if tag.is_known() { &tag.base_from_tag } else { &unknown };
@@ -32,7 +32,8 @@ impl RecordedSurvey {
         }
     }
 
-    /// The survey around `robot` that it holds; a tag without a direction, which no recording gives back, is left out.
+    /// Returns the survey around `robot` that the message holds. A tag without a direction is omitted; no recording
+    /// returns such a tag.
     #[must_use]
     pub fn survey(&self, robot: &Robot) -> TagSurvey {
         let tag = |tag: &RecordedTag| {

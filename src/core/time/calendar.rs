@@ -1,15 +1,15 @@
-//! Stamps as dates, and dates as stamps.
+//! Conversion of stamps to dates, and of dates to stamps.
 
 use toml::value::{Datetime, Offset};
 
 use super::stamp::Stamp;
 
-/// `2026-01-01T00:00:00.000Z`.
+/// Returns the UTC date and time, such as `2026-01-01T00:00:00.000Z`.
 #[must_use]
 pub fn utc(nanos: u64) -> String {
     let (seconds, millis) = (nanos / 1_000_000_000, nanos / 1_000_000 % 1000);
     let (days, second) = (seconds / 86_400, seconds % 86_400);
-    // Years from 1 March, so that the leap day is the last.
+    // Years are counted from 1 March, so that the leap day is the last.
     let shifted = days + 719_468;
     let (era, day_of_era) = (shifted / 146_097, shifted % 146_097);
     let year_of_era = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
@@ -22,10 +22,11 @@ pub fn utc(nanos: u64) -> String {
     format!("{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}.{millis:03}Z")
 }
 
-/// The stamp of a date and time of RFC 3339 (the extended form of ISO 8601), such as `2026-03-01T12:00:00.250+01:00`.
+/// Returns the stamp of a date and time of RFC 3339 (the extended form of ISO 8601), such as
+/// `2026-03-01T12:00:00.250+01:00`.
 ///
-/// It is UTC where it has no offset. A space may stand for the `T` and a comma for the point; decimals beyond
-/// nanoseconds are dropped. `None` for every other text, for a leap second, and before 1970 or after 2262.
+/// The time is UTC if it states no offset. A space may replace the `T`, a comma the point; decimals beyond nanoseconds
+/// are dropped. `None` for every other text, for a leap second, and before 1970 or after 2262.
 #[must_use]
 pub fn stamp_of_date(text: &str) -> Option<Stamp> {
     let read: Datetime = text.replace(',', ".").parse().ok()?;
@@ -35,7 +36,7 @@ pub fn stamp_of_date(text: &str) -> Option<Stamp> {
         Some(Offset::Custom { minutes }) => i64::from(minutes),
         Some(Offset::Z) | None => 0,
     };
-    // Years from 1 March, so that the leap day is the last.
+    // Years are counted from 1 March, so that the leap day is the last.
     let (year, month) = (i64::from(date.year), i64::from(date.month));
     let (year, shifted_month) = if month > 2 { (year, month - 3) } else { (year - 1, month + 9) };
     let day_of_year = (153 * shifted_month + 2) / 5 + i64::from(date.day) - 1;
@@ -69,7 +70,7 @@ mod tests {
 
     #[test]
     fn dates_are_read_as_they_are_written() {
-        // From 1970 to 2262 in steps of about 11 hours, whole milliseconds.
+        // Samples from 1970 to 2262 in steps of about 11 hours, whole milliseconds.
         for millis in (0..9_223_372_036_854_u64).step_by(39_916_801) {
             let date = utc(millis * 1_000_000);
             assert_eq!(stamp_of_date(&date), Some(Stamp { nanos: millis as i64 * 1_000_000 }), "{date}");
@@ -98,7 +99,7 @@ mod tests {
         assert_eq!(stamp_of_date("2262-04-11T23:47:16.854775807Z"), Some(Stamp { nanos: i64::MAX }));
     }
 
-    /// Texts between bars.
+    /// Refused texts, separated by bars.
     const REFUSED: &str = "| |T|Z|1772366400|12:00:00|2026-03-01|2026-03-01T|2026-03-01T12|2026-03-01T12:00Z|\
         2026-13-01T12:00:00Z|2026-00-01T12:00:00Z|2026-03-00T12:00:00Z|2026-04-31T12:00:00Z|\
         2026-02-29T12:00:00Z|2100-02-29T12:00:00Z|2026-03-01T24:00:00Z|2026-03-01T12:60:00Z|\
@@ -115,7 +116,7 @@ mod tests {
         for text in REFUSED.split('|') {
             assert_eq!(stamp_of_date(text), None, "{text:?}");
         }
-        // Every beginning of a date but the whole one, and a date with any one byte exchanged.
+        // Every proper prefix of a date, and a date with any one byte replaced.
         let whole = "2026-03-01T12:00:00.250+01:00";
         assert!((0..19).all(|end| stamp_of_date(&whole[..end]).is_none()));
         for (at, c) in (0..whole.len()).flat_map(|at| ['9', ',', '-', 'T', '\u{e9}', '\u{10ffff}'].map(|c| (at, c))) {

@@ -6,21 +6,21 @@ use serde::{Deserialize, Serialize};
 /// A point in time, nanoseconds since the Unix epoch.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
 pub struct Stamp {
-    /// Negative before 1970.
+    /// Nanoseconds since the Unix epoch; negative before 1970.
     pub nanos: i64,
 }
 
-/// Where simulated time starts: 2026-01-01T00:00:00Z. Fixed, so that recordings repeat byte for byte.
+/// Start of simulated time: 2026-01-01T00:00:00Z. It is fixed, so that recordings repeat byte for byte.
 pub const SIMULATION_EPOCH: Stamp = Stamp { nanos: 1_767_225_600_000_000_000 };
 
 impl Stamp {
-    /// The stamp that lies `seconds` after `self` (before, if negative), rounded to whole nanoseconds.
+    /// Returns the stamp that lies `seconds` after `self` (before, if negative), rounded to whole nanoseconds.
     #[must_use]
     pub fn plus_s(self, seconds: f64) -> Self {
         Self { nanos: self.nanos.saturating_add((seconds * 1e9).round() as i64) }
     }
 
-    /// Seconds from `earlier` to `self`; negative if `self` comes first.
+    /// Returns the seconds from `earlier` to `self`; negative if `self` comes first.
     #[must_use]
     pub fn since_s(self, earlier: Self) -> f64 {
         // i128: the difference of two arbitrary recorded stamps may not fit an i64.

@@ -43,7 +43,7 @@ impl Float<'_> {
         self.run_seen(system, state, end_s, |_, _| ());
     }
 
-    /// Advances the system, and passes each state with its time to `see`.
+    /// Advances the system, and passes each state with its time to `seen`.
     fn run_seen(
         &self,
         system: &Multibody,

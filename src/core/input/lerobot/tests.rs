@@ -14,7 +14,7 @@ fn read(text: &str, motors: LerobotMotors, values: LerobotValues) -> Result<Lero
     LerobotCalibration::parse(Path::new("arm.json"), text, &raw).map_err(|error| error.to_string())
 }
 
-/// LeRobot's own equations, the other way round.
+/// Uses LeRobot's own equations, inverted.
 #[test]
 fn numbers_become_the_ticks_that_lerobot_made_them_of() {
     use LerobotMotors::{Dynamixel, Feetech};
@@ -47,7 +47,7 @@ fn numbers_become_the_ticks_that_lerobot_made_them_of() {
     }
 }
 
-/// The motor's own reading under the new offset, by the makers' equations.
+/// Uses the motor's own reading under the new offset, by the makers' equations.
 #[test]
 fn a_homing_offset_moves_the_reading_to_where_it_shall_be() {
     let homing = |text: &str, motors: LerobotMotors, name: &str| {
@@ -57,7 +57,7 @@ fn a_homing_offset_moves_the_reading_to_where_it_shall_be() {
     };
     for (motors, sign) in [(LerobotMotors::Feetech, -1), (LerobotMotors::Dynamixel, 1)] {
         let Form::Newer(all) = homing(NEWER, motors, "lift.pos") else { panic!("the newer form") };
-        // Present = actual + sign * offset; 2100 under the old one.
+        // Present = actual + sign * offset; the reading was 2100 under the old offset.
         let actual = 2100 - sign * 40;
         assert_eq!(actual + sign * all["lift"].homing_offset, 2080, "{motors:?}");
         assert_eq!(all["pan"].homing_offset, -12);

@@ -12,9 +12,9 @@ use crate::codes::Code;
 use crate::input::lerobot::LerobotToml;
 use crate::robot::{FileIssue, JointSensorSpec, Robot, StatedAngle};
 
-/// Allowed sizes of a factor: beyond the ratio of any two units. Assumed.
+/// Allowed absolute values of a factor: beyond the ratio of any two units. Assumed.
 const FACTORS: RangeInclusive<f64> = 1e-6..=1e6;
-/// Allowed zeros, as of offset_counts in robot.toml.
+/// Allowed zeros, like those of offset_counts in robot.toml.
 const ZEROS: RangeInclusive<f64> = -1e9..=1e9;
 
 #[derive(Deserialize, JsonSchema)]
@@ -22,19 +22,19 @@ const ZEROS: RangeInclusive<f64> = -1e9..=1e9;
 pub(super) struct JointsToml {
     /// Topic of sensor_msgs/msg/JointState.
     pub topic: Option<String>,
-    /// Recorded name or column of each joint of the robot, where they differ.
+    /// Recorded name or column of each joint of the robot, if they differ.
     #[serde(default)]
     pub names: BTreeMap<String, String>,
     /// Unit of the recorded numbers.
     #[serde(default)]
     pub unit: JointUnit,
-    /// Unit of slides, where `unit` is "rad" or "deg".
+    /// Unit of slides, if `unit` is "rad" or "deg".
     pub slide_unit: Option<SlideUnit>,
-    /// By joint of the robot, where `unit` is "rad" or "deg": angle over reading.
+    /// Angle over reading of each joint of the robot, if `unit` is "rad" or "deg".
     #[serde(default)]
     #[schemars(extend("additionalProperties" = { "type": "number", "minimum": -1e6, "maximum": 1e6 }))]
     pub factor: BTreeMap<String, f64>,
-    /// By joint of the robot, where `unit` is "rad" or "deg": the reading at angle zero.
+    /// Reading at angle zero of each joint of the robot, if `unit` is "rad" or "deg".
     #[serde(default)]
     #[schemars(extend("additionalProperties" = { "type": "number", "minimum": -1e9, "maximum": 1e9 }))]
     pub zero: BTreeMap<String, f64>,
@@ -42,14 +42,14 @@ pub(super) struct JointsToml {
     pub lerobot: Option<LerobotToml>,
 }
 
-/// Lines from recorded numbers that are no counts to angles: `angle = factor (recorded - zero)`.
+/// Lines from recorded numbers that are not counts to angles: `angle = factor (recorded - zero)`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct JointAngleLines {
     /// Unit of slides.
     pub slide_unit: SlideUnit,
-    /// Factor of each joint where it is not 1.
+    /// Factor of each joint, if it is not 1.
     pub factor: BTreeMap<String, f64>,
-    /// Zero of each joint where it is not 0.
+    /// Zero of each joint, if it is not 0.
     pub zero: BTreeMap<String, f64>,
 }
 
@@ -77,7 +77,7 @@ impl JointAngleLines {
         Ok(Self { slide_unit, factor: joints.factor.clone(), zero: joints.zero.clone() })
     }
 
-    /// Checks that the joints named are of this robot.
+    /// Checks that the named joints exist on this robot.
     pub(super) fn check_robot(&self, file: &Path, robot: &Robot) -> Result<(), FileIssue> {
         for (key, of) in [("factor", &self.factor), ("zero", &self.zero)] {
             of.keys().try_for_each(|name| check_name(file, key, name, robot))?;
@@ -145,7 +145,7 @@ mod tests {
         assert!(map.check_robot(Path::new("map.toml"), &robot).is_ok());
     }
 
-    /// Whatever the scale and sign of robot.toml's line.
+    /// Holds for each scale and sign of robot.toml's line.
     #[test]
     fn the_angle_is_the_factor_times_the_reading_less_the_zero() {
         let robot = titan();

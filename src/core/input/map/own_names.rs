@@ -1,11 +1,11 @@
-//! Each joint has a recorded name of its own.
+//! Check that each joint has a recorded name of its own.
 
 use super::InputMap;
 use crate::robot::Robot;
 
 impl InputMap {
-    /// Describes two joints that have one recorded name. A joint beyond the camera that nobody maps may lack
-    /// readings.
+    /// Describes two joints that share one recorded name. A joint distal to the camera that the map does not name may
+    /// lack readings.
     pub(super) fn shared_name(&self, robot: &Robot) -> Option<String> {
         let joints = robot.joint_names();
         let is_read =

@@ -1,4 +1,4 @@
-//! The part of an input map that describes a table: which columns of a CSV or YAML file are what.
+//! The part of an input map that describes a table: the meaning of the columns of a CSV or YAML file.
 
 use crate::codes::Code;
 use std::path::{Path, PathBuf};
@@ -19,17 +19,17 @@ pub enum TableFormat {
     Yaml,
 }
 
-/// How a rotation is written.
+/// Form of a rotation's numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RotationForm {
-    /// Hamilton, the real part first.
+    /// Hamilton quaternion, the real part first.
     QuaternionWxyz,
-    /// Hamilton, the real part last.
+    /// Hamilton quaternion, the real part last.
     QuaternionXyzw,
-    /// Nine numbers, row by row.
+    /// Rotation matrix, nine numbers row by row.
     Matrix,
-    /// Axis times angle.
+    /// Rotation vector: axis times angle.
     RotationVector,
     /// Angles about the fixed axes x, y, z in that order: Rz Ry Rx.
     FixedXyz,
@@ -44,7 +44,7 @@ impl RotationForm {
         }
     }
 
-    /// As the input map writes it.
+    /// Returns the name that the input map uses.
     fn name(self) -> &'static str {
         match self {
             Self::QuaternionWxyz => "quaternion_wxyz",
@@ -60,7 +60,7 @@ impl RotationForm {
     }
 }
 
-/// Which of the two poses a row holds; `a_from_b` maps coordinates in b to coordinates in a.
+/// Pose that a row holds, of the two; `a_from_b` maps coordinates in b to coordinates in a.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Direction {
@@ -70,7 +70,7 @@ pub enum Direction {
     TagFromCamera,
 }
 
-/// Which corner of a tag is the first, and which way round the others follow; as the tag is printed.
+/// First corner of a tag and direction of the others, as the tag is printed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum CornerOrder {
@@ -82,17 +82,17 @@ pub enum CornerOrder {
 }
 
 impl CornerOrder {
-    /// Place of the corner `number`, 0 to 3, in the first order.
+    /// Index of the corner `number`, 0 to 3, in the order of AprilTag.
     #[must_use]
     pub fn place(self, number: usize) -> usize {
         if self == Self::Apriltag { number } else { 3 - number }
     }
 }
 
-/// Where a row's rotation is.
+/// Columns of a row's rotation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RotationColumns {
-    /// As many as the form needs.
+    /// Names of the columns, in the number that the form requires.
     pub columns: Vec<String>,
     /// Form of the numbers.
     pub form: RotationForm,
@@ -100,7 +100,7 @@ pub struct RotationColumns {
     pub unit_rad: f64,
 }
 
-/// Where a row's time is.
+/// Column of a row's time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TimeColumn {
     /// Name of the column.
@@ -116,13 +116,13 @@ pub struct TimeColumn {
 /// kind = "input"
 /// [table]
 /// format = "csv"                           # optional: "csv" or "yaml"; absent: by the end of the file's name
-/// rows = "poses"                           # optional, YAML alone: where the rows are, keys joined by dots
+/// rows = "poses"                           # optional, only for YAML: keys that lead to the rows, joined by dots
 /// time = { column = "t", unit = "s" }      # optional: "s", "ms", "us", "ns", "iso8601"; absent: rows are 1 s apart
 /// [joint_sensors]
-/// names = { elbow = "q3" }                 # columns that are not called as the robot's joint
+/// names = { elbow = "q3" }                 # columns whose name differs from the robot's joint
 /// unit = "rad"                             # optional: "counts" | "rad" | "deg"
 /// [tags]
-/// child_frame = "board"                    # the landmark; absent where a column has the tags' numbers
+/// child_frame = "board"                    # the landmark; absent if a column has the tags' ids
 /// use = "pose"                             # "position" | "pose"
 /// [tags.columns]
 /// direction = "tag_from_camera"            # or "camera_from_tag"
@@ -134,7 +134,7 @@ pub struct TimeColumn {
 /// id = "tag"                               # optional: column of the tag's number
 /// ```
 ///
-/// With `use = "board_corners"` a row is one inner corner of the board:
+/// A row is one inner corner of the board with `use = "board_corners"`:
 ///
 /// ```toml
 /// [tags.columns]
@@ -142,7 +142,7 @@ pub struct TimeColumn {
 /// pixel = ["u", "v"]                       # columns of its place in the image, px
 /// ```
 ///
-/// With `use = "corners"` a row is one corner of a tag, or the four of one tag:
+/// A row is one corner of a tag, or the four of one tag, with `use = "corners"`:
 ///
 /// ```toml
 /// [tags.columns]
@@ -153,7 +153,7 @@ pub struct TimeColumn {
 /// corner_order = "apriltag"                # optional: "apriltag" | "opencv"
 /// ```
 ///
-/// Where the tags are in a table of their own, `[table]` is that of the joints:
+/// If the tags are in a table of their own, `[table]` is the table of the joints:
 ///
 /// ```toml
 /// [tags]
@@ -162,44 +162,44 @@ pub struct TimeColumn {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct TableLayout {
-    /// `None`: by the end of the file's name.
+    /// Format of the file; `None`: the format of its name's ending.
     pub format: Option<TableFormat>,
     /// Keys that lead to the rows in YAML; empty for the whole file.
     pub rows: Vec<String>,
-    /// `None`: rows are a second apart.
+    /// Column of the time; `None`: rows are 1 s apart.
     pub time: Option<TimeColumn>,
-    /// What was seen.
+    /// Columns of the measurement.
     pub seen: SeenColumns,
-    /// Column of the tag's number, or of the board's corner.
+    /// Column of the tag's id, or of the board's corner.
     pub id: Option<String>,
-    /// The tags' own table; `None` where one table has joints and tags.
+    /// Table of the tags; `None` if one table has joints and tags.
     pub tags: Option<TagTable>,
 }
 
-/// The table of the tags where that of the joints is another file.
+/// Table of the tags, if that of the joints is another file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TagTable {
-    /// Next to the input map, unless its path says otherwise.
+    /// Path of the file, relative to the input map.
     pub file: PathBuf,
-    /// As [`TableLayout::format`].
+    /// Format of the file; `None`: the format of its name's ending.
     pub format: Option<TableFormat>,
-    /// As [`TableLayout::rows`].
+    /// Keys that lead to the rows in YAML; empty for the whole file.
     pub rows: Vec<String>,
-    /// Rows of both that belong together.
+    /// Rule that joins rows of both tables.
     pub join: TableJoin,
 }
 
-/// Columns by which rows of two tables belong together.
+/// Columns that join rows of two tables.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TableJoin {
-    /// The joints' row nearest in time, within `max_gap_s`.
+    /// Join with the joints' row nearest in time, within `max_gap_s`.
     Time {
-        /// Time in the table of the tags.
+        /// Time column in the table of the tags.
         time: TimeColumn,
         /// Joints' clock less the camera's, s.
         clock_offset_s: f64,
     },
-    /// Rows with the same text.
+    /// Join of rows with the same text.
     Key {
         /// Column of the tags' table.
         tags: String,
@@ -208,23 +208,23 @@ pub enum TableJoin {
     },
 }
 
-/// What the columns of a row hold of the landmark.
+/// Measurement of the landmark that a row's columns hold.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SeenColumns {
-    /// Its position or pose.
+    /// Columns of the position or pose.
     Pose(PoseColumns),
     /// Columns of u and v of one corner of a board, raw pixels.
     Pixel([String; 2]),
-    /// One corner of a tag.
+    /// Columns of one corner of a tag.
     TagCorner {
-        /// Column of its number, 0 to 3.
+        /// Column of the corner's number, 0 to 3.
         corner: String,
         /// Columns of u and v, raw pixels.
         pixel: [String; 2],
         /// Order of the numbers.
         order: CornerOrder,
     },
-    /// The four corners of a tag.
+    /// Columns of the four corners of a tag.
     TagCorners {
         /// Columns of u and v, corner by corner, raw pixels.
         columns: [String; 8],
@@ -233,16 +233,16 @@ pub enum SeenColumns {
     },
 }
 
-/// Where a row's pose is.
+/// Columns of a row's pose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PoseColumns {
-    /// Which pose the columns hold.
+    /// Pose that the columns hold.
     pub direction: Direction,
     /// Columns of x, y, z.
     pub position: [String; 3],
     /// Metres of one unit of the position.
     pub position_unit_m: f64,
-    /// `None` where positions are used and none is needed.
+    /// Columns of the rotation; `None` if only positions are used.
     pub rotation: Option<RotationColumns>,
 }
 
@@ -276,7 +276,7 @@ impl TimeUnit {
         }
     }
 
-    /// As the input map writes it.
+    /// Returns the name that the input map uses.
     #[must_use]
     pub fn key(self) -> &'static str {
         match self {
@@ -321,7 +321,7 @@ struct TimeToml {
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct TableToml {
-    /// Form of the file; absent: by the end of its name.
+    /// Form of the file; absent: the form of its name's ending.
     format: Option<TableFormat>,
     /// Keys that lead to the rows of a YAML file, joined by dots.
     rows: Option<String>,
@@ -332,13 +332,13 @@ pub(super) struct TableToml {
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct TagTableToml {
-    /// File of the tags, from the folder of this file.
+    /// File of the tags, relative to the folder of this file.
     file: String,
-    /// Form of the file; absent: by the end of its name.
+    /// Form of the file; absent: the form of its name's ending.
     format: Option<TableFormat>,
     /// Keys that lead to the rows of a YAML file, joined by dots.
     rows: Option<String>,
-    /// Column of the time: rows belong to the joints nearest in time.
+    /// Column of the time; a row joins the joints' row nearest in time.
     time: Option<TimeToml>,
     /// Column with the same text in both tables.
     key: Option<String>,
@@ -346,7 +346,7 @@ pub(super) struct TagTableToml {
     joints_key: Option<String>,
 }
 
-/// The keys of `[tags]` that a table has.
+/// Keys of `[tags]` for a table.
 pub(super) struct TagsOfTable<'a> {
     pub tag_use: TagUse,
     pub child_frame: Option<&'a ChildFrame>,
@@ -357,7 +357,7 @@ pub(super) struct TagsOfTable<'a> {
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct TagColumnsToml {
-    /// Which pose a row holds.
+    /// Pose that a row holds.
     direction: Option<Direction>,
     /// Columns of x, y, z.
     position: Option<[String; 3]>,
@@ -372,17 +372,17 @@ pub(super) struct TagColumnsToml {
     /// Unit of the position.
     #[serde(default)]
     position_unit: LengthUnit,
-    /// Columns of the rotation, as many as its form has.
+    /// Columns of the rotation, in the number of its form.
     rotation: Option<Vec<String>>,
     /// Form of the rotation.
     rotation_form: Option<RotationForm>,
     /// Unit of the rotation's angles.
     rotation_unit: Option<AngleUnit>,
-    /// Column of the tag's number, or of the board's corner.
+    /// Column of the tag's id, or of the board's corner.
     id: Option<String>,
 }
 
-/// The layout by `[table]` and `[tags.columns]`.
+/// Returns the layout by `[table]` and `[tags.columns]`.
 pub(super) fn layout(
     file: &Path,
     table: TableToml,

@@ -1,4 +1,4 @@
-//! What input maps are taken, and what is named of the others.
+//! Accepted input maps, and the errors of the others.
 
 use super::*;
 
@@ -70,8 +70,8 @@ fn corners_need_no_frames() {
     assert_eq!(map.joint_names["elbow"], "j3");
 }
 
-/// Two names of one map, and a name that is another joint's own. Exchanged names and a distal joint without readings
-/// are no mistake.
+/// Two equal names of one map, and a name that is another joint's own, are refused. Exchanged names and a distal joint
+/// without readings are accepted.
 #[test]
 fn each_joint_has_a_recorded_name_of_its_own() {
     let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots/titan4");

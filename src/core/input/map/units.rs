@@ -1,23 +1,23 @@
-//! In what units joints are recorded.
+//! Units of recorded joints.
 
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// What the recorded numbers of the joints are.
+/// Unit of the recorded numbers of the joints.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum JointUnit {
     /// Raw readings, in the unit of robot.toml's scale.
     #[default]
     Counts,
-    /// Angles made of the readings by the datasheet: robot.toml's scale and offset.
+    /// Angles in radians, computed from the readings by the datasheet: robot.toml's scale and offset.
     Rad,
-    /// The same in degrees.
+    /// Angles in degrees, computed from the readings by the datasheet.
     Deg,
 }
 
 impl JointUnit {
-    /// In words.
+    /// Returns the unit in words.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -27,7 +27,7 @@ impl JointUnit {
         }
     }
 
-    /// As the input map writes it.
+    /// Returns the name that the input map uses.
     #[must_use]
     pub fn key(self) -> &'static str {
         match self {
@@ -38,7 +38,7 @@ impl JointUnit {
     }
 }
 
-/// What the recorded numbers of slides are, where they are no raw readings.
+/// Unit of the recorded numbers of slides, if they are no raw readings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SlideUnit {
@@ -50,7 +50,7 @@ pub enum SlideUnit {
 }
 
 impl SlideUnit {
-    /// In words.
+    /// Returns the unit in words.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -59,7 +59,7 @@ impl SlideUnit {
         }
     }
 
-    /// As the input map writes it.
+    /// Returns the name that the input map uses.
     #[must_use]
     pub fn key(self) -> &'static str {
         match self {
@@ -68,7 +68,7 @@ impl SlideUnit {
         }
     }
 
-    /// Of one in metres.
+    /// Returns one unit in metres.
     pub(in crate::input) fn in_m(self) -> f64 {
         match self {
             Self::M => 1.0,

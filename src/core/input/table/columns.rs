@@ -10,18 +10,18 @@ use crate::robot::Robot;
 /// Names of columns that an error lists.
 const MAX_LISTED: usize = 30;
 
-/// Where in `names` the columns of each quantity are; the joints of the robot come first.
+/// Indices of each quantity's columns in `names`; the joints of the robot come first.
 pub(super) struct Columns {
     pub names: Vec<String>,
-    /// Three, of x, y, z, or two, of a pixel, or eight, of four.
+    /// Three columns of x, y, z, two of a pixel, or eight of four pixels.
     pub place: Range<usize>,
-    /// As many as the form has; none without a rotation.
+    /// Columns of the rotation, in the number of its form; none without a rotation.
     pub rotation: Range<usize>,
     pub time: Option<(usize, TimeUnit)>,
     pub id: Option<usize>,
-    /// Number of a tag's corner.
+    /// Column of the number of a tag's corner.
     pub corner: Option<usize>,
-    /// Not of numbers: the column that joins two tables.
+    /// Column of texts that joins two tables.
     pub key: Option<String>,
     pub part: Part,
 }
@@ -77,7 +77,7 @@ impl Columns {
         Wanted { names: &self.names, time: self.time, id: self.id, key: self.key.as_ref() }
     }
 
-    /// Columns of joints come first.
+    /// Number of joints, whose columns come first.
     pub fn n_joints(&self) -> usize {
         self.place.start
     }

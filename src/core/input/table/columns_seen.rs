@@ -1,46 +1,46 @@
-//! What the cells of each column are, added row by row; those of the first rows are kept.
+//! Contents of each column, added row by row; the cells of the first rows are kept.
 
 use super::rows::is_missing;
 use crate::time::{Stamp, stamp_of_date};
 
-/// One column.
+/// A column and a summary of its cells.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TableColumn {
-    /// As the input map names it.
+    /// Name as the input map writes it.
     pub name: String,
     /// Cells with a finite number.
     pub n_numbers: usize,
-    /// Cells with a date and time of ISO 8601, in a column that begins with one; zero in columns of numbers.
+    /// Cells with a date and time of ISO 8601, in a column whose first value is a date; zero in columns of numbers.
     pub n_dates: usize,
-    /// Cells that are empty, or say that they have nothing.
+    /// Cells that are empty or hold a word for no value.
     pub n_empty: usize,
-    /// Cells with something else; the first of them.
+    /// Cells with anything else.
     pub n_others: usize,
-    /// The first cell that is neither.
+    /// First cell with anything else.
     pub first_other: Option<String>,
     /// Lowest and highest number; `None` without one. A date counts as its seconds since 1970.
     pub range: Option<[f64; 2]>,
-    /// All numbers are whole.
+    /// True if all numbers are integers.
     pub is_whole: bool,
-    /// Numbers that differ from the one before.
+    /// Numbers that differ from the previous one.
     pub n_steps: usize,
-    /// No number is smaller than the one before.
+    /// True if no number is smaller than the previous one.
     pub is_rising: bool,
 }
 
-/// Columns as far as their rows were looked at.
+/// Columns as far as their rows were examined.
 pub(super) struct ColumnsSeen {
     pub columns: Vec<TableColumn>,
-    /// The last number of each.
+    /// Last number of each column.
     last: Vec<f64>,
     pub n_rows: usize,
     /// The cells of the first rows.
     pub first_rows: Vec<Vec<String>>,
 }
 
-/// Rows whose cells are kept.
+/// Number of rows whose cells are kept.
 const N_KEPT: usize = 200;
-/// Kept characters of a cell.
+/// Number of characters of a cell that are kept.
 const MAX_CELL: usize = 80;
 
 impl ColumnsSeen {
@@ -98,7 +98,7 @@ impl TableColumn {
         }
     }
 
-    /// Cells with what the column has: numbers, or dates.
+    /// Number of cells with a value of the column's kind: numbers or dates.
     #[must_use]
     pub fn n_values(&self) -> usize {
         self.n_numbers + self.n_dates

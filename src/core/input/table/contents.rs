@@ -13,13 +13,13 @@ use crate::input::map::TableFormat;
 /// Columns and rows of a table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TableContents {
-    /// CSV, or YAML with JSON.
+    /// Format of the file: CSV, or YAML including JSON.
     pub format: TableFormat,
     /// Keys that lead to the rows in YAML.
     pub rows_at: Vec<String>,
     /// Number of rows.
     pub n_rows: usize,
-    /// In the order of the file.
+    /// Columns in the order of the file.
     pub columns: Vec<TableColumn>,
     /// Names that another list of the file gives to numbered columns.
     pub other_names: BTreeMap<String, String>,
@@ -35,10 +35,10 @@ impl TableContents {
     }
 }
 
-/// Looks at a table, whose format is that of its name's ending; `None` where the ending is not a table's.
+/// Examines a table, whose format is that of its name's ending; `None` if the ending is not a table's.
 ///
 /// # Errors
-/// [`InputError`] where it is no table: without rows, columns or numbers.
+/// [`InputError`] if the file is no table: without rows, columns or numbers.
 pub fn read_table_contents(path: &Path) -> Option<Result<TableContents, InputError>> {
     let format = format_by_name(path)?;
     Some(contents(path, format))

@@ -6,16 +6,16 @@ use super::columns_seen::ColumnsSeen;
 use super::rows::{MAX_COLUMNS, Rows, Wanted, check_count, is_missing, is_value};
 use crate::input::error::InputError;
 
-/// Marks of lines that are no rows.
+/// Marks of comment lines.
 const COMMENTS: [&str; 3] = ["#", "%", "//"];
-/// Lines of the beginning that show how the table is written.
+/// Number of first lines that show the table's format.
 const N_LOOKED_AT: usize = 30;
-/// Stands between cells that spaces separate.
+/// Delimiter that replaces spaces between cells.
 const TAB: char = '\t';
 
 /// A CSV's line of names and its rows.
 struct CsvTable {
-    /// Without comments and repeated lines of names.
+    /// Rows without comments and repeated lines of names.
     rows: String,
     delimiter: char,
     header: Vec<String>,
@@ -25,13 +25,13 @@ fn bad<T>(file: &str, problem: String) -> Result<T, InputError> {
     Err(InputError::Table { file: file.to_owned(), problem })
 }
 
-/// The text behind the mark of a comment.
+/// Returns the text after the mark of a comment.
 fn comment_of(line: &str) -> Option<&str> {
     COMMENTS.iter().find_map(|mark| line.trim_start().strip_prefix(mark))
 }
 
 impl CsvTable {
-    /// The line of names is the first one that has as many cells as the rows, a comment where these begin at once.
+    /// Finds the line of names: the first line with as many cells as the rows; a comment, if the rows begin at once.
     fn new(file: &str, text: &str) -> Result<Self, InputError> {
         let text = text.trim_start_matches('\u{feff}');
         let text = if text.contains('\n') { Cow::Borrowed(text) } else { Cow::Owned(text.replace('\r', "\n")) };
@@ -99,7 +99,7 @@ impl CsvTable {
         Ok(())
     }
 
-    /// Words in every named column.
+    /// Returns true for one cell per named column, of which at least one holds a word.
     fn is_of_units(&self, cells: &[Cow<'_, str>]) -> bool {
         self.header.len() > 1 && cells.len() == self.header.len() && cells.iter().any(|cell| !is_missing(cell))
     }
@@ -115,7 +115,7 @@ fn reader(text: &str, delimiter: char) -> csv::Reader<&[u8]> {
     builder.from_reader(text.as_bytes())
 }
 
-/// The mark that most of the lines have; a tab where spaces separate.
+/// Returns the delimiter that most of the lines have; a tab if spaces separate.
 fn delimiter_of(lines: &[&str]) -> char {
     let n_with = |mark: &char| lines.iter().filter(|line| line.contains(*mark)).count();
     let [semicolon, comma] = [';', ','].map(|mark| n_with(&mark));
@@ -133,7 +133,7 @@ fn delimiter_of(lines: &[&str]) -> char {
     }
 }
 
-/// The line with a tab for each run of spaces, where these separate its cells.
+/// Returns the line with a tab for each run of spaces, if spaces separate its cells.
 fn separated(line: &str, delimiter: char) -> Cow<'_, str> {
     if is_spaced(line, delimiter) {
         return line.split_whitespace().collect::<Vec<_>>().join("\t").into();
@@ -156,7 +156,7 @@ fn cells(line: &str, delimiter: char) -> Vec<String> {
     record.iter().map(str::to_owned).collect()
 }
 
-/// The cell with a point for the decimal comma, which no delimiter but the comma itself forbids.
+/// Returns the cell with a point for the decimal comma, unless the comma is the delimiter.
 fn plain(cell: &str, delimiter: char) -> Cow<'_, str> {
     let cell = cell.trim();
     let is_decimal = delimiter != ',' && !cell.contains('.') && cell.matches(',').count() == 1;

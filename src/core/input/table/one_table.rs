@@ -1,4 +1,4 @@
-//! A table whose rows have the joints and what the camera saw.
+//! Reader of a table whose rows have the joints and the camera's measurements.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -16,9 +16,9 @@ use crate::joints::JointCounts;
 use crate::robot::Robot;
 use crate::time::Stamp;
 
-/// Poses at rest are this far apart at least, s: nearer ones would pass for readings of a moving arm.
+/// Minimum time between poses at rest, s: closer ones would pass for readings of a moving arm.
 pub const MIN_APART_S: f64 = 0.3;
-/// Between rows without a time, s.
+/// Time between rows without a time, s.
 pub(super) const ROW_S: f64 = 1.0;
 
 pub(super) fn read(
@@ -41,7 +41,7 @@ pub(super) fn read(
     Ok(ExternalRecording { absent_joints, ..recording })
 }
 
-/// A coarser unit of the times, in which all rows of other times are poses at rest; as stated, none are.
+/// Returns a coarser unit of the times in which all rows of different times are poses at rest, if none are as stated.
 fn likely_time_unit(reader: RowReader<'_>, rows: &[Row]) -> Option<TimeUnit> {
     let (at, stated) = reader.columns.time?;
     let stated_nanos = stated.nanos()?;
@@ -60,10 +60,10 @@ fn likely_time_unit(reader: RowReader<'_>, rows: &[Row]) -> Option<TimeUnit> {
 
 struct PoseReader<'a> {
     rows: RowReader<'a>,
-    /// Unit that the times may be in, where they are too near to each other as stated.
+    /// Likely unit of the times, if they are too close to each other as stated.
     likely_unit: Option<TimeUnit>,
     recording: ExternalRecording,
-    /// [`ExternalDetection::key`] of those in the last frame.
+    /// [`ExternalDetection::key`] of the detections in the last frame.
     keys: BTreeSet<(Option<u32>, Option<u32>)>,
 }
 
@@ -93,7 +93,8 @@ impl PoseReader<'_> {
         Ok(())
     }
 
-    /// Rows of one time are of one pose. Without a time, so are rows of different tags with the same joint readings.
+    /// Returns the stamp of a row's pose. Rows of one time belong to one pose. Without a time, so do rows of different
+    /// tags with the same joint readings.
     fn stamp(&self, row: &Row, values: &[f64], pose: (&JointCounts, &ExternalDetection)) -> Result<Stamp, InputError> {
         let last = self.recording.readings.last().zip(self.recording.frames.last());
         let is_again = self.keys.contains(&pose.1.key());
@@ -136,7 +137,7 @@ mod tests {
         [joint_sensors]\nunit = \"rad\"\n[tags]\nchild_frame = \"board\"\nuse = \"position\"\n[tags.columns]\n\
         direction = \"camera_from_tag\"\nposition = [\"x\", \"y\", \"z\"]\n";
 
-    /// The unit that is thought likely of times that are stated to be in `unit`.
+    /// Returns the likely unit of times that are stated to be in `unit`.
     fn likely(unit: &str, times: &[f64]) -> Option<TimeUnit> {
         let robot = crate::robot::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/titan4")).unwrap();
         let map = parse_input_map(Path::new("map.toml"), &MAP.replace("UNIT", unit)).unwrap();
@@ -157,12 +158,13 @@ mod tests {
         assert_eq!(likely("ms", &[1.79e9, 1.79e9 + 4.0, 1.79e9 + 9.0]), Some(TimeUnit::S));
         assert_eq!(likely("ns", &[0.0, 3e3, 8e3]), Some(TimeUnit::Ms));
         assert_eq!(likely("us", &[0.0, 3e3, 8e3]), Some(TimeUnit::Ms));
-        // As stated some are poses at rest, none follow each other, or times are disordered.
+        // No other unit is likely if, as stated, some rows are poses at rest, none follow each other, or times are
+        // disordered.
         assert_eq!(likely("ms", &[0.0, 3.0, 4000.0, 4003.0]), None);
         assert_eq!(likely("s", &[0.0, 0.01, 0.02]), None);
         assert_eq!(likely("ms", &[5.0, 5.0]), None);
         assert_eq!(likely("ms", &[5.0, 2.0, 9.0]), None);
-        // Seconds would be beyond all times.
+        // In seconds these times would be beyond the largest time.
         assert_eq!(likely("ms", &[1.79e12, 1.79e12 + 10.0]), None);
     }
 }

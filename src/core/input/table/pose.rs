@@ -1,11 +1,11 @@
-//! A row's numbers as a pose.
+//! Conversion of a row's numbers to a pose.
 
 use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
 use crate::input::map::QUATERNION_LENGTH_TOLERANCE;
 use crate::input::map::{Direction, PoseColumns, RotationForm};
 
-/// `camera_from_tag` of a row; the rotation is the identity where the table has none. The error is the end of a
+/// Returns `camera_from_tag` of a row; the rotation is the identity if the table has none. The error is the end of a
 /// sentence about the row.
 pub(super) fn camera_from_tag(
     layout: &PoseColumns,
@@ -27,7 +27,7 @@ pub(super) fn camera_from_tag(
     })
 }
 
-/// `values`: as many as the form has, angles in rad.
+/// Converts a rotation to a quaternion. `values` has the number of elements of the form, angles in rad.
 fn unit_quaternion(form: RotationForm, values: &[f64]) -> Result<UnitQuaternion<f64>, String> {
     Ok(match (form, values) {
         (RotationForm::QuaternionWxyz, &[w, x, y, z]) | (RotationForm::QuaternionXyzw, &[x, y, z, w]) => {

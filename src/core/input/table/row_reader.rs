@@ -1,4 +1,4 @@
-//! The numbers of a row: as a table states them, and what the camera saw by them.
+//! Reader of a row: its numbers as the table states them, and the camera's measurement that they hold.
 
 use nalgebra::Isometry3;
 
@@ -15,7 +15,7 @@ use crate::time::Stamp;
 /// The largest time, ns: the year 2262.
 pub(super) const MAX_NANOS: f64 = 9.2e18;
 
-/// One table, and what its columns are.
+/// A table with the meaning of its columns.
 #[derive(Clone, Copy)]
 pub(super) struct RowReader<'a> {
     pub file: &'a str,
@@ -32,8 +32,8 @@ impl RowReader<'_> {
         Err(InputError::Row { file: self.file.to_owned(), place: BadPlace::Row(row.number), problem })
     }
 
-    /// The row's values, zero for absent joints; `None` where one is missing or not finite and
-    /// such rows are left out.
+    /// Returns the row's values, zero for absent joints; `None` if one is missing or not finite and such rows are left
+    /// out.
     pub fn finite_values(&self, row: &Row) -> Result<Option<Vec<f64>>, InputError> {
         let mut values = Vec::with_capacity(row.values.len());
         for (k, value) in row.values.iter().enumerate() {
@@ -75,7 +75,7 @@ impl RowReader<'_> {
         Ok(Some(value as u32))
     }
 
-    /// Place of the row's corner in armcal's order.
+    /// Returns the position of the row's corner in armcal's order.
     fn corner(&self, row: &Row, values: &[f64], order: CornerOrder) -> Result<u32, InputError> {
         let Some(at) = self.columns.corner else { return Ok(0) };
         match [0.0, 1.0, 2.0, 3.0].iter().position(|number| *number == values[at]) {
@@ -128,7 +128,7 @@ impl RowReader<'_> {
         Ok(ExternalDetection { id, seen })
     }
 
-    /// The row's time; `None` where the input map names no column.
+    /// Returns the row's time; `None` if the input map names no column of times.
     pub fn time(&self, row: &Row, values: &[f64]) -> Result<Option<Stamp>, InputError> {
         let Some((at, unit)) = self.columns.time else { return Ok(None) };
         let Some(unit_nanos) = unit.nanos() else { return Ok(row.date) };

@@ -6,9 +6,9 @@ use crate::input::error::{BadPlace, InputError};
 use crate::input::map::TimeUnit;
 use crate::time::{Stamp, stamp_of_date};
 
-/// Poses at rest: eleven days of one every ten seconds.
+/// Maximum number of poses at rest: eleven days of one every ten seconds.
 pub const MAX_ROWS: usize = 100_000;
-/// Columns of a table; those of poses and joints are some tens.
+/// Maximum number of columns of a table; those of poses and joints are a few dozen.
 pub(super) const MAX_COLUMNS: usize = 1000;
 
 /// Columns that are read.
@@ -16,9 +16,9 @@ pub(super) const MAX_COLUMNS: usize = 1000;
 pub(super) struct Wanted<'a> {
     /// Columns of numbers.
     pub names: &'a [String],
-    /// Which of them has the times, which may be dates.
+    /// Index of the column of times, which may be dates, and their unit.
     pub time: Option<(usize, TimeUnit)>,
-    /// Which of them has the tags' numbers, which may stand behind a name.
+    /// Index of the column of the tags' ids, which may follow a name.
     pub id: Option<usize>,
     /// A column of texts.
     pub key: Option<&'a String>,
@@ -26,11 +26,11 @@ pub(super) struct Wanted<'a> {
 
 /// The wanted values of one row.
 pub(super) struct Row {
-    /// From 1, in the order of the file.
+    /// Number of the row from 1, in the order of the file.
     pub number: u64,
-    /// In the order of the wanted columns; `None` where the row has no such value. A date is seconds since 1970.
+    /// Values in the order of the wanted columns; `None` if the row has no such value. A date is seconds since 1970.
     pub values: Vec<Option<f64>>,
-    /// The time to the nanosecond, where it is a date.
+    /// Time to the nanosecond, if it is a date.
     pub date: Option<Stamp>,
     /// The text in the key's column; empty without one.
     pub key: String,
@@ -44,7 +44,7 @@ pub(super) struct Rows {
 }
 
 impl Wanted<'_> {
-    /// The row with the cells that `cell` has for a column.
+    /// Reads a row; `cell` returns the cell of a column.
     pub fn row<'c>(
         &self,
         (file, number): (&str, u64),
@@ -72,7 +72,7 @@ impl Wanted<'_> {
         Ok(Row { number, values, date, key })
     }
 
-    /// Text of an error: what the cell of the column `k` should be, and the remedy.
+    /// Text of an error: the required content of the cell of column `k`, and the remedy.
     fn no_value(&self, k: usize, cell: &str) -> String {
         let correct = "correct it, or empty the cell and set not_finite = \"leave_out\" in the input map";
         let unit = self.time.filter(|(at, _)| *at == k).map(|(_, unit)| unit);
@@ -102,21 +102,21 @@ pub(super) fn check_count(file: &str, n: usize) -> Result<(), InputError> {
     Err(InputError::Table { file: file.to_owned(), problem })
 }
 
-/// An empty cell, or one of the words that programs write for none.
+/// Returns true for an empty cell, or one of the words that programs write for no value.
 pub(super) fn is_missing(cell: &str) -> bool {
     ["", "-", "na", "n/a", "null", "none"].iter().any(|word| cell.eq_ignore_ascii_case(word))
 }
 
-/// A number or a date.
+/// Returns true for a number or a date.
 pub(super) fn is_value(cell: &str) -> bool {
     cell.parse::<f64>().is_ok() || stamp_of_date(cell).is_some()
 }
 
-/// The tag's number of a cell such as `tag36h11:3`, `tag_3` or `id 3`: the digits behind a name.
+/// Returns the tag's id of a cell such as `tag36h11:3`, `tag_3` or `id 3`: the digits after a name.
 #[must_use]
 pub fn tag_number(cell: &str) -> Option<u32> {
     let name = cell.trim_end_matches(|c: char| c.is_ascii_digit());
-    // The digits of `tag36h11` are those of a family.
+    // The digits of `tag36h11` belong to a family.
     let is_apart = name.ends_with([':', '_', '-', ' ', '/', '#', '.']) || !name.contains(|c: char| c.is_ascii_digit());
     cell[name.len()..].parse().ok().filter(|_| is_apart && name.starts_with(|c: char| c.is_alphabetic() || c == '/'))
 }
@@ -124,7 +124,8 @@ pub fn tag_number(cell: &str) -> Option<u32> {
 /// Endings of images' names.
 const IMAGES: [&str; 9] = [".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm", ".ppm", ".webp"];
 
-/// The text by which rows of two tables are compared: a number as such, an image without its folder and ending.
+/// Returns the text by which rows of two tables are compared: a number as such, an image without its folder and
+/// extension.
 #[must_use]
 pub fn plain_key(cell: &str) -> String {
     let cell = cell.trim();

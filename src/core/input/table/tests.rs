@@ -17,7 +17,7 @@ fn titan() -> Robot {
     crate::robot::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/titan4")).expect("it reads")
 }
 
-/// What the map makes of a file of that name and content.
+/// Returns the recording that the map reads from a file of that name and content.
 fn read_with(map: &str, name: &str, text: &str) -> Result<ExternalRecording, InputError> {
     let folder = tempfile::tempdir().expect("a folder");
     let file: PathBuf = folder.path().join(name);
@@ -112,7 +112,7 @@ fn joints_of_the_datasheets_angles_become_counts() {
     assert!((sensors.models[0].angle_rad(in_rad.readings[0].counts[0]) + 0.5).abs() < 1e-9);
 }
 
-/// As eye-to-hand rigs write it: an entry for each time, joints in a list, the pose in a map.
+/// YAML as eye-to-hand rigs write it: an entry for each time, joints in a list, the pose in a map.
 #[test]
 fn yaml_entries_are_rows_in_a_list_or_a_map() {
     let map = format!(
@@ -220,7 +220,7 @@ const SQUARES: [[[f64; 2]; 4]; 2] =
 /// Rows of one tag each.
 const ALL_IN_ONE: &str = "a,b,c,d,e,f,g,h";
 
-/// Two tags at two poses, in these columns; `order` has the corners' places as printed.
+/// Rows of two tags at two poses, in these columns; `order` has the corners' positions as printed.
 fn corner_rows(order: [usize; 4], columns: &str) -> String {
     let mut text = format!("{JOINTS},tag,{columns}\n");
     for (pose, tag) in [(1, 0), (1, 1), (2, 1)] {
@@ -267,7 +267,7 @@ fn corners_of_tags_are_rows_each_or_eight_columns() {
     insta::assert_snapshot!("tag_corners", told.concat());
 }
 
-/// Reading is linear in the rows: all of them may be of one pose.
+/// Reading is linear in the rows, even if all of them are of one pose.
 #[test]
 fn many_corners_of_one_pose_are_read_at_once() {
     let map = format!("{CORNERS}corner = \"k\"\npixel = [\"u\", \"v\"]\n");
@@ -282,7 +282,7 @@ fn many_corners_of_one_pose_are_read_at_once() {
 const PLACES: &str = "version = 1\n[table]\n[joint_sensors]\n[tags]\nuse = \"position\"\n[tags.columns]\n\
     id = \"tag\"\ndirection = \"camera_from_tag\"\nposition = [\"x\", \"y\", \"z\"]\n";
 
-/// Two poses with a tag each, with a point or a comma in the decimals.
+/// Rows of two poses with a tag each, with a point or a comma in the decimals.
 fn two_poses(mark: char, point: &str) -> String {
     let text = format!("{JOINTS},tag,x,y,z\n1.5,2,3,4,5,6,3,0,0.25,1\n2.5,2,3,4,5,6,7,0,0.5,2\n");
     text.replace('.', "\0").replace(',', &mark.to_string()).replace('\0', point)
@@ -326,7 +326,7 @@ fn csv_is_read_as_programs_write_it() {
         let found = read_with(PLACES, "a.csv", &text).unwrap_or_else(|error| panic!("{error}: {text}"));
         assert_eq!((found.readings, found.frames), (expected.readings.clone(), expected.frames.clone()), "{text}");
     }
-    // A row whose cells say that there is nothing.
+    // A row with words for no value.
     let lenient = PLACES.replace("[table]", "not_finite = \"leave_out\"\n[table]");
     for word in ["N/A", "", "null", "-", "nan"] {
         let found = read_with(&lenient, "a.csv", &plain.replace("0.25", word)).expect(word);
@@ -374,7 +374,7 @@ fn csv_that_is_of_no_use_is_refused_with_the_remedy() {
     insta::assert_snapshot!("no_utf8", told.join("\n"));
 }
 
-/// A pose an entry, with what the camera saw of each tag in a list; the same with an entry in each line.
+/// One entry per pose, with the camera's measurements of the tags in a list; the same with an entry in each line.
 #[test]
 fn lists_of_tags_make_a_row_each() {
     let map = "version = 1\n[table]\n[joint_sensors]\n[tags]\nuse = \"position\"\n[tags.columns]\n\

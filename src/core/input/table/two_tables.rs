@@ -1,4 +1,4 @@
-//! Joints in one table, what the camera saw in another: their rows are joined by time or by a column of both.
+//! Reader of joints in one table and camera measurements in another, joined by time or by a column of both.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -17,7 +17,7 @@ use crate::input::tags::TagFrame;
 use crate::robot::Robot;
 use crate::time::Stamp;
 
-/// The joints' table at `path` with that of the tags.
+/// Reads the joints' table at `path` and the tags' table.
 pub(super) fn read(
     path: &Path,
     map: &InputMap,
@@ -48,7 +48,7 @@ pub(super) fn read(
 
 struct Joined {
     recording: ExternalRecording,
-    /// Row and stamp of the joints, by the text that joins.
+    /// Row and stamp of the joints, by the joining text.
     stamps: BTreeMap<String, (u64, Stamp)>,
     /// Texts that both tables have.
     matched: BTreeSet<String>,
@@ -61,7 +61,7 @@ impl Joined {
         }
     }
 
-    /// Readings in the order of time.
+    /// Adds the readings in the order of time.
     fn take_joints(&mut self, rows: RowReader<'_>, found: &Rows) -> Result<(), InputError> {
         for row in &found.rows {
             let Some(values) = rows.finite_values(row)? else {
@@ -97,7 +97,7 @@ impl Joined {
         }
     }
 
-    /// Frames by their stamps, with the tags of each once.
+    /// Adds the frames by their stamps, with each tag once.
     fn take_tags(&mut self, rows: RowReader<'_>, found: &Rows, join: &TableJoin) -> Result<(), InputError> {
         let mut frames: BTreeMap<Stamp, TagFrame> = BTreeMap::new();
         let mut keys = BTreeSet::new();

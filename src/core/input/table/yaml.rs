@@ -1,4 +1,4 @@
-//! Rows from YAML, of which JSON is a part: a list or a map with one entry per row.
+//! Rows from YAML, which includes JSON: a list or a map with one entry per row.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -10,16 +10,16 @@ use super::columns_seen::ColumnsSeen;
 use super::rows::{MAX_COLUMNS, MAX_ROWS, Rows, Wanted, check_count};
 use crate::input::error::InputError;
 
-/// Maps and lists within each other.
+/// Maximum nesting of maps and lists.
 const MAX_DEPTH: usize = 32;
 
-/// In the path of a column: each place of a list, of which each makes a row.
+/// Key in the path of a column for every index of a list; each index makes a row.
 const STAR: &str = "*";
 
-/// Names that paths have for the places of a list of maps.
+/// Names in paths for the indices of a list of maps.
 #[derive(Clone, Copy, PartialEq)]
 enum Lists {
-    /// All by one star.
+    /// One star for all indices.
     Starred,
     Numbered,
 }
@@ -27,15 +27,15 @@ enum Lists {
 /// A part of the file.
 #[derive(Debug)]
 enum Node {
-    /// Also a number: what it means is asked for later.
+    /// A scalar, which may be a number: it is parsed later.
     Scalar(String),
     List(Vec<Node>),
-    /// In the order of the file.
+    /// A map in the order of the file.
     Map(Vec<(String, Node)>),
 }
 
 impl Node {
-    /// The part that `key` leads to: a key of a map, or a place in a list, from 0.
+    /// Returns the part at `key`: a key of a map, or an index of a list, from 0.
     fn get(&self, key: &str) -> Option<&Self> {
         match self {
             Self::Scalar(_) => None,
@@ -48,7 +48,7 @@ impl Node {
         path.into_iter().try_fold(self, |node, key| node.get(key))
     }
 
-    /// The scalar at the path of a column, with this place for its star; empty without one.
+    /// Returns the scalar at the path of a column, with index `place` for its star; empty if there is none.
     fn cell(&self, column: &str, place: usize) -> &str {
         let place = place.to_string();
         match self.at(column.split('.').map(|key| if key == STAR { place.as_str() } else { key })) {
@@ -57,7 +57,7 @@ impl Node {
         }
     }
 
-    /// The length of the list that has a star in the path of `column`.
+    /// Returns the length of the list that has a star in the path of `column`.
     fn n_starred(&self, column: &str) -> usize {
         match self.at(column.split('.').take_while(|key| *key != STAR)) {
             Some(Self::List(list)) => list.len(),
@@ -65,7 +65,8 @@ impl Node {
         }
     }
 
-    /// The paths of all scalars, in the order of the file; a list of maps counts once, with a star for the place.
+    /// Returns the paths of all scalars, in the order of the file. A list of maps counts once, with a star for the
+    /// index.
     fn leaves(&self, lists: Lists) -> Vec<String> {
         let join = |key: &str, below: String| if below.is_empty() { key.to_owned() } else { format!("{key}.{below}") };
         let of = |key: String, node: &Self, lists: Lists| {
@@ -159,7 +160,7 @@ impl<'de> Visitor<'de> for NodeVisitor {
 }
 
 fn parse(file: &str, text: &str) -> Result<Node, InputError> {
-    // What aliases make is limited by itself.
+    // The number of nodes that aliases create is limited separately.
     let budget = serde_saphyr::budget! { max_depth: MAX_DEPTH, alias_anchor_min_aliases: MAX_ROWS };
     let options = serde_saphyr::options! { budget: budget };
     serde_saphyr::from_str_with_options(&as_one_list(text), options).map_err(|error| {
@@ -182,7 +183,7 @@ fn as_one_list(text: &str) -> Cow<'_, str> {
     text.into()
 }
 
-/// The entries of a list or a map that are lists or maps themselves; none where one is a scalar.
+/// Returns the entries of a list or a map that are lists or maps themselves; none if any entry is a scalar.
 fn entries(node: &Node) -> Vec<&Node> {
     let all: Vec<&Node> = match node {
         Node::List(list) => list.iter().collect(),
@@ -192,16 +193,16 @@ fn entries(node: &Node) -> Vec<&Node> {
     if all.iter().any(|entry| matches!(entry, Node::Scalar(_))) { Vec::new() } else { all }
 }
 
-/// Numbers in an entry beyond those of joints and a pose: a column of a table.
+/// Number of numbers in an entry above which it is a column of a table, because joints and a pose have fewer.
 const MANY: usize = 24;
 
-/// The columns of the entry that has most of them.
+/// Returns the columns of the entry that has most of them.
 fn columns_of(rows: &[&Node]) -> Vec<String> {
     let most = rows.iter().map(|row| row.leaves(Lists::Starred)).reduce(|a, b| if b.len() > a.len() { b } else { a });
     most.unwrap_or_default().into_iter().take(MAX_COLUMNS).collect()
 }
 
-/// Rows that an entry makes: one, or one for each place of the list that a column has a star for.
+/// Returns the number of rows of an entry: one, or one for each index of the list that a column has a star for.
 fn n_rows_of(entry: &Node, columns: &[String]) -> usize {
     let starred = columns.iter().find(|column| column.split('.').any(|key| key == STAR));
     starred.map_or(1, |column| entry.n_starred(column))
@@ -212,11 +213,11 @@ pub(super) struct YamlColumns {
     pub seen: ColumnsSeen,
     /// Keys that lead to the rows.
     pub rows_at: Vec<String>,
-    /// Names that another list gives to numbered columns, to the column.
+    /// Names that another list of the file gives to numbered columns, by column.
     pub other_names: BTreeMap<String, String>,
 }
 
-/// Looks at all cells: of the list or map with the most entries that are lists or maps, at the top or below one key.
+/// Examines all cells of the list or map with the most entries that are lists or maps, at the top or below one key.
 pub(super) fn yaml_columns(file: &str, text: &str) -> Result<YamlColumns, InputError> {
     let all = parse(file, text)?;
     let below: Vec<(Vec<String>, &Node)> = match &all {
@@ -226,7 +227,7 @@ pub(super) fn yaml_columns(file: &str, text: &str) -> Result<YamlColumns, InputE
     let candidates = std::iter::once((Vec::new(), &all)).chain(below);
     let found = candidates.map(|(path, node)| (path, entries(node))).max_by_key(|(path, rows)| {
         let is_uniform = rows.windows(2).all(|two| two[0].leaves(Lists::Starred) == two[1].leaves(Lists::Starred));
-        // The whole file before its parts; a map of one list is that list.
+        // The whole file comes before its parts; a map of one list is that list.
         (is_uniform, rows.len() > 1, rows.len(), path.is_empty())
     });
     let Some((rows_at, rows)) = found.filter(|(_, rows)| !rows.is_empty()) else {
@@ -260,7 +261,7 @@ pub(super) fn yaml_columns(file: &str, text: &str) -> Result<YamlColumns, InputE
     Ok(YamlColumns { seen, rows_at, other_names: names_beside(&all, &names) })
 }
 
-/// A list of as many texts as there are numbered columns names these.
+/// Returns the names of numbered columns by a list of as many texts.
 fn names_beside(all: &Node, columns: &[String]) -> BTreeMap<String, String> {
     let Node::Map(map) = all else { return BTreeMap::new() };
     let is_numbered = columns.iter().enumerate().all(|(k, column)| *column == k.to_string());

@@ -14,7 +14,7 @@ fn titan() -> Robot {
     load(&Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots/titan4")).expect("the robot reads")
 }
 
-/// The same with slides for the first joint and for the forearm's.
+/// Returns the titan arm with slides as first joint and as forearm joint.
 fn sliding() -> Robot {
     let mut robot = titan();
     let mut joints = robot.chain.joints().to_vec();
@@ -33,7 +33,8 @@ fn drawn_angles(robot: &Robot, name: &str) -> Vec<JointAngles> {
     (0..20).map(|_| one()).collect()
 }
 
-/// Of links in water and of a load at the tool, up to a constant, by the bodies and not by their loads; J.
+/// Potential energy of links in water and of a load at the tool, J, up to a constant. It is computed from the bodies,
+/// not from their loads.
 fn potential_j(robot: &Robot, poses: &LinkPoses, tool_load_n: f64) -> f64 {
     let mut sum = tool_load_n * poses.frame(&robot.tool.mount).translation.vector.z;
     for (k, body) in robot.bodies.iter().enumerate() {
@@ -139,12 +140,12 @@ fn bends_of(robot: &Robot) {
         let (there, moved) = (tool(&straight), tool(&poses) - tool(&straight));
         let [foretold, _] = bend.motion(&straight, 0..robot.tool.mount.n_joints, &there);
         assert!((moved - foretold).norm() < 0.01 * moved.norm() + 1e-9, "{moved} for {foretold}");
-        // Downwards: what gives, gives way to the weight.
+        // The arm yields downwards, to the weight.
         assert!(moved.z < 1e-6, "{moved}");
     }
 }
 
-/// The tool comes to its target though the arm bends on its way there.
+/// The tool reaches its target although the arm bends on the way.
 #[test]
 fn a_bending_arm_reaches_its_targets() {
     let robot = titan();

@@ -1,5 +1,5 @@
-//! Jacobians of chains of both kinds of joints against differences of their forward kinematics, which Pinocchio vouches
-//! for (tests/oracle.rs).
+//! Jacobians of chains with both kinds of joints, against differences of their forward kinematics, which
+//! tests/oracle.rs checks against Pinocchio.
 
 use nalgebra::{Point3, Translation3, UnitQuaternion, UnitVector3};
 use rand::RngExt;
@@ -60,7 +60,7 @@ fn jacobians_are_the_slopes_of_the_poses() {
             let turn = (above.rotation * below.rotation.inverse()).scaled_axis() / (2.0 * STEP);
             assert!((poses.point_jacobian(joint, &at.translation.vector) - slope).amax() < 1e-8, "{joint}");
             assert!((poses.turn_jacobian(joint) - turn).amax() < 1e-8, "{joint}");
-            // A slide's own frame stays on its parent link, wherever the slide is.
+            // The frame of a slide stays on its parent link, at any travel.
             let place = chain.joints()[joint].parent_from_joint;
             let origin = (poses.link(joint) * place).translation.vector;
             assert!((poses.joint_origin(joint) - origin).amax() < 1e-12, "{joint}");
@@ -80,7 +80,7 @@ fn slides_are_moved_to_reach_a_place_and_stay_within_their_limits() {
         let limits = JointLimits { lower_rad: -1.0, upper_rad: 1.0 };
         let (locked, limits) = (chain.joints().iter().map(|j| !j.kind.is_slide()).collect(), vec![limits; N]);
         let settings = IkSettings { limits, locked, tolerance_m: 1e-6, max_iterations: 200 };
-        // Two slides alone reach a plane: to somewhere in it, and to as far out as they go.
+        // A chain of two slides reaches only a plane: test a point inside its range and a point beyond it.
         let seed = angles(&mut rng);
         let mut there = seed;
         (0..N).filter(|j| chain.joints()[*j].kind.is_slide()).for_each(|j| there[j] = rng.random_range(-1.0..1.0));

@@ -9,22 +9,22 @@ use crate::log::header::RecordingHeader;
 use crate::log::schema::{RosMessage, RosSchema};
 use crate::streams::Attitude;
 
-/// sensor_msgs/msg/Imu, rad/s and m/s2; covariances row by row, -1 first where the sensor lacks the quantity.
+/// sensor_msgs/msg/Imu, rad/s and m/s2; covariances row by row, with -1 first if the sensor lacks the quantity.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Imu {
     /// Stamp, and the frame of the vehicle.
     pub header: Header,
     /// Attitude: `world_from_vehicle`.
     pub orientation: Quaternion,
-    /// Of `orientation`, rad2.
+    /// Covariance of `orientation`, rad2.
     pub orientation_covariance: [f64; 9],
-    /// Of the vehicle, in its own axes.
+    /// Angular velocity of the vehicle, in its own axes.
     pub angular_velocity: Vector3,
-    /// Of `angular_velocity`, rad2/s2.
+    /// Covariance of `angular_velocity`, rad2/s2.
     pub angular_velocity_covariance: [f64; 9],
     /// Specific force of the vehicle, in its own axes.
     pub linear_acceleration: Vector3,
-    /// Of `linear_acceleration`, m2/s4.
+    /// Covariance of `linear_acceleration`, m2/s4.
     pub linear_acceleration_covariance: [f64; 9],
 }
 
@@ -39,7 +39,7 @@ message!(
     vector3!(),
 );
 
-/// Covariances are zero: in ROS, "unknown".
+/// Converts an attitude. Covariances are zero, which means "unknown" in ROS.
 pub(in crate::log) fn to_ros(m: &Attitude, header: &RecordingHeader) -> Result<Imu, EncodeError> {
     Ok(Imu {
         header: Header::new(m.stamp, &header.vehicle_frame)?,

@@ -1,6 +1,6 @@
 //! ROS types that several messages contain.
 //!
-//! Quaternions are x, y, z, w here, as ROS orders them; everywhere else in this crate w comes first.
+//! Quaternions are x, y, z, w here, as in ROS; everywhere else in this crate w comes first.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,9 +12,9 @@ const NANOS_PER_S: i64 = 1_000_000_000;
 /// builtin_interfaces/msg/Time: seconds and nanoseconds since the Unix epoch.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Time {
-    /// Whole seconds, rounded down; negative before 1970.
+    /// Seconds, rounded down; negative before 1970.
     pub sec: i32,
-    /// Rest, 0..1e9.
+    /// Remaining nanoseconds, 0..1e9.
     pub nanosec: u32,
 }
 
@@ -43,12 +43,12 @@ impl TryFrom<Time> for Stamp {
 pub struct Header {
     /// Sender's clock.
     pub stamp: Time,
-    /// Frame of the message's coordinates; empty where it has none.
+    /// Frame of the message's coordinates; empty if it has none.
     pub frame_id: String,
 }
 
 impl Header {
-    /// The header of a message at `stamp` with coordinates in `frame_id`.
+    /// Builds the header of a message at `stamp` with coordinates in `frame_id`.
     ///
     /// # Errors
     /// [`EncodeError::StampRange`].
@@ -68,13 +68,13 @@ pub struct Quaternion {
 }
 
 impl Quaternion {
-    /// From w, x, y, z.
+    /// Builds a quaternion of w, x, y, z.
     #[must_use]
     pub fn from_wxyz([w, x, y, z]: [f64; 4]) -> Self {
         Self { x, y, z, w }
     }
 
-    /// As w, x, y, z.
+    /// Returns w, x, y, z.
     #[must_use]
     pub fn wxyz(self) -> [f64; 4] {
         [self.w, self.x, self.y, self.z]
@@ -124,9 +124,9 @@ pub struct Pose {
 /// apriltag_msgs/msg/Point, px.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PixelPoint {
-    /// Column, to the right; 0 in the middle of the first pixel.
+    /// Column, to the right; 0 at the centre of the first pixel.
     pub x: f64,
-    /// Row, downwards; 0 in the middle of the first pixel.
+    /// Row, downwards; 0 at the centre of the first pixel.
     pub y: f64,
 }
 

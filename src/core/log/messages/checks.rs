@@ -3,7 +3,8 @@
 use super::basic::Quaternion;
 use crate::log::error::DecodeRejection;
 
-/// Largest difference of a quaternion's length from 1. Float32 senders are within 1e-6; a zero quaternion is far off.
+/// Largest deviation of a quaternion's length from 1. Float32 senders are within 1e-6; a zero quaternion is clearly
+/// outside.
 const QUATERNION_LENGTH_TOLERANCE: f64 = 0.01;
 
 pub fn finite(field: &'static str, values: impl IntoIterator<Item = f64>) -> Result<(), DecodeRejection> {
@@ -15,7 +16,7 @@ pub fn variance(value: f64) -> Result<f64, DecodeRejection> {
     if value < 0.0 { Err(DecodeRejection::NegativeVariance) } else { Ok(value) }
 }
 
-/// A quaternion of length 1, within the tolerance, as w, x, y, z.
+/// Returns a quaternion of length 1, within the tolerance, as w, x, y, z.
 pub fn unit_quaternion_wxyz(quaternion: &Quaternion) -> Result<[f64; 4], DecodeRejection> {
     let wxyz = quaternion.wxyz();
     finite("orientation", wxyz)?;

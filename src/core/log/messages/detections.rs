@@ -12,21 +12,21 @@ use crate::streams::{TagDetection, TagDetections};
 /// apriltag_msgs/msg/AprilTagDetection; the corners in the order of `streams::TagDetection`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct AprilTagDetection {
-    /// `tag36h11` and the like; not read.
+    /// Name of the family, such as `tag36h11`; not read.
     pub family: String,
-    /// Number in the family; negative ones are rejected.
+    /// Id of the tag in the family; negative ids are rejected.
     pub id: i32,
     /// Number of bits that the decoder corrected; 0 in our recordings.
     pub hamming: i32,
     /// Unused; 0 in our recordings.
     pub goodness: f32,
-    /// Larger is surer, as apriltag gives it.
+    /// Decision margin as apriltag gives it; a larger one is more certain.
     pub decision_margin: f32,
     /// Mean of the corners in our recordings; not read.
     pub centre: PixelPoint,
-    /// Raw, distorted pixels.
+    /// Corners in raw, distorted pixels.
     pub corners: [PixelPoint; 4],
-    /// Row by row; zeros where the writer has none.
+    /// Homography, row by row; zeros if the writer has none.
     pub homography: [f64; 9],
 }
 
@@ -35,7 +35,7 @@ pub struct AprilTagDetection {
 pub struct AprilTagDetectionArray {
     /// Stamp of the image, and the frame of the camera.
     pub header: Header,
-    /// Every tag of the image.
+    /// All tags of the image.
     pub detections: Vec<AprilTagDetection>,
 }
 
@@ -62,7 +62,8 @@ pub(in crate::log) fn to_ros(
     })
 }
 
-/// The centre is the mean of the corners. Goodness, Hamming distance and homography are zero: our messages lack them.
+/// Converts a detection. The centre is the mean of the corners. Goodness, Hamming distance and homography are zero: our
+/// messages lack them.
 fn detection_to_ros(tag: &TagDetection, family: &str) -> Result<AprilTagDetection, EncodeError> {
     let mean = |axis: usize| tag.corners_px.iter().map(|corner| corner[axis]).sum::<f64>() / 4.0;
     Ok(AprilTagDetection {

@@ -1,11 +1,11 @@
-//! Messages of Foxglove's own: solids in frames, and marks on images. Rerun does not draw them.
+//! Foxglove's own messages: solids in frames, and marks on images. Rerun does not draw them.
 
 use serde::{Deserialize, Serialize};
 
 use super::basic::{PixelPoint, Point, Pose, Time, Vector3};
 use crate::log::schema::{RosMessage, RosSchema};
 
-/// A list of what our recordings have none of.
+/// List that is always empty in our recordings.
 pub type NoneOfThem = Vec<u8>;
 
 /// foxglove_msgs/msg/Color, 0 .. 1.
@@ -21,58 +21,58 @@ pub struct Color {
 /// foxglove_msgs/msg/CubePrimitive and SpherePrimitive, m.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SizedPrimitive {
-    /// Of its middle in the entity's frame.
+    /// Pose of the centre in the entity's frame.
     pub pose: Pose,
-    /// Whole lengths along its axes.
+    /// Full lengths along the axes.
     pub size: Vector3,
-    /// Of its faces.
+    /// Colour of the faces.
     pub color: Color,
 }
 
 /// foxglove_msgs/msg/TriangleListPrimitive, m.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TriangleListPrimitive {
-    /// Of its own frame in the entity's.
+    /// Pose of the primitive's frame in the entity's frame.
     pub pose: Pose,
-    /// Its corners.
+    /// Corners of the triangles.
     pub points: Vec<Point>,
-    /// Of all triangles.
+    /// Colour of all triangles.
     pub color: Color,
-    /// Empty: one colour for all.
+    /// Colours of the corners; empty: one colour for all.
     pub colors: Vec<Color>,
-    /// Three of each triangle, into `points`.
+    /// Indices into `points`, three for each triangle.
     pub indices: Vec<u32>,
 }
 
 /// foxglove_msgs/msg/TextPrimitive.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TextPrimitive {
-    /// Of its middle in the entity's frame.
+    /// Pose of the text's centre in the entity's frame.
     pub pose: Pose,
-    /// Whether it faces the viewer.
+    /// True if the text always faces the viewer.
     pub billboard: bool,
     /// Height of a letter, m.
     pub font_size: f64,
-    /// Whether it is as large from everywhere.
+    /// True if the text has the same size at any distance.
     pub scale_invariant: bool,
-    /// Of the letters.
+    /// Colour of the letters.
     pub color: Color,
-    /// What it says.
+    /// Content of the text.
     pub text: String,
 }
 
-/// foxglove_msgs/msg/SceneEntity: what keeps its place in a frame.
+/// foxglove_msgs/msg/SceneEntity: solids that are fixed in a frame.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SceneEntity {
-    /// From when on.
+    /// Start of validity.
     pub timestamp: Time,
-    /// The frame of all its parts.
+    /// Frame of all parts.
     pub frame_id: String,
-    /// Another entity of the same name replaces it.
+    /// Name of the entity; a new entity replaces one of the same name.
     pub id: String,
-    /// Zero: for ever.
+    /// Duration of validity; zero: without limit.
     pub lifetime: Time,
-    /// Whether it goes where its frame goes.
+    /// True if the entity moves with its frame.
     pub frame_locked: bool,
     /// Empty.
     pub metadata: NoneOfThem,
@@ -80,15 +80,15 @@ pub struct SceneEntity {
     pub arrows: NoneOfThem,
     /// Boxes.
     pub cubes: Vec<SizedPrimitive>,
-    /// Balls.
+    /// Spheres.
     pub spheres: Vec<SizedPrimitive>,
     /// Empty.
     pub cylinders: NoneOfThem,
     /// Empty.
     pub lines: NoneOfThem,
-    /// Meshes.
+    /// Triangle meshes.
     pub triangles: Vec<TriangleListPrimitive>,
-    /// Names.
+    /// Labels with names.
     pub texts: Vec<TextPrimitive>,
     /// Empty.
     pub models: NoneOfThem,
@@ -99,7 +99,7 @@ pub struct SceneEntity {
 pub struct SceneUpdate {
     /// Empty.
     pub deletions: NoneOfThem,
-    /// What is there from now on.
+    /// Entities that are valid from now on.
     pub entities: Vec<SceneEntity>,
 }
 
@@ -184,19 +184,19 @@ message!(
 /// foxglove_msgs/msg/PointsAnnotation.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PointsAnnotation {
-    /// Of the image.
+    /// Time of the image.
     pub timestamp: Time,
-    /// 2: a closed line.
+    /// Kind of the annotation; 2: a closed line.
     pub kind: u8,
-    /// Its corners, px.
+    /// Corners of the line, px.
     pub points: Vec<PixelPoint>,
-    /// Of the line.
+    /// Colour of the line.
     pub outline_color: Color,
-    /// Empty: one colour for all.
+    /// Colours of the corners; empty: one colour for all.
     pub outline_colors: Vec<Color>,
-    /// Of what it surrounds.
+    /// Colour of the enclosed area.
     pub fill_color: Color,
-    /// Of the line, px.
+    /// Width of the line, px.
     pub thickness: f64,
     /// Empty.
     pub metadata: NoneOfThem,
@@ -205,17 +205,17 @@ pub struct PointsAnnotation {
 /// foxglove_msgs/msg/TextAnnotation.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TextAnnotation {
-    /// Of the image.
+    /// Time of the image.
     pub timestamp: Time,
-    /// Of its lower left corner, px.
+    /// Position of the text's lower left corner, px.
     pub position: PixelPoint,
-    /// What it says.
+    /// Content of the text.
     pub text: String,
-    /// px.
+    /// Height of the letters, px.
     pub font_size: f64,
-    /// Of the letters.
+    /// Colour of the letters.
     pub text_color: Color,
-    /// Behind them.
+    /// Colour behind the letters.
     pub background_color: Color,
     /// Empty.
     pub metadata: NoneOfThem,
@@ -224,13 +224,13 @@ pub struct TextAnnotation {
 /// foxglove_msgs/msg/ImageAnnotations.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ImageAnnotations {
-    /// Of the image.
+    /// Time of the image.
     pub timestamp: Time,
     /// Empty.
     pub circles: NoneOfThem,
-    /// Outlines.
+    /// Outlines of the tags.
     pub points: Vec<PointsAnnotation>,
-    /// Names.
+    /// Names of the tags.
     pub texts: Vec<TextAnnotation>,
     /// Empty.
     pub metadata: NoneOfThem,

@@ -13,7 +13,7 @@ use crate::streams::CameraImage;
 pub struct CompressedImage {
     /// Stamp of the exposure, and the frame of the camera.
     pub header: Header,
-    /// `jpeg`, or a text that contains it; all else is rejected.
+    /// Format: `jpeg`, or a text that contains it; all others are rejected.
     pub format: String,
     /// Bytes of the JPEG file.
     pub data: Vec<u8>,
@@ -35,13 +35,13 @@ pub struct Image {
     pub height: u32,
     /// Columns.
     pub width: u32,
-    /// Such as `mono8`, `bgr8` or `bayer_rggb8`.
+    /// Encoding of the pixels, such as `mono8`, `bgr8` or `bayer_rggb8`.
     pub encoding: String,
-    /// 0: little endian.
+    /// Byte order; 0: little endian.
     pub is_bigendian: u8,
     /// Bytes from one row to the next.
     pub step: u32,
-    /// `step * height` bytes.
+    /// Pixels, `step * height` bytes.
     pub data: Vec<u8>,
 }
 

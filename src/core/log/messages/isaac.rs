@@ -12,24 +12,24 @@ use crate::log::schema::{RosMessage, RosSchema, is_type};
 pub struct PoseWithCovarianceStamped {
     /// Stamp of the image, and the frame of the camera.
     pub header: Header,
-    /// `camera_from_tag`; not read.
+    /// Pose `camera_from_tag`; not read.
     pub pose: Pose,
-    /// Row by row; not read.
+    /// Covariance of the pose, row by row; not read.
     pub covariance: [[f64; 6]; 6],
 }
 
 /// isaac_ros_apriltag_interfaces/msg/AprilTagDetection; the corners in the order of [`AprilTagDetection`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct IsaacDetection {
-    /// `tag36h11` and the like; not read.
+    /// Name of the family, such as `tag36h11`; not read.
     pub family: String,
-    /// Number in the family.
+    /// Id of the tag in the family.
     pub id: i32,
-    /// Pixels; z is unused.
+    /// Centre in pixels; z is unused.
     pub center: Point,
-    /// Pixels; z is unused.
+    /// Corners in pixels; z is unused.
     pub corners: [Point; 4],
-    /// The tag in the camera's frame, by the detector's own lens.
+    /// Pose of the tag in the camera's frame, by the detector's own lens.
     pub pose: PoseWithCovarianceStamped,
 }
 
@@ -38,7 +38,7 @@ pub struct IsaacDetection {
 pub struct IsaacDetectionArray {
     /// Stamp of the image, and the frame of the camera.
     pub header: Header,
-    /// Every tag of the image.
+    /// All tags of the image.
     pub detections: Vec<IsaacDetection>,
 }
 

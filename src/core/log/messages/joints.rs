@@ -14,15 +14,16 @@ use crate::time::Stamp;
 /// Name of the one joint on the gripper's topics.
 const GRIPPER_JOINT: &str = "gripper";
 
-/// What the first message of a topic says of all: the joint names, and where the numbers lie.
+/// Properties of a topic's first message that all share: the joint names, and the positions of the numbers in the
+/// bytes.
 #[derive(Clone, Debug, Default)]
 pub(in crate::log) struct FirstJoints {
-    /// `None` before the first message.
+    /// Names of the joints; `None` before the first message.
     pub(in crate::log) names: Option<Vec<String>>,
     layout: Option<Layout>,
 }
 
-/// Bytes of a message that have stamp and positions only to differ from others of its topic: names need not be read
+/// Bytes of a message that differs from others of its topic only in stamp and positions: so names need not be read
 /// again in each of millions.
 #[derive(Clone, Debug)]
 struct Layout {
@@ -31,12 +32,12 @@ struct Layout {
 }
 
 impl Layout {
-    /// Little endian, after the encapsulation header.
+    /// Range of the stamp, after the encapsulation header.
     const STAMP: std::ops::Range<usize> = 4..12;
-    /// Lengths of the empty velocities and efforts, in which our own messages end.
+    /// Lengths of the empty velocities and efforts at the end of our own messages.
     const TAIL_BYTES: usize = 8;
 
-    /// Of a message that decodes to these positions; `None` where they lie elsewhere.
+    /// Returns the layout of a message that decodes to these positions; `None` if they have other places in the bytes.
     fn of(bytes: &[u8], position: &[f64]) -> Option<Self> {
         let layout = Self { bytes: bytes.to_vec(), n_positions: position.len() };
         let is_little_endian = bytes.starts_with(&[0, 1]);
@@ -44,7 +45,7 @@ impl Layout {
         (found == position).then_some(layout)
     }
 
-    /// Stamp and positions of a message that is otherwise the same.
+    /// Returns stamp and positions of a message that is otherwise equal.
     fn read(&self, bytes: &[u8]) -> Option<(Time, Vec<f64>)> {
         let tail = bytes.len().checked_sub(Self::TAIL_BYTES)?;
         let start = tail.checked_sub(8 * self.n_positions).filter(|&start| start >= Self::STAMP.end)?;
@@ -67,7 +68,7 @@ pub struct JointState {
     pub header: Header,
     /// Names of the joints.
     pub name: Vec<String>,
-    /// One number per name.
+    /// Positions, one per name.
     pub position: Vec<f64>,
     /// Empty in our recordings; not read.
     pub velocity: Vec<f64>,
@@ -106,7 +107,7 @@ struct JointStateIn<'a> {
     _effort: Vec<f64>,
 }
 
-/// Encodes one position per joint into `out`, whose former content goes.
+/// Encodes one position per joint into `out`, and replaces its content.
 pub(in crate::log) fn encode(
     stamp: Stamp,
     position: &[f64],
@@ -122,7 +123,8 @@ pub(in crate::log) fn encode(
     Ok(cdr::encode(&joints, out)?)
 }
 
-/// Stamp and one finite position per joint. The first message sets the names in `first`; later ones must have the same.
+/// Returns the stamp and one finite position per joint. The first message sets the names in `first`; later ones must
+/// have the same.
 pub(in crate::log) fn decode(bytes: &[u8], first: &mut FirstJoints) -> Result<(Stamp, Vec<f64>), DecodeRejection> {
     if let Some((stamp, position)) = first.layout.as_ref().and_then(|layout| layout.read(bytes)) {
         finite("position", position.iter().copied())?;
@@ -154,7 +156,7 @@ pub(in crate::log) fn decode(bytes: &[u8], first: &mut FirstJoints) -> Result<(S
     Ok((joints.stamp.try_into()?, joints.position))
 }
 
-/// The gripper as one joint, whose position is the gap between the jaws, m.
+/// Returns the gripper as one joint, whose position is the gap between the jaws, m.
 pub(in crate::log) fn gripper_to_ros(stamp: Stamp, opening_m: f64) -> Result<JointState, EncodeError> {
     Ok(JointState {
         header: Header::new(stamp, "")?,
@@ -164,7 +166,7 @@ pub(in crate::log) fn gripper_to_ros(stamp: Stamp, opening_m: f64) -> Result<Joi
     })
 }
 
-/// Stamp and opening, m, of one joint with any name.
+/// Returns stamp and opening, m, of one joint with any name.
 pub(in crate::log) fn gripper_from_ros(m: &JointState) -> Result<(Stamp, f64), DecodeRejection> {
     let [opening_m] = m.position[..] else {
         return Err(DecodeRejection::JointCount { got: m.position.len(), expected: 1 });

@@ -12,11 +12,11 @@ use crate::streams::{LogLevel, LogLine};
 pub struct Log {
     /// Sender's clock.
     pub stamp: Time,
-    /// Numbers between two levels mean the lower one.
+    /// Severity; a number between two levels means the lower one.
     pub level: u8,
-    /// Part of the program that says it.
+    /// Part of the program that writes the line.
     pub name: String,
-    /// The text.
+    /// Content of the line.
     pub msg: String,
     /// Source file; empty in our recordings.
     pub file: String,
@@ -43,7 +43,7 @@ pub(in crate::log) fn to_ros(m: &LogLine) -> Result<Log, EncodeError> {
     Ok(Log { stamp: m.stamp.try_into()?, level, name: m.name.clone(), msg: m.text.clone(), ..Log::default() })
 }
 
-/// A number between two levels is the lower one.
+/// Converts a line; a level between two levels becomes the lower one.
 pub(in crate::log) fn from_ros(m: Log) -> Result<LogLine, DecodeRejection> {
     let level =
         LEVELS.into_iter().rev().find(|(least, _)| m.level >= *least).map_or(LogLevel::Debug, |(_, level)| level);

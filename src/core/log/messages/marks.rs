@@ -10,14 +10,14 @@ use crate::log::schema::{RosMessage, RosSchema};
 use crate::robot::{FailedJoint, FailedKind};
 use crate::streams::{self, CaptureSet, MarkKind, Phase, PriorSource, ReachAttempt};
 
-/// armcal_msgs/msg/Mark: what the span `start..=end` was for.
+/// armcal_msgs/msg/Mark: purpose of the span `start..=end`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Mark {
-    /// By the joint sensors' clock.
+    /// Start of the span by the joint sensors' clock.
     pub start: Time,
-    /// Not before `start`.
+    /// End of the span, not before `start`.
     pub end: Time,
-    /// Such as `capture_fit`; an end stop's kind contains its angle, rad.
+    /// Kind of the mark, such as `capture_fit`; an end stop's kind contains its angle, rad.
     pub kind: String,
     /// Number of a pose, joint or target, from 0; 0 for kinds without one.
     pub index: u32,
@@ -30,7 +30,7 @@ message!(
     time!(),
 );
 
-/// A kind from its index, that of a pose, joint or target; 0 where it has none.
+/// Builds a kind from its index (of a pose, joint or target); 0 if it has none.
 type KindOf = fn(u32) -> MarkKind;
 
 /// Names of the kinds in a file.
@@ -52,9 +52,9 @@ const NAMES: [(&str, KindOf); 16] = [
     ("phase_wait", |_| MarkKind::Phase(Phase::Wait)),
     ("phase_done", |_| MarkKind::Phase(Phase::Done)),
 ];
-/// In front of the name of a [`FailedKind`].
+/// Prefix of the name of a [`FailedKind`].
 const FAILED: &str = "failed_";
-/// In front of the angle of an end stop, rad: the one kind with a number that is no index.
+/// Prefix of the angle of an end stop, rad: the only kind with a number that is no index.
 const STOP: &str = "stop ";
 
 pub(in crate::log) fn to_ros(m: &streams::Mark) -> Result<Mark, EncodeError> {

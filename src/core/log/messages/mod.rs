@@ -1,7 +1,7 @@
 //! The messages of a recording: one file per kind with its ROS types, their schema, encoder and decoder.
 //!
-//! A field stands where the ROS definition has it. `to_ros` and `from_ros` convert between these types and `streams`;
-//! every number that `from_ros` gives back is finite. The table `message_codec::Stream` names them for each topic.
+//! Fields are in the order of the ROS definition. `to_ros` and `from_ros` convert between these types and `streams`;
+//! every number that `from_ros` returns is finite. The table `message_codec::Stream` lists them by topic.
 
 pub(super) mod attitude;
 mod basic;

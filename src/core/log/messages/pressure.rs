@@ -16,7 +16,7 @@ pub struct FluidPressure {
     pub header: Header,
     /// Absolute pressure.
     pub fluid_pressure: f64,
-    /// 0 where it is unknown.
+    /// Variance of the pressure; 0 if it is unknown.
     pub variance: f64,
 }
 

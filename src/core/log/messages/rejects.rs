@@ -12,20 +12,20 @@ use crate::streams::{self, RejectReason};
 /// armcal_msgs/msg/DetectionReject: corners as in apriltag_msgs/msg/AprilTagDetection.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct DetectionReject {
-    /// As decoded, right or wrong.
+    /// Decoded id, right or wrong.
     pub id: u32,
-    /// Name of a [`RejectReason`].
+    /// Reason of the rejection: name of a [`RejectReason`].
     pub reason: String,
-    /// Raw, distorted pixels.
+    /// Corners in raw, distorted pixels.
     pub corners: [PixelPoint; 4],
 }
 
-/// armcal_msgs/msg/DetectionRejects: what looked like a tag in one image and was not taken for one.
+/// armcal_msgs/msg/DetectionRejects: rejected candidates for tags in one image.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct DetectionRejects {
     /// Stamp of the image, and the frame of the camera.
     pub header: Header,
-    /// All of the image.
+    /// All rejected candidates of the image.
     pub rejects: Vec<DetectionReject>,
 }
 

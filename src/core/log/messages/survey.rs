@@ -11,29 +11,29 @@ use crate::log::header::{BASE_FRAME, RecordingHeader};
 use crate::log::schema::{RosMessage, RosSchema};
 use crate::streams::{RecordedSurvey, RecordedTag};
 
-/// armcal_msgs/msg/SurveyedTag: `pose` in the frame of the survey's header, m; one sigma per axis.
+/// armcal_msgs/msg/SurveyedTag: `pose` in the frame of the survey's header, m; standard deviations per axis.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SurveyedTag {
-    /// Number in the family.
+    /// Id of the tag in the family.
     pub id: u32,
     /// Side of the black square.
     pub size_m: f64,
-    /// The identity where it is unknown.
+    /// Pose of the tag; the identity if it is unknown.
     pub pose: Pose,
-    /// Infinite where the pose is unknown.
+    /// Standard deviation of the position; infinite if the pose is unknown.
     pub position_std_m: f64,
-    /// Infinite where the pose is unknown.
+    /// Standard deviation of the rotation; infinite if the pose is unknown.
     pub rotation_std_rad: f64,
 }
 
-/// armcal_msgs/msg/TagSurvey: where the tags are.
+/// armcal_msgs/msg/TagSurvey: poses of the tags.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TagSurvey {
     /// Stamp, and the frame of the arm's base, or of the link that carries the tags.
     pub header: Header,
-    /// Id of the tag beside the base; one of `tags`.
+    /// Id of the tag next to the base; one of `tags`.
     pub base_tag: u32,
-    /// Each id once.
+    /// Surveyed tags, each id once.
     pub tags: Vec<SurveyedTag>,
 }
 
@@ -66,7 +66,7 @@ pub(in crate::log) fn to_ros(m: &RecordedSurvey, header: &RecordingHeader) -> Re
     })
 }
 
-/// One unusable tag rejects the whole survey: a wrong pose would bias the others.
+/// Converts a survey. One unusable tag rejects the whole survey: a wrong pose would bias the others.
 pub(in crate::log) fn from_ros(m: &TagSurvey) -> Result<RecordedSurvey, DecodeRejection> {
     let tags = m.tags.iter().map(tag_from_ros).collect::<Result<Vec<_>, _>>()?;
     let ids: BTreeSet<u32> = tags.iter().map(|tag| tag.id).collect();
@@ -77,7 +77,7 @@ pub(in crate::log) fn from_ros(m: &TagSurvey) -> Result<RecordedSurvey, DecodeRe
         return Err(DecodeRejection::NoBaseTag);
     }
     let frame = &m.header.frame_id;
-    // What is not said, or said as our recordings say it, is the base's.
+    // An empty frame, or that of our own recordings, is the base's.
     let link = (!frame.is_empty() && frame != BASE_FRAME).then(|| frame.clone());
     Ok(RecordedSurvey { stamp: m.header.stamp.try_into()?, link, base_tag: m.base_tag, tags })
 }
@@ -86,7 +86,7 @@ fn tag_from_ros(tag: &SurveyedTag) -> Result<RecordedTag, DecodeRejection> {
     let position_m = tag.pose.position.into();
     finite("position", position_m)?;
     finite("size_m", [tag.size_m])?;
-    // Both are infinite where only the tag's size is known.
+    // Both are infinite if only the tag's size is known.
     let is_unknown = tag.position_std_m == f64::INFINITY && tag.rotation_std_rad == f64::INFINITY;
     if !is_unknown {
         finite("standard deviation", [tag.position_std_m, tag.rotation_std_rad])?;
@@ -111,7 +111,7 @@ fn tag_from_ros(tag: &SurveyedTag) -> Result<RecordedTag, DecodeRejection> {
 mod tests {
     use super::*;
 
-    /// As of a tag of which only the size is known.
+    /// Sets the message of a tag of which only the size is known.
     fn forget_pose(tag: &mut SurveyedTag) {
         (tag.position_std_m, tag.rotation_std_rad) = (f64::INFINITY, f64::INFINITY);
     }

@@ -14,9 +14,9 @@ use crate::streams::{TemperatureSample, Thermometer};
 pub struct Temperature {
     /// Stamp, and the frame of the vehicle.
     pub header: Header,
-    /// Of the oil or the water; the topic says which.
+    /// Temperature of the oil or the water, by topic.
     pub temperature: f64,
-    /// 0 where it is unknown.
+    /// Variance of the temperature; 0 if it is unknown.
     pub variance: f64,
 }
 
@@ -27,7 +27,7 @@ message!(
     header!(),
 );
 
-/// The topic tells which thermometer it is.
+/// Converts a temperature; the topic states the thermometer.
 pub(in crate::log) fn to_ros(m: &TemperatureSample, header: &RecordingHeader) -> Result<Temperature, EncodeError> {
     let header = Header::new(m.stamp, &header.vehicle_frame)?;
     Ok(Temperature { header, temperature: m.temperature_c, variance: m.variance_c2 })

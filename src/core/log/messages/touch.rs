@@ -1,4 +1,4 @@
-//! The tool against a surveyed surface, felt by the arm.
+//! Contact of the tool with a surveyed surface, felt by the arm.
 
 use serde::{Deserialize, Serialize};
 
@@ -14,17 +14,17 @@ use crate::streams::ToolTouch;
 pub struct Touch {
     /// Beginning of the span, and the frame of `point` and `normal`.
     pub header: Header,
-    /// Of the rest against the surface, s.
+    /// Duration of the contact, s.
     pub duration_s: f64,
     /// Name of the surface, for people.
     pub surface: String,
     /// Any point of the plane, m.
     pub point: Point,
-    /// Out of the surface, unit length.
+    /// Unit normal out of the surface.
     pub normal: Vector3,
-    /// Of a ball about the tool point, m; zero for a tip that is the tool point.
+    /// Radius of a ball about the tool point, m; zero if the tip is the tool point.
     pub tip_radius_m: f64,
-    /// One sigma along the normal, m.
+    /// Standard deviation along the normal, m.
     pub std_m: f64,
 }
 
@@ -38,7 +38,7 @@ message!(
     vector3!(),
 );
 
-/// Largest difference of a normal's length from 1.
+/// Largest deviation of a normal's length from 1.
 const LENGTH_TOLERANCE: f64 = 0.01;
 
 pub(in crate::log) fn to_ros(m: &ToolTouch, header: &RecordingHeader) -> Result<Touch, EncodeError> {

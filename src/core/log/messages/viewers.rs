@@ -11,7 +11,7 @@ use crate::time::Stamp;
 /// std_msgs/msg/String.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StringMessage {
-    /// The text; on `/robot_description` a URDF.
+    /// Content; on `/robot_description` a URDF.
     pub data: String,
 }
 
@@ -31,7 +31,7 @@ pub struct RegionOfInterest {
 /// sensor_msgs/msg/CameraInfo, px; `k`, `r`, `p` row by row.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CameraInfo {
-    /// The frame of the camera; no stamp.
+    /// Frame of the camera, without a stamp.
     pub header: Header,
     /// Rows of the image.
     pub height: u32,
@@ -47,11 +47,11 @@ pub struct CameraInfo {
     pub r: [f64; 9],
     /// Projection of the rectified image.
     pub p: [f64; 12],
-    /// 0: no binning.
+    /// Binning along x; 0: none.
     pub binning_x: u32,
-    /// 0: no binning.
+    /// Binning along y; 0: none.
     pub binning_y: u32,
-    /// All zero: the whole image.
+    /// Region of interest; all zero: the whole image.
     pub roi: RegionOfInterest,
 }
 
@@ -79,7 +79,7 @@ pub struct TransformStamped {
 }
 
 impl TransformStamped {
-    /// The pose of the second frame in the first.
+    /// Builds the transform of the second frame in the first.
     ///
     /// # Errors
     /// [`EncodeError::StampRange`].
@@ -95,7 +95,7 @@ impl TransformStamped {
 /// tf2_msgs/msg/TFMessage.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TfMessage {
-    /// In any order; stamps may differ.
+    /// Transforms in any order; stamps may differ.
     pub transforms: Vec<TransformStamped>,
 }
 

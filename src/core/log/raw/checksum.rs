@@ -4,10 +4,10 @@ use std::io::{Read, Result, Seek};
 
 use super::window::Window;
 
-/// Bytes added at once.
+/// Number of bytes added at once.
 const STEP_BYTES: u64 = 1 << 18;
 
-/// The checksum as far as the file was passed.
+/// Checksum of the file up to the position of the pass.
 #[derive(Default)]
 pub struct DataChecksum {
     hasher: crc32fast::Hasher,
@@ -15,7 +15,7 @@ pub struct DataChecksum {
 }
 
 impl DataChecksum {
-    /// Adds the bytes before `end` that are not in it yet.
+    /// Adds the bytes before `end` that are not yet included.
     pub fn add_until<R: Read + Seek>(&mut self, window: &mut Window<R>, end: u64) -> Result<()> {
         while self.end < end {
             let len = (end - self.end).min(STEP_BYTES);

@@ -1,4 +1,4 @@
-//! Chunks and summary, unpacked and verified by mcap's decompressors and checksums.
+//! Chunks and summary, unpacked and verified with mcap's decompressors and checksums.
 
 use mcap::records::op;
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
@@ -7,7 +7,7 @@ use mcap::{McapError, McapResult};
 use super::limits::{MAX_RECORD_BYTES, MAX_UNCHECKED_BYTES, record_limit, unpacked_limit};
 use super::record::{ChunkHead, PREFIX_BYTES};
 
-/// Why a chunk is not read, or not to its end.
+/// Reason why a chunk is not read, or not to its end.
 #[derive(Debug, thiserror::Error)]
 pub enum ChunkError {
     #[error(transparent)]
@@ -20,16 +20,16 @@ pub enum ChunkError {
     NoRecord,
 }
 
-/// Unpacks whole chunks. What it is made of is large, and serves for one chunk after the other.
+/// Unpacks whole chunks. Its buffers are large and are reused from chunk to chunk.
 #[derive(Default)]
 pub struct Unpacker {
-    /// At the end of a chunk.
+    /// Reader, positioned at the end of a chunk.
     reader: Option<Box<LinearReader>>,
 }
 
 impl Unpacker {
-    /// Passes the records of a whole chunk to `visit` after its checksum is verified (where it has one). `bytes` is the
-    /// record from its opcode on, with a consistent `head`.
+    /// Passes the records of a whole chunk to `visit` after verification of its checksum (if it has one). `bytes` is
+    /// the record from its opcode on, with a consistent `head`.
     pub fn for_each_record(
         &mut self,
         bytes: &[u8],
@@ -47,7 +47,7 @@ impl Unpacker {
             self.reader = Some(reader);
             return Ok(());
         }
-        // The chunk ends within a record, or says a wrong size.
+        // The chunk ends within a record, or states a wrong size.
         end(&mut reader)
     }
 }
@@ -67,13 +67,13 @@ pub fn for_each_record_of_cut(bytes: &[u8], head: &ChunkHead, visit: impl FnMut(
     chunk.extend_from_slice(head.compression.as_bytes());
     chunk.extend_from_slice(&(compressed.len() as u64).to_le_bytes());
     chunk.extend_from_slice(compressed);
-    // The error comes from the cut.
+    // The cut causes the error.
     let options = options().with_record_length_limit(MAX_UNCHECKED_BYTES as usize);
     let _ = drive_chunk(&mut LinearReader::new_with_options(options), &chunk, head, visit);
 }
 
-/// Schemas, channels and statistics of the summary section, if its checksum holds. `bytes` runs from the data end
-/// record in front of the summary to the end of the footer.
+/// Returns schemas, channels and statistics of the summary section, if its checksum is right. `bytes` runs from the
+/// data end record before the summary to the end of the footer.
 pub fn verified_summary(bytes: &[u8]) -> McapResult<Vec<(u8, Vec<u8>)>> {
     let mut records = Vec::new();
     let options = options().with_validate_summary_section_crc(true).with_record_length_limit(bytes.len());
@@ -92,7 +92,8 @@ fn options() -> LinearReaderOptions {
     LinearReaderOptions::default().with_skip_start_magic(true).with_skip_end_magic(true)
 }
 
-/// Passes records on until one is impossible, or they are too many or too long for what is stored; their bytes.
+/// Passes records on until one is impossible, or they are too many or too long for the stored bytes. Returns their
+/// bytes.
 fn drive_chunk(
     reader: &mut LinearReader,
     bytes: &[u8],
@@ -118,7 +119,7 @@ fn drive_chunk(
     Ok(unpacked)
 }
 
-/// Passes records on until the reader wants more than `bytes`.
+/// Passes records on until the reader requests more than `bytes`.
 fn drive<E: From<McapError>>(
     reader: &mut LinearReader,
     mut bytes: &[u8],
@@ -139,7 +140,7 @@ fn drive<E: From<McapError>>(
     Ok(())
 }
 
-/// That nothing is missing, once no more bytes come.
+/// Checks that nothing is missing, once no more bytes come.
 fn end<E: From<McapError>>(reader: &mut LinearReader) -> Result<(), E> {
     while let Some(event) = reader.next_event() {
         if let LinearReadEvent::ReadRequest(_) = event? {

@@ -6,12 +6,12 @@ use mcap::records::op;
 
 use super::record::{ChunkHead, Fields};
 
-/// Bytes read of a header, metadata or attachment record.
+/// Maximum number of bytes read of a header, metadata or attachment record.
 pub const MAX_HEAD_BYTES: u64 = 1 << 20;
 
-/// Bytes of such records that are kept in all.
+/// Maximum number of bytes of such records that are kept in all.
 const MAX_KEPT_BYTES: usize = 16 << 20;
-/// What one of them costs beside its texts.
+/// Memory of one such record in addition to its texts, bytes.
 const ENTRY_BYTES: usize = 1024;
 
 /// Number and bytes of the chunks of one compression.
@@ -19,9 +19,9 @@ const ENTRY_BYTES: usize = 1024;
 pub struct ChunkTotals {
     /// Number of chunks.
     pub chunks: u64,
-    /// As stored.
+    /// Stored size of the chunks.
     pub compressed_bytes: u64,
-    /// As the chunks' headers declare it.
+    /// Unpacked size of the chunks, as their headers declare it.
     pub uncompressed_bytes: u64,
 }
 
@@ -30,11 +30,11 @@ pub struct ChunkTotals {
 pub struct AttachmentInfo {
     /// File name given by the writer.
     pub name: String,
-    /// Such as `application/xml`.
+    /// Media type, such as `application/xml`.
     pub media_type: String,
     /// Length of the attached data.
     pub bytes: u64,
-    /// Start in the file and length of the record's fields.
+    /// Start of the record's fields in the file, and their length.
     pub(in crate::log) record: (u64, u64),
 }
 
@@ -43,13 +43,13 @@ pub struct AttachmentInfo {
 pub struct FileContents {
     /// Length of the file, bytes.
     pub bytes: u64,
-    /// `ros2`, `ros1`, empty or another.
+    /// Profile: `ros2`, `ros1`, empty or another.
     pub profile: String,
-    /// The program that wrote it.
+    /// Name of the program that wrote the file.
     pub library: String,
     /// Readable chunks by compression: `zstd`, `lz4` or empty.
     pub chunks: BTreeMap<&'static str, ChunkTotals>,
-    /// In the order of the file; their data stay in the file.
+    /// Attachments in the order of the file; their data stay in the file.
     pub attachments: Vec<AttachmentInfo>,
     /// Name and key-value pairs of each record, in the order of the file.
     pub metadata: Vec<(String, BTreeMap<String, String>)>,
@@ -64,8 +64,8 @@ impl FileContents {
         totals.uncompressed_bytes += head.uncompressed_bytes;
     }
 
-    /// Adds a header, metadata or attachment record. `body` is the beginning of its fields, `record` their place.
-    /// `None` if it is malformed, or beyond what is kept.
+    /// Adds a header, metadata or attachment record. `body` is the beginning of its fields, `record` their position.
+    /// `None` if it is malformed, or exceeds the limit of kept bytes.
     pub(super) fn take(&mut self, opcode: u8, body: &[u8], record: (u64, u64)) -> Option<()> {
         let mut fields = Fields(body);
         // The data of an attachment stay in the file.

@@ -1,4 +1,4 @@
-//! Reads the messages or the other contents of a file.
+//! Reader of the messages or the other contents of a file.
 
 use std::collections::BTreeSet;
 use std::fs::{File, Metadata};
@@ -17,7 +17,7 @@ use crate::log::error::LogError;
 /// First bytes of a journal whose transaction is unfinished.
 const JOURNAL_MAGIC: [u8; 8] = [0xd9, 0xd5, 0x05, 0xf9, 0x20, 0xa1, 0x63, 0xd7];
 
-/// Hands every readable message of an MCAP file or a ROS 2 bag (`.db3`) to `visit`, in the order of the file.
+/// Passes every readable message of an MCAP file or a ROS 2 bag (`.db3`) to `visit`, in the order of the file.
 ///
 /// A chunk's messages are visited once its checksum has been verified. From a cut last chunk, the messages before the
 /// cut are visited unverified.
@@ -29,7 +29,7 @@ pub fn for_each_raw(path: impl AsRef<Path>, visit: impl FnMut(&RawMessage<'_>)) 
     for_each_raw_twice(path.as_ref(), visit).map(|(summary, _)| summary)
 }
 
-/// A file whose messages were visited, to visit those of some of its parts again.
+/// A file whose messages were visited, for a second visit of some of its parts.
 pub enum SecondLook {
     Mcap(Box<SecondPass<File>>),
     Bag(Box<SecondBagPass<File>>),
@@ -45,7 +45,7 @@ impl SecondLook {
     }
 }
 
-/// [`for_each_raw`], and what visits the messages of some parts again.
+/// Does the same as [`for_each_raw`], and returns the means to visit some parts again.
 pub fn for_each_raw_twice(
     path: &Path,
     visit: impl FnMut(&RawMessage<'_>),
@@ -59,11 +59,11 @@ pub fn for_each_raw_twice(
     found.map_err(|error| of_scan(path, error))
 }
 
-/// Contents of a file other than messages. Its messages are skipped: damage within chunks is not noticed, and large
-/// files are read quickly.
+/// Returns the contents of a file other than messages. Its messages are skipped: damage within chunks is not noticed,
+/// and large files are read quickly.
 ///
 /// # Errors
-/// As [`for_each_raw`].
+/// The errors of [`for_each_raw`].
 pub fn file_contents(path: impl AsRef<Path>) -> Result<FileContents, LogError> {
     let path = path.as_ref();
     let found = match open_any(path)? {
@@ -73,9 +73,9 @@ pub fn file_contents(path: impl AsRef<Path>) -> Result<FileContents, LogError> {
     found.map_err(|error| of_scan(path, error))
 }
 
-/// A file by what it begins with.
+/// An opened file, by its first bytes.
 enum Opened {
-    /// Or anything but a bag.
+    /// An MCAP file, or anything except a bag.
     Mcap(File),
     Bag(BagFiles<File>),
 }
@@ -105,7 +105,7 @@ fn open_any(path: &Path) -> Result<Opened, LogError> {
     Ok(Opened::Bag(BagFiles { bag: file, log: beside("-wal")?, is_in_transaction }))
 }
 
-/// The start of reading a file that another program may still be writing.
+/// Starts reading a file that another program may still be writing.
 pub fn begin_growing(path: &Path) -> Result<(GrowingScan<File>, Option<FileIdentity>), LogError> {
     let file = open(path)?;
     let read_error = |source| LogError::Read { path: path.to_owned(), source };
@@ -113,17 +113,17 @@ pub fn begin_growing(path: &Path) -> Result<(GrowingScan<File>, Option<FileIdent
     Ok((GrowingScan::new(file).map_err(read_error)?, identity))
 }
 
-/// Device and number of a file, which stay when it is renamed.
+/// Device and inode number of a file, which stay when it is renamed.
 pub type FileIdentity = (u64, u64);
 
-/// What tells a file from another one in its place, where the system has that.
+/// Returns the identity of a file, if the system has one. Another file under the same name has another identity.
 #[cfg(unix)]
 pub fn identity(metadata: &Metadata) -> Option<FileIdentity> {
     use std::os::unix::fs::MetadataExt;
     Some((metadata.dev(), metadata.ino()))
 }
 
-/// What tells a file from another one in its place, where the system has that.
+/// Returns the identity of a file, if the system has one. Another file under the same name has another identity.
 #[cfg(not(unix))]
 pub fn identity(_: &Metadata) -> Option<FileIdentity> {
     None

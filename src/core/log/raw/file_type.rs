@@ -2,14 +2,14 @@
 
 use super::record::MAGIC;
 
-/// Bytes of the file's beginning that are compared.
+/// Number of the file's first bytes that are compared.
 pub const START_BYTES: usize = 512;
 
 /// First bytes of an SQLite file.
 pub const SQLITE: &[u8] = b"SQLite format 3\0";
 
 const UNPACK: &str = "unpack it first";
-/// Command that makes a readable recording of a ROS 1 bag; tests/oracle/make_ros1_golden.py runs it.
+/// Advice: the command that converts a ROS 1 bag to a readable recording; tests/oracle/make_ros1_golden.py runs it.
 pub const ROS1_ADVICE: &str = "rosbags 0.11.9 (`pip install rosbags==0.11.9`) converts it: \
     `rosbags-convert --src IN.bag --dst OUT --dst-storage mcap` writes OUT/OUT.mcap";
 const NO_RECORDING: &str = "name the recording itself, an .mcap or .db3 file";
@@ -52,7 +52,7 @@ const KINDS: [(&[u8], &str, &str); 25] = [
     (b"version https://git-lfs", "a pointer of Git LFS, not the recording itself", "fetch it with `git lfs pull`"),
 ];
 
-/// Type of a file that begins with `start`, which is not empty and not the beginning of a recording.
+/// Describes the type of a file that begins with `start`, which is not empty and not the beginning of a recording.
 pub fn describe(start: &[u8]) -> String {
     if MAGIC.starts_with(start) {
         return format!("it holds only the first {} bytes of one", start.len());
@@ -77,7 +77,7 @@ pub fn describe(start: &[u8]) -> String {
 fn text_kind(start: &[u8]) -> Option<&'static str> {
     let text = match std::str::from_utf8(start) {
         Ok(text) => text,
-        // The beginning may end within a character.
+        // The compared bytes may end within a character.
         Err(error) if error.error_len().is_none() => std::str::from_utf8(&start[..error.valid_up_to()]).ok()?,
         Err(_) => return None,
     };
@@ -99,7 +99,7 @@ fn text_kind(start: &[u8]) -> Option<&'static str> {
     })
 }
 
-/// A table in a zip archive, by the name of its first member.
+/// Returns the type of a table in a zip archive, by the name of its first member.
 fn zipped_table(start: &[u8]) -> Option<&'static str> {
     let has = |name: &[u8]| start.windows(name.len()).any(|part| part == name);
     let is_zip = start.starts_with(b"PK\x03\x04");
@@ -111,7 +111,7 @@ fn zipped_table(start: &[u8]) -> Option<&'static str> {
     kinds.into_iter().find(|(name, _)| is_zip && has(name)).map(|(_, what)| what)
 }
 
-/// A list, or a map whose first line is `key:` or `key: value`.
+/// Returns true for a list, or a map whose first line is `key:` or `key: value`.
 fn is_yaml(text: &str) -> bool {
     let lines = text.lines().map(str::trim_end).filter(|line| !line.is_empty() && !line.starts_with('#'));
     let Some(first) = lines.clone().find(|line| *line != "---") else { return false };
@@ -120,7 +120,7 @@ fn is_yaml(text: &str) -> bool {
     has_key || (first.starts_with("- ") && lines.clone().all(|line| line.starts_with(['-', ' '])))
 }
 
-/// `[table]`.
+/// Returns true for a line such as `[table]`.
 fn is_toml(line: &str) -> bool {
     line.starts_with('[') && line.trim_end().ends_with(']') && !line.contains('"')
 }

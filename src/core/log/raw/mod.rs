@@ -2,8 +2,8 @@
 //!
 //! A file may be whole, cut off at any byte, still being written, or hold flipped bits. Chunks that pass their checksum
 //! are read; damaged ones are skipped and counted. Each length is checked against the file's size before its use. The
-//! memory needed is that of the largest chunk, not of the file; `limits` bounds what is unpacked. Chunks that lie in
-//! another order are read in the order of time, exact copies once. `bag` reads ROS 2 bags in SQLite files.
+//! required memory is that of the largest chunk, not of the file; `limits` bounds the unpacked data. Chunks in another
+//! order are read in the order of time, exact copies once. `bag` reads ROS 2 bags in SQLite files.
 
 mod bag;
 mod checksum;

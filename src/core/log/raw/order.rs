@@ -4,20 +4,20 @@ use std::collections::BTreeSet;
 
 use super::record::ChunkHead;
 
-/// What was put right in the order of a file's chunks.
+/// Corrections to the order of a file's chunks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ChunkOrder {
-    /// Chunks that lie behind one of a later time; they were read in the order of time.
+    /// Number of chunks behind one of a later time; they were read in the order of time.
     pub moved: u64,
-    /// Chunks that are exact copies of others; they were read once.
+    /// Number of chunks that are exact copies of others; they were read once.
     pub copies: u64,
 }
 
-/// Whether the heads of the chunks, in the order of the file, leave their order in doubt.
+/// Check of the chunk heads, in the order of the file, for chunks out of order or copied.
 #[derive(Default)]
 pub struct HeadOrder {
     latest_nanos: u64,
-    /// Checksum and size of the chunks of that time.
+    /// Checksum and size of the chunks at the latest time.
     latest: BTreeSet<(u32, u64)>,
     pub is_doubtful: bool,
 }
@@ -38,18 +38,18 @@ impl HeadOrder {
 
 /// A chunk that can be read.
 pub struct SurveyedChunk {
-    /// Place of its record in the file.
+    /// Position of the chunk's record in the file.
     pub at: u64,
     pub record_bytes: usize,
-    /// Of the whole record.
+    /// Hash of the whole record.
     pub hash: [u8; 32],
     pub messages: u64,
     /// Log times of the earliest and the latest message.
     pub nanos: Option<(u64, u64)>,
 }
 
-/// The chunks in the order of time, each once; the number of messages in the copies that are left out. Where sorting
-/// does not make them overlap less, times go backwards within chunks, and they stay as they are.
+/// Returns the chunks in the order of time, each once, and the number of messages in omitted copies. If sorting does
+/// not reduce their overlap, times go backwards within chunks, and the order is kept.
 pub fn in_order(chunks: Vec<SurveyedChunk>) -> (Vec<SurveyedChunk>, ChunkOrder, u64) {
     let (mut order, mut copied_messages) = (ChunkOrder::default(), 0);
     let (mut known, mut latest_nanos, mut nanos) = (BTreeSet::new(), 0, (0, 0));
@@ -60,7 +60,7 @@ pub fn in_order(chunks: Vec<SurveyedChunk>) -> (Vec<SurveyedChunk>, ChunkOrder, 
             copied_messages += chunk.messages;
             continue;
         }
-        // One without messages stays where it is.
+        // A chunk without messages keeps its position.
         nanos = chunk.nanos.unwrap_or(nanos);
         order.moved += u64::from(nanos.0 < latest_nanos);
         latest_nanos = latest_nanos.max(nanos.0);
@@ -76,7 +76,7 @@ pub fn in_order(chunks: Vec<SurveyedChunk>) -> (Vec<SurveyedChunk>, ChunkOrder, 
     (kept.into_iter().map(|(_, chunk)| chunk).collect(), order, copied_messages)
 }
 
-/// By how much chunks of these times begin before the end of those before them, all together.
+/// Returns the total time by which chunks of these times begin before the end of the previous ones.
 fn overlap_nanos<'a>(spans: impl IntoIterator<Item = &'a (u64, u64)>) -> u128 {
     let mut end = 0;
     spans
@@ -93,7 +93,7 @@ fn overlap_nanos<'a>(spans: impl IntoIterator<Item = &'a (u64, u64)>) -> u128 {
 mod tests {
     use super::*;
 
-    /// Numbers of the chunks as they are read.
+    /// Returns the numbers of the chunks in the order of reading.
     fn read_as(spans: &[(u64, u64)]) -> (Vec<u64>, u64) {
         let chunk = |(n, span): (usize, &(u64, u64))| SurveyedChunk {
             at: n as u64,
@@ -111,7 +111,7 @@ mod tests {
         assert_eq!(read_as(&[(1, 9), (20, 29), (10, 19), (30, 39)]), (vec![0, 2, 1, 3], 1));
         // Writers on several threads overlap a little.
         assert_eq!(read_as(&[(1, 11), (20, 31), (10, 21), (30, 39)]), (vec![0, 2, 1, 3], 1));
-        // One message of the third was stamped too early.
+        // One message of the third chunk was stamped too early.
         assert_eq!(read_as(&[(1, 9), (10, 19), (4, 29), (30, 39)]), (vec![0, 1, 2, 3], 0));
     }
 }

@@ -6,17 +6,17 @@ use std::rc::Rc;
 use super::limits::MAX_DECLARED_BYTES;
 use super::message::{Channel, RawMessage, Schema};
 
-/// Bytes at both ends of the file.
+/// Magic bytes at both ends of the file.
 pub const MAGIC: &[u8] = mcap::MAGIC;
-/// Opcode and length in front of each record.
+/// Length of opcode and record length before each record.
 pub const PREFIX_BYTES: usize = 9;
 pub const FOOTER_BYTES: u64 = 20;
 pub const DATA_END_BYTES: u64 = 4;
 
-/// The longest chunk head: prefix, times, sizes, checksum and a compression name of four letters.
+/// Maximum length of a chunk head: prefix, times, sizes, checksum and a compression name of four letters.
 pub const CHUNK_HEAD_BYTES: usize = PREFIX_BYTES + 44;
 
-/// What a schema or channel costs beside its texts.
+/// Memory of a schema or channel in addition to its texts, bytes.
 const DECLARATION_BYTES: usize = 1024;
 
 /// Opcode and length of a record.
@@ -33,7 +33,7 @@ impl Prefix {
     }
 }
 
-/// Little-endian fields, read in turn; `None` at the end of the bytes.
+/// Little-endian fields, read one after the other; `None` at the end of the bytes.
 pub struct Fields<'a>(pub &'a [u8]);
 
 impl<'a> Fields<'a> {
@@ -65,7 +65,7 @@ impl<'a> Fields<'a> {
         self.array().map(u64::from_le_bytes)
     }
 
-    /// Bytes after a length of four bytes.
+    /// Reads the bytes after a length of four bytes.
     fn blob(&mut self) -> Option<&'a [u8]> {
         let len = self.u32()?;
         self.take(usize::try_from(len).ok()?)
@@ -75,7 +75,7 @@ impl<'a> Fields<'a> {
         self.blob().and_then(|bytes| std::str::from_utf8(bytes).ok()).map(str::to_owned)
     }
 
-    /// Pairs of texts after a length of four bytes.
+    /// Reads pairs of texts after a length of four bytes.
     pub fn pairs(&mut self) -> Option<BTreeMap<String, String>> {
         let mut fields = Fields(self.blob()?);
         let mut pairs = BTreeMap::new();
@@ -94,10 +94,10 @@ pub struct ChunkHead {
     pub start_nanos: u64,
     pub checksum: u32,
     pub uncompressed_bytes: u64,
-    /// "zstd", "lz4" or "".
+    /// Name of the compression: "zstd", "lz4" or "".
     pub compression: &'static str,
     pub compressed_bytes: u64,
-    /// From the record's opcode to the compressed bytes.
+    /// Length from the record's opcode to the compressed bytes.
     pub head_bytes: usize,
 }
 
@@ -108,7 +108,7 @@ impl ChunkHead {
         Self::parse_body(bytes).filter(|_| bytes[0] == mcap::records::op::CHUNK)
     }
 
-    /// The same with any opcode.
+    /// Parses a chunk head with any opcode.
     pub fn parse_body(bytes: &[u8]) -> Option<Self> {
         let prefix = Prefix::parse(bytes)?;
         let mut fields = Fields(&bytes[PREFIX_BYTES..]);
@@ -126,8 +126,8 @@ impl ChunkHead {
         Some(Self { record_len, start_nanos, checksum, uncompressed_bytes, compression, compressed_bytes, head_bytes })
     }
 
-    /// Whether the record's two lengths agree and the record fits into the `available` bytes from its opcode on. Random
-    /// bytes pass with probability 2^-64.
+    /// Returns true if the record's two lengths agree and the record fits into the `available` bytes from its opcode
+    /// on. Random bytes pass with probability 2^-64.
     pub fn is_consistent(&self, available: u64) -> bool {
         let body = (self.head_bytes - PREFIX_BYTES) as u64;
         self.compressed_bytes.checked_add(body) == Some(self.record_len)
@@ -135,26 +135,26 @@ impl ChunkHead {
     }
 }
 
-/// Whether the first bytes of a message index fit its length.
+/// Returns true if the first bytes of a message index are consistent with its length.
 pub fn is_message_index(body: &[u8], len: u64) -> bool {
     let mut fields = Fields(body);
     let _channel = fields.u16();
     fields.u32().is_some_and(|array_bytes| u64::from(array_bytes) + 6 == len && array_bytes % 16 == 0)
 }
 
-/// Log time of a message record's fields; `None` if they are too few.
+/// Returns the log time of a message record's fields; `None` if they are too few.
 pub fn log_time_nanos(body: &[u8]) -> Option<u64> {
     let mut fields = Fields(body);
     let _channel_and_sequence = (fields.u16()?, fields.u32()?);
     fields.u64()
 }
 
-/// Schemas and channels seen so far.
+/// Schemas and channels read so far.
 #[derive(Debug, Default)]
 pub struct Tables {
     schemas: BTreeMap<u16, Rc<Schema>>,
     channels: BTreeMap<u16, Channel>,
-    /// Of all that were declared, repetitions aside.
+    /// Bytes of all declarations, without repetitions.
     declared_bytes: usize,
 }
 
@@ -186,13 +186,13 @@ impl Tables {
         Some(())
     }
 
-    /// `None` once a file has declared too much.
+    /// Counts a declaration; `None` once a file has declared too much.
     fn declare(&mut self, body: &[u8]) -> Option<()> {
         self.declared_bytes += DECLARATION_BYTES + body.len();
         (self.declared_bytes <= MAX_DECLARED_BYTES).then_some(())
     }
 
-    /// The message of a record in a part of a file; `None` if it is malformed or its channel is unknown.
+    /// Returns the message of a record in a part of a file; `None` if it is malformed or its channel is unknown.
     pub fn message<'a>(&'a self, body: &'a [u8], part: u64) -> Option<RawMessage<'a>> {
         let mut fields = Fields(body);
         let channel = self.channels.get(&fields.u16()?)?;

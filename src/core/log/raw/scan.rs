@@ -1,4 +1,4 @@
-//! Pass through a file, record by record. After damage it continues at the next chunk.
+//! Pass through a file, record by record. After damage the pass continues at the next chunk.
 
 mod chunks;
 mod growing;
@@ -28,12 +28,12 @@ use super::record::{
 };
 use super::window::Window;
 
-/// Stored bytes of a part of a file.
+/// Number of stored bytes of a part of a file.
 const PART_BYTES: u64 = 1 << 16;
-/// Prefix and fields of the last record, and the magic after it.
+/// Length of the last record's prefix and fields, and the magic after it.
 const TAIL_BYTES: u64 = PREFIX_BYTES as u64 + FOOTER_BYTES + MAGIC.len() as u64;
 
-/// Why nothing of a file can be read.
+/// Reason why nothing of a file can be read.
 #[derive(Debug)]
 pub enum ScanError {
     Read(io::Error),
@@ -41,16 +41,16 @@ pub enum ScanError {
     NotMcap {
         found: String,
     },
-    /// An SQLite file that is no bag of rosbag2.
+    /// An SQLite file that is not a bag of rosbag2.
     NotBag {
         found: String,
     },
-    /// A growing file became shorter than what was read of it.
+    /// A growing file became shorter than the bytes read of it.
     Truncated {
         bytes: u64,
         read: u64,
     },
-    /// The bytes of a growing file that were read are others now.
+    /// The bytes read of a growing file have changed.
     Rewritten,
 }
 
@@ -60,36 +60,36 @@ impl From<io::Error> for ScanError {
     }
 }
 
-/// Place where the pass continues after a record.
+/// Position at which the pass continues after a record.
 enum Next {
     At(u64),
-    /// Here, once the file has grown.
+    /// The same position, once the file has grown.
     Later,
-    /// Nothing more can be read.
+    /// End of the pass: nothing more can be read.
     End,
 }
 
-/// Whether a file may still grow.
+/// State of the file's end.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Ending {
-    /// What is incomplete is cut.
+    /// The file no longer grows: an incomplete record is cut.
     Closed,
-    /// What is incomplete is still being written.
+    /// The file may grow: an incomplete record is still being written.
     Open,
 }
 
-/// What a pass does with chunks.
+/// Use of chunks in a pass.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum ChunkUse {
-    /// Their heads are looked at.
+    /// Only the heads of chunks are read.
     Heads,
-    /// They are read for their times and channels.
+    /// Chunks are read for their times and channels.
     Survey,
-    /// Their messages are visited.
+    /// Messages of chunks are visited.
     Messages,
 }
 
-/// What a pass has come to know.
+/// State of a pass through a file.
 struct Pass {
     chunk_use: ChunkUse,
     damage: Damage,
@@ -97,15 +97,15 @@ struct Pass {
     has_chunks: bool,
     is_past_data: bool,
     contents: FileContents,
-    /// End of the last chunk, or of the opening magic: surely the beginning of a record.
+    /// End of the last chunk, or of the opening magic: certainly the beginning of a record.
     verified_end: u64,
     checksum: DataChecksum,
-    /// Whether a chunk has no checksum of its own. mcap 0.26 for Rust leaves such chunks out of that of all data.
+    /// True if a chunk has no checksum of its own. mcap 0.26 for Rust omits such chunks from the checksum of all data.
     has_unchecked_chunks: bool,
     heads: HeadOrder,
     surveyed: Vec<SurveyedChunk>,
     budget: Budget,
-    /// Of all chunks.
+    /// Number of records of all chunks.
     records: u64,
 }
 
@@ -135,14 +135,14 @@ struct Scan<R, F> {
     unpacker: Unpacker,
     tables: Tables,
     readable: u64,
-    /// Messages that the file's own summary counts, and those of them that are copies.
+    /// Number of messages that the file's own summary counts, and of copies among them.
     counted: Option<u64>,
     copied: u64,
     ends_with_magic: bool,
     /// Parts whose messages are visited; `None`: all.
     parts: Option<BTreeSet<u64>>,
     ending: Ending,
-    /// Length of an open file from which on a lost place is searched again.
+    /// Length of an open file from which on a lost position is searched again.
     search_at_bytes: u64,
     pass: Pass,
 }
@@ -163,7 +163,7 @@ pub fn scan<R: Read + Seek, F: FnMut(&RawMessage<'_>)>(
     Ok((summary, SecondPass { of_chunks, scan: scan.with_visit(()) }))
 }
 
-/// A file whose messages were visited, to visit those of some of its parts again.
+/// A file whose messages were visited, for a second visit of some of its parts.
 pub struct SecondPass<R> {
     scan: Scan<R, ()>,
     of_chunks: ChunkUse,
@@ -181,7 +181,7 @@ impl<R: Read + Seek> SecondPass<R> {
     }
 }
 
-/// Contents of `source` other than messages; its chunks are not read.
+/// Returns the contents of `source` other than messages; its chunks are not read.
 pub fn scan_contents<R: Read + Seek>(source: R) -> Result<FileContents, ScanError> {
     let mut scan = begin(source, |_| {})?;
     scan.walk()?;
@@ -194,7 +194,7 @@ fn begin<R: Read + Seek, F: FnMut(&RawMessage<'_>)>(source: R, visit: F) -> Resu
     Ok(scan)
 }
 
-/// The part of a file that a record outside of chunks belongs to, a chunk whole.
+/// Returns the part of a file that a record outside of chunks, or a whole chunk, belongs to.
 fn part_of(at: u64) -> u64 {
     at / PART_BYTES
 }
@@ -259,7 +259,7 @@ impl<R: Read + Seek, F> Scan<R, F> {
 }
 
 impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
-    /// Reads channels and the count of messages from the end of a finished file. Thus a damaged chunk that declared
+    /// Reads channels and the count of messages from the end of a finished file. So damage of a chunk that declared
     /// channels does not make the messages of other chunks unreadable.
     fn read_summary(&mut self) -> io::Result<()> {
         let len = self.window.len();
@@ -362,7 +362,7 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
             op::HEADER | op::ATTACHMENT | op::METADATA => {
                 let (at, len) = (at + PREFIX_BYTES as u64, prefix.len);
                 let body = self.window.bytes(at, len.min(MAX_HEAD_BYTES) as usize)?;
-                // Malformed ones are skipped: belief never reads them.
+                // Malformed records are skipped: the estimator never reads them.
                 let _ = self.pass.contents.take(prefix.opcode, body, (at, len));
             }
             _ => {}
@@ -370,8 +370,8 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
         Ok(Next::At(at + PREFIX_BYTES as u64 + prefix.len))
     }
 
-    /// Why a record contradicts its opcode. An opcode has no checksum; a changed one must neither hide a record nor
-    /// turn another record into a message.
+    /// Returns the reason why a record contradicts its opcode. An opcode has no checksum; a changed one must neither
+    /// hide a record nor turn another record into a message.
     fn contradiction(&mut self, at: u64, prefix: Prefix) -> io::Result<Option<&'static str>> {
         let left = self.window.len() - at;
         let start = self.window.bytes(at, left.min(CHUNK_HEAD_BYTES as u64) as usize)?;
@@ -406,7 +406,7 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
         Ok(())
     }
 
-    /// The data section ends here; its checksum, where it has one, covers all bytes before.
+    /// Handles the end of the data section; its checksum, if it has one, covers all bytes before.
     fn data_end(&mut self, at: u64) -> io::Result<()> {
         let body = self.window.bytes(at + PREFIX_BYTES as u64, DATA_END_BYTES as usize)?;
         let stated = Fields(body).u32().unwrap_or(0);
@@ -424,7 +424,7 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
 
     fn footer(&mut self, at: u64, prefix: Prefix) -> io::Result<Next> {
         if self.ending == Ending::Open {
-            // It was not there when the file was opened.
+            // The summary did not exist when the file was opened.
             self.read_summary()?;
         }
         let left = self.window.len() - at;

@@ -12,7 +12,7 @@ use crate::log::{LogError, samples};
 
 const PER_CHUNK: usize = 60;
 
-/// Bytes of a recording of several chunks, and the data of its messages in the order of the file.
+/// Returns the bytes of a recording of several chunks, and the data of its messages in the order of the file.
 fn recording() -> (Vec<u8>, Vec<Vec<u8>>) {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("run.mcap");
@@ -31,13 +31,13 @@ fn read(bytes: &[u8]) -> Result<(Vec<Vec<u8>>, RawSummary), ScanError> {
     Ok((messages, summary))
 }
 
-/// Whether `part` is `whole` with some left out, in the same order.
+/// Returns true if `part` is `whole` with some elements omitted, in the same order.
 fn is_subsequence(part: &[Vec<u8>], whole: &[Vec<u8>]) -> bool {
     let mut rest = whole.iter();
     part.iter().all(|message| rest.any(|other| other == message))
 }
 
-/// Where the records outside of chunks begin, and how long they are.
+/// Returns start and length of the records outside of chunks.
 fn records(bytes: &[u8]) -> Vec<(usize, usize)> {
     let mut at = 8;
     let mut records = Vec::new();
@@ -49,7 +49,7 @@ fn records(bytes: &[u8]) -> Vec<(usize, usize)> {
     records
 }
 
-/// The chunks among them.
+/// Returns start and length of the chunks.
 fn chunks(bytes: &[u8]) -> Vec<(usize, usize)> {
     records(bytes).into_iter().filter(|(at, _)| bytes[*at] == 6).collect()
 }
@@ -85,7 +85,7 @@ fn messages_before_the_cut_within_a_chunk_are_saved() {
     assert!(messages.len() > 1000, "{}", messages.len());
 }
 
-/// Checks what is read of `bytes` after one bit of them was flipped.
+/// Checks the messages read from `bytes` after a flip of one bit.
 fn check_flip(bytes: &[u8], messages: &[Vec<u8>], at: usize, bit: u8) {
     let mut damaged = bytes.to_vec();
     damaged[at] ^= 1 << bit;
@@ -185,7 +185,7 @@ fn a_lost_chunk_is_counted_and_the_rest_is_read() {
 fn huge_lengths_are_not_believed() {
     let (bytes, messages) = recording();
     let (at, _) = chunks(&bytes)[2];
-    // The record's length, the unpacked size, and the packed size, in turn.
+    // The record's length, the unpacked size, and the packed size, one after the other.
     for (field, lost) in [(1, PER_CHUNK), (25, PER_CHUNK), (45, PER_CHUNK)] {
         let mut damaged = bytes.clone();
         damaged[at + field..at + field + 8].copy_from_slice(&(u64::MAX / 3).to_le_bytes());
@@ -206,7 +206,7 @@ fn zeros_behind_a_crash_are_a_cut() {
     assert!(matches!(summary.completeness, Completeness::Cut { .. }), "{summary:?}");
 }
 
-/// What writers beside ours leave out or do otherwise than `plain`.
+/// Options of other writers, which omit or change parts of `plain`.
 pub(super) fn other_writers(plain: impl Fn() -> WriteOptions) -> [WriteOptions; 5] {
     [
         plain().compression(None),
@@ -271,7 +271,7 @@ fn empty_and_foreign_files_are_errors_that_name_the_file() {
     assert!(matches!(read(dir.path()), LogError::Read { .. }));
 }
 
-/// The bytes before the first chunk, each chunk with its index, and the bytes from the end of the data on.
+/// Returns the bytes before the first chunk, each chunk with its index, and the bytes from the end of the data on.
 fn taken_apart(bytes: &[u8]) -> (Vec<u8>, Vec<Vec<u8>>, Vec<u8>) {
     let chunks = chunks(bytes);
     let (data_end, _) = *records(bytes).iter().find(|(at, _)| bytes[*at] == 15).unwrap();
@@ -288,12 +288,12 @@ fn chunks_in_another_order_are_sorted_and_do_not_pass_for_whole() {
     let swapped = |tail: &[u8]| [head.clone(), groups.concat(), tail.to_vec()].concat();
     let (read_back, summary) = read(&swapped(&tail)).unwrap();
     assert!(read_back == messages);
-    // The chunks 2, 3 and 1 lie behind chunk 4.
+    // The chunks 2, 3 and 1 come after chunk 4.
     assert_eq!(summary.chunk_order, ChunkOrder { moved: 3, copies: 0 });
     let Completeness::Damaged { reason, lost_messages, .. } = summary.completeness else { panic!("{summary:?}") };
     assert_eq!(lost_messages, Some(0));
     insta::assert_snapshot!("chunks_in_another_order", reason);
-    // Without a checksum, or with one of that order, a writer may well have written them so.
+    // Without a checksum, or with one of that order, a writer may have written the chunks in this order.
     tail[9..13].fill(0);
     let (read_back, summary) = read(&swapped(&tail)).unwrap();
     assert!(read_back == messages);
@@ -318,7 +318,7 @@ fn copies_of_chunks_are_left_out() {
     }
 }
 
-/// Times in the heads of chunks have no checksum of their own: a wrong one moves nothing.
+/// Times in the heads of chunks have no checksum of their own: a wrong one must not move a chunk.
 #[test]
 fn a_wrong_time_in_the_head_of_a_chunk_moves_nothing() {
     let (mut bytes, messages) = recording();
@@ -356,7 +356,7 @@ fn more_records_than_a_chunk_can_hold_are_not_read() {
     insta::assert_snapshot!("many_records", reason);
 }
 
-/// Whole and cut, and with chunks that lie in another order.
+/// Tests whole and cut files, and chunks in another order.
 #[test]
 fn chosen_parts_are_read_again_and_no_others() {
     let dir = tempfile::tempdir().unwrap();
@@ -395,7 +395,7 @@ fn zeros_in_a_chunk_are_no_records() {
     let (read_back, summary) = read(&damaged).unwrap();
     assert_eq!(read_back.len(), messages.len() - PER_CHUNK);
     let Completeness::Damaged { reason, .. } = summary.completeness else { panic!("{summary:?}") };
-    // The summary is no more where the footer has it; its damage is told first.
+    // The summary is no longer at the footer's position; the damage there is reported first.
     insta::assert_snapshot!("zeros_in_a_chunk", reason);
 }
 

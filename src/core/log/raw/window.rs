@@ -2,10 +2,10 @@
 
 use std::io::{Error, ErrorKind, Read, Result, Seek, SeekFrom};
 
-/// Bytes read at once when less is asked for.
+/// Number of bytes read at once if less is requested.
 const READ_AHEAD_BYTES: usize = 1 << 18;
 
-/// A file with one range in memory. Bytes appended after opening are seen by [`Self::refresh`] alone.
+/// A file with one range in memory. Only [`Self::refresh`] notices bytes appended after opening.
 pub struct Window<R> {
     source: R,
     len: u64,
@@ -19,7 +19,7 @@ impl<R: Read + Seek> Window<R> {
         Ok(Self { source, len, start: 0, buffer: Vec::new() })
     }
 
-    /// Looks at the file anew: its length, and its bytes.
+    /// Reads the file's length again and drops the buffered bytes.
     pub fn refresh(&mut self) -> Result<()> {
         self.buffer.clear();
         self.len = self.source.seek(SeekFrom::End(0))?;
@@ -31,7 +31,8 @@ impl<R: Read + Seek> Window<R> {
         self.len
     }
 
-    /// `len` bytes from `at`, which must lie within the file: no more memory is allocated than the file has bytes.
+    /// Returns `len` bytes from `at`, which must lie within the file: no more memory is allocated than the file has
+    /// bytes.
     pub fn bytes(&mut self, at: u64, len: usize) -> Result<&[u8]> {
         let end = at.checked_add(len as u64).filter(|&end| end <= self.len);
         let end = end.ok_or_else(|| Error::new(ErrorKind::UnexpectedEof, "range exceeds the file"))?;

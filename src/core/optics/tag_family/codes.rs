@@ -1,15 +1,15 @@
 //! The codes of each family.
 //!
-//! Those of the older families come from OpenCV's dictionaries, turned upright: OpenCV holds them turned by half a turn
-//! against the AprilTag project's images. The others are the AprilTag library's: each code is the one before it plus a
-//! multiple of a prime (Olson 2011), and the multiples are what is kept. Both are written by
-//! tests/oracle/make_tag_families.py.
+//! The codes of the older families come from OpenCV's dictionaries, turned upright: OpenCV holds them turned by half a
+//! turn against the AprilTag project's images. The others are the AprilTag library's. Each code is the previous one
+//! plus a multiple of a prime (Olson 2011); the multiples are stored. The script tests/oracle/make_tag_families.py
+//! writes both.
 
 use std::sync::LazyLock;
 
 use super::TagFamily;
 
-/// The step from code to code, as the AprilTag project's generator has it.
+/// Step between codes, as in the AprilTag project's generator.
 const PRIME: u64 = 982_451_653;
 
 /// Codes by id, the highest bit first; 1 is white.
@@ -19,7 +19,7 @@ fn listed(text: &str) -> Vec<u64> {
     text.split_whitespace().filter_map(|word| u64::from_str_radix(word, 16).ok()).collect()
 }
 
-/// The first code, then each one's multiple of the prime.
+/// Decodes codes stored as the first code, then each one's multiple of the prime.
 fn stepped(text: &str, n_bits: u32) -> Vec<u64> {
     let mut code = 0_u64;
     let mut next = |(n, word): (usize, u64)| {

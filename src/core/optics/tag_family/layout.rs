@@ -1,11 +1,11 @@
-//! Where the cells of a family's tags are: a text a family, as the AprilTag project draws its layouts.
+//! Layouts of the families' cells: one text per family, as the AprilTag project draws them.
 //!
-//! `w` white, `b` black, `d` a bit of the code, `.` not printed. The border square is that on whose edge `w` and `b`
+//! `w` white, `b` black, `d` a bit of the code, `.` not printed. The edge of the border square is where `w` and `b`
 //! meet.
 
 use super::TagFamily;
 
-/// Most cells along a side of a printed tag.
+/// Maximum number of cells along a side of a printed tag.
 pub const MAX_PRINT_CELLS: usize = 11;
 
 const TAG_16H5: &str = "wwwwwwww wbbbbbbw wbddddbw wbddddbw wbddddbw wbddddbw wbbbbbbw wwwwwwww";
@@ -22,7 +22,7 @@ const STANDARD_41H12: &str =
 const STANDARD_52H13: &str = "dddddddddd dbbbbbbbbd dbwwwwwwbd dbwddddwbd dbwddddwbd dbwddddwbd dbwddddwbd dbwwwwwwbd \
     dbbbbbbbbd dddddddddd";
 
-/// One cell of a layout.
+/// Content of one cell of a layout.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum LayoutCell {
     Fixed(bool),
@@ -36,7 +36,7 @@ pub(super) enum BitOrder {
     /// Row by row from the top left.
     Rows,
     /// A quarter of the tag, then the same turned clockwise by one, two and three quarters; a middle cell is last. The
-    /// quarter has the top side of each ring of cells, the outermost first, without the ring's right corner.
+    /// quarter has the top side of each ring of cells, outermost ring first, without the ring's right corner.
     Quarters,
 }
 
@@ -54,7 +54,7 @@ pub(super) fn rows(family: TagFamily) -> impl DoubleEndedIterator<Item = &'stati
     text.split(' ')
 }
 
-/// The cells row by row from the top, and how many there are along a side.
+/// Returns the cells row by row from the top, and their number along a side.
 pub(super) fn cells(family: TagFamily) -> ([[LayoutCell; MAX_PRINT_CELLS]; MAX_PRINT_CELLS], usize) {
     let mut cells = [[LayoutCell::Blank; MAX_PRINT_CELLS]; MAX_PRINT_CELLS];
     let mut n = 0;

@@ -1,4 +1,5 @@
-//! `[[further_camera]]` of robot.toml: cameras beside the first one, which `calibrate` uses where a recording has them.
+//! `[[further_camera]]` of robot.toml: cameras in addition to the first one, which `calibrate` uses if a recording has
+//! them.
 
 use crate::codes::Code;
 use std::path::Path;
@@ -7,10 +8,11 @@ use super::{CameraFile, CameraSpec, CameraTable, check_camera};
 use crate::robot::error::{FileIssue, RobotError};
 use crate::robot::urdf::UrdfChain;
 
-/// An arm has no more cameras beside the first.
+/// Maximum number of cameras of an arm in addition to the first.
 pub const MAX_FURTHER_CAMERAS: usize = 7;
 
-/// Each sees the same tags as the first, past no joint that the first does not: `first` is the one farthest out.
+/// Checks the further cameras. No joint may come between tags and such a camera that does not for the first: `first` is
+/// the most distal.
 ///
 /// # Errors
 /// [`RobotError`] naming the table's number and key.

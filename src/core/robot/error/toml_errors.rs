@@ -1,7 +1,7 @@
-//! What is wrong with a TOML text, all missing keys at once, and for an unknown key the likeliest known one.
+//! Problems of a TOML text: all missing keys at once, and for an unknown key the likeliest known one.
 //!
-//! A reader stops at the first key that it misses. So that key is put in with some value that it takes, and the text is
-//! read again, until nothing is missing or another mistake comes first.
+//! A reader stops at the first missing key. So that key is inserted with a value that it accepts, and the text is read
+//! again. This ends when no key is missing or another mistake comes first.
 
 use std::ops::Range;
 
@@ -11,14 +11,14 @@ use toml::de::Error;
 use crate::codes::Code;
 use crate::text::with_nearest;
 
-/// Values that keys may take, the plain ones first.
+/// Values that keys may accept, the plain ones first.
 const VALUES: [&str; 10] =
     ["0", "\"\"", "true", "[]", "{}", "[0, 0, 0]", "[0, 0, 0, 0]", "[0, 0]", "[[0, 0, 0]]", "[\"\", \"\", \"\"]"];
-/// Longer texts are not read so often.
+/// Maximum length of texts that are read repeatedly.
 const MAX_BYTES: usize = 100_000;
 const MAX_MISSING: usize = 100;
 
-/// The reader's message in full.
+/// Returns the reader's message with all missing keys.
 pub(super) fn explained<T: DeserializeOwned>(text: &str, error: &Error) -> String {
     let mut message = with_nearest(error.to_string().trim_end());
     let others = others_missing::<T>(text, error);
@@ -43,16 +43,16 @@ pub fn syntax_code(message: &str) -> Code {
     kinds.into_iter().find(|(words, _)| message.contains(words)).map_or(Code::FileSyntax, |(_, code)| code)
 }
 
-/// What is wrong with a value of a text that was read before: without a line, and with the likeliest of the known keys.
+/// Describes the problem of a value in a text that was already read: without a line, and with the likeliest known key.
 #[must_use]
 pub fn toml_problem(error: &toml::de::Error) -> String {
     with_nearest(error.message().trim_end())
 }
 
-/// Reads a table of a text that was read before; the message has no line.
+/// Reads a table of a text that was already read; the message has no line.
 ///
 /// # Errors
-/// The problem in words, with every other key that is missing.
+/// The problem in words, with every other missing key.
 pub fn from_table<T: DeserializeOwned>(table: &toml::Table) -> Result<T, String> {
     toml::Value::Table(table.clone()).try_into().map_err(|error: Error| {
         let message = toml_problem(&error);
@@ -65,13 +65,13 @@ pub fn from_table<T: DeserializeOwned>(table: &toml::Table) -> Result<T, String>
     })
 }
 
-/// The keys that are missing beside the one that `error` names.
+/// Returns the missing keys other than the one that `error` names.
 fn others_missing<T: DeserializeOwned>(text: &str, error: &Error) -> Vec<String> {
     let mut filled = Filled { text: text.to_owned(), inserted: Vec::new() };
     let (mut names, mut error) = (Vec::new(), error.clone());
     while let Some(name) = missing_name(&error).filter(|_| text.len() < MAX_BYTES && names.len() < MAX_MISSING) {
         let span = error.span().unwrap_or(0..0);
-        // A table that is missing itself is named without its keys.
+        // A missing table is named without its keys.
         if !filled.is_inserted(&span) {
             names.push(format!("`{name}`{}", filled.place(&span)));
         }
@@ -89,20 +89,20 @@ fn missing_name(error: &Error) -> Option<String> {
     is_plain.then(|| name.to_owned())
 }
 
-/// A text, and what of it was put in.
+/// A text with the insertions made in it.
 struct Filled {
     text: String,
     inserted: Vec<Range<usize>>,
 }
 
 impl Filled {
-    /// The outermost table is where the text begins, whatever was put in there.
+    /// Returns true for an inserted table. The outermost table has an empty span and never counts as inserted.
     fn is_inserted(&self, span: &Range<usize>) -> bool {
         !span.is_empty()
             && self.inserted.iter().any(|inserted| inserted.start <= span.start && span.end <= inserted.end)
     }
 
-    /// ` in [capture]`; nothing for the outermost table.
+    /// Returns the table in words, such as ` in [capture]`; empty for the outermost table.
     fn place(&self, span: &Range<usize>) -> String {
         match self.text.get(span.clone()) {
             Some(header) if header.starts_with('[') && header.ends_with(']') => format!(" in {header}"),
@@ -114,7 +114,8 @@ impl Filled {
         }
     }
 
-    /// Puts the key in with a value that it takes. The next mistake; `None` where there is none, or no value fits.
+    /// Inserts the key with a value that it accepts. Returns the next mistake; `None` if there is none, or no value
+    /// fits.
     fn fill<T: DeserializeOwned>(&mut self, name: &str, span: &Range<usize>) -> Option<Error> {
         let table = self.text.get(span.clone())?;
         let (at, before, after) = if table.starts_with('{') {
@@ -153,7 +154,7 @@ impl Filled {
     }
 }
 
-/// The first of the values that a key of few takes.
+/// Returns the first allowed value of a key with few values.
 fn first_variant(error: &Error) -> Option<String> {
     let names = error.message().strip_prefix("unknown variant ``, expected ")?;
     Some(format!("\"{}\"", names.split('`').nth(1)?))

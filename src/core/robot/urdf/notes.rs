@@ -1,13 +1,13 @@
-//! Warnings about a URDF, and what planning lacks in it.
+//! Warnings about a URDF, and the data that planning lacks in it.
 
 use super::{MAX_COLLISION_SHAPES, UrdfChain};
 use crate::codes::{Code, Warning};
 use crate::robot::error::FileIssue;
 use crate::robot::urdf_file::{Range, Skipped, UrdfJoint};
 
-/// Links or joints that one warning names.
+/// Maximum number of links or joints that one warning names.
 const MAX_NAMED: usize = 8;
-/// Warnings about one file.
+/// Maximum number of warnings about one file.
 const MAX_WARNINGS: usize = 40;
 
 /// Returns one warning per problem, each with the links or joints that have it.
@@ -36,7 +36,7 @@ fn named(owners: &[&Skipped]) -> String {
     }
 }
 
-/// Wrong values of joints that the arm does without.
+/// Returns the wrong values of joints that are not on the arm's chain.
 fn defects_off_chain(arm: &UrdfChain<'_>) -> Vec<Skipped> {
     let is_on_chain = |joint: &&UrdfJoint| arm.chain.joints().iter().any(|other| other.name == joint.name);
     let joints = arm.urdf.robot.joints.iter().filter(|joint| !is_on_chain(joint));
@@ -49,7 +49,7 @@ fn defects_off_chain(arm: &UrdfChain<'_>) -> Vec<Skipped> {
     skipped.collect()
 }
 
-/// Returns what planning needs of the URDF and cannot use.
+/// Returns the data that planning needs of the URDF and cannot use.
 pub fn planning_issues(arm: &UrdfChain<'_>) -> Vec<FileIssue> {
     let file = &arm.urdf.file;
     let mut issues = Vec::new();

@@ -1,4 +1,4 @@
-//! Offsets and reductions of `<ros2_control>` and `<transmission>`, which a driver applies before anybody records.
+//! Offsets and reductions of `<ros2_control>` and `<transmission>`, which a driver applies before anything is recorded.
 //!
 //! ros-controls/ros2_control 53b9999: hardware_interface/src/component_parser.cpp, lines 71, 72 and 561 to 564, reads
 //! `<offset>` and `<mechanical_reduction>` of a transmission's joint, lines 430 and 547 the free `<param>`s of a joint
@@ -23,7 +23,7 @@ pub(super) fn note_offsets(scan: &mut Scan<'_>, tree: &XmlTree, at: usize) {
             let written = element.text.trim();
             if written.parse::<f64>().ok() != Some(usual) {
                 let written: String = written.chars().take(40).collect();
-                // One text for all joints: warnings are grouped by it.
+                // One text for all joints, because warnings are grouped by it.
                 scan.skip(&format!("{what} = {written} of joint `{joint}`"), at, APPLIED.to_owned());
             }
         }
@@ -31,7 +31,7 @@ pub(super) fn note_offsets(scan: &mut Scan<'_>, tree: &XmlTree, at: usize) {
     }
 }
 
-/// Returns the correction that an element states, and the number that changes nothing.
+/// Returns the correction that an element states, and its neutral value.
 fn correction(element: &str, name: Option<&str>) -> Option<(&'static str, f64)> {
     match (element, name) {
         ("offset", _) | ("param", Some("offset")) => Some(("offset", 0.0)),

@@ -6,14 +6,14 @@ use super::scan::{Scan, UrdfPose};
 use crate::kinematics::JointLimits;
 use crate::robot::xml_tree::Place;
 
-/// Range above which a revolute joint counts as continuous, rad: 20 turns. Cables let an arm's joint turn 4 times at
-/// most; files write 999999 or 1e16 for a joint without stops.
+/// Range above which a revolute joint counts as continuous, rad: 20 turns. Cables limit an arm's joint to about 4
+/// turns; files write 999999 or 1e16 for a joint without stops.
 const MAX_RANGE_RAD: f64 = 20.0 * std::f64::consts::TAU;
 /// Range above which a slide counts as one without limits, m. The longest gantries have about 100 m.
 const MAX_RANGE_M: f64 = 1000.0;
-/// Shortest axis that has a direction.
+/// Smallest length of an axis that has a direction.
 const MIN_AXIS: f64 = 1e-6;
-/// Elements of a joint.
+/// Known elements of a joint.
 const KNOWN: [&str; 10] =
     ["parent", "child", "origin", "axis", "limit", "mimic", "dynamics", "calibration", "safety_controller", "safety"];
 /// Largest effort, N m or N.
@@ -26,11 +26,11 @@ pub enum JointType {
     Revolute,
     Continuous,
     Prismatic,
-    /// More than one degree of freedom, or an unknown type.
+    /// A type with more than one degree of freedom, or an unknown type.
     Other(String),
 }
 
-/// A value that kinematics need and that is wrong.
+/// A wrong value that kinematics need.
 #[derive(Clone, Debug)]
 pub struct Defect {
     pub place: Place,
@@ -44,11 +44,11 @@ pub struct Defect {
 #[derive(Clone, Debug)]
 pub enum Range {
     Limits(JointLimits),
-    /// Motion by the joint's type.
+    /// Unlimited motion by the joint's type.
     Endless,
-    /// Limits that are farther apart than those of any joint: lower and upper.
+    /// Limits with a larger range than that of any joint: lower and upper.
     Unlimited([f64; 2]),
-    /// The file states none, or one that holds nothing; why.
+    /// The file states no range, or an empty one; the text is the reason.
     Unknown(String),
 }
 
@@ -61,12 +61,12 @@ pub struct UrdfJoint {
     pub parent: String,
     pub child: String,
     pub origin: UrdfPose,
-    /// Has a direction unless `defects` says otherwise.
+    /// Axis of the joint; it has a direction unless `defects` states otherwise.
     pub axis: [f64; 3],
     pub range: Range,
-    /// 0 where the file states none.
+    /// Effort; 0 if the file states none.
     pub effort: f64,
-    /// 0 where the file states none.
+    /// Velocity; 0 if the file states none.
     pub velocity: f64,
     /// Name of the joint that this one follows.
     pub mimic: Option<String>,
@@ -87,7 +87,7 @@ impl UrdfJoint {
 /// Reads one `<joint>`.
 ///
 /// # Errors
-/// A sentence with line and column where the joint does not name its links.
+/// A sentence with line and column if the joint does not name its links.
 pub(super) fn read_joint(scan: &mut Scan<'_>, at: usize) -> Result<UrdfJoint, String> {
     let element = scan.element(at);
     let mut defects = Vec::new();
@@ -161,12 +161,12 @@ fn axis(scan: &mut Scan<'_>, owner: &str, at: usize, joint_type: &JointType, def
     USUAL
 }
 
-/// Velocity or effort of a joint that moves; 0 where the file states none that is usable.
+/// Returns velocity or effort of a joint that moves; 0 if the file states no usable one.
 fn figure(scan: &mut Scan<'_>, owner: &str, limit: Option<usize>, key: &str, joint_type: &JointType) -> f64 {
     let (Some(limit), false) = (limit, *joint_type == JointType::Fixed) else { return 0.0 };
     let problem = match scan.number(limit, key) {
         Ok(Some(value)) if (0.0..=MAX_EFFORT).contains(&value) => return value,
-        // Stands for no limit.
+        // Such a value means no limit.
         Ok(Some(value)) if value > MAX_EFFORT => return 0.0,
         Ok(Some(value)) => format!("the limit's {key} is {value}, and it must be 0 or more; it is ignored"),
         Ok(None) => format!("the limit has no {key}; calibration does not use it"),
@@ -186,7 +186,7 @@ fn range(scan: &Scan<'_>, limit: Option<usize>, joint_type: &JointType) -> Range
     let [lower, upper] = ["lower", "upper"].map(|key| scan.number(limit, key));
     let (lower, upper) = match (lower, upper) {
         (Ok(None), Ok(None)) => return Range::Unknown("the limit has neither lower nor upper".to_owned()),
-        // An absent one is 0, as URDF has it.
+        // An absent limit is 0, as in URDF.
         (Ok(lower), Ok(upper)) => (lower.unwrap_or(0.0), upper.unwrap_or(0.0)),
         (Err(problem), _) | (_, Err(problem)) => return Range::Unknown(format!("the limit's {problem}")),
     };

@@ -1,4 +1,4 @@
-//! Links of a URDF: mass and shapes, which calibration does without.
+//! Links of a URDF: mass and shapes, which calibration does not need.
 
 use std::collections::BTreeMap;
 
@@ -8,15 +8,15 @@ use super::scan::{Scan, UrdfPose};
 use crate::robot::shape::Shape;
 use crate::robot::xml_tree::Place;
 
-/// Smallest mass, kg: files write less for a link that has none, and rounding would swamp its inertia.
+/// Smallest mass, kg: files write less for a link without mass, and rounding would dominate its inertia.
 const MIN_MASS_KG: f64 = 1e-6;
 /// Largest mass, kg.
 const MAX_MASS_KG: f64 = 1e6;
 /// Smallest and largest length of a shape, m.
 const SHAPE_LENGTHS_M: std::ops::RangeInclusive<f64> = 1e-6..=1e4;
-/// Elements of a link; the last four are of simulators.
+/// Known elements of a link; the last four belong to simulators.
 const KNOWN: [&str; 7] = ["inertial", "visual", "collision", "contact", "sensor", "gazebo", "self_collision_checking"];
-/// Elements of a visual or a collision shape.
+/// Known elements of a visual or a collision shape.
 const KNOWN_OF_SHAPE: [&str; 4] = ["origin", "geometry", "material", "verbose"];
 
 /// Colours of materials that are defined once for the file.
@@ -50,7 +50,7 @@ pub struct ShapeElement {
 pub struct UrdfLink {
     pub name: String,
     pub place: Place,
-    /// `None` where the file states no mass or an unusable one.
+    /// Mass; `None` if the file states none or an unusable one.
     pub inertial: Option<Inertial>,
     pub visual: Vec<ShapeElement>,
     pub collision: Vec<ShapeElement>,
@@ -61,7 +61,7 @@ pub struct UrdfLink {
 /// A shape that was not read.
 struct Unusable {
     problem: String,
-    /// Point or nothing: there is nothing to keep clear of.
+    /// True for a point or an empty shape, from which no clearance is needed.
     is_empty: bool,
 }
 
@@ -149,7 +149,8 @@ fn inertial_of(scan: &mut Scan<'_>, owner: &str, at: usize) -> Result<Option<Ine
     Ok(Some(Inertial { mass_kg, origin, inertia_kg_m2 }))
 }
 
-/// The shapes of one `<visual>` or `<collision>`: one as a rule, and each of several geometries in the same element.
+/// Returns the shapes of one `<visual>` or `<collision>`: usually one, or one for each of several geometries in the
+/// same element.
 fn shapes(scan: &mut Scan<'_>, owner: &str, at: usize, colors: &NamedColors) -> Result<Vec<ShapeElement>, Unusable> {
     scan.skip_unknown(owner, at, &KNOWN_OF_SHAPE);
     let origin = scan.only(owner, at, "origin").map(|origin| scan.pose(origin)).transpose();
@@ -221,7 +222,7 @@ fn mesh(scan: &Scan<'_>, at: usize) -> Result<UrdfShape, Unusable> {
     Ok(UrdfShape::Mesh { name, scale })
 }
 
-/// The colour of a material; `None` where it has none or an unreadable one.
+/// Returns the colour of a material; `None` if it has none or an unreadable one.
 fn color(scan: &mut Scan<'_>, owner: &str, material: usize) -> Option<[u8; 3]> {
     let at = scan.children(material).find(|&at| scan.element(at).name == "color")?;
     let four = scan.numbers::<4>(at, "rgba").map(|rgba| rgba.map(|[r, g, b, _]| [r, g, b]));

@@ -1,10 +1,10 @@
-//! Values of elements, and the list of what was skipped.
+//! Values of elements, and the list of the skipped parts.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use crate::robot::xml_tree::{Element, Place, XmlTree};
 
-/// Largest coordinate of a frame, m. Doubles resolve 15 nm there, which is below what any arm is calibrated to.
+/// Largest coordinate of a frame, m. Doubles resolve 15 nm there, finer than any calibration of an arm.
 pub(super) const MAX_POSITION_M: f64 = 1e8;
 /// Largest angle of a frame, rad. Doubles resolve 1e-12 rad there.
 const MAX_ANGLE_RAD: f64 = 1e4;
@@ -12,7 +12,7 @@ const MAX_ANGLE_RAD: f64 = 1e4;
 /// A part of a URDF that was skipped, or replaced by a default.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Skipped {
-    /// The link or joint, as ``link `tool` ``.
+    /// Name of the link or joint, as ``link `tool` ``.
     pub owner: String,
     pub place: Place,
     /// End of a sentence that begins with the owner.
@@ -37,7 +37,7 @@ impl UrdfPose {
     }
 }
 
-/// The elements of a file, and what was skipped so far.
+/// Elements of a file, and the parts skipped so far.
 pub(super) struct Scan<'a> {
     tree: &'a XmlTree,
     skipped: Vec<Skipped>,
@@ -56,7 +56,7 @@ impl<'a> Scan<'a> {
         self.tree.element(at)
     }
 
-    /// Elements of URDF directly in another one.
+    /// Returns the elements of URDF directly in another one.
     pub fn children(&self, at: usize) -> impl Iterator<Item = usize> + use<'a> {
         let tree = self.tree;
         tree.children(at).filter(move |&child| tree.element(child).prefix.is_empty())
@@ -66,7 +66,7 @@ impl<'a> Scan<'a> {
         self.skipped.push(Skipped { owner: owner.to_owned(), place: self.element(at).place, text });
     }
 
-    /// The first element of that name; further ones are noted as skipped.
+    /// Returns the first element of that name; further ones are noted as skipped.
     pub fn only(&mut self, owner: &str, at: usize, name: &str) -> Option<usize> {
         let mut found =
             self.children(at).filter(|&child| self.element(child).name == name).collect::<Vec<_>>().into_iter();
@@ -87,7 +87,7 @@ impl<'a> Scan<'a> {
         }
     }
 
-    /// The numbers of an attribute; `None` where it is absent.
+    /// Returns the numbers of an attribute; `None` if it is absent.
     ///
     /// # Errors
     /// The end of a sentence that begins with the attribute's element.
@@ -101,18 +101,18 @@ impl<'a> Scan<'a> {
         values.and_then(|values| values.try_into().ok()).map(Some).ok_or_else(wrong)
     }
 
-    /// One number of an attribute; `None` where it is absent.
+    /// Returns the number of an attribute; `None` if it is absent.
     ///
     /// # Errors
-    /// As [`Self::numbers`].
+    /// The errors of [`Self::numbers`].
     pub fn number(&self, at: usize, attribute: &str) -> Result<Option<f64>, String> {
         Ok(self.numbers::<1>(at, attribute)?.map(|[value]| value))
     }
 
-    /// The frame of an `<origin>`; zero where an attribute is absent.
+    /// Returns the frame of an `<origin>`; zero if an attribute is absent.
     ///
     /// # Errors
-    /// As [`Self::numbers`], also for values that are not finite or too large.
+    /// The errors of [`Self::numbers`], and an error for values that are not finite or too large.
     pub fn pose(&self, origin: usize) -> Result<UrdfPose, String> {
         let xyz_m = self.numbers::<3>(origin, "xyz")?.unwrap_or_default();
         let rpy_rad = self.numbers::<3>(origin, "rpy")?.unwrap_or_default();

@@ -41,14 +41,14 @@ fn any_terms() -> impl Strategy<Value = Terms> {
     let shape = proptest::collection::vec(-1.0f64..1.0, N_SHAPE);
     (shape, -5e-4f64..5e-4, -1e-4f64..1e-4, -1e-4f64..1e-4, -1e-3f64..1e-3).prop_map(
         |(shape, offset_rad_per_k, gain_per_k, offset_rad_per_mpa, drift_rad_per_h)| Terms {
-            // Up to some 0.7 % of the range in the slow ones.
+            // The slow terms reach about 0.7 % of the range.
             nonlinearity_rad: std::array::from_fn(|h| 0.02 * shape[h] / (1 + h * h) as f64),
             offset_rad_per_k,
             gain_per_k,
             offset_rad_per_mpa,
             drift_rad_per_h,
             half_backlash_rad: 0.0,
-            // A worn spot, no steeper than a tenth.
+            // A worn spot with a slope of at most a tenth.
             bump: Bump { at_rad: 0.4 * shape[0], width_rad: 0.05, height_rad: 0.005 * shape[1] },
         },
     )
@@ -69,7 +69,7 @@ proptest! {
         prop_assert!(low > 0.6 && high < 1.4 && low <= 1.0 && high >= 1.0, "{low} {high}");
     }
 
-    /// The same arithmetic as before there were terms, whatever the conditions.
+    /// Without terms the arithmetic is as before the terms were added, under all conditions.
     #[test]
     fn a_straight_sensor_does_not_feel_the_conditions(
         counts in 0.0f64..65536.0, gain in 0.95f64..1.05, offset_rad in -0.1f64..0.1, oil_k in -30.0f64..30.0
@@ -111,7 +111,7 @@ fn each_term_moves_the_angle_by_what_its_name_says() {
     }
 }
 
-/// With the sigmas of `shape_prior` the functions make a process of unit variance and its covariance.
+/// With the standard deviations of `shape_prior` the functions are a process of unit variance and its covariance.
 #[test]
 fn the_shape_prior_is_a_squared_exponential_process() {
     for length in [0.25, 0.35] {

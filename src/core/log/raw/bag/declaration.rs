@@ -1,9 +1,9 @@
-//! Names of a table's columns, from the text that declared it.
+//! Names of a table's columns, from the text of its declaration.
 
-/// Words that begin a constraint of the table instead of a column.
+/// Words that begin a constraint of the table rather than a column.
 const CONSTRAINTS: [&str; 5] = ["constraint", "primary", "unique", "check", "foreign"];
 
-/// Names in lower case, in the order of the columns; `None` where the text has no list of columns.
+/// Returns the names in lower case, in the order of the columns; `None` if the text has no list of columns.
 pub fn column_names(sql: &str) -> Option<Vec<String>> {
     let plain = without_comments(sql);
     let mut names = Vec::new();
@@ -42,7 +42,8 @@ fn column_name(definition: &str) -> Option<String> {
     (!name.is_empty() && !CONSTRAINTS.contains(&name.as_str())).then_some(name)
 }
 
-/// Comments of both kinds become blanks. Each byte is looked at once, however many begin and whether they end or not.
+/// Replaces comments of both kinds by blanks. Each byte is read once, regardless of the number of comments and of their
+/// ends.
 fn without_comments(sql: &str) -> String {
     let mut plain = String::with_capacity(sql.len());
     let mut rest = sql;
@@ -60,7 +61,7 @@ fn without_comments(sql: &str) -> String {
 mod tests {
     use super::*;
 
-    /// Each kind of comment was searched for in all of the rest.
+    /// An earlier version searched all of the rest for each kind of comment.
     #[test]
     fn many_comments_are_passed_over() {
         for comment in ["/* */", "--\n", "/*/ -- */", "-- /*\n"] {

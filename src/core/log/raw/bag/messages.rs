@@ -22,19 +22,19 @@ use crate::log::raw::message::{Channel, RawMessage, Schema};
 use crate::log::raw::order::ChunkOrder;
 use crate::log::raw::scan::ScanError;
 
-/// The table of all tables is on the first page.
+/// Root page of the table of all tables.
 const TABLES_ROOT: u32 = 1;
-/// The tables that are read, of any number that a file may declare.
+/// Names of the tables that are read; a file may declare any number.
 const TABLES: [&str; 4] = ["topics", "messages", "schema", "message_definitions"];
-/// What a topic or type costs beside its texts.
+/// Memory of a topic or type in addition to its texts, bytes.
 const DECLARATION_BYTES: usize = 1024;
 
-/// A bag's file, and what a killed recorder leaves beside it.
+/// A bag's file, and the files that a killed recorder leaves next to it.
 pub struct BagFiles<R> {
     pub bag: R,
-    /// Writes that are not in the file yet (`-wal`).
+    /// Log of writes that are not in the file yet (`-wal`).
     pub log: Option<R>,
-    /// Whether the writes of an unfinished transaction may be in the file (`-journal`).
+    /// True if the writes of an unfinished transaction may be in the file (`-journal`).
     pub is_in_transaction: bool,
 }
 
@@ -60,7 +60,7 @@ struct Bag<R> {
     readable: u64,
 }
 
-/// A bag whose messages were visited, to visit those of some of its parts again.
+/// A bag whose messages were visited, for a second visit of some of its parts.
 pub struct SecondBagPass<R> {
     bag: Bag<R>,
 }
@@ -88,7 +88,7 @@ pub fn scan_bag<R: Read + Seek>(
     Ok((summary, SecondBagPass { bag }))
 }
 
-/// Contents of a bag other than messages.
+/// Returns the contents of a bag other than messages.
 pub fn bag_contents<R: Read + Seek>(files: BagFiles<R>) -> Result<FileContents, ScanError> {
     Bag::open(files).map(|bag| bag.contents)
 }
@@ -187,7 +187,7 @@ fn message<'a>(
     Ok(RawMessage { channel, log_time_nanos, publish_time_nanos: log_time_nanos, sequence, part, data })
 }
 
-/// The tables that SQLite itself lists; views, and what has no pages, are none.
+/// Returns the tables that SQLite itself lists, without views and tables without pages.
 fn tables<R: Read + Seek>(pages: &mut Pages<R>, losses: &mut Losses) -> io::Result<BTreeMap<String, Table>> {
     let list = ["type", "name", "tbl_name", "rootpage", "sql"].map(str::to_owned).to_vec();
     let list = Table { root: TABLES_ROOT, columns: list };
@@ -203,16 +203,16 @@ fn tables<R: Read + Seek>(pages: &mut Pages<R>, losses: &mut Losses) -> io::Resu
     Ok(found)
 }
 
-/// Reader of tables that stay in memory.
+/// Reader of tables that are kept in memory.
 struct Small<'a, R> {
     pages: &'a mut Pages<R>,
     losses: &'a mut Losses,
-    /// How much of them is kept.
+    /// Number of bytes that may still be kept.
     left_bytes: usize,
 }
 
 impl<R: Read + Seek> Small<'_, R> {
-    /// The number and these columns of each row.
+    /// Returns the number and these columns of each row.
     fn each<const N: usize>(
         &mut self,
         table: &Table,
@@ -235,7 +235,7 @@ impl<R: Read + Seek> Small<'_, R> {
         })
     }
 
-    /// Definitions by the name of the type.
+    /// Returns the definitions by the name of the type.
     fn types(&mut self, table: &Table) -> io::Result<BTreeMap<String, Rc<Schema>>> {
         let mut types = BTreeMap::new();
         let names = ["topic_type", "encoding", "encoded_message_definition"];
@@ -248,7 +248,7 @@ impl<R: Read + Seek> Small<'_, R> {
         Ok(types)
     }
 
-    /// Topics by their numbers.
+    /// Returns the topics by their numbers.
     fn channels(&mut self, table: &Table, types: &BTreeMap<String, Rc<Schema>>) -> io::Result<BTreeMap<i64, Channel>> {
         let mut channels = BTreeMap::new();
         let names = ["id", "name", "type", "serialization_format"];

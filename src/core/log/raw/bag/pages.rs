@@ -9,22 +9,22 @@ use crate::log::raw::file_type::SQLITE;
 use crate::log::raw::scan::ScanError;
 use crate::log::raw::window::Window;
 
-/// Bytes of the file's header, the beginning of the first page.
+/// Length of the file's header at the beginning of the first page.
 pub const HEADER_BYTES: usize = 100;
-/// Pages of the largest file that is read: one bit of memory each. 1 TiB of usual pages.
+/// Maximum number of pages of a file that is read: one bit of memory each. 1 TiB of usual pages.
 const MAX_PAGES: u64 = 1 << 28;
-/// The newest format of reading that is known: 2 has a log of writes.
+/// Newest known format of reading: 2 has a log of writes.
 const NEWEST_FORMAT: u8 = 2;
-/// Texts in UTF-8; 0 in a file without tables.
+/// Code of texts in UTF-8; 0 in a file without tables.
 const UTF_8: u32 = 1;
 
-/// Why a page cannot be used.
+/// Reason why a page cannot be used.
 #[derive(Debug)]
 pub enum PageError {
     Read(io::Error),
-    /// It lies behind the end of the file.
+    /// The page lies beyond the end of the file.
     Missing,
-    /// What is wrong with it.
+    /// The page is malformed; the text states the fault.
     Broken(&'static str),
 }
 
@@ -34,22 +34,22 @@ impl From<io::Error> for PageError {
     }
 }
 
-/// A file's pages, each of which is given out once in a pass.
+/// Pages of a file, each of which is read only once in a pass.
 pub struct Pages<R> {
     window: Window<R>,
     page_bytes: usize,
-    /// Of each page, without what is reserved at its end.
+    /// Usable bytes of each page, without the reserved end.
     pub usable_bytes: usize,
-    /// Pages that the file says it has.
+    /// Number of pages that the file declares.
     pub declared: u64,
-    /// Later versions of pages, and where in the log they are.
+    /// Later versions of pages in the log, with their positions.
     newer: Option<(Window<R>, BTreeMap<u32, u64>)>,
-    /// One bit per page.
+    /// Flags of the pages that were read, one bit per page.
     is_used: Vec<u64>,
 }
 
 impl<R: Read + Seek> Pages<R> {
-    /// `log`: the file beside it whose name ends with `-wal`.
+    /// Opens the pages of a file. `log` is the file next to it whose name ends with `-wal`.
     pub fn open(source: R, log: Option<R>) -> Result<Self, ScanError> {
         let mut window = Window::new(source)?;
         let refused = |found: &str| ScanError::NotBag { found: found.to_owned() };
@@ -83,17 +83,17 @@ impl<R: Read + Seek> Pages<R> {
         self.window.len()
     }
 
-    /// Whether the file is shorter than it says.
+    /// Returns true if the file is shorter than it declares.
     pub fn is_cut(&self) -> bool {
         self.newer.is_none() && self.declared.saturating_mul(self.page_bytes as u64) > self.window.len()
     }
 
-    /// Begins another pass.
+    /// Begins another pass, in which all pages can be read again.
     pub fn forget(&mut self) {
         self.is_used.fill(0);
     }
 
-    /// A page without what is reserved at its end, by its number from 1.
+    /// Returns a page without its reserved end, by its number from 1.
     pub fn page(&mut self, number: u32) -> Result<&[u8], PageError> {
         let idx = u64::from(number).checked_sub(1).ok_or(PageError::Broken("page 0 is named"))?;
         let Some(word) = self.is_used.get_mut((idx / 64) as usize) else { return Err(PageError::Missing) };
@@ -116,13 +116,13 @@ impl<R: Read + Seek> Pages<R> {
     }
 }
 
-/// What the header says.
+/// Properties that the file's header states.
 struct Form {
     page_bytes: usize,
     reserved: u8,
     read_format: u8,
     encoding: u32,
-    /// `None` where a program older than the field wrote last.
+    /// Number of pages; `None` if a program older than the field wrote last.
     declared: Option<u32>,
 }
 

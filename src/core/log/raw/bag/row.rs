@@ -2,10 +2,10 @@
 
 use super::numbers::varint;
 
-/// One column.
+/// Value of one column.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Value<'a> {
-    /// Nothing, or a column that the row is too old for. Of a row's own number, that it is the row's number.
+    /// No value, or a column that was added after the row. In the column of the row's own number, it means that number.
     #[default]
     Null,
     Integer(i64),
@@ -30,8 +30,8 @@ impl Value<'_> {
     }
 }
 
-/// The columns at `wanted` places; those that no table declares are [`Value::Null`]. `None` for a row that contradicts
-/// itself.
+/// Returns the columns at the indices `wanted`; columns that no table declares are [`Value::Null`]. `None` for a row
+/// that contradicts itself.
 pub fn columns<'a, const N: usize>(payload: &'a [u8], wanted: &[Option<usize>; N]) -> Option<[Value<'a>; N]> {
     let mut values = [Value::Null; N];
     let (head_bytes, _) = varint(payload)?;
@@ -55,7 +55,7 @@ pub fn columns<'a, const N: usize>(payload: &'a [u8], wanted: &[Option<usize>; N
     Some(values)
 }
 
-/// Bytes of a column of this kind.
+/// Returns the length in bytes of a column of this kind.
 fn length(kind: u64) -> Option<usize> {
     Some(match kind {
         0 | 8 | 9 => 0,
@@ -102,7 +102,7 @@ mod tests {
 
     #[test]
     fn columns_are_found_by_place_and_lengths_are_not_believed() {
-        // Number of the row, 300, "ab", two bytes.
+        // The row's own number, 300, "ab", two bytes.
         let row = [5, 0, 2, 17, 16, 1, 44, b'a', b'b', 7, 8];
         let found = columns(&row, &[Some(3), None, Some(1), Some(2), Some(0), Some(9)]).expect("a row");
         let text = Value::Text(b"ab");

@@ -57,7 +57,8 @@ fn create(path: &Path, page_bytes: u32, version: u32) -> Connection {
     bag
 }
 
-/// Of every tenth the data are long: rows go on behind their page, on several pages, or fill it to the last byte.
+/// Returns the data of row `n`. Every tenth row is long: it continues after its page, on several pages, or fills it to
+/// the last byte.
 fn data(n: usize) -> Vec<u8> {
     let long = [4000, 4061, 4062, 4063, 9000, 477, 478, 70_000, 0, 300_000];
     let bytes = if n.is_multiple_of(10) { long[n / 10 % long.len()] } else { 20 + n % 90 };
@@ -165,7 +166,7 @@ fn what_a_killed_recorder_left_in_the_log_is_read() {
     insert(&bag, 100..300);
     bag.execute("COMMIT; PRAGMA cache_size=10; BEGIN").expect("committed");
     insert(&bag, 300..400);
-    // As a kill leaves it: the last transaction is partly in the log.
+    // State after a kill: the last transaction is partly in the log.
     let copy = folder.path().join("killed.db3");
     let beside = |path: &Path| PathBuf::from(format!("{}-wal", path.display()));
     for (from, to) in [(path.clone(), copy.clone()), (beside(&path), beside(&copy))] {
@@ -174,7 +175,7 @@ fn what_a_killed_recorder_left_in_the_log_is_read() {
     let (messages, summary) = read(&copy);
     assert!(messages == expected(0..300), "{}", messages.len());
     assert_eq!(summary.completeness, Completeness::Whole);
-    // A log that was cut ends a transaction earlier; another file's log counts for nothing.
+    // A cut log ends a transaction earlier; the log of another file is ignored.
     let log = std::fs::read(beside(&copy)).expect("it reads");
     std::fs::write(beside(&copy), &log[..log.len() / 2]).expect("written");
     assert!(read(&copy).0 == expected(0..100));
@@ -191,7 +192,7 @@ fn an_unfinished_transaction_is_told() {
     assert!(matches!(read(&path).1.completeness, Completeness::Cut { readable_messages: 20, .. }));
 }
 
-/// What a scan of these bytes gives.
+/// Returns the result of a scan of these bytes.
 fn scanned(bytes: &[u8]) -> Result<(Vec<Vec<u8>>, RawSummary), ScanError> {
     let files = BagFiles { bag: Cursor::new(bytes), log: None, is_in_transaction: false };
     let mut messages = Vec::new();
@@ -212,7 +213,7 @@ fn a_cut_bag_gives_what_is_there() {
         assert!(messages.iter().all(|message| rest.any(|other| other == message)), "{end}");
         readable.push(messages.len());
     }
-    // Most of it is there when most of the file is.
+    // Most messages are readable if most of the file is present.
     assert!(readable.is_sorted() && readable[readable.len() * 9 / 10] > 200, "{readable:?}");
 }
 

@@ -12,35 +12,35 @@ const TABLE_LEAF: u8 = 13;
 const INNER_HEAD_BYTES: usize = 12;
 const LEAF_HEAD_BYTES: usize = 8;
 
-/// One row.
+/// A row of a table.
 pub struct Row<'a> {
-    /// Page that it begins on.
+    /// Page on which the row begins.
     pub leaf: u32,
-    /// Its number in the table.
+    /// Number of the row in the table.
     pub number: i64,
-    /// Its columns.
+    /// Encoded columns of the row.
     pub payload: &'a [u8],
 }
 
-/// Which rows of a table are read.
+/// Selection of the rows of a table that are read.
 pub struct Wanted<'a> {
-    /// Page that the table begins on.
+    /// Page on which the table begins.
     pub root: u32,
-    /// The longest row that is read; longer ones count as lost.
+    /// Maximum length of a row that is read; longer rows count as lost.
     pub max_bytes: u64,
     /// Pages whose rows are read; `None`: all.
     pub leaves: Option<&'a BTreeSet<u64>>,
 }
 
-/// What could not be read.
+/// Rows and pages that could not be read.
 #[derive(Debug, Default)]
 pub struct Losses {
-    /// The first of them.
+    /// Reason of the first loss.
     pub reason: Option<String>,
     pub pages: u64,
-    /// Of which the pages were read.
+    /// Number of lost rows on pages that were read.
     pub rows: u64,
-    /// Pages behind the end of the file.
+    /// Number of pages beyond the end of the file.
     pub missing_pages: u64,
 }
 
@@ -65,13 +65,13 @@ impl Losses {
     }
 }
 
-/// Where a row's bytes are.
+/// Positions of a row's bytes.
 struct Cell {
     number: i64,
     bytes: u64,
-    /// On its leaf.
+    /// Range of the bytes on the row's leaf.
     local: Range<usize>,
-    /// First page of the rest.
+    /// First page of the remaining bytes.
     overflow: Option<u32>,
 }
 
@@ -82,7 +82,7 @@ pub fn for_each_row<R: Read + Seek>(
     losses: &mut Losses,
     mut visit: impl FnMut(&Row<'_>, &mut Losses),
 ) -> io::Result<()> {
-    // Each page is given out once, so that this ends.
+    // Each page is read only once, so the loop ends.
     let mut open = vec![wanted.root];
     let mut payload = Vec::new();
     while let Some(number) = open.pop() {
@@ -120,7 +120,7 @@ pub fn for_each_row<R: Read + Seek>(
     Ok(())
 }
 
-/// Puts a row together from its leaf and the pages behind it.
+/// Assembles a row from its leaf and the following pages.
 fn read_row<R: Read + Seek>(
     pages: &mut Pages<R>,
     cell: &Cell,
@@ -153,7 +153,7 @@ fn read_row<R: Read + Seek>(
 /// A page of a table.
 struct Page<'a> {
     bytes: &'a [u8],
-    /// Of its head: the first page has the file's header before it.
+    /// Start of the page's head: on the first page the file's header precedes it.
     start: usize,
 }
 
@@ -162,7 +162,7 @@ impl Page<'_> {
         self.bytes.get(self.start).copied()
     }
 
-    /// Where the cells begin.
+    /// Returns the start of each cell.
     fn cell_places(&self, head_bytes: usize) -> Option<Vec<usize>> {
         let n = usize::from(be_u16(self.bytes, self.start + 3)?);
         let at = self.start + head_bytes;
@@ -180,7 +180,7 @@ impl Page<'_> {
         })
     }
 
-    /// `None` for each that cannot be read. Together they are no longer than the page.
+    /// Returns the cells; `None` for each that cannot be read. Together they are no longer than the page.
     fn cells(&self) -> Vec<Option<Cell>> {
         let Some(places) = self.cell_places(LEAF_HEAD_BYTES) else { return vec![None] };
         let mut left = self.bytes.len();
@@ -205,7 +205,7 @@ impl Page<'_> {
     }
 }
 
-/// How many of a row's bytes are on its leaf, by "Database File Format", section 1.6.
+/// Returns the number of a row's bytes on its leaf, by "Database File Format", section 1.6.
 fn local_bytes(bytes: u64, usable: usize) -> Option<usize> {
     let most = usable.checked_sub(35)?;
     if bytes <= most as u64 {

@@ -1,4 +1,4 @@
-//! The log of writes beside a database (`-wal`): pages that were not put into the file when its writer was killed.
+//! Log of writes next to a database (`-wal`): pages that were not written to the file before its writer was killed.
 
 use std::collections::BTreeMap;
 use std::io::{self, Read, Seek};
@@ -6,23 +6,23 @@ use std::io::{self, Read, Seek};
 use super::numbers::be_u32;
 use crate::log::raw::window::Window;
 
-/// First number of a log; its last bit tells the order of the checksum's words.
+/// First number of a log; its last bit states the byte order of the checksum's words.
 const MAGIC: u32 = 0x377f_0682;
 const HEADER_BYTES: usize = 32;
 const FRAME_HEAD_BYTES: usize = 24;
-/// Frames of the longest log that is read; SQLite begins anew after 1000.
+/// Maximum number of frames of a log that is read; SQLite restarts the log after 1000.
 const MAX_FRAMES: u64 = 1 << 22;
 
-/// What a log has.
+/// Pages in a log.
 pub struct NewerPages<R> {
     pub log: Window<R>,
-    /// Place of the latest version of each page, by its number.
+    /// Position of the latest version of each page, by its number.
     pub places: BTreeMap<u32, u64>,
     /// Length of the database with the log, pages.
     pub pages: u32,
 }
 
-/// The pages of all finished transactions; `None` without any.
+/// Returns the pages of all finished transactions; `None` if there are none.
 pub fn newer_pages<R: Read + Seek>(source: R, page_bytes: usize) -> io::Result<Option<NewerPages<R>>> {
     let mut log = Window::new(source)?;
     let bytes = log.len();
@@ -49,7 +49,7 @@ pub fn newer_pages<R: Read + Seek>(source: R, page_bytes: usize) -> io::Result<O
         let word = |at: usize| be_u32(frame, at).unwrap_or(0);
         sum.add(&frame[..8]);
         sum.add(&frame[FRAME_HEAD_BYTES..]);
-        // What is left of an older log has other salts.
+        // Remains of an older log have other salts.
         if [word(8), word(12)] != [number(16), number(20)] || sum.words != [word(16), word(20)] {
             break;
         }
@@ -62,7 +62,7 @@ pub fn newer_pages<R: Read + Seek>(source: R, page_bytes: usize) -> io::Result<O
     Ok((!places.is_empty()).then_some(NewerPages { log, places, pages }))
 }
 
-/// That of SQLite's log, over words of four bytes.
+/// Checksum of SQLite's log, over words of four bytes.
 struct Checksum {
     is_big_endian: bool,
     words: [u32; 2],

@@ -1,4 +1,4 @@
-//! Chunks: their messages, and the order in which these are visited.
+//! Chunks: their messages, and the order in which they are visited.
 
 use std::io::{self, Read, Seek};
 
@@ -30,7 +30,7 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
             return Ok(Next::At(at + record_bytes));
         }
         let records = self.pass.records;
-        // A chunk that states more is not unpacked.
+        // A chunk that states a larger size is not unpacked.
         let is_unpacked = head.uncompressed_bytes <= unpacked_limit(head.compressed_bytes);
         let unpacked = if is_unpacked { head.uncompressed_bytes } else { 0 };
         let read = match self.pass.chunk_use {
@@ -71,7 +71,7 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
         Ok(read)
     }
 
-    /// Takes the channels of a chunk and the time of its messages.
+    /// Records the channels of a chunk and the time of its messages.
     fn survey_chunk(&mut self, at: u64, head: &ChunkHead) -> io::Result<Result<(), ChunkError>> {
         let record_bytes = PREFIX_BYTES + head.record_len as usize;
         let bytes = self.window.bytes(at, record_bytes)?;
@@ -106,7 +106,7 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
         for chunk in chunks {
             let bytes = self.window.bytes(chunk.at, chunk.record_bytes)?;
             if let Some(head) = ChunkHead::parse(&bytes[..bytes.len().min(CHUNK_HEAD_BYTES)]) {
-                // It was read before.
+                // The chunk was read before.
                 let _ = self.visit_chunk(chunk.at, &head)?;
             }
         }
@@ -114,7 +114,7 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
     }
 }
 
-/// Where records of one part of a file go to.
+/// Destination of the records of one part of a file.
 pub(super) struct Delivery<'a> {
     pub tables: &'a mut Tables,
     pub readable: &'a mut u64,

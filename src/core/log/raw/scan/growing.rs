@@ -7,28 +7,28 @@ use mcap::records::op;
 use super::{CHUNK_HEAD_BYTES, ChunkHead, ChunkUse, Ending, FOOTER_BYTES, MAGIC, MAX_RECORD_BYTES, Next, PREFIX_BYTES};
 use super::{Pass, Prefix, RawMessage, RawSummary, Scan, ScanError, TAIL_BYTES, Window};
 
-/// Bytes after which a poll returns though there is more.
+/// Number of bytes after which a poll returns although there is more.
 const POLL_BYTES: u64 = 1 << 18;
-/// Bytes before the place of reading that must stay as they are.
+/// Number of bytes before the reading position that must stay unchanged.
 const ANCHOR_BYTES: u64 = 64;
 
-/// How far a poll came.
+/// Progress of a poll.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Growth {
     /// There is more to read at once.
     Behind,
-    /// All that is complete was read; the file has no end yet.
+    /// All complete records were read; the file has no end yet.
     Waiting,
     /// The file's own end was read.
     Finished,
 }
 
-/// A pass that waits where the file ends and goes on when it has grown. No record is visited twice.
+/// A pass that waits at the end of the file and continues when it has grown. No record is visited twice.
 pub struct GrowingScan<R> {
     scan: Option<Scan<R, ()>>,
     has_begun: bool,
     is_finished: bool,
-    /// Where the next record begins, and the bytes before it.
+    /// Position of the next record, and the bytes before it.
     at: u64,
     anchor: Vec<u8>,
 }
@@ -41,22 +41,22 @@ impl<R: Read + Seek> GrowingScan<R> {
         Ok(Self { scan: Some(scan), has_begun: false, is_finished: false, at: 0, anchor: Vec::new() })
     }
 
-    /// Length of the file as last seen, and the bytes of it that were read.
+    /// Returns the length of the file as last seen, and the number of its bytes that were read.
     pub fn seen(&self) -> (u64, u64) {
         (self.scan.as_ref().map_or(0, |scan| scan.window.len()), self.at)
     }
 
-    /// Whether chunks lie in another order than that of time, or twice.
+    /// Returns true if chunks are not in the order of time, or occur twice.
     pub fn is_out_of_order(&self) -> bool {
         self.scan.as_ref().is_some_and(|scan| scan.pass.heads.is_doubtful)
     }
 
-    /// Visits the messages of what has become complete.
+    /// Visits the messages of the records completed since the last poll.
     pub fn poll(&mut self, visit: impl FnMut(&RawMessage<'_>)) -> Result<Growth, ScanError> {
         self.with(visit, |growing, scan| growing.advance(scan, POLL_BYTES))
     }
 
-    /// Visits what is left of a file that does not grow any more, as [`super::scan`] does at a cut.
+    /// Visits the rest of a file that no longer grows, as [`super::scan`] does at a cut.
     pub fn finish(mut self, visit: impl FnMut(&RawMessage<'_>)) -> Result<RawSummary, ScanError> {
         self.with(visit, |growing, scan| {
             if !growing.is_finished {
@@ -68,7 +68,7 @@ impl<R: Read + Seek> GrowingScan<R> {
         Ok(self.stop())
     }
 
-    /// What was read of a file that may go on: its end is not missing.
+    /// Returns the summary of a file that may go on: its end does not count as missing.
     pub fn stop(self) -> RawSummary {
         let Some(mut scan) = self.scan else { return RawSummary::default() };
         if !self.is_finished {
@@ -89,7 +89,7 @@ impl<R: Read + Seek> GrowingScan<R> {
         done
     }
 
-    /// A file that became shorter within a read.
+    /// Returns the error of a file that became shorter during a read.
     fn explained<F>(&mut self, error: ScanError, scan: &mut Scan<R, F>) -> ScanError {
         self.anchor.clear();
         match error {
@@ -131,7 +131,7 @@ impl<R: Read + Seek> GrowingScan<R> {
         Ok(growth)
     }
 
-    /// Looks at the file anew.
+    /// Reads the file's length again and checks the bytes already read.
     fn refresh<F>(&mut self, scan: &mut Scan<R, F>) -> Result<(), ScanError> {
         let before = scan.window.len();
         scan.window.refresh()?;
@@ -148,7 +148,7 @@ impl<R: Read + Seek> GrowingScan<R> {
         Ok(())
     }
 
-    /// Whether the file has its opening bytes. One that is finished already is read as any other.
+    /// Returns true if the file has its opening bytes. A file that is already finished is read like any other.
     fn begin<F: FnMut(&RawMessage<'_>)>(&mut self, scan: &mut Scan<R, F>) -> Result<bool, ScanError> {
         let n = scan.window.len().min(MAGIC.len() as u64) as usize;
         if scan.ending == Ending::Open && n < MAGIC.len() && MAGIC.starts_with(scan.window.bytes(0, n)?) {
@@ -165,7 +165,7 @@ impl<R: Read + Seek> GrowingScan<R> {
 }
 
 impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
-    /// Whether what begins here may be a record that is not written to its end. One that contradicts itself is not.
+    /// Returns true if an incomplete record may begin here. A record that contradicts itself is not incomplete.
     pub(super) fn is_unfinished(&mut self, at: u64) -> io::Result<bool> {
         let left = self.window.len() - at;
         let start = self.window.bytes(at, left.min(CHUNK_HEAD_BYTES as u64) as usize)?;

@@ -1,4 +1,4 @@
-//! After damage: what was lost, and where the pass goes on.
+//! Recovery after damage: the losses, and the position at which the pass continues.
 
 use std::io::{self, Read, Seek};
 
@@ -9,13 +9,14 @@ use super::{CHUNK_HEAD_BYTES, ChunkHead, ChunkUse, Completeness, Ending, Next, R
 use crate::log::raw::chunk;
 use crate::log::raw::limits::MAX_UNCHECKED_BYTES;
 
-/// Bytes searched at once for the next chunk: few at first, as it is often near, so that they are in memory already.
+/// Number of bytes searched at once for the next chunk: few at first, because it is often near and then already in
+/// memory.
 const FIRST_SEARCH_BYTES: u64 = 1 << 10;
 const SEARCH_BYTES: u64 = 1 << 18;
 
 #[derive(Default)]
 pub(super) struct Damage {
-    /// Of the first damage.
+    /// Reason of the first damage.
     pub reason: Option<String>,
     pub chunks: u64,
     pub bytes: u64,
@@ -59,7 +60,8 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
     /// Continues at the next chunk after an impossible record; without one, the pass ends.
     pub(super) fn broken(&mut self, at: u64, opcode: Option<u8>, what: &str) -> io::Result<Next> {
         let is_chunk = opcode == Some(op::CHUNK);
-        // Not from `at`: a wrong length before it may have skipped chunks. A broken chunk is no candidate.
+        // The search does not start at `at`: a wrong length before it may have skipped chunks. A broken chunk is no
+        // candidate.
         if let Some(next) = self.find_next_chunk()? {
             self.pass.damage.note(at, what);
             self.pass.damage.chunks += u64::from(is_chunk);
@@ -98,8 +100,8 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
         Ok(())
     }
 
-    /// The next chunk behind all that is verified. An open file is searched when it is a quarter longer than before, so
-    /// that a recorder that goes on for hours costs no hours.
+    /// Finds the next chunk behind all verified bytes. An open file is searched again when it is a quarter longer, so
+    /// that the search does not grow with a recording of hours.
     fn find_next_chunk(&mut self) -> io::Result<Option<u64>> {
         let (from, bytes) = (self.pass.verified_end, self.window.len());
         if self.ending == Ending::Open && bytes < self.search_at_bytes {
@@ -112,7 +114,7 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
         Ok(found)
     }
 
-    /// The first place at or after `from` where a whole chunk may begin.
+    /// Returns the first position at or after `from` where a whole chunk may begin.
     fn find_chunk(&mut self, from: u64) -> io::Result<Option<u64>> {
         let overlap = CHUNK_HEAD_BYTES as u64 - 1;
         let (mut at, mut step) = (from, FIRST_SEARCH_BYTES);

@@ -1,4 +1,4 @@
-//! Files that grow: piece by piece, up to any byte, damaged, cut, replaced.
+//! Growing files: piece by piece, up to any byte, damaged, cut, replaced.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -54,7 +54,7 @@ impl Seek for Shared {
     }
 }
 
-/// A file that is shorter whenever its bytes are asked for than when its length was.
+/// A file whose bytes are always fewer than its stated length.
 struct CutWithin(Cursor<Vec<u8>>);
 
 impl Read for CutWithin {
@@ -109,7 +109,7 @@ fn recording(steps: usize) -> Vec<u8> {
     std::fs::read(path).unwrap()
 }
 
-/// Ends of whole chunks, and how many messages lie before each.
+/// Returns the ends of whole chunks, and the number of messages before each.
 fn chunk_ends(bytes: &[u8]) -> Vec<(usize, usize)> {
     let (mut at, mut ends) = (MAGIC.len(), Vec::new());
     while at + PREFIX_BYTES <= bytes.len() - MAGIC.len() {
@@ -123,7 +123,7 @@ fn chunk_ends(bytes: &[u8]) -> Vec<(usize, usize)> {
     ends
 }
 
-/// Cut at each byte: what is whole is read at once, what is cut when it is whole, and nothing twice.
+/// Cut at each byte: complete records are read at once, cut ones when they are complete, and none twice.
 #[test]
 fn a_file_cut_anywhere_is_read_as_far_as_it_is_whole_and_then_goes_on() {
     let bytes = recording(60);
@@ -147,13 +147,13 @@ fn a_file_cut_anywhere_is_read_as_far_as_it_is_whole_and_then_goes_on() {
     }
 }
 
-/// Where no more comes, a cut file is what any reader makes of it.
+/// A cut file that no longer grows gives the same result as with any reader.
 #[test]
 fn the_end_of_a_cut_file_is_that_of_a_scan() {
     let bytes = recording(60);
     for end in MAGIC.len()..bytes.len() {
         let file = Shared::default();
-        // In two pieces.
+        // The file is read in two pieces.
         file.set(&bytes[..end / 2]);
         let mut growing = GrowingScan::new(file.clone()).unwrap();
         let mut heard = Vec::new();
@@ -193,7 +193,7 @@ fn pieces_of_any_size_give_the_same_messages() {
     }
 }
 
-/// Files of other writers while they are written: without chunks, and with chunk heads that are filled in later.
+/// Files of other writers during writing: without chunks, and with chunk heads that are filled in later.
 #[test]
 fn files_of_other_writers_are_followed() {
     let plain = || mcap::WriteOptions::new().compression_threads(0).chunk_size(Some(4096));
@@ -224,7 +224,7 @@ fn files_of_other_writers_are_followed() {
     }
 }
 
-/// A finished file is read as any other, whatever bit of it is wrong.
+/// A finished file is read like any other, regardless of the bit that is wrong.
 #[test]
 fn a_damaged_file_that_is_finished_is_read_as_by_a_scan() {
     let bytes = recording(120);
@@ -245,14 +245,14 @@ fn a_damaged_file_that_is_finished_is_read_as_by_a_scan() {
     }
 }
 
-/// Damage in a file that grows costs what it hit, is told of, and does not stop the reader.
+/// Damage in a growing file loses only the damaged part, is reported, and does not stop the reader.
 #[test]
 fn damage_in_a_growing_file_is_passed_over() {
     let bytes = recording(1200);
     let (messages, _) = read(&bytes);
     let ends = chunk_ends(&bytes);
     let (third, fourth) = (ends[2].0, ends[3].0);
-    // Before the fourth chunk lie the indexes of the third.
+    // The indexes of the third chunk are before the fourth chunk.
     let head = (third..fourth).find(|&at| bytes[at] == op::CHUNK && ChunkHead::parse(&bytes[at..]).is_some()).unwrap();
     let (in_data, its_length, its_opcode) = (fourth - 20, head + 2, head);
     for at in [in_data, its_length, its_opcode] {
@@ -292,21 +292,21 @@ fn a_file_that_became_shorter_or_another_is_an_error() {
     let (file, mut growing) = followed();
     file.set(&bytes[..half / 2]);
     assert!(matches!(growing.poll(|_| {}), Err(ScanError::Truncated { bytes, .. }) if bytes == half as u64 / 2));
-    // Written anew beyond what was read.
+    // The file was rewritten beyond the bytes that were read.
     let (file, mut growing) = followed();
     file.set(&[&other[..MAGIC.len()], &[1; 7], &other[MAGIC.len()..]].concat());
     assert!(matches!(growing.poll(|_| {}), Err(ScanError::Rewritten)));
-    // Between the look at its length and the read.
+    // The file was cut after its length was read and before its bytes were.
     let mut growing = GrowingScan::new(CutWithin(Cursor::new(bytes))).unwrap();
     let error = growing.poll(|_| {}).unwrap_err();
     assert!(matches!(error, ScanError::Truncated { read: 0, .. }), "{error:?}");
-    // No recording at all.
+    // The file is not a recording.
     let file = Shared::default();
     file.set(b"hello, this is a text");
     assert!(matches!(GrowingScan::new(file).unwrap().poll(|_| {}), Err(ScanError::NotMcap { .. })));
 }
 
-/// A recording within an attachment: its chunks are none of this file's.
+/// A recording within an attachment: its chunks do not belong to this file.
 #[test]
 fn an_attachment_in_the_making_holds_no_chunks() {
     let inner = recording(100);
@@ -332,7 +332,7 @@ fn an_attachment_in_the_making_holds_no_chunks() {
     assert!(heard == messages && whole.completeness == Completeness::Whole);
 }
 
-/// What was read of a recording that goes on is no loss.
+/// The unread rest of a recording that goes on is no loss.
 #[test]
 fn a_reader_that_stops_early_misses_nothing() {
     let bytes = recording(600);
@@ -343,7 +343,7 @@ fn a_reader_that_stops_early_misses_nothing() {
         poll(&mut growing, &mut Vec::new()).unwrap();
         assert_eq!(growing.stop().completeness, Completeness::Whole);
     }
-    // Before all of a finished file was read.
+    // The reader stops before all of a finished file was read.
     let file = Shared::default();
     file.set(&recording(12_000));
     let mut growing = GrowingScan::new(file).unwrap();
