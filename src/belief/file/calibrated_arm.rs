@@ -72,8 +72,8 @@ mod tests {
     use crate::methods::CalibrationMethod;
     use armcal_core::log::read_recording;
 
-    /// If offsets are the only parameters, the tool's covariance equals that from finite differences of the tool pose,
-    /// plus the datasheet's error of the other parameters.
+    /// With only offsets estimated, the tool's covariance equals that from finite differences of the tool pose, plus
+    /// the datasheet's error of other parameters.
     #[test]
     fn a_reading_has_the_angles_the_tool_and_the_covariance_of_the_calibration() {
         let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");

@@ -47,7 +47,7 @@ pub(crate) mod compact_text {
     /// Robot names longer than this after escaping are shortened, bytes.
     pub(crate) const MAX_NAME_BYTES: usize = 40;
     pub(crate) const SUM_DIGITS: usize = 8;
-    /// Letters of the longest code of a refusal, with room for later ones.
+    /// Number of letters of the longest code of a refusal, with room for later ones.
     pub(crate) const MAX_CODE: usize = 32;
 }
 

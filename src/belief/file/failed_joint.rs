@@ -17,7 +17,7 @@ pub struct FailedJointTable {
     pub joint: String,
     /// Kind of failure.
     pub kind: FailedKind,
-    /// `declared` or `detected`.
+    /// Source of the failure: `declared` or `detected`.
     pub found: String,
     /// Evidence of the failure, in words.
     pub evidence: String,

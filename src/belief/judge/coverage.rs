@@ -1,7 +1,7 @@
 //! U95: the radius that contains the tool's position error with 95 % probability (GUM: expanded uncertainty).
 //!
-//! An error with covariance `C` (eigenvalues `l`) is `rho C^(1/2) s`: `s` is uniform on the unit sphere, and `rho^2` is
-//! chi-square with 3 degrees of freedom, or `3 F(3, nu)` where the size of the noise was estimated with `nu` degrees of
+//! An error with covariance `C` (eigenvalues `l`) is `rho C^(1/2) s`, where `s` is uniform on the unit sphere. `rho^2`
+//! is chi-square with 3 degrees of freedom, or `3 F(3, nu)` if the size of the noise was estimated with `nu` degrees of
 //! freedom. So `P(|e| <= r)` is the mean of `P(rho^2 <= r^2 / sum l_i s_i^2)` over the sphere. It is integrated over an
 //! octant: Gauss-Legendre in `s_1`, the midpoint rule in the angle about that axis.
 

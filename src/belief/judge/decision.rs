@@ -57,7 +57,7 @@ pub struct TargetU95 {
 pub(crate) struct TargetError {
     /// Number of the target, from 0.
     pub index: usize,
-    /// Part from the recording, its noise as fitted.
+    /// Part from the recording, with its fitted noise.
     pub by_data_m2: Matrix3<f64>,
     /// Part from the stated standard deviations of parameters that the recording does not determine.
     pub by_priors_m2: Matrix3<f64>,

@@ -63,7 +63,7 @@ impl LensInformation {
 /// Running sums over the rows of residuals.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct TwistSums {
-    /// Lower triangle.
+    /// Lower triangle of `H`.
     h: [[f64; 6]; 6],
     g: [f64; 6],
 }

@@ -11,7 +11,7 @@ pub(crate) mod blocks_value {
 }
 
 pub(crate) mod parameters {
-    /// Relative standard deviation of a worn spot's middle and width from the bump's, in widths. Assumed: tracks wear
+    /// Standard deviation of a worn spot's middle and width from the bump's, in widths. Assumed: tracks wear
     /// as they are used.
     pub(crate) const SHAPE_STD: f64 = 0.3;
     /// Standard width of a worn spot, rad. Assumed: about three degrees. A narrower spot affects readings only at its

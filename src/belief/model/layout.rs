@@ -17,7 +17,7 @@ pub(crate) struct Layout {
     pub links: Range<usize>,
     /// Columns of the compliance, right after those of the links.
     pub sag: Range<usize>,
-    /// First column of each block that has any.
+    /// First column of each block; `None` for a block without columns.
     first: PerBlock<Option<usize>>,
     pub n: usize,
 }

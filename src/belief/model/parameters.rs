@@ -234,8 +234,8 @@ impl WornSpot {
     }
 
     /// Returns the standard deviation of the error at a travel from the middle of the range if the spot has another
-    /// shape. It is a share of the height, and follows from the bump's slopes along its middle and its width, for a
-    /// spot half as wide again.
+    /// shape. It is a share of the height. It follows from the bump's slopes along its middle and its width, for a spot
+    /// half as wide again.
     #[must_use]
     pub fn shape_error_share(self, travel_rad: f64) -> f64 {
         let widths = (travel_rad - self.at_rad()) / (1.5 * SPOT_WIDTH_RAD);

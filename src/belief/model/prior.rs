@@ -21,7 +21,7 @@ pub(crate) fn at_least(std: f64) -> f64 {
 pub(crate) enum Covers {
     /// The joints' parameters.
     Parameters,
-    /// These and the first camera's mount.
+    /// The joints' parameters and the first camera's mount.
     ParametersAndMount,
     /// All columns of the layout.
     All,

@@ -58,7 +58,7 @@ impl NormalEquations {
     }
 }
 
-/// A matrix of twists row by row, so that products with all its columns become vector instructions.
+/// A matrix of twists, stored row by row so that products with all its columns become vector instructions.
 struct RowsOf {
     rows: [[f64; N_BODY_COLUMNS]; 6],
     n: usize,

@@ -27,7 +27,7 @@ pub(crate) mod evidence {
     pub(crate) const NU_LINK: f64 = 2.0;
     pub(crate) const NU_NOISE: f64 = 20.0;
     pub(crate) const NU_CAMERA: f64 = 6.0;
-    /// Bounds of the noise's factor.
+    /// Bounds of the noise's factor; `SCALE_BOUNDS` are those of every other scale over its first guess.
     pub(crate) const NOISE_BOUNDS: [f64; 2] = [0.1, 30.0];
     /// Bounds of the noise of positions and rotations, relative to the first guess, if no noise is stated.
     pub(crate) const POSITION_BOUNDS: [f64; 2] = [1e-3, 1e3];

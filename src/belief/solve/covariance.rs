@@ -105,7 +105,7 @@ impl ParameterCovariance {
         Self { matrix: &to * &self.matrix * to.transpose(), ..self.clone() }
     }
 
-    /// Returns the variance of a joint's angle at that travel, rad^2: from its own parameters, plus `besides`.
+    /// Returns the variance of a joint's angle at that travel, rad^2: from its own parameters, plus the given variance.
     #[must_use]
     pub fn angle_var_rad2(&self, at: JointAt<'_>, change: &ConditionChange, besides: f64) -> f64 {
         let JointAt { spec, joint, travel_rad } = at;

@@ -115,7 +115,7 @@ impl Sums {
 pub(crate) enum ScaleMoment {
     /// The sum of squares over the degrees of freedom: the maximum of the evidence.
     Fitted,
-    /// The mean.
+    /// The mean of the distribution.
     Mean,
 }
 

@@ -103,7 +103,7 @@ pub(crate) mod scale_identification {
     pub(crate) const TURN_FLOOR_RAD: f64 = 3e-4;
     /// Sum of squared deviations from the mean below which readings count as constant, rad^2.
     pub(crate) const CONSTANT_RAD2: f64 = 1e-12;
-    /// Undamped: the start is a tag's own pose, near enough for Gauss-Newton, and twelve steps end in the last digits.
+    /// Damping: none. The start is a tag's own pose, near enough for Gauss-Newton; twelve steps reach the last digits.
     pub(crate) const DAMPING: Damping =
         Damping { first: 0.0, min: 0.0, max: 0.0, down: 0.0, up: 0.0, min_after_rejection: 0.0 };
     pub(crate) const STOP: StopRule = StopRule { slack: f64::INFINITY, ..StopRule::after(12) };

@@ -34,7 +34,7 @@ fn terms_come_back_as_they_were() {
         assert_eq!(Calibration { covariance_hash: None, ..read.clone() }, full);
         assert_eq!(read.to_toml(), text);
         assert!(text.contains("[joint.terms]") && text.contains("[reference]") && text.contains("phi_h(x) = sin"));
-        // Joint 5 has none.
+        // Joint 5 has no terms.
         assert_eq!(read.joint[5].terms, None);
         let back = read.parameters(&robot);
         assert_eq!((back.terms, back.reference), (parameters.terms, parameters.reference));

@@ -1,7 +1,7 @@
 //! Parts of `armcal2` beyond `armcal1`: the reference, and each joint's terms in whole steps.
 //!
-//! A number of steps is one to four printable characters: digits of base 45, the last from the first half of
-//! [`DIGITS`], those before it from the second half, so that small numbers are short and none needs a space between.
+//! A number of steps is one to four printable characters: digits of base 45. The last is from the first half of
+//! [`DIGITS`], those before it from the second half. So small numbers are short and need no space between them.
 
 pub(crate) use crate::file::constants::compact_terms::SHAPE_STEPS_RAD;
 use crate::file::constants::compact_terms::{
@@ -26,7 +26,7 @@ pub struct CompactReference {
     pub oil_c: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pressure_pa: Option<f64>,
-    /// Seconds after the calibration's time.
+    /// Reference time, in seconds after the calibration's time.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub after_time_s: Option<i64>,
     /// Step of the shapes' coefficients.

@@ -12,7 +12,7 @@ use armcal_core::stats::{quantile, stream_rng};
 use armcal_core::streams::JointAngles;
 use armcal_core::time::SIMULATION_EPOCH;
 
-/// Largest distance between the tool by `a` and by `b` over the arm's range, m.
+/// Returns the largest distance between the tool's positions by `a` and by `b` over the arm's range, m.
 fn worst_m(robot: &Robot, a: &ArmSensors, b: &ArmSensors, away: f64, seed: u64) -> f64 {
     let mut rng = stream_rng(seed, "poses");
     let tool_m = |angles: &JointAngles| robot.chain.link_poses(angles).frame(&robot.tool.mount).translation.vector;
