@@ -174,20 +174,21 @@ impl Calibration {
         self.joint.iter().any(|joint| joint.moves.is_slide())
     }
 
-    /// Adds `reasons`, if any, after the calibration's earlier refusals.
+    /// Adds `reasons`, if any, after the calibration's earlier refusals of the same rank.
     pub(crate) fn refuse_for(&mut self, reasons: impl IntoIterator<Item = Refusal>) {
         self.refusals.extend(reasons);
         self.state_refusals();
     }
 
-    /// Adds `reasons` before the calibration's earlier refusals, unless those are about the data themselves.
+    /// Adds `reasons` before the earlier refusals of the same rank, unless the first refusal is about the data
+    /// themselves.
     pub(crate) fn refuse_first_for(&mut self, reasons: impl IntoIterator<Item = Refusal>) {
         let at = if self.refusals.first().is_some_and(Refusal::is_about_data) { self.refusals.len() } else { 0 };
         self.refusals.splice(at..at, reasons);
         self.state_refusals();
     }
 
-    /// Sets the figures in refusals by the decision rule to those of the final table, which includes stated deviations.
+    /// Sets the figures in refusals by the decision rule to those of the final table, which includes stated sigmas.
     pub(crate) fn restate_risk(&mut self) {
         let Some((worst, (risk, worst_m))) =
             self.u95.beyond().and_then(|worst| Some((worst.index + 1, worst.p_beyond_tolerance.zip(worst.u95_m)?)))
