@@ -1,4 +1,4 @@
-//! Belief: estimates and plans from messages of the arm alone.
+//! Estimates and plans from the messages of the arm only.
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 

@@ -10,7 +10,7 @@ use armcal_core::kind::Kind;
 use armcal_core::numeric::Outcome;
 use armcal_core::routine::Method;
 
-/// Accepted, without joints or covariance.
+/// Returns an accepted calibration without joints or covariance.
 pub(crate) fn bare(robot: &str, method: Method) -> Calibration {
     Calibration {
         version: VERSION,

@@ -1,4 +1,4 @@
-//! A calibration applied to its arm: angles, tool and its uncertainty by raw readings.
+//! Calibration applied to its arm: joint angles, tool pose and tool covariance from raw readings.
 
 use nalgebra::{Isometry3, Matrix3};
 
@@ -9,13 +9,13 @@ use armcal_core::joints::{JointAngles, JointCounts};
 use armcal_core::robot::Robot;
 use armcal_core::sensor::{ArmSensors, Conditions};
 
-/// An arm with its sensors, links and camera as calibrated.
+/// Arm with its sensors, links and camera as calibrated.
 #[derive(Clone, Debug)]
 pub struct CalibratedArm {
     sensors: ArmSensors,
-    /// With links and camera as calibrated.
+    /// Robot with links and camera as calibrated.
     robot: Robot,
-    /// With the scales that the covariance is relative to.
+    /// Robot with the sensor scales that the covariance is relative to.
     scaled: Robot,
     covariance: ParameterCovariance,
 }
@@ -54,8 +54,9 @@ impl CalibratedArm {
         self.robot.chain.frame(&self.angles(counts, conditions), &self.robot.tool.mount)
     }
 
-    /// Returns the covariance of the tool's position in the frame of the base, m^2: of the estimated parameters and of
-    /// what each sensor leaves. U95 of the calibration also has links and tool point by their stated sigmas.
+    /// Returns the covariance of the tool's position in the base frame, m^2. It includes the estimated parameters and
+    /// the remaining error of each sensor. The calibration's U95 also includes links and tool point by their stated
+    /// standard deviations.
     #[must_use]
     pub fn tool_covariance_m2(&self, counts: &JointCounts, conditions: &Conditions) -> Matrix3<f64> {
         let angles = self.angles(counts, conditions);
@@ -71,8 +72,8 @@ mod tests {
     use crate::methods::CalibrationMethod;
     use armcal_core::log::read_recording;
 
-    /// With offsets as the only parameters, the tool's covariance is that of finite differences of its pose by them,
-    /// and what the datasheet leaves of the others comes on top.
+    /// With only offsets estimated, the tool's covariance equals that from finite differences of the tool pose, plus
+    /// the datasheet's error of other parameters.
     #[test]
     fn a_reading_has_the_angles_the_tool_and_the_covariance_of_the_calibration() {
         let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");

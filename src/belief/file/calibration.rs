@@ -1,4 +1,4 @@
-//! calibration.toml: the answer, how sure it is, what it rests on and where it holds.
+//! calibration.toml: the estimate, its uncertainty, the data behind it and its range of validity.
 
 use armcal_core::kind::Kind;
 use armcal_core::kinematics::JointKind;
@@ -29,112 +29,113 @@ use crate::say::refusal::words::in_words;
 use crate::say::reservation::Reservation;
 use crate::solve::details::FitDetails;
 
-/// Whether the answer may be used.
+/// Verdict: accepted or refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Status {
     /// No reason to refuse was found.
     Accepted,
-    /// The reasons are in `refusals`.
+    /// At least one reason to refuse was found; `refusals` lists them.
     Refused,
 }
 
-/// One calibration, as its file has it.
+/// Content of one calibration file.
 ///
 /// `angle_rad = center_rad + offset_rad + gain_rad_per_count * travel_counts`, where `travel_counts` is the reading
 /// less the datasheet's reading at `center_rad`, wrapped to half a word either way.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Calibration {
-    /// Of the format: 1.
+    /// Version of the format: 1.
     pub version: u32,
-    /// [`Kind::Calibration`].
+    /// Kind of the document: [`Kind::Calibration`].
     #[serde(default = "Kind::calibration")]
     pub kind: Kind,
     /// Name of the robot.
     pub robot: String,
-    /// Method that made it.
+    /// Method that made the calibration.
     pub method: Method,
-    /// Whether it may be used.
+    /// Verdict: accepted or refused.
     pub status: Status,
-    /// All reasons to refuse in words.
+    /// All reasons to refuse, in words.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub refusal: Option<String>,
-    /// Hash of the recorded messages that this rests on (blake3).
+    /// Hash (blake3) of the recorded messages that the calibration was made from.
     pub messages_hash: String,
-    /// Hash of the covariance in the file beside; absent before the calibration was written, and in files of before
-    /// there was one.
+    /// Hash of the covariance file next to this one. Absent before the calibration is written, and in older files
+    /// without a covariance file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub covariance_hash: Option<String>,
-    /// What the data did not determine, and why; these keep the datasheet's values.
+    /// Parameters that the data did not determine, and why; they keep the datasheet's values.
     pub unobservable: Vec<String>,
     /// Tag observations that the fit rejected: `view 12: tag 3: 45 sigma`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub outliers: Vec<String>,
-    /// Solver and fitted views.
+    /// Outcome of the solver and residuals of the fitted views.
     pub fit: FitMetrics,
-    /// Views that the fit did not use.
+    /// Errors at views that the fit did not use.
     pub held_out: HeldOutMetrics,
-    /// Over the task's targets; absent without a task.
+    /// Predicted tool error over the task's targets, m; absent without a task.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub predicted_tool_error_m: Option<Summary>,
-    /// The same with what the drawing leaves open: link geometry and tool point with their priors.
+    /// Predicted tool error over the task's targets, m, with link geometry and tool point uncertain by their priors.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub predicted_tool_error_with_priors_m: Option<Summary>,
-    /// Radius that contains the tool error with 95 % probability, and the decision by that.
+    /// Radius that contains the tool error with 95 % probability, m, and the decision based on it.
     #[serde(default)]
     pub u95: U95Table,
     /// Conditions that the captured views covered.
     pub valid: ValidRange,
-    /// What the joints' terms are counted from, where there are any.
+    /// Reference conditions of the joints' terms; absent if no joint has terms.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reference: Option<ReferenceTable>,
-    /// Of `bundle`, and of other methods where the robot has a tag on the gripper.
+    /// Estimated camera mount. Present with `bundle`, and with other methods if the robot has a tag on the gripper.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera_mount: Option<CameraMount>,
-    /// Of `bundle`: the further cameras that have views and whose mounts robot.toml does not call exact.
+    /// Further cameras (`bundle` only) that have views and whose mounts robot.toml does not call exact.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub further_camera: Vec<FurtherCamera>,
-    /// Of `bundle`: the lenses that the views contradict.
+    /// Lenses (`bundle` only) whose values in robot.toml the views contradict.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub lens: Vec<LensResult>,
-    /// Where the tags were found to be, where no survey said it.
+    /// Estimated tag poses; absent if a survey gives them all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub map: Option<MapResult>,
-    /// Of `bundle`: what the data determine, before solving.
+    /// Observability of the parameters (`bundle` only), computed before solving.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub observability: Option<ObservabilityTable>,
-    /// Of `bundle`: what the verdict rests on beside `held_out`.
+    /// Checks behind the verdict (`bundle` only) in addition to `held_out`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub verdict: Option<VerdictTable>,
-    /// What `bundle` took for its model.
+    /// Model that `bundle` estimated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model: Option<ModelTable>,
-    /// One per joint, base first.
+    /// Sensor of each joint, base first.
     pub joint: Vec<JointResult>,
-    /// Joints' places on their parent links, where the data asked for others than the drawing's.
+    /// Corrections of the joints' poses on their parent links; empty unless the data required them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub link: Vec<LinkResult>,
-    /// How the arm bends under its weight, where the data asked for it.
+    /// Compliance of the arm under its weight; absent unless the data required it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sag: Option<SagTable>,
-    /// Joints that failed, or whose sensors did.
+    /// Joints that failed, or whose sensors failed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub failed_joint: Vec<FailedJointTable>,
-    /// What a warm calibration by `bundle` started from.
+    /// Prior that a warm calibration by `bundle` started from.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub prior: Option<PriorTable>,
-    /// The reasons to refuse as data, the most telling first.
+    /// Reasons to refuse as data, the most important first.
     #[serde(default, skip_serializing_if = "Vec::is_empty", with = "crate::say::refusal::in_files")]
     #[schemars(with = "Vec<Refusal>")]
     pub refusals: Vec<Refusal>,
-    /// What rests on priors alone, the largest at the tool first.
+    /// Errors that only priors limit, the largest at the tool first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub reservations: Vec<Reservation>,
-    /// What is other than robot.toml, survey and drawing say, the most telling first.
+    /// Deviations from robot.toml, survey and nominal model (URDF), the most important first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub findings: Vec<Finding>,
-    /// Not in calibration.toml, but in the file beside it; older files have it as a table.
+    /// Covariance of the estimated parameters. It is in a file of its own next to calibration.toml; older files have it
+    /// as a table.
     #[serde(default, skip_serializing)]
     pub covariance: CovarianceTable,
     /// Residuals and predictions one by one, for reports; in no file.
@@ -148,10 +149,10 @@ pub fn calibration_schema() -> serde_json::Value {
     with_slides(schema_of::<Calibration>(Kind::Calibration))
 }
 
-/// Tables of a joint in a calibration.
+/// Names of the schema definitions that hold a joint's values.
 const JOINT_TABLES: [&str; 2] = ["JointResult", "TermsTable"];
 
-/// Returns the schema of a calibration whose joints may slide: their keys end in `_m` instead of `_rad`.
+/// Returns `schema` extended by the keys of slides, which end in `_m` instead of `_rad`.
 fn with_slides(mut schema: Value) -> Value {
     let definitions = schema.get_mut("definitions").and_then(Value::as_object_mut);
     for (_, definition) in definitions.into_iter().flatten().filter(|(name, _)| JOINT_TABLES.contains(&name.as_str())) {
@@ -167,26 +168,27 @@ fn with_slides(mut schema: Value) -> Value {
 }
 
 impl Calibration {
-    /// Whether any joint slides.
+    /// Returns true if any joint slides.
     #[must_use]
     pub fn has_slide(&self) -> bool {
         self.joint.iter().any(|joint| joint.moves.is_slide())
     }
 
-    /// Refuses for `reasons`, if there are any, behind those that it was refused for before.
+    /// Adds `reasons`, if any, after the calibration's earlier refusals of the same rank.
     pub(crate) fn refuse_for(&mut self, reasons: impl IntoIterator<Item = Refusal>) {
         self.refusals.extend(reasons);
         self.state_refusals();
     }
 
-    /// The same, before those that it was refused for before, unless those are about the data themselves.
+    /// Adds `reasons` before the earlier refusals of the same rank, unless the first refusal is about the data
+    /// themselves.
     pub(crate) fn refuse_first_for(&mut self, reasons: impl IntoIterator<Item = Refusal>) {
         let at = if self.refusals.first().is_some_and(Refusal::is_about_data) { self.refusals.len() } else { 0 };
         self.refusals.splice(at..at, reasons);
         self.state_refusals();
     }
 
-    /// Gives the refusals by the decision rule the figures of the final table, which includes stated sigmas.
+    /// Sets the figures in refusals by the decision rule to those of the final table, which includes stated sigmas.
     pub(crate) fn restate_risk(&mut self) {
         let Some((worst, (risk, worst_m))) =
             self.u95.beyond().and_then(|worst| Some((worst.index + 1, worst.p_beyond_tolerance.zip(worst.u95_m)?)))
@@ -212,42 +214,42 @@ impl Calibration {
     }
 }
 
-/// The sensor of one joint.
+/// Sensor of one joint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct JointResult {
     /// Name of the joint in the URDF.
     pub name: String,
-    /// Whether it slides: then all that is in rad here is in m, and calibration.toml's keys say so.
+    /// Motion of the joint. If it slides, every value here in rad is in m, and the keys in calibration.toml say so.
     #[serde(default, skip_serializing_if = "JointKind::is_turning")]
     pub moves: JointKind,
-    /// Middle of the joint's range by the drawing.
+    /// Nominal angle at the middle of the joint's range.
     pub center_rad: f64,
-    /// Negative where the reading falls as the angle grows.
+    /// Change of the angle per count; negative where the reading falls as the angle grows.
     pub gain_rad_per_count: f64,
-    /// Added to the angle.
+    /// Sensor error at mid-range, added to the angle.
     pub offset_rad: f64,
-    /// One sigma; the datasheet's where the joint was not determined.
+    /// Standard deviation of the gain; the datasheet's where the joint was not determined.
     pub gain_std_rad_per_count: f64,
-    /// One sigma; the datasheet's where the joint was not determined.
+    /// Standard deviation of the offset; the datasheet's where the joint was not determined.
     pub offset_std_rad: f64,
-    /// Whether these views, or those of the prior, determined the gain.
+    /// True if these views, or those of the prior, determined the gain.
     pub gain_estimated: bool,
-    /// Whether these views, or those of the prior, determined the offset.
+    /// True if these views, or those of the prior, determined the offset.
     pub offset_estimated: bool,
-    /// Angles that the captured views covered.
+    /// Angles at both ends of the range that the captured views covered.
     pub covered_rad: [f64; 2],
-    /// The gain over the datasheet's; negative where the counts run the other way.
+    /// Ratio of the gain to the datasheet's; negative where the counts run the other way.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gain_over_datasheet: Option<f64>,
-    /// Counts per radian over the datasheet's, where they were measured first because nobody knew them; the gain's
-    /// relative standard deviation in `covariance` is about that scale.
+    /// Ratio of the measured counts per radian to the datasheet's, if an unknown scale was measured first. The gain's
+    /// relative standard deviation in `covariance` refers to that scale.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub identified_ratio: Option<f64>,
-    /// One sigma of what the parameters leave of the sensor's error; absent where that is the datasheet's linearity.
+    /// Standard deviation of the sensor error that the parameters leave; absent if it equals the datasheet's linearity.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub residual_std_rad: Option<f64>,
-    /// What the sensor is beyond a straight line.
+    /// Terms of the sensor beyond a straight line.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub terms: Option<TermsTable>,
 }

@@ -1,4 +1,4 @@
-//! calibration.toml as a file: written, read, checked, and turned into sensors again.
+//! calibration.toml as a file: written, read, checked, and converted to sensors.
 
 use crate::file::constants::calibration_file::{LEAST_SLOPE, SAME};
 use armcal_core::codes::Code;
@@ -23,17 +23,17 @@ use armcal_core::kinematics::LinkCorrections;
 use armcal_core::robot::{FileIssue, JointSensorSpec, Robot, RobotError, from_table, read_text, syntax_code};
 use armcal_core::sensor::{ArmSensors, Correction};
 
-/// The texts of a calibration's two files, which hold each other's hashes: to be put in place together.
+/// Texts of a calibration's two files, to be written together because each holds the other's hash.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CalibrationFiles {
-    /// calibration.toml.
+    /// Text of calibration.toml.
     pub calibration: String,
-    /// The covariance, for [`covariance_file`](crate::file::covariance_file).
+    /// Text of the covariance file, for [`covariance_file`](crate::file::covariance_file).
     pub covariance: String,
 }
 
 impl JointResult {
-    /// Counts per radian that the gain is relative to, over those of `spec`, where the scale was measured on the way.
+    /// Returns the ratio of the gain's reference scale to the counts per radian of `spec`, if the scale was measured.
     fn ratio_to(&self, spec: &JointSensorSpec) -> Option<f64> {
         let gain = self.gain_over_datasheet? * self.identified_ratio?;
         let ratio = gain / self.gain_rad_per_count / spec.counts_per_rad;
@@ -51,10 +51,10 @@ const TERMS_HEAD: &str = "\
 ";
 
 impl Calibration {
-    /// The sensors of `robot` under this calibration.
+    /// Returns the sensors of `robot` under this calibration.
     ///
     /// # Errors
-    /// [`CalibrationFileError::OtherRobot`] when it was made for another arm.
+    /// [`CalibrationFileError::OtherRobot`] if the calibration was made for another arm.
     pub fn sensors(&self, robot: &Robot) -> Result<ArmSensors, CalibrationFileError> {
         let names: Vec<String> = self.joint.iter().map(|joint| joint.name.clone()).collect();
         let moves_as = |(joint, spec): (&JointResult, &JointSensorSpec)| joint.moves == spec.moves;
@@ -90,8 +90,8 @@ impl Calibration {
         Ok(sensors)
     }
 
-    /// `robot` with the sensor scales that were measured on the way, which the covariance's gains are relative to, with
-    /// sensors as far from straight as the residuals say, and with its links as calibrated.
+    /// Returns `robot` with measured sensor scales, which the covariance's gains refer to. Its sensors have the
+    /// nonlinearity that the residuals show, and its links are as calibrated.
     #[must_use]
     pub fn scaled_robot(&self, robot: &Robot) -> Robot {
         let mut scaled = robot.clone().with_linearity(self.fit.linearity_scale);
@@ -103,7 +103,7 @@ impl Calibration {
         self.parameters(robot).with_links(scaled)
     }
 
-    /// The parameters relative to the sensors of `robot`, whose joints must be this calibration's.
+    /// Returns the parameters relative to the sensors of `robot`, whose joints must be this calibration's.
     #[must_use]
     pub fn parameters(&self, robot: &Robot) -> JointParameters {
         let mut parameters = JointParameters::default();
@@ -117,7 +117,7 @@ impl Calibration {
         parameters
     }
 
-    /// Where joints sit on their parent links beyond the drawing, and how the arm bends; zero where that was not
+    /// Returns the corrections of the joints' poses on their parent links and of the arm's compliance; zero where not
     /// estimated.
     #[must_use]
     pub fn link_corrections(&self) -> LinkCorrections {
@@ -131,7 +131,7 @@ impl Calibration {
         corrections
     }
 
-    /// What is to be added to a joint's angle before its sensor slipped, at a time since the first view, rad.
+    /// Returns the correction of a joint's angle before its sensor slipped, at a time since the first view, rad.
     #[must_use]
     pub fn slipped_rad(&self, joint: &str, since_first_view_s: f64) -> f64 {
         let slips = self.findings.iter().filter(|found| found.kind == FindingKind::SensorSlip && found.name == joint);
@@ -139,11 +139,11 @@ impl Calibration {
         later.filter_map(|slip| slip.size).sum()
     }
 
-    /// What the reading of each view means under this calibration, slips among it, rad; `views` with the travels by
-    /// the datasheet, which they are read with.
+    /// Returns the joint angles of each view under this calibration, slips included, rad. `views` have the travels by
+    /// the datasheet.
     ///
     /// # Errors
-    /// [`CalibrationFileError::OtherRobot`] when it was made for another arm.
+    /// [`CalibrationFileError::OtherRobot`] if the calibration was made for another arm.
     pub fn view_angles(&self, robot: &Robot, views: &[View]) -> Result<Vec<JointAngles>, CalibrationFileError> {
         let (nominal, sensors, names) = (ArmSensors::nominal(robot), self.sensors(robot)?, robot.joint_names());
         let first = views.iter().map(|view| view.end).min();
@@ -158,7 +158,7 @@ impl Calibration {
         Ok(views.iter().map(angles_of).collect())
     }
 
-    /// `robot` with its links and the cameras' mounts and lenses as calibrated; sensors and tags stay.
+    /// Returns `robot` with links, camera mounts and lenses as calibrated; sensors and tags stay.
     #[must_use]
     pub fn applied_to(&self, robot: &Robot) -> Robot {
         let mut robot = robot.clone();
@@ -176,7 +176,7 @@ impl Calibration {
         self.with_lenses(&robot)
     }
 
-    /// `robot` with its lenses and their sigmas as calibrated.
+    /// Returns `robot` with its lenses and their standard deviations as calibrated.
     #[must_use]
     pub fn with_lenses(&self, robot: &Robot) -> Robot {
         let mut robot = robot.clone();
@@ -193,7 +193,7 @@ impl Calibration {
         robot
     }
 
-    /// The covariance of the estimated parameters for `robot`'s joints; rows that name no joint of it are left out.
+    /// Returns the covariance of the estimated parameters of `robot`'s joints; rows of other joints are omitted.
     #[must_use]
     pub fn parameter_covariance(&self, robot: &Robot) -> ParameterCovariance {
         let all = Parameter::all(robot.n_joints());
@@ -212,7 +212,7 @@ impl Calibration {
         }
     }
 
-    /// The texts of calibration.toml and of the covariance beside it.
+    /// Returns the texts of calibration.toml and of its covariance file.
     #[must_use]
     pub fn to_files(&self) -> CalibrationFiles {
         let calibration = self.to_toml();
@@ -220,7 +220,7 @@ impl Calibration {
         CalibrationFiles { calibration, covariance }
     }
 
-    /// The text of calibration.toml, without covariance but with its hash.
+    /// Returns the text of calibration.toml, without the covariance but with its hash.
     ///
     /// # Panics
     /// Never: every value here has a TOML form.
@@ -235,17 +235,17 @@ impl Calibration {
         format!("{}{head}{more}{slides}{}", first_line(Kind::Calibration), in_metres(&body))
     }
 
-    /// Of the covariance that it has, or was said to have by a file that was read without.
+    /// Returns the hash of the covariance, or the hash that the file states if its covariance was not read.
     fn hash_of_covariance(&self) -> Option<String> {
         let not_read = self.covariance.parameters.is_empty() && self.covariance_hash.is_some();
         if not_read { self.covariance_hash.clone() } else { Some(self.covariance.hash()) }
     }
 
-    /// Reads a calibration file and the covariance beside it.
+    /// Reads a calibration file and the covariance file next to it.
     ///
     /// # Errors
-    /// [`CalibrationFileError`] naming file, key and allowed range; a covariance that is missing or another
-    /// calibration's.
+    /// [`CalibrationFileError`] naming file, key and allowed range; also for a covariance that is missing or belongs to
+    /// another calibration.
     pub fn read(file: &Path) -> Result<Self, CalibrationFileError> {
         let text = read_text(file)?;
         let mut calibration = Self::parse(file, &text)?;
@@ -255,8 +255,8 @@ impl Calibration {
         Ok(calibration)
     }
 
-    /// Reads the text of a calibration file alone, for what needs no covariance: that of the result is empty, unless an
-    /// older file has it inside. `file` is for messages.
+    /// Reads only the text of a calibration file, for uses that need no covariance. The covariance of the result is
+    /// empty, unless an older file contains it. `file` is for messages.
     ///
     /// # Errors
     /// [`CalibrationFileError`] naming file, key and allowed range.

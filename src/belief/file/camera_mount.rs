@@ -8,48 +8,48 @@ use crate::positions::mount_estimate::MountEstimate;
 use armcal_core::robot::Robot;
 use armcal_core::spatial::{Camera, Link, Pose};
 
-/// Where the camera hangs, by the tag on the gripper; by the drawing where that was left out.
+/// Camera mount, estimated from the tag on the gripper; the nominal mount if that tag was not used.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CameraMount {
-    /// Why the tag was not used.
+    /// Reason why the tag was not used.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub left_out: Option<String>,
-    /// `link_from_camera` on the link that carries the camera.
+    /// Position of the camera on the link that carries it (`link_from_camera`), m.
     pub position_m: [f64; 3],
     /// Rotation of `link_from_camera`.
     pub quaternion_wxyz: [f64; 4],
-    /// One sigma per axis of the camera.
+    /// Standard deviation of the position along each axis of the camera, m.
     pub position_std_m: [f64; 3],
-    /// One sigma about each axis of the camera.
+    /// Standard deviation of the rotation about each axis of the camera, rad.
     pub rotation_std_rad: [f64; 3],
-    /// Views that showed the tag.
+    /// Number of views that showed the tag.
     pub views: usize,
-    /// Of the tag's corners, root mean square distance in the image; absent where no fit of it alone was made.
+    /// Root mean square reprojection error of the tag's corners; absent if the tag was not fitted separately.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rms_px: Option<f64>,
 }
 
-/// Where a further camera hangs, by the tags.
+/// Mount of a further camera, estimated from the tags.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FurtherCamera {
-    /// Its name in robot.toml.
+    /// Name of the camera in robot.toml.
     pub name: String,
-    /// `link_from_camera` on the link that carries the camera.
+    /// Position of the camera on the link that carries it (`link_from_camera`), m.
     pub position_m: [f64; 3],
     /// Rotation of `link_from_camera`.
     pub quaternion_wxyz: [f64; 4],
-    /// One sigma per axis of the camera.
+    /// Standard deviation of the position along each axis of the camera, m.
     pub position_std_m: [f64; 3],
-    /// One sigma about each axis of the camera.
+    /// Standard deviation of the rotation about each axis of the camera, rad.
     pub rotation_std_rad: [f64; 3],
-    /// Its views.
+    /// Number of the camera's views.
     pub views: usize,
 }
 
 impl FurtherCamera {
-    /// `None` where the quaternion is none.
+    /// Returns the camera mount; `None` if the quaternion has no valid length.
     pub(crate) fn link_from_camera(&self) -> Option<Isometry3<f64>> {
         isometry(&self.position_m, &self.quaternion_wxyz)
     }
@@ -61,12 +61,12 @@ fn isometry(position_m: &[f64; 3], [w, x, y, z]: &[f64; 4]) -> Option<Isometry3<
 }
 
 impl CameraMount {
-    /// `None` where the quaternion is none.
+    /// Returns the camera mount; `None` if the quaternion has no valid length.
     pub(crate) fn link_from_camera(&self) -> Option<Isometry3<f64>> {
         isometry(&self.position_m, &self.quaternion_wxyz)
     }
 
-    /// Of `robot`, whose camera is where it was found to hang; `None` where no tag is on the gripper.
+    /// Returns the mount of `robot`'s camera, which holds the estimate; `None` if the robot has no tag on the gripper.
     pub(crate) fn of(robot: &Robot, mount: &Result<Option<MountEstimate>, String>) -> Option<Self> {
         let camera = &robot.camera;
         let link_from_camera: Pose<Link, Camera> = Pose::from_isometry(camera.mount.link_from_frame);

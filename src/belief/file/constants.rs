@@ -1,25 +1,26 @@
 //! Constants that decide something in `file`: unit, source and effect of each, by the file that uses it.
 
 pub(crate) mod calibration_file {
-    /// `spec` has the scale already, but for rounding.
+    /// Relative difference below which the scale of `spec` counts as the measured one, 1: only rounding differs.
     pub(crate) const SAME: f64 = 1e-9;
-    /// The least slope that a sensor may have anywhere, over its gain.
+    /// The least slope that a sensor may have anywhere, relative to its gain.
     pub(crate) const LEAST_SLOPE: f64 = 0.2;
 }
 
 pub(crate) mod compact_precision {
-    /// The text is shorter than this, bytes.
+    /// The text must be shorter than this, bytes.
     pub const MAX_COMPACT_BYTES: usize = 512;
-    /// Corrections and their deviations are whole multiples of 1e-7 (gains: relative, offsets: rad). Half of that at 8
-    /// joints of a 5 m arm at the ends of their ranges moves the tool by less than 0.01 mm.
+    /// Steps per unit of corrections and their deviations: multiples of 1e-7 (gains: relative, offsets: rad). Half a
+    /// step at 8 joints of a 5 m arm at the ends of their ranges moves the tool by less than 0.01 mm.
     pub(crate) const STEPS: f64 = 1e7;
-    /// With terms of 1e-6, which leaves room for them; the tool of a 2 m arm moves by less than 0.02 mm.
+    /// Steps per unit if the sensors have terms: 1e-6 leaves room for them and moves the tool of a 2 m arm by less than
+    /// 0.02 mm.
     pub(crate) const STEPS_WITH_TERMS: f64 = 1e6;
-    /// Predicted tool errors are whole micrometres.
+    /// Steps per metre of predicted tool errors: whole micrometres.
     pub(crate) const UM_PER_M: f64 = 1e6;
     /// The largest correction, in steps: 10 times the datasheet's gain, 10 rad.
     pub(crate) const MAX_STEPS: i64 = 99_999_999;
-    /// Digits of the messages' hash that are sent.
+    /// Number of digits of the messages' hash in the text.
     pub(crate) const HASH_DIGITS: usize = 12;
 }
 
@@ -33,30 +34,30 @@ pub(crate) mod compact_terms {
     pub(crate) const GAIN_STEPS: f64 = 5e6;
     pub(crate) const DRIFT_STEPS: f64 = 1e6;
     pub(crate) const PLAY_STEPS: f64 = 2e5;
-    /// Of the reference: per C and per Pa.
+    /// Steps per C and per Pa of the reference.
     pub(crate) const OIL_STEPS: f64 = 1e2;
     pub(crate) const PRESSURE_STEPS: f64 = 1e-3;
     pub(crate) const BASE: i64 = 45;
-    /// More digits than any allowed number has.
+    /// Number of digits that no allowed number exceeds.
     pub(crate) const MAX_DIGITS: usize = 4;
     pub(crate) const LARGEST_STEPS: i64 = 1_000_000;
 }
 
 pub(crate) mod compact_text {
-    /// Robot names longer than this are shortened, bytes after escaping.
+    /// Robot names longer than this after escaping are shortened, bytes.
     pub(crate) const MAX_NAME_BYTES: usize = 40;
     pub(crate) const SUM_DIGITS: usize = 8;
-    /// Letters of the longest code of a refusal, with room for later ones.
+    /// Number of letters of the longest code of a refusal, with room for later ones.
     pub(crate) const MAX_CODE: usize = 32;
 }
 
 pub(crate) mod covariance_file {
-    /// Above so many rows, a covariance is written with seven significant digits.
+    /// Number of rows above which a covariance is written with seven significant digits.
     pub(crate) const FULL_DIGITS_ROWS: usize = 24;
 }
 
 pub(crate) mod lookup {
-    /// Points of a table; between them a straight line is off by some 1 % of the nonlinearity.
+    /// Number of points of a table; the error of straight lines between them is about 1 % of the nonlinearity.
     pub(crate) const POINTS: usize = 65;
 }
 
@@ -70,9 +71,9 @@ pub(crate) mod valid_range {
 pub(crate) mod validity {
     /// Excess of an angle that is not reported, rad. Assumed.
     pub(crate) const MARGIN_RAD: f64 = 0.05;
-    /// Excess over the captured range, in widths of that range, from which a target is not judged: U95 includes the
+    /// Excess over the captured range, in widths of that range, above which a target is not judged. U95 includes the
     /// stated linearity of a sensor beyond the views, and in good arms up to 0.96 widths occur. Assumed.
     pub(crate) const MAX_EXTRAPOLATION: f64 = 1.0;
-    /// A joint that moves the tool by less than this matters to no target, m/rad; slides always do. Assumed.
+    /// Least tool motion per joint motion that makes a joint matter to a target, m/rad; slides always do. Assumed.
     pub(crate) const MIN_LEVER_M: f64 = 0.01;
 }

@@ -1,7 +1,8 @@
-//! The covariance of a calibration, and its file beside calibration.toml.
+//! The covariance of a calibration, and its file next to calibration.toml.
 //!
-//! calibration.toml is for people; a hundred rows of numbers are not. `NAME.toml` has its covariance in
-//! `NAME.covariance.toml`. Each file holds the other's hash, so that a covariance never meets another's parameters.
+//! calibration.toml is for people; a hundred rows of numbers are not. The covariance of `NAME.toml` is in
+//! `NAME.covariance.toml`. Each file holds the other's hash, so that a covariance is never used with another
+//! calibration's parameters.
 
 use crate::file::constants::covariance_file::FULL_DIGITS_ROWS;
 use armcal_core::codes::Code;
@@ -18,7 +19,7 @@ use armcal_core::robot::{FileIssue, RobotError, read_text};
 use armcal_core::schema::{first_line, schema_of};
 use armcal_core::text::printable;
 
-/// What the key of a file's own counterpart begins with; the line counts in neither hash.
+/// Start of the key that holds the other file's hash; neither hash includes that line.
 const CALIBRATION_HASH: &str = "calibration_hash";
 
 const HEAD: &str = "\
@@ -27,18 +28,18 @@ const HEAD: &str = "\
 # their keys, the camera mount in m and rad.
 ";
 
-/// Estimated parameters by [`Parameter::name`](crate::model::Parameter::name): gains relative, offsets in rad, ... and
-/// their covariance.
+/// Names and covariance of the estimated parameters. The names are those of
+/// [`Parameter::name`](crate::model::Parameter::name); gains are relative, offsets in rad.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CovarianceTable {
-    /// Names in the order of the rows.
+    /// Names of the parameters, in the order of the rows.
     pub parameters: Vec<String>,
-    /// Square and symmetric.
+    /// Rows of the covariance, square and symmetric.
     pub rows: Vec<Vec<f64>>,
 }
 
-/// The same as its file has it.
+/// Covariance as its file holds it.
 #[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct CovarianceFile {
@@ -60,7 +61,7 @@ pub fn covariance_schema() -> serde_json::Value {
 }
 
 impl CovarianceTable {
-    /// From the lower triangle of `matrix`, rounded to what the file keeps.
+    /// Returns the covariance from the lower triangle of `matrix`, rounded to the digits that the file keeps.
     pub(crate) fn new(parameters: Vec<String>, matrix: &DMatrix<f64>) -> Self {
         let is_large = matrix.nrows() > FULL_DIGITS_ROWS;
         let rounded = |value: f64| {
@@ -77,7 +78,7 @@ impl CovarianceTable {
         Self { parameters, rows: (0..n).map(row).collect() }
     }
 
-    /// The row of the parameter of this name.
+    /// Returns the index of the row of the parameter with this name.
     pub(crate) fn row(&self, parameter: &str) -> Option<usize> {
         self.parameters.iter().position(|name| name == parameter)
     }
@@ -91,20 +92,20 @@ impl CovarianceTable {
         format!("{}{HEAD}{body}", first_line(Kind::Covariance))
     }
 
-    /// What `covariance_hash` in calibration.toml is.
+    /// Returns the value of `covariance_hash` in calibration.toml.
     pub(crate) fn hash(&self) -> String {
         content_hash(&self.text(String::new()))
     }
 
-    /// The file that goes beside the calibration with this text.
+    /// Returns the text of the covariance file of the calibration with this text.
     pub(crate) fn to_file(&self, calibration: &str) -> String {
         self.text(content_hash(calibration))
     }
 
-    /// Reads the covariance of `calibration`, whose text and `covariance_hash` these are.
+    /// Reads the covariance of `calibration`, a file with this `text` and `covariance_hash`.
     ///
     /// # Errors
-    /// [`CalibrationFileError`]: its file is missing, belongs to another calibration, or is none.
+    /// [`CalibrationFileError`] if its file is missing, belongs to another calibration, or is no covariance file.
     pub(crate) fn read_beside(calibration: &Path, text: &str, hash: &str) -> Result<Self, CalibrationFileError> {
         let file = covariance_file(calibration);
         if !file.exists() {
@@ -124,18 +125,19 @@ impl CovarianceTable {
     }
 }
 
-/// Where the covariance of the calibration in `calibration` is: `NAME.covariance.toml` beside `NAME.toml`.
+/// Returns the path of a calibration's covariance: `NAME.covariance.toml` in the folder of `NAME.toml`.
 #[must_use]
 pub fn covariance_file(calibration: &Path) -> PathBuf {
     calibration.with_extension("covariance.toml")
 }
 
-/// Hash (blake3) of a file's lines, whatever comments, indents and empty lines it got, less the key of its counterpart.
+/// Returns the hash (blake3) of a file's lines, without comments, indents, empty lines and the key of the other file's
+/// hash.
 fn content_hash(text: &str) -> String {
     let mut hasher = blake3::Hasher::new();
     let lines = text.lines().map(str::trim);
     for line in lines.filter(|l| !l.is_empty() && !l.starts_with('#') && !l.starts_with(CALIBRATION_HASH)) {
-        // As the file is written.
+        // The hash is that of the text as the program writes it.
         hasher.update(printable(line).as_bytes());
         hasher.update(b"\n");
     }

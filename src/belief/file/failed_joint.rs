@@ -1,4 +1,5 @@
-//! `[[failed_joint]]` and `[prior]` of calibration.toml: what failed and what that costs, and whether a prior held.
+//! `[[failed_joint]]` and `[prior]` of calibration.toml: failures and their cost, and whether the views agree with a
+//! prior.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -8,46 +9,46 @@ use armcal_core::kinematics::JointKind;
 use armcal_core::robot::FailedKind;
 use armcal_core::stats::Summary;
 
-/// One joint that failed, or whose sensor did.
+/// A joint that failed, or whose sensor failed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FailedJointTable {
     /// Name of the joint in the URDF.
     pub joint: String,
-    /// What is wrong with it.
+    /// Kind of failure.
     pub kind: FailedKind,
-    /// `declared` or `detected`.
+    /// Source of the failure: `declared` or `detected`.
     pub found: String,
-    /// What shows it.
+    /// Evidence of the failure, in words.
     pub evidence: String,
-    /// Poses of the views whose reading was not used.
+    /// Poses of the views whose reading of this joint was not used.
     pub poses: Vec<u32>,
-    /// Of a slip that lasts: the first pose after it. The sensor is calibrated as it is since then.
+    /// First pose after a slip that lasts. The calibration is that of the sensor since then.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub since_pose: Option<u32>,
-    /// Where a locked joint stands, with one sigma; m of a slide.
+    /// Angle of a locked joint, rad; m for a slide.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub angle_rad: Option<f64>,
-    /// Absent where `angle_rad` is.
+    /// Standard deviation of `angle_rad`; absent with it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub angle_std_rad: Option<f64>,
-    /// One sigma of the angle where the camera alone tells it, in a view like those; m of a slide.
+    /// Standard deviation of the angle in a view like those if only the camera measures it, rad; m for a slide.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera_std_rad: Option<f64>,
-    /// Predicted tool error over the task where the joint's angle is known ...
-    /// ... as well as it now is: by what is left of its sensor, or as locked; else anywhere in its range.
+    /// Predicted tool error over the task if the joint's angle is known as well as now: from the rest of its sensor, or
+    /// as locked. Otherwise the joint may be anywhere in its range.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tool_error_m: Option<Summary>,
-    /// ... by the camera, which then must see tags.
+    /// Predicted tool error over the task if the camera measures the joint's angle, for which it must see tags.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tool_error_by_camera_m: Option<Summary>,
-    /// ... by a sound sensor of the datasheet, nothing calibrated on it.
+    /// Predicted tool error over the task with an uncalibrated sensor that conforms to the datasheet.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tool_error_by_datasheet_m: Option<Summary>,
 }
 
 impl FailedJointTable {
-    /// The same, for sentences.
+    /// Returns the failure in the form that sentences use.
     #[must_use]
     pub fn told(&self) -> FailedJoint<'_> {
         let Self { joint, kind, evidence, since_pose, .. } = self;
@@ -59,29 +60,28 @@ impl FailedJointTable {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PriorTable {
-    /// Whether prior and views can both be right. Where they cannot, a script's recalibration rests on the new views
-    /// alone.
+    /// True if prior and views are consistent. Otherwise a script's recalibration uses only the new views.
     pub agrees: bool,
-    /// Whether the result rests on it.
+    /// True if the result uses the prior.
     pub used: bool,
-    /// blake3 of the messages that the prior rests on.
+    /// Hash (blake3) of the messages that the prior was made from.
     pub messages_hash: String,
-    /// Hours since its last view.
+    /// Time since the prior's last view, h.
     pub elapsed_h: f64,
-    /// Square of the estimate's move from the prior under its covariance.
+    /// Squared Mahalanobis distance of the estimate from the prior, under the covariance of their difference.
     pub chi_square: f64,
-    /// Number of directions that the views tell enough of to be tested.
+    /// Number of tested directions: those that the views determine well enough.
     pub degrees_of_freedom: usize,
-    /// The 0.999 quantile.
+    /// The 0.999 quantile of chi-square for these degrees of freedom.
     pub chi_square_limit: f64,
-    /// The joint that is off the most in its own sigma: mean over the views.
+    /// Joint with the largest mean deviation over the views, in standard deviations.
     pub worst_joint: String,
-    /// Whether that joint slides: the two figures that follow are in m then.
+    /// Motion of `worst_joint`. If it slides, the next two values are in m.
     #[serde(default, skip_serializing_if = "JointKind::is_turning")]
     pub moves: JointKind,
-    /// Positive where the new views put the joint's angle above the prior's.
+    /// Deviation of that joint's angle, rad; positive where the new views give a larger angle than the prior.
     pub worst_off_rad: f64,
-    /// One sigma of `worst_off_rad`.
+    /// Standard deviation of `worst_off_rad`.
     pub worst_off_std_rad: f64,
 }
 

@@ -1,11 +1,11 @@
-//! What can be wrong with calibration.toml and the covariance beside it.
+//! Errors in calibration.toml and its covariance file.
 
 use armcal_core::codes::{Code, Coded};
 use std::path::PathBuf;
 
 use armcal_core::robot::RobotError;
 
-/// Why a calibration file was refused.
+/// Reason why a calibration file was refused.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum CalibrationFileError {

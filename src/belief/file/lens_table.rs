@@ -8,24 +8,24 @@ use serde::{Deserialize, Serialize};
 use armcal_core::optics::CameraModel;
 use armcal_core::robot::{CameraSpec, FileIssue, LensPriors};
 
-/// A lens that was estimated, where the views contradict the one that robot.toml states.
+/// Lens that was estimated because the views contradict its values in robot.toml.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LensResult {
-    /// Name of the further camera; absent: `[camera]`.
+    /// Name of the further camera; absent for `[camera]`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<String>,
-    /// Along both axes of the image, px.
+    /// Focal lengths along both axes of the image, px.
     pub focal_px: [f64; 2],
     /// Optical centre, px.
     pub center_px: [f64; 2],
-    /// The first four coefficients of distortion of robot.toml's model.
+    /// First four distortion coefficients of robot.toml's lens model.
     pub distortion: [f64; 4],
-    /// One sigma, px.
+    /// Standard deviation of the focal lengths, px.
     pub focal_std_px: [f64; 2],
-    /// One sigma, px.
+    /// Standard deviation of the optical centre, px.
     pub center_std_px: [f64; 2],
-    /// One sigma.
+    /// Standard deviation of each distortion coefficient.
     pub distortion_std: [f64; 4],
 }
 
@@ -53,7 +53,7 @@ impl LensResult {
         Ok(())
     }
 
-    /// Gives `camera` this lens and its sigmas, of axes and coefficients the largest.
+    /// Gives `camera` this lens, with the largest standard deviations over axes and coefficients.
     pub(crate) fn apply(&self, camera: &mut CameraSpec) {
         let ([fx, fy], [cx, cy], [a, b, c, d]) = (self.focal_px, self.center_px, self.distortion);
         camera.lens = camera.lens.with_intrinsics([fx, fy, cx, cy, a, b, c, d]);
@@ -83,7 +83,7 @@ mod tests {
         let table = LensResult::new(Some("elbow".to_owned()), &found, [0.1; 8]);
         let read: LensResult = toml::from_str(&toml::to_string(&table).expect("it writes")).expect("it reads");
         assert_eq!(read, table);
-        // How far the lens sees stays the nominal one's, as in the estimate.
+        // The lens's field of view stays nominal, as in the estimate.
         let mut camera = CameraSpec { lens: nominal, ..crate::fixture::titan().camera };
         read.apply(&mut camera);
         assert_eq!(camera.lens.intrinsics(), found.intrinsics());

@@ -8,24 +8,24 @@ use crate::solve::covariance::ParameterCovariance;
 use armcal_core::kinematics::LinkCorrection;
 use armcal_core::robot::Robot;
 
-/// Where a joint sits on its parent link, beyond the URDF's `origin`; in the parent link's frame.
+/// Correction of a joint's pose on its parent link, beyond the URDF's `origin`, in the parent link's frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LinkResult {
-    /// The joint.
+    /// Name of the joint.
     pub joint: String,
-    /// Of the joint's origin, m.
+    /// Shift of the joint's origin, m.
     pub shift_m: [f64; 3],
-    /// Of the joint's attitude, before the URDF's: a rotation vector, rad.
+    /// Rotation of the joint's frame, applied before the URDF's: a rotation vector, rad.
     pub turn_rad: [f64; 3],
-    /// One sigma, m.
+    /// Standard deviation of the shift, m.
     pub shift_std_m: [f64; 3],
-    /// One sigma, rad.
+    /// Standard deviation of the rotation, rad.
     pub turn_std_rad: [f64; 3],
 }
 
 impl LinkResult {
-    /// Of each joint whose link geometry is in `covariance`.
+    /// Returns the correction of each joint whose link geometry is in `covariance`.
     pub(crate) fn all(robot: &Robot, at: &JointParameters, covariance: &ParameterCovariance) -> Vec<Self> {
         let one = |(joint, spec): (usize, &armcal_core::robot::JointSensorSpec)| {
             let std = |kind| covariance.std(Parameter { joint, kind });

@@ -6,20 +6,20 @@ use serde::Serialize;
 use crate::file::calibration::{Calibration, JointResult};
 use armcal_core::sensor::{SensorModel, nonlinearity_basis};
 
-/// The angle of one joint over its range under the reference's conditions.
+/// Table of one joint's angle over its range under the reference conditions.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LookupTable {
     /// Name of the joint in the URDF.
     pub joint: String,
-    /// Reading less the datasheet's reading in the middle of the range; ascending or descending.
+    /// Reading minus the datasheet's reading in the middle of the range; ascending or descending.
     pub travel_counts: Vec<f64>,
-    /// Ascending, where the gain is positive.
+    /// Angle at each of `travel_counts`; ascending if the gain is positive.
     pub angle_rad: Vec<f64>,
-    /// What of it is beyond `center_rad + offset_rad + gain_rad_per_count * travel_counts`.
+    /// Part of the angle beyond `center_rad + offset_rad + gain_rad_per_count * travel_counts`.
     pub correction_rad: Vec<f64>,
 }
 
-/// A joint of which all is known but the datasheet's reading in its middle.
+/// Sensor of a joint whose reading in the middle of the range need not be known.
 struct Sensor<'a> {
     joint: &'a str,
     center_rad: f64,
@@ -49,7 +49,7 @@ impl Sensor<'_> {
 }
 
 impl Calibration {
-    /// A table for each joint with terms.
+    /// Returns a table for each joint with terms.
     #[must_use]
     pub fn lookup(&self) -> Vec<LookupTable> {
         let one = |joint: &JointResult| {
@@ -70,7 +70,7 @@ impl Calibration {
 }
 
 impl LookupTable {
-    /// That of a sensor with terms.
+    /// Returns the table of a sensor with terms; `None` for other sensors.
     #[must_use]
     pub fn of(model: &SensorModel) -> Option<Self> {
         let (spec, correction) = (&model.spec, &model.correction);
@@ -117,7 +117,7 @@ mod tests {
                     let reading = |travel: f64| model.angle_rad((middle + travel).rem_euclid(model.spec.wrap_counts));
                     assert!((reading(table.travel_counts[n]) - a).abs() < 1e-9);
                     assert!((again.angle_rad[n] - a).abs() < 1e-9);
-                    // A straight line between two points.
+                    // The angle between two points comes from a straight line.
                     let between = reading(0.5 * (table.travel_counts[n] + table.travel_counts[n + 1]));
                     let size = table.correction_rad.iter().fold(0.0_f64, |size, by| size.max(by.abs()));
                     worst = worst.max((between - 0.5 * (a + b)).abs() / size);

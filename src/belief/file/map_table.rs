@@ -1,4 +1,4 @@
-//! `[map]` of calibration.toml: where the tags are, in place of a survey.
+//! `[map]` of calibration.toml: tag poses, used instead of a survey.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -7,35 +7,35 @@ use armcal_core::document::VERSION;
 use armcal_core::kind::Kind;
 use armcal_core::schema::first_line;
 
-/// The map that a calibration used in place of a survey.
+/// Tag map that a calibration used instead of a survey.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MapResult {
-    /// What was known before.
+    /// Part of the tag poses that was known before.
     pub known: SurveyCoverage,
-    /// The arm's base link, whose frame the tags' places are in.
+    /// Base link of the arm; the tags' poses are in its frame.
     pub frame: String,
-    /// Id of the tag beside the base.
+    /// Id of the tag at the base.
     pub base_tag: u32,
-    /// Views that it was made from.
+    /// Number of views that the map was made from.
     pub views: usize,
-    /// Root mean square distance between measured and predicted corner, px.
+    /// Root mean square distance between measured and predicted corners, px.
     pub rms_px: f64,
-    /// Detections that it did not use.
+    /// Number of detections that the map did not use.
     pub rejected: usize,
-    /// `tag N: why`; their detections are not used for the joints either.
+    /// Omitted tags as `tag N: why`; their detections are not used for the joints either.
     pub left_out: Vec<String>,
-    /// Tags of the map, known ones included; those that are left out are missing.
+    /// Tags of the map, known ones included, omitted ones not.
     pub tag: Vec<MapTag>,
 }
 
-/// How much of the map was known before.
+/// Part of the tag poses that was known before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SurveyCoverage {
-    /// Where some tags are.
+    /// The poses of some tags are known.
     Partly,
-    /// Where the base tag is.
+    /// Only the pose of the base tag is known.
     BaseTagAlone,
 }
 
@@ -43,19 +43,19 @@ pub enum SurveyCoverage {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MapTag {
-    /// Number of the tag.
+    /// Id of the tag.
     pub id: u32,
-    /// Side of the black square.
+    /// Side length of the black square.
     pub size_m: f64,
-    /// Origin of the tag.
+    /// Position of the tag's origin.
     pub position_m: [f64; 3],
-    /// `base_from_tag`.
+    /// Rotation of `base_from_tag`.
     pub quaternion_wxyz: [f64; 4],
-    /// Along the base frame's axes, the anchor's own error included.
+    /// Standard deviation of the position along the base frame's axes, the anchor's own error included.
     pub position_std_m: [f64; 3],
-    /// About the tag's axes.
+    /// Standard deviation of the rotation about the tag's axes.
     pub rotation_std_rad: [f64; 3],
-    /// Number of views that show it.
+    /// Number of views that show the tag.
     pub n_views: usize,
 }
 
@@ -80,7 +80,7 @@ struct MapFileTag {
 }
 
 impl MapResult {
-    /// The map as a file of its own, in the frame of the arm's base.
+    /// Returns the map as a separate file, in the frame of the arm's base.
     ///
     /// # Panics
     /// Never: numbers and names have a TOML form.

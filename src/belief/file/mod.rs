@@ -1,7 +1,7 @@
-//! The answer: calibration.toml, its tables and its short form.
+//! The calibration file, its tables and its short form.
 //!
-//! `calibration` is the file's content; the other files are its tables. `calibration_file` reads and writes it,
-//! `covariance_file` the covariance beside it, `compact` is one line of less than 512 bytes, `lookup` a table from
+//! `calibration` is the file's content; the other files are its tables. `calibration_file` reads and writes it, and
+//! `covariance_file` the covariance next to it. `compact` is one line of less than 512 bytes, `lookup` a table from
 //! counts to radians.
 
 #[cfg(test)]

@@ -1,32 +1,32 @@
-//! `[model]` of calibration.toml: what was estimated, and the sizes that the data gave the unknown errors.
+//! `[model]` of calibration.toml: estimated terms, and noise and prior scales that were fitted to the data.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What `bundle` took for its model.
+/// Model that `bundle` estimated.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ModelTable {
-    /// Measurement noise over what was stated for it.
+    /// Ratio of the measurement noise to its stated value.
     pub noise_scale: f64,
-    /// Positions or poses that a recording gave in place of corners: their noise.
+    /// Standard deviation of tag positions, if the recording has positions or poses instead of corners.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub position_std_m: Option<f64>,
-    /// The same of poses' rotations.
+    /// Standard deviation of the rotations of tag poses.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotation_std_rad: Option<f64>,
-    /// All variances are multiplied by it, for held-out cameras were farther off than predicted.
+    /// Factor on all variances, estimated because errors of held-out cameras exceeded their prediction.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub variance_factor: Option<f64>,
-    /// The error of the camera's pose that all tags of a view share: translation m, rotation rad.
+    /// Standard deviation of the camera pose error that all tags of a view share: translation m, rotation rad.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera_error_std: Option<[f64; 2]>,
-    /// How much later the joint sensors' stamps are than the camera's, and one sigma.
+    /// Delay of the joint sensors' stamps behind the camera's, and its standard deviation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time_offset_s: Option<[f64; 2]>,
-    /// One sigma of each joint's nonlinearity, rad; joints that are not estimated have none.
+    /// Standard deviation of each estimated joint's nonlinearity, rad, base first.
     pub nonlinearity_std_rad: Vec<f64>,
-    /// Terms that the evidence decided on: `drift: in, 12.3 nats`.
+    /// Terms that the evidence included or excluded, such as `drift: in, 12.3 nats`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub decided: Vec<String>,
 }

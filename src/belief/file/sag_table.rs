@@ -1,4 +1,4 @@
-//! `[sag]` of calibration.toml: how the arm bends under its weight.
+//! `[sag]` of calibration.toml: compliance of the arm under its weight.
 
 use std::path::Path;
 
@@ -10,36 +10,36 @@ use crate::solve::covariance::ParameterCovariance;
 use armcal_core::kinematics::Sag;
 use armcal_core::robot::{FileIssue, Robot};
 
-/// Compliances under the torques of weight less buoyancy, by the URDF's masses, at the angles that the sensors show.
+/// Compliances under the torques of weight minus buoyancy, from the URDF's masses at the measured angles.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SagTable {
-    /// Of the base on what carries it, about the base's axes, rad/(N m).
+    /// Rotation of the base on its mounting about the base's axes, rad/(N m).
     pub mount_rad_per_nm: [f64; 3],
-    /// One sigma.
+    /// Standard deviation of `mount_rad_per_nm`.
     pub mount_std_rad_per_nm: [f64; 3],
-    /// Weight less buoyancy at the tool point beyond the URDF's, N.
+    /// Weight minus buoyancy at the tool point beyond the URDF's, N.
     pub tool_load_n: f64,
-    /// One sigma, N.
+    /// Standard deviation of the tool load, N.
     pub tool_load_std_n: f64,
-    /// Of each joint that the views show.
+    /// Compliance of each joint that the views determine.
     pub joint: Vec<JointCompliance>,
 }
 
-/// How much a joint turns behind its sensor.
+/// Compliance of a joint: its rotation behind the sensor per torque.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct JointCompliance {
     /// Name of the joint in the URDF.
     pub joint: String,
-    /// rad/(N m).
+    /// Compliance, rad/(N m).
     pub rad_per_nm: f64,
-    /// One sigma.
+    /// Standard deviation of the compliance.
     pub std_rad_per_nm: f64,
 }
 
 impl SagTable {
-    /// `None` where it is not in `covariance`.
+    /// Returns the table; `None` if `covariance` has no compliances.
     pub(crate) fn of(robot: &Robot, at: &JointParameters, covariance: &ParameterCovariance) -> Option<Self> {
         let std = |joint, kind| covariance.std(Parameter { joint, kind });
         let tool_load_std_n = std(0, ParameterKind::ToolLoad)?;
@@ -57,7 +57,7 @@ impl SagTable {
         })
     }
 
-    /// Of the arm whose joints have these names, base first.
+    /// Returns the compliance of the arm whose joints have these names, base first.
     pub(crate) fn sag<'a>(&self, joints: impl Iterator<Item = &'a str>) -> Sag {
         let (mount_rad_per_nm, tool_load_n) = (self.mount_rad_per_nm, self.tool_load_n);
         let mut sag = Sag { mount_rad_per_nm, tool_load_n, ..Sag::default() };

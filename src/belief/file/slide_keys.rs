@@ -1,6 +1,6 @@
-//! Keys of a slide's table in calibration.toml: `_m` in the place of `_rad`.
+//! Keys of a slide's table in calibration.toml: `_m` instead of `_rad`.
 //!
-//! Within the program a slide's figures are metres under the names of angles; a file names their unit.
+//! The program holds a slide's values in metres under the names of angles; files name the right unit.
 
 use armcal_core::codes::Code;
 use std::path::Path;
@@ -9,17 +9,17 @@ use armcal_core::robot::FileIssue;
 
 const MARK: &str = "moves = \"prismatic\"";
 
-/// What is said of slides at the head of a file that has any.
+/// Note on slides at the head of a file that has any.
 pub(crate) const SLIDE_HEAD: &str =
     "# Of a slide (moves = \"prismatic\") the unit is m instead of rad: keys end in _m instead of _rad.\n";
 
-/// `text` of a calibration with the keys of slides in metres.
+/// Returns `text` of a calibration with the keys of slides in metres.
 pub(crate) fn in_metres(text: &str) -> String {
     if !text.contains(MARK) {
         return text.to_owned();
     }
     let lines: Vec<&str> = text.split_inclusive('\n').collect();
-    // A joint's table ends where another begins that is not a part of it.
+    // A joint's table ends at the next table that is not a part of it.
     let is_head = |line: &str| line.starts_with('[') && !line.starts_with("[joint.");
     let mut out = String::with_capacity(text.len());
     let mut rest = &lines[..];
@@ -37,10 +37,10 @@ pub(crate) fn in_metres(text: &str) -> String {
     out
 }
 
-/// The tables of a calibration with the keys of slides as the program names them.
+/// Returns the tables of a calibration with the keys of slides as the program names them.
 ///
 /// # Errors
-/// [`FileIssue`] for a slide with a key in rad.
+/// [`FileIssue`] if a slide has a key in rad.
 pub(crate) fn named_as_angles(file: &Path, mut calibration: toml::Table) -> Result<toml::Table, FileIssue> {
     let joints = calibration.get_mut("joint").and_then(toml::Value::as_array_mut);
     for joint in joints.into_iter().flatten().filter_map(toml::Value::as_table_mut) {
@@ -68,7 +68,7 @@ fn renamed(file: &Path, joint: &str, table: &toml::Table) -> Result<toml::Table,
     Ok(out)
 }
 
-/// The key in metres.
+/// Returns the key in metres.
 #[must_use]
 pub fn metric(key: &str) -> String {
     in_parts(key, "rad", "m")

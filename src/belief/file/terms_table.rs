@@ -1,4 +1,4 @@
-//! `[joint.terms]` and `[reference]` of calibration.toml: what a sensor is beyond a straight line.
+//! `[joint.terms]` and `[reference]` of calibration.toml: terms of a sensor beyond a straight line.
 
 use armcal_core::codes::Code;
 use std::path::Path;
@@ -12,67 +12,67 @@ use armcal_core::robot::FileIssue;
 use armcal_core::sensor::{Conditions, N_SHAPE, SensorModel, Terms};
 use armcal_core::time::Stamp;
 
-/// What the terms are counted from; absent values were not measured.
+/// Reference conditions of the terms; absent values were not measured.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ReferenceTable {
     /// Oil temperature, degrees Celsius.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub oil_c: Option<f64>,
-    /// Ambient pressure, absolute.
+    /// Absolute ambient pressure.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pressure_pa: Option<f64>,
-    /// Nanoseconds since the epoch.
+    /// Time in nanoseconds since the epoch.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time_nanos: Option<i64>,
 }
 
-/// Terms of one joint; those that are zero and were not estimated are left out.
+/// Terms of one joint; terms that are zero and were not estimated are absent.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct TermsTable {
-    /// What the travel is divided by for the shape's functions.
+    /// Half of the joint's range, by which the shape's functions divide the travel.
     pub half_range_rad: f64,
     /// Coefficients of [`nonlinearity_basis`](armcal_core::sensor::nonlinearity_basis).
     #[serde(skip_serializing_if = "Option::is_none", alias = "shape_rad")]
     pub nonlinearity_rad: Option<Vec<f64>>,
-    /// One sigma of each coefficient, 0 for those that were held; absent where none was estimated.
+    /// Standard deviation of each coefficient, 0 for fixed coefficients; absent if none was estimated.
     #[serde(skip_serializing_if = "Option::is_none", alias = "shape_rad_std")]
     pub nonlinearity_rad_std: Option<Vec<f64>>,
     /// Change of the offset with the oil temperature.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub offset_rad_per_k: Option<f64>,
-    /// One sigma; absent where it was not estimated, as for all that follow.
+    /// Standard deviation of the term before it; absent if not estimated, as are all below.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub offset_rad_per_k_std: Option<f64>,
-    /// Of the gain relative to the datasheet's.
+    /// Change with the oil temperature of the gain relative to the datasheet's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gain_per_k: Option<f64>,
-    /// One sigma.
+    /// Standard deviation of `gain_per_k`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gain_per_k_std: Option<f64>,
     /// Change of the offset with the ambient pressure.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub offset_rad_per_mpa: Option<f64>,
-    /// One sigma.
+    /// Standard deviation of `offset_rad_per_mpa`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub offset_rad_per_mpa_std: Option<f64>,
     /// Change of the offset with time.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub drift_rad_per_h: Option<f64>,
-    /// One sigma.
+    /// Standard deviation of `drift_rad_per_h`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub drift_rad_per_h_std: Option<f64>,
     /// Half of the backlash between joint and sensor shaft.
     #[serde(skip_serializing_if = "Option::is_none", alias = "half_play_rad")]
     pub half_backlash_rad: Option<f64>,
-    /// One sigma.
+    /// Standard deviation of `half_backlash_rad`.
     #[serde(skip_serializing_if = "Option::is_none", alias = "half_play_rad_std")]
     pub half_backlash_rad_std: Option<f64>,
 }
 
 impl ReferenceTable {
-    /// `None` for straight sensors of which nothing more was estimated.
+    /// Returns the reference; `None` if all sensors are straight and no term was estimated.
     pub(crate) fn of(parameters: &JointParameters, covariance: &ParameterCovariance) -> Option<Self> {
         let Conditions { oil_c, pressure_pa, stamp } = parameters.reference;
         let table = Self { oil_c, pressure_pa, time_nanos: stamp.map(|stamp| stamp.nanos) };
@@ -80,7 +80,7 @@ impl ReferenceTable {
         (!parameters.are_linear() || covariance.parameters.iter().any(is_term)).then_some(table)
     }
 
-    /// As the sensor model has them.
+    /// Returns the reference as the sensor model's conditions.
     #[must_use]
     pub fn conditions(&self) -> Conditions {
         let Self { oil_c, pressure_pa, time_nanos } = *self;
@@ -98,14 +98,14 @@ impl ReferenceTable {
 }
 
 impl TermsTable {
-    /// Those of `joint`, whose sensor is `model`; `None` for a straight one of which no term was estimated.
+    /// Returns the terms of `joint`, whose sensor is `model`; `None` for a straight sensor without estimated terms.
     pub(crate) fn of(joint: usize, model: &SensorModel, covariance: &ParameterCovariance) -> Option<Self> {
         let terms = &model.correction.terms;
         let std = |kind| covariance.std(Parameter { joint, kind });
         let shape_std: Vec<Option<f64>> = (0..N_SHAPE as u8).map(|h| std(ParameterKind::Shape(h))).collect();
         let has_shape = terms.nonlinearity_rad != [0.0; N_SHAPE] || shape_std.iter().any(Option::is_some);
         let nonlinearity_rad_std = shape_std.iter().any(Option::is_some).then(|| {
-            // One that was held has no error of its own.
+            // A fixed coefficient has no error of its own.
             shape_std.iter().map(|std| std.unwrap_or(0.0)).collect()
         });
         let scalar = |value: f64, kind| (Some(value).filter(|v| *v != 0.0 || std(kind).is_some()), std(kind));
@@ -134,7 +134,7 @@ impl TermsTable {
         (table != empty).then_some(table)
     }
 
-    /// As the sensor model has them; what is absent is zero.
+    /// Returns the terms as the sensor model's; absent ones are zero.
     #[must_use]
     pub fn terms(&self) -> Terms {
         let shape = self.nonlinearity_rad.as_deref().unwrap_or_default();
@@ -149,7 +149,7 @@ impl TermsTable {
         }
     }
 
-    /// `joint` is the joint's name, for messages.
+    /// Checks the values' ranges; `joint` is the joint's name, for messages.
     pub(crate) fn check(&self, file: &Path, joint: &str) -> Result<(), FileIssue> {
         let key = |name: &str| format!("joint `{joint}`: terms.{name}");
         let check = |name: &str, value: f64, range| FileIssue::check_range(file, &key(name), value, range);

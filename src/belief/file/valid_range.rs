@@ -8,11 +8,11 @@ use crate::views::view::CaptureData;
 use armcal_core::sensor::Conditions;
 use armcal_core::time::{Stamp, utc};
 
-/// What the captured views covered; beyond it the result is a guess.
+/// Conditions that the captured views covered; beyond them the result is extrapolated.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ValidRange {
-    /// When the last view was captured, nanoseconds since the epoch.
+    /// Time at which the last view was captured, in nanoseconds since the epoch.
     pub time_nanos: i64,
     /// Lowest and highest oil temperature, degrees Celsius; absent where it was not measured.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -20,7 +20,7 @@ pub struct ValidRange {
     /// Lowest and highest water temperature, degrees Celsius; absent where it was not measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub water_c: Option<[f64; 2]>,
-    /// Lowest and highest ambient pressure, absolute; absent where it was not measured.
+    /// Lowest and highest absolute ambient pressure; absent where it was not measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pressure_pa: Option<[f64; 2]>,
 }
@@ -75,12 +75,12 @@ impl ValidRange {
     }
 }
 
-/// A sensor whose counts run the other way has its range the other way round.
+/// Returns the range in ascending order; it is descending if the sensor's counts run the other way.
 pub(crate) fn ordered([a, b]: [f64; 2]) -> [f64; 2] {
     [a.min(b), a.max(b)]
 }
 
-/// How far `value` is outside of the range; zero or less inside.
+/// Returns the distance of `value` outside of the range; zero or less inside.
 pub(crate) fn past(value: f64, [low, high]: [f64; 2]) -> f64 {
     (low - value).max(value - high)
 }

@@ -1,4 +1,4 @@
-//! Where a calibration holds: what a configuration, a task or the conditions have beyond the captured views.
+//! Range of validity: excess of a configuration, a task or the conditions over the captured views.
 
 use crate::file::constants::validity::{MARGIN_RAD, MAX_EXTRAPOLATION, MIN_LEVER_M};
 use std::collections::BTreeSet;
@@ -10,9 +10,9 @@ use armcal_core::sensor::Conditions;
 use armcal_core::streams::JointAngles;
 
 impl Calibration {
-    /// In words, what `angles` (of as many joints as there are, base first) under `conditions` have beyond what the
-    /// calibration saw; nothing where all is within it. Joints of which nothing was estimated have no range, and what
-    /// is unknown is not beyond.
+    /// Returns, in words, the excess of `angles` (one for each joint, base first) and `conditions` over the captured
+    /// range; empty within it. Joints without estimated parameters have no range, and unknown conditions count as
+    /// inside.
     #[must_use]
     pub fn beyond(&self, angles: &JointAngles, conditions: &Conditions) -> Vec<String> {
         let joints = self.joint.iter().zip(angles.iter()).filter(|(j, _)| j.gain_estimated || j.offset_estimated);
@@ -28,7 +28,7 @@ impl Calibration {
         beyond
     }
 
-    /// In words, what it is valid for.
+    /// Returns the range of validity in words.
     #[must_use]
     pub fn valid_for(&self) -> Vec<String> {
         let joints = self.joint.iter().filter(|joint| joint.gain_estimated || joint.offset_estimated);
@@ -40,11 +40,11 @@ impl Calibration {
     }
 }
 
-/// Postures at the targets of a task, by number from 0, against the angles that the views covered.
+/// Configurations at the targets of a task, by number from 0, compared with the angles that the views covered.
 pub(crate) struct Extrapolation<'a> {
     calibration: &'a Calibration,
     postures: &'a [(u32, JointAngles)],
-    /// True for each joint that moves the tool at that posture.
+    /// For each configuration: true for each joint that moves the tool there.
     matters: Vec<Vec<bool>>,
 }
 
@@ -61,7 +61,7 @@ impl<'a> Extrapolation<'a> {
         Self { calibration, postures, matters: postures.iter().map(of_posture).collect() }
     }
 
-    /// Numbers of the targets beyond the range of `joint`, and by how much.
+    /// Returns the numbers of the targets beyond the range of `joint`, and their excess.
     fn beyond(&self, joint: usize) -> Vec<(u32, f64)> {
         let range = ordered(self.calibration.joint[joint].covered_rad);
         let all = self.postures.iter().zip(&self.matters).filter(|(_, matters)| matters[joint]);
@@ -73,8 +73,8 @@ impl<'a> Extrapolation<'a> {
         self.calibration.joint.iter().enumerate().filter(|(_, j)| j.gain_estimated || j.offset_estimated)
     }
 
-    /// Numbers, from 1, of the targets that are too far beyond the range of a joint to be judged. An earlier
-    /// calibration knows more of the range than these views, and a joint that is held needs none.
+    /// Returns the numbers, from 1, of the targets that are too far beyond a joint's range to be judged. None with a
+    /// prior, which covers more of the range than these views; joints that are fixed do not count.
     pub(crate) fn not_judged(&self) -> Vec<usize> {
         let mut numbers = BTreeSet::new();
         if self.calibration.prior.is_some() {
@@ -92,7 +92,7 @@ impl<'a> Extrapolation<'a> {
         numbers.into_iter().collect()
     }
 
-    /// Names, joint by joint, the targets whose postures go beyond the angles that the views covered, and by how much.
+    /// Names, joint by joint, the targets whose configurations exceed the captured angles, and the excess.
     pub(crate) fn in_words(&self) -> Vec<String> {
         let of_joint = |(joint, result): (usize, &JointResult)| {
             let beyond = self.beyond(joint);

@@ -1,9 +1,9 @@
-//! Held-out views by a calibration against the same views by mount and map alone, the joints at the datasheet.
+//! Comparison of a calibration with a fit of mount and map only (joints as in the datasheet) on held-out views.
 //!
-//! A paired test over views, for all tags of a view share its errors: `l_v`, the mean over the tags of view v of `ln
-//! (distance by the baseline / distance by the calibration)`, has the mean m and the standard deviation s over n views;
-//! `t = m sqrt(n) / s` is Student's with n - 1 degrees of freedom where neither is better (Student 1908). The
-//! logarithm, for distances differ between views by factors.
+//! A test paired by views, because all tags of a view share its errors. `l_v` is the mean over the tags of view v of
+//! `ln (distance by the baseline / distance by the calibration)`; it has mean m and standard deviation s over n views.
+//! If neither is better, `t = m sqrt(n) / s` is Student's with n - 1 degrees of freedom (Student 1908). The logarithm
+//! is used because distances differ between views by factors.
 
 use crate::judge::constants::baseline_comparison::LEAST_P;
 pub use crate::judge::constants::baseline_comparison::SIGNIFICANCE;
@@ -11,20 +11,20 @@ use armcal_core::stats::StudentT;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Mount and map alone on the held-out views, and whether the calibration beats it.
+/// Error of mount and map only on the held-out views, and the test against the calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BaselineComparison {
-    /// Tag position error by mount and map alone.
+    /// Root mean square tag position error with mount and map only, m.
     pub rms_m: f64,
-    /// Distances by the calibration over those by mount and map alone, geometric mean.
+    /// Geometric mean of the distances with the calibration over those with mount and map only.
     pub ratio: f64,
-    /// Probability of as large an improvement where there is none; close to one where the calibration is worse.
+    /// Probability of an improvement at least as large if there is none; close to one if the calibration is worse.
     pub p_value: f64,
 }
 
 impl BaselineComparison {
-    /// `log_ratios`: of each view, baseline over calibration. `None` below two views.
+    /// Returns the comparison; `None` below two views. `log_ratios`: for each view, baseline over calibration.
     pub(crate) fn new(rms_m: f64, log_ratios: &[f64]) -> Option<Self> {
         let n = log_ratios.len();
         if n < 2 {
@@ -37,7 +37,7 @@ impl BaselineComparison {
         Some(Self { rms_m, ratio: (-mean).exp(), p_value })
     }
 
-    /// Whether the calibration is better than by chance.
+    /// Returns true if the calibration is significantly better.
     #[must_use]
     pub fn is_beaten(&self) -> bool {
         self.p_value < SIGNIFICANCE
@@ -50,7 +50,7 @@ mod tests {
     use armcal_core::stats::stream_rng;
     use rand_distr::{Distribution, StandardNormal};
 
-    /// Of arms that neither fits better, one in a hundred passes.
+    /// One in a hundred arms passes if neither fit is better.
     #[test]
     fn chance_passes_as_often_as_it_should() {
         const SEEDS: u64 = 4000;

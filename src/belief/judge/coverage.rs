@@ -1,7 +1,7 @@
 //! U95: the radius that contains the tool's position error with 95 % probability (GUM: expanded uncertainty).
 //!
-//! An error with covariance `C` (eigenvalues `l`) is `rho C^(1/2) s`: `s` is uniform on the unit sphere, and `rho^2` is
-//! chi-square with 3 degrees of freedom, or `3 F(3, nu)` where the size of the noise was estimated with `nu` degrees of
+//! An error with covariance `C` (eigenvalues `l`) is `rho C^(1/2) s`, where `s` is uniform on the unit sphere. `rho^2`
+//! is chi-square with 3 degrees of freedom, or `3 F(3, nu)` if the size of the noise was estimated with `nu` degrees of
 //! freedom. So `P(|e| <= r)` is the mean of `P(rho^2 <= r^2 / sum l_i s_i^2)` over the sphere. It is integrated over an
 //! octant: Gauss-Legendre in `s_1`, the midpoint rule in the angle about that axis.
 
@@ -15,11 +15,11 @@ use nalgebra::Matrix3;
 pub struct ErrorDistribution {
     /// Eigenvalues of the covariance, m^2, the largest first; none is negative.
     eigenvalues_m2: [f64; 3],
-    /// `None` where the covariance's size is known.
+    /// Estimated noise; `None` if the size of the covariance is known.
     fitted_size: Option<FittedSize>,
 }
 
-/// A size of the noise that was estimated.
+/// Degrees of freedom of an estimated noise, and the functions that they determine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct FittedSize {
     dof: f64,
@@ -29,8 +29,8 @@ struct FittedSize {
 }
 
 impl ErrorDistribution {
-    /// Distribution for a covariance, m^2, whose size has `dof` degrees of freedom (infinite where it is known). `None`
-    /// where the covariance is not finite: nothing is known of the error then.
+    /// Returns the distribution for a covariance, m^2, whose size has `dof` degrees of freedom (infinite if it is
+    /// known). `None` if the covariance is not finite, because the error is then unknown.
     #[must_use]
     pub fn new(covariance_m2: &Matrix3<f64>, dof: f64) -> Option<Self> {
         if !covariance_m2.iter().all(|value| value.is_finite()) || dof.is_nan() {
@@ -39,12 +39,12 @@ impl ErrorDistribution {
         let mut eigenvalues_m2: [f64; 3] = covariance_m2.symmetric_eigenvalues().into();
         eigenvalues_m2.sort_by(|a, b| b.total_cmp(a));
         let eigenvalues_m2 = eigenvalues_m2.map(|value| value.max(0.0));
-        // The GUM (G.4.1) takes the next lower integer.
+        // The next lower integer, as in the GUM (G.4.1).
         let fitted_size = (dof < INFINITE_DOF).then(|| FittedSize::new(dof.max(1.0) as usize));
         Some(Self { eigenvalues_m2, fitted_size })
     }
 
-    /// Probability that the error exceeds `radius_m`.
+    /// Returns the probability that the error exceeds `radius_m`.
     #[must_use]
     pub fn beyond(&self, radius_m: f64) -> f64 {
         let [first, second, third] = self.eigenvalues_m2;
@@ -62,7 +62,7 @@ impl ErrorDistribution {
         along.sum::<f64>().clamp(0.0, 1.0)
     }
 
-    /// U95, m.
+    /// Returns U95, m.
     #[must_use]
     pub fn u95_m(&self) -> f64 {
         let largest_m = self.eigenvalues_m2[0].sqrt();
@@ -87,7 +87,7 @@ impl ErrorDistribution {
         high_m
     }
 
-    /// Probability that `rho^2` exceeds `x`.
+    /// Returns the probability that `rho^2` exceeds `x`.
     fn radius_above(&self, x: f64) -> f64 {
         self.fitted_size.map_or_else(|| chi_square_above(x, 3), |size| size.radius_above(x))
     }
@@ -98,19 +98,19 @@ impl FittedSize {
         Self { dof: dof as f64, student: StudentT::new(dof), beta: beta_with_half(dof) }
     }
 
-    /// Probability that `3 F(3, dof)` exceeds `x`.
+    /// Returns the probability that `3 F(3, dof)` exceeds `x`.
     fn radius_above(&self, x: f64) -> f64 {
         if x.is_infinite() {
             return 0.0;
         }
-        // The tail of |t| in one dimension, and the term that two more dimensions add: a recurrence of the incomplete
+        // The tail of |t| in one dimension, plus the term of two more dimensions from a recurrence of the incomplete
         // beta function.
         let share = x / (x + self.dof);
         2.0 * self.student.above(x.sqrt()) + 2.0 * share.sqrt() * (1.0 - share).powf(0.5 * self.dof) / self.beta
     }
 }
 
-/// `B(1/2, dof / 2)`, by its recurrence from `B(1/2, 1/2)` or `B(1/2, 1)`.
+/// Returns `B(1/2, dof / 2)`, by its recurrence from `B(1/2, 1/2)` or `B(1/2, 1)`.
 fn beta_with_half(dof: usize) -> f64 {
     let (mut b, mut value) = if dof.is_multiple_of(2) { (1.0, 2.0) } else { (0.5, std::f64::consts::PI) };
     while b < 0.5 * dof as f64 {
@@ -120,7 +120,7 @@ fn beta_with_half(dof: usize) -> f64 {
     value
 }
 
-/// Gauss-Legendre nodes and weights on [0, 1], by Newton's method on the Legendre polynomial.
+/// Returns Gauss-Legendre nodes and weights on [0, 1], by Newton's method on the Legendre polynomial.
 fn octant_nodes() -> [(f64, f64); NODES] {
     std::array::from_fn(|k| {
         let mut x = (std::f64::consts::PI * (k as f64 + 0.75) / (NODES as f64 + 0.5)).cos();
@@ -151,7 +151,7 @@ mod tests {
         turn * Matrix3::from_diagonal(&Vector3::from(std_m.map(|std| std * std))) * turn.inverse()
     }
 
-    /// Draws of the error's size; `dof` none for a covariance that is known.
+    /// Returns the 95 % quantile of sampled error sizes; `dof` is `None` for a known covariance.
     fn drawn_95_m(covariance_m2: &Matrix3<f64>, dof: Option<usize>, n: usize) -> f64 {
         let mut rng = stream_rng(7, "coverage");
         let root = covariance_m2.symmetric_eigen();
@@ -166,7 +166,7 @@ mod tests {
         quantile(&sizes, COVERAGE).expect("draws")
     }
 
-    /// Closed forms: chi with three, two and one degrees of freedom.
+    /// Compares with closed forms: chi with three, two and one degrees of freedom.
     #[test]
     fn equal_axes_have_the_quantiles_of_chi() {
         for (std_m, chi_square) in

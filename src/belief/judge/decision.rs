@@ -1,5 +1,5 @@
-//! The decision rule (ILAC-G8; JCGM 106, 8.3.2): a result is accepted where the probability that the tool's error
-//! exceeds the tolerance is at most 5 % at every target of the task. A target that cannot be judged is not accepted.
+//! The decision rule (ILAC-G8; JCGM 106, 8.3.2). A result is accepted if the probability that the tool's error exceeds
+//! the tolerance is at most 5 % at every target of the task. A target that cannot be judged is not accepted.
 
 use armcal_core::codes::Code;
 use nalgebra::Matrix3;
@@ -9,15 +9,14 @@ use serde::{Deserialize, Serialize};
 pub use crate::judge::constants::decision::MAX_RISK;
 use crate::judge::coverage::ErrorDistribution;
 
-/// The rule as files and reports state it.
+/// Decision rule in the words of files and reports.
 pub const RULE: &str = "P(error > tolerance) <= 5 % at every target";
 
-/// `[u95]` of calibration.toml: how far the tool may be off.
+/// `[u95]` of calibration.toml: predicted tool error and its comparison with the tolerance.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct U95Table {
-    /// Largest U95 of the targets, or of the recorded views' configurations where there is no task, m; absent where
-    /// none is known.
+    /// Largest U95 over the targets, or without a task over the recorded configurations, m; absent if it is unknown.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_m: Option<f64>,
     /// Tolerance of the task, m; absent without a task.
@@ -26,29 +25,29 @@ pub struct U95Table {
     /// Largest probability over the targets that the error exceeds the tolerance.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub p_beyond_tolerance: Option<f64>,
-    /// Keys of `[geometry]` that robot.toml lacks: U95 does not include the unobservable parameters that they are of.
+    /// Keys of `[geometry]` that robot.toml lacks; U95 does not include the unobservable parameters that they describe.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub not_included: Vec<String>,
-    /// Each target of the task.
+    /// U95 at each target of the task.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub target: Vec<TargetU95>,
 }
 
-/// One target of the task.
+/// U95 at one target of the task.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TargetU95 {
-    /// Number in the task, from 0.
+    /// Number of the target in the task, from 0.
     pub index: usize,
-    /// U95 there, m; absent where it cannot be judged.
+    /// U95 at the target, m; absent if the target cannot be judged.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub u95_m: Option<f64>,
     /// Probability that the error exceeds the tolerance.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub p_beyond_tolerance: Option<f64>,
-    /// Both are known.
+    /// True if both are known.
     pub judged: bool,
-    /// Why not.
+    /// Reason why the target cannot be judged.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub code: Option<Code>,
 }
@@ -58,20 +57,20 @@ pub struct TargetU95 {
 pub(crate) struct TargetError {
     /// Number of the target, from 0.
     pub index: usize,
-    /// Part from the recording, its noise as fitted.
+    /// Part from the recording, with its fitted noise.
     pub by_data_m2: Matrix3<f64>,
-    /// Part from the stated sigmas of parameters that the recording does not determine.
+    /// Part from the stated standard deviations of parameters that the recording does not determine.
     pub by_priors_m2: Matrix3<f64>,
 }
 
 impl TargetError {
-    /// Total covariance, m^2.
+    /// Returns the total covariance, m^2.
     pub(crate) fn total_m2(&self) -> Matrix3<f64> {
         self.by_data_m2 + self.by_priors_m2
     }
 
-    /// Total covariance with its effective degrees of freedom (Welch-Satterthwaite, GUM G.4): the data's share has
-    /// `dof_of_noise`, stated sigmas have infinitely many.
+    /// Returns the total covariance with its effective degrees of freedom (Welch-Satterthwaite, GUM G.4). The data's
+    /// share has `dof_of_noise`, stated standard deviations have infinitely many.
     pub(crate) fn distribution(&self, dof_of_noise: f64) -> Option<ErrorDistribution> {
         let total_m2 = self.total_m2();
         let share = self.by_data_m2.trace() / total_m2.trace();
@@ -81,7 +80,7 @@ impl TargetError {
 }
 
 impl U95Table {
-    /// Table of a task with `n_targets`; those without an error have the code that `why_not` gives.
+    /// Returns the table of a task with `n_targets`; targets without an error have the code that `why_not` returns.
     pub(crate) fn of_task(
         n_targets: usize,
         tolerance_m: f64,
@@ -113,26 +112,26 @@ impl U95Table {
         }
     }
 
-    /// The table with the keys of unobservable parameters that it does not include.
+    /// Returns the table with the keys of unobservable parameters that it does not include.
     pub(crate) fn without(self, keys: &[&str]) -> Self {
         Self { not_included: keys.iter().map(|key| (*key).to_owned()).collect(), ..self }
     }
 
-    /// Without a task: the largest of the configurations that the recording has.
+    /// Returns the table without a task: the largest U95 of the recorded configurations.
     pub(crate) fn of_configurations(errors: &[TargetError], dof_of_noise: f64) -> Self {
         let distributions = errors.iter().map(|error| error.distribution(dof_of_noise));
-        // One that is not known makes the largest unknown.
+        // The largest U95 is unknown if any of them is.
         let all: Option<Vec<f64>> = distributions.map(|one| one.map(|one| one.u95_m())).collect();
         Self { max_m: all.and_then(|all| all.into_iter().reduce(f64::max)), ..Self::default() }
     }
 
-    /// Numbers of the targets that cannot be judged, from 1, without those of [`Self::kept_by_failed_joint`].
+    /// Returns the numbers, from 1, of the targets that cannot be judged, except [`Self::kept_by_failed_joint`].
     #[must_use]
     pub fn unjudged(&self) -> Vec<usize> {
         self.numbers(|code| code != Code::SensorFailed)
     }
 
-    /// Numbers of the targets that a failed joint keeps out of reach, from 1.
+    /// Returns the numbers, from 1, of the targets that a failed joint keeps out of reach.
     #[must_use]
     pub fn kept_by_failed_joint(&self) -> Vec<usize> {
         self.numbers(|code| code == Code::SensorFailed)
@@ -143,7 +142,7 @@ impl U95Table {
         wanted.map(|target| target.index + 1).collect()
     }
 
-    /// The target with the greatest risk, where that is more than the rule allows.
+    /// Returns the target with the greatest risk, if that exceeds the rule's limit.
     #[must_use]
     pub fn beyond(&self) -> Option<&TargetU95> {
         let risk = |target: &TargetU95| target.p_beyond_tolerance.unwrap_or(0.0);
@@ -167,7 +166,7 @@ mod tests {
         TargetError { index, by_data_m2: of(data_mm), by_priors_m2: of(priors_mm) }
     }
 
-    /// U95 of a round error is 2.796 of its sigma.
+    /// U95 of an isotropic error is 2.796 of its standard deviation.
     #[test]
     fn accepted_is_what_is_within_the_tolerance_with_95_percent_at_each_target() {
         let u95_mm = 2.795_5 * f64::hypot(3.0, 4.0);
@@ -197,7 +196,7 @@ mod tests {
         assert_eq!(U95Table::of_configurations(&[error(0, 1.0, 1.0), unknown], 100.0).max_m, None);
     }
 
-    /// Three degrees of freedom of the data alone widen U95; the larger the share of stated sigmas, the less.
+    /// Three degrees of freedom of the data alone widen U95; a larger share of stated deviations widens it less.
     #[test]
     fn stated_sigmas_count_as_known() {
         let u95 = |data_mm: f64, priors_mm: f64| {

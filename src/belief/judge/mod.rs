@@ -1,8 +1,8 @@
-//! May the result be used for its task?
+//! Decision whether the result may be used for its task.
 //!
-//! `coverage` says how far the tool may be off with a stated probability, `decision` holds that against the task's
-//! tolerance, target by target. One covariance gives both figures. `baseline_comparison` tests whether held-out views
-//! fit better than without joints.
+//! `coverage` computes the radius that contains the tool's error with a stated probability. `decision` compares that
+//! with the task's tolerance at each target. Both results come from one covariance. `baseline_comparison` tests whether
+//! held-out views fit better than without calibrated joints.
 
 pub(crate) mod baseline_comparison;
 pub(crate) mod constants;

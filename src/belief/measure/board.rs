@@ -1,4 +1,4 @@
-//! The corners of a calibration board: as a tag's, with a weight of each.
+//! Corners of a calibration board: like a tag's corners, but each with its own weight.
 
 use nalgebra::{Isometry3, Point3};
 
@@ -7,16 +7,16 @@ use crate::measure::projection::ImagePoint;
 use armcal_core::optics::CameraModel;
 use armcal_core::spatial::adjoint;
 
-/// A corner of a board and where it was seen.
+/// Corner of a board and its measured pixel.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct WeightedPoint {
     pub on_board: Point3<f64>,
     pub pixel: [f64; 2],
-    /// px^-2.
+    /// Inverse of the pixel's variance, px^-2.
     pub info: f64,
 }
 
-/// `scale` multiplies the weights.
+/// Returns the information of the corners; `scale` multiplies the weights.
 pub(super) fn information(
     points: &[WeightedPoint],
     camera_from_board: &Isometry3<f64>,

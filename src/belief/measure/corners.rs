@@ -12,12 +12,12 @@ use armcal_core::spatial::adjoint;
 pub(crate) struct WeightedCorners {
     pub corners_px: [[f64; 2]; 4],
     pub half_size_m: f64,
-    /// px^-2.
+    /// Inverse of a pixel's variance, px^-2.
     pub info: f64,
     pub used: [bool; 4],
 }
 
-/// With `info` instead of the corners' own.
+/// Returns the information of the corners, with `info` instead of their own weight.
 pub(super) fn information(
     seen: &WeightedCorners,
     camera_from_tag: &Isometry3<f64>,

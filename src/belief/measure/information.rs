@@ -1,15 +1,15 @@
-//! What one observation says of the camera's pose relative to the tag.
+//! Information of one observation on the camera's pose relative to the tag.
 //!
 //! With X = camera_from_tag, a point c of the tag is at p = X c. The camera's pose perturbed on the right by xi = (rho,
-//! omega) moves it by `dp = -rho - omega x p`; the tag's by xi_T does the same with the opposite sign and
-//! `xi = Ad(X) xi_T`. So one 6x6 matrix in the camera's frame carries all: `H = sum J^T W J`, `g = sum J^T W r`, J =
+//! omega) moves it by `dp = -rho - omega x p`; the tag's by xi_T does the same with the opposite sign and `xi = Ad(X)
+//! xi_T`. So one 6x6 matrix in the camera's frame contains all information: `H = sum J^T W J`, `g = sum J^T W r`, J =
 //! d(prediction)/d(xi), r = measured - predicted.
 
 use nalgebra::{Matrix6, SMatrix, SVector, Vector6};
 
 use crate::measure::projection::ImagePoint;
 
-/// An observation linearized, in the camera's frame.
+/// Linearized observation, in the camera's frame.
 #[derive(Clone, Debug)]
 pub(crate) struct PoseInformation {
     pub h: Matrix6<f64>,
@@ -18,11 +18,11 @@ pub(crate) struct PoseInformation {
     pub adjoint: Matrix6<f64>,
     /// Sum of squares of the whitened residuals.
     pub chi2: f64,
-    /// The same of each corner, used or not; zero without corners.
+    /// Sum of squares of each corner's whitened residuals, used or not; zero without corners.
     pub corner_chi2: [f64; 4],
 }
 
-/// The lens's part, by its intrinsics: focal lengths, centre, four coefficients of distortion.
+/// Information on the lens's intrinsics: focal lengths, centre, four distortion coefficients.
 #[derive(Clone, Debug)]
 pub(crate) struct LensInformation {
     pub cross: SMatrix<f64, 6, 8>,
@@ -41,7 +41,7 @@ impl LensInformation {
         self.g *= weight;
     }
 
-    /// Adds a point: its pixel's derivatives by the intrinsics, its residual, its weight.
+    /// Adds a point: the derivatives of its pixel by the intrinsics, its residual, its weight.
     pub(crate) fn add(
         &mut self,
         image: &ImagePoint,
@@ -60,10 +60,10 @@ impl LensInformation {
     }
 }
 
-/// Sums of the rows of residuals while they are added.
+/// Running sums over the rows of residuals.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct TwistSums {
-    /// Lower triangle.
+    /// Lower triangle of `H`.
     h: [[f64; 6]; 6],
     g: [f64; 6],
 }
@@ -79,7 +79,7 @@ impl TwistSums {
         }
     }
 
-    /// `H` and `g`, times a weight that all rows share.
+    /// Returns `H` and `g`, times a weight that all rows share.
     pub(crate) fn weighted(&self, weight: f64) -> (Matrix6<f64>, Vector6<f64>) {
         let h = Matrix6::from_fn(|i, k| weight * if i >= k { self.h[i][k] } else { self.h[k][i] });
         (h, Vector6::from(self.g) * weight)

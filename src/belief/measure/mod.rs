@@ -1,8 +1,8 @@
-//! Measurements: one file a kind, each with its information on the camera's pose.
+//! Measurements: one file per kind, each with its information on the camera's pose.
 //!
 //! `corners` of a tag, points of a `board`, a tag's `position` or `pose`; `observation` is any of them, `information`
 //! its linearization in the camera's twist. `projection` is the only place that linearizes a projection.
-//! `block_measurement` is of blocks against each other.
+//! `block_measurement` has measurements between blocks.
 
 mod block_measurement;
 mod board;

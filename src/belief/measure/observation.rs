@@ -1,4 +1,4 @@
-//! One tag in one view, weighted.
+//! Weighted observation of one tag in one view.
 
 use crate::measure::constants::observation::UNSEEN_SIGMAS;
 use std::sync::Arc;
@@ -12,18 +12,18 @@ use crate::measure::{pose, position};
 use crate::model::blocks::Block;
 use armcal_core::optics::CameraModel;
 
-/// One tag in one view.
+/// Weighted observation of one tag in one view.
 #[derive(Clone, Debug)]
 pub(crate) struct ObservationTerm {
-    /// The tag.
+    /// Block of the tag.
     pub block: Block,
     pub data: WeightedMeasurement,
-    /// Sightings that are out of the estimate keep their place.
+    /// True if the estimate uses the observation; rejected ones keep their index.
     pub is_used: bool,
 }
 
 impl ObservationTerm {
-    /// Which corners are used; of a position or pose all four or none.
+    /// Returns true for each corner in use; for a position or pose, all four or none.
     pub(crate) fn used(&self) -> [bool; 4] {
         match &self.data {
             WeightedMeasurement::Corners(corners) if self.is_used => corners.used,
@@ -31,7 +31,7 @@ impl ObservationTerm {
         }
     }
 
-    /// Uses no other corners than these; an observation without any is out as a whole.
+    /// Uses only these corners; without any, the whole observation is out.
     pub(crate) fn set_used(&mut self, corners: [bool; 4]) {
         self.is_used = corners.contains(&true);
         if let WeightedMeasurement::Corners(seen) = &mut self.data {
@@ -50,8 +50,8 @@ pub(crate) enum WeightedMeasurement {
 }
 
 impl WeightedMeasurement {
-    /// Linearizes; `noise` multiplies the corners' standard deviations. Adds the lens's part to `by_lens` where that is
-    /// wanted. `None` where a corner is beyond the lens's view.
+    /// Returns the linearization; `noise` multiplies the corners' standard deviations. Adds the lens's part to
+    /// `by_lens`, if given. `None` if a corner is outside of the lens's view.
     pub(crate) fn information(
         &self,
         camera_from_tag: &Isometry3<f64>,
@@ -70,18 +70,18 @@ impl WeightedMeasurement {
         }
     }
 
-    /// Cost of an observation that the lens cannot have seen.
+    /// Returns the cost of an observation outside of the lens's view.
     pub(crate) fn unseen_chi2(&self) -> f64 {
         self.n_coordinates() as f64 * UNSEEN_SIGMAS * UNSEEN_SIGMAS
     }
 
-    /// An observation that is not possible: it pulls nowhere and costs much.
+    /// Returns the information of an impossible observation, which has no gradient and a large cost.
     pub(crate) fn unseen(&self) -> PoseInformation {
         let (chi2, corner_chi2) = (self.unseen_chi2(), [UNSEEN_SIGMAS * UNSEEN_SIGMAS; 4]);
         PoseInformation { h: Matrix6::zeros(), g: Vector6::zeros(), adjoint: Matrix6::identity(), chi2, corner_chi2 }
     }
 
-    /// Of the corners that are used.
+    /// Returns the number of measured coordinates, for corners only of those in use.
     pub(crate) fn n_coordinates(&self) -> usize {
         match self {
             Self::Corners(corners) => 2 * corners.used.iter().filter(|is_used| **is_used).count(),
@@ -91,7 +91,7 @@ impl WeightedMeasurement {
         }
     }
 
-    /// Returns true for pixels, whose noise is that of corners.
+    /// Returns true for measurements in pixels, which have the noise of corners.
     pub(crate) fn is_in_pixels(&self) -> bool {
         matches!(self, Self::Corners(_) | Self::Board { .. })
     }

@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
 use crate::measure::information::PoseInformation;
 use armcal_core::spatial::{adjoint, log, skew};
 
-/// `info`: inverse variances along (m^-2) and about (rad^-2) the tag's axes.
+/// Returns the information of a pose. `info`: inverse variances along (m^-2) and about (rad^-2) the tag's axes.
 pub(super) fn information(
     tag_from_camera: &Isometry3<f64>,
     info: [f64; 2],
@@ -26,8 +26,8 @@ pub(super) fn information(
     }
 }
 
-/// Inverse of the right Jacobian of SE(3), to the second order: `log(exp(d) exp(x)) = d + J x`. For deviations from a
-/// prior, which are small (Barfoot, eq. 7.83).
+/// Returns the inverse of the right Jacobian of SE(3), to the second order: `log(exp(d) exp(x)) = d + J x`. Valid for
+/// small deviations from a prior (Barfoot, eq. 7.83).
 pub(crate) fn right_jacobian_inverse(d: &Vector6<f64>) -> Matrix6<f64> {
     let rho = skew(&Vector3::new(d[0], d[1], d[2]));
     let phi = skew(&Vector3::new(d[3], d[4], d[5]));

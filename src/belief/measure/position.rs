@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, SMatrix, Vector3};
 use crate::measure::information::PoseInformation;
 use armcal_core::spatial::{adjoint, skew};
 
-/// `info`: inverse variance of each coordinate, m^-2.
+/// Returns the information of a position. `info`: inverse variance of each coordinate, m^-2.
 pub(super) fn information(in_camera_m: &Vector3<f64>, info: f64, camera_from_tag: &Isometry3<f64>) -> PoseInformation {
     let p = camera_from_tag.translation.vector;
     let residual = in_camera_m - p;

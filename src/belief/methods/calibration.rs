@@ -22,21 +22,21 @@ use crate::views::view::View;
 use armcal_core::robot::Robot;
 use armcal_core::routine::Method;
 
-/// Where the search starts, and what is known before it.
+/// Start of the search, and the prior information.
 struct Start {
-    /// With the map's tags, and the camera where the tag on the gripper has it.
+    /// Robot with the map's tags, and with the camera mount from the tag on the gripper.
     robot: Robot,
     guess: JointParameters,
     errors: CommonErrors,
     map: Option<MapResult>,
-    /// By the tag on the gripper, or why not; none where the robot has none.
+    /// Camera mount from the tag on the gripper, or the reason why it failed; `None` if the robot has no such tag.
     mount: Result<Option<MountEstimate>, String>,
-    /// What that tag determines.
+    /// Parameters that the tag on the gripper determines.
     determined: Vec<Parameter>,
 }
 
 /// # Errors
-/// [`CalibError`] where the views make no map or determine no parameter.
+/// [`CalibError`] if the views make no map or determine no parameter.
 pub(crate) fn calibrate_positions(
     mut data: CalibrationData,
     (method, solver): (Method, PositionSolver),
@@ -80,7 +80,7 @@ pub(crate) fn calibrate_positions(
     })
 }
 
-/// Held-out views by `at`, the calibration of `free`, and by mount and map alone.
+/// Returns the errors at held-out views: with `at`, the calibration of `free`, and with mount and map only.
 fn held_out(
     data: &CalibrationData,
     solver: PositionSolver,
@@ -131,7 +131,8 @@ fn start(data: &mut CalibrationData, prior: Option<&Calibration>) -> Result<Star
     Ok(Start { robot, guess, errors, map, mount, determined })
 }
 
-/// The solver's answer, its covariance with what the tag on the gripper determines; `None` if nothing is left.
+/// Returns the solver's result, its covariance including the parameters from the tag on the gripper; `None` if nothing
+/// is left to solve for.
 fn solve(
     solver: PositionSolver,
     problem: &PositionProblem<'_>,

@@ -1,4 +1,4 @@
-//! How a calibration is made: by `bundle`, or by a method on positions whose equations are elsewhere.
+//! Calibration methods: `bundle`, end stops, or a method on positions whose equations are in another crate.
 
 use nalgebra::DMatrix;
 
@@ -9,42 +9,43 @@ use crate::positions::unobservable::Unobservable;
 use crate::solve::covariance::{CommonErrors, ParameterCovariance};
 use armcal_core::routine::Method;
 
-/// A method, with the solver of those that go by the tags' positions.
+/// A method, with its solver if it uses the tags' positions.
 #[derive(Clone, Copy, Debug)]
 pub enum CalibrationMethod {
     /// Maximum a posteriori over everything that the measurements depend on.
     Bundle,
-    /// End stops; needs no camera.
+    /// Joint limits from end stops, without a camera.
     JointLimits,
-    /// Positions of tags.
+    /// Method on the positions of tags.
     Positions {
-        /// As files and reports name it.
+        /// Name of the method in files and reports.
         method: Method,
-        /// Its equations.
+        /// Solver with the method's equations.
         solve: PositionSolver,
     },
 }
 
-/// Solves for the free parameters from a guess, under errors that all views share; `None` where it determines none.
+/// Solver for the free parameters from a guess, under errors that all views share; returns `None` if it determines
+/// none.
 pub type PositionSolver =
     fn(&PositionProblem<'_>, &[Parameter], &JointParameters, &CommonErrors) -> Option<PositionSolution>;
 
-/// Answer of a [`PositionSolver`].
+/// Result of a [`PositionSolver`].
 pub struct PositionSolution {
-    /// Those of the free parameters that it determines.
+    /// Free parameters that the solver determines.
     pub determined: Vec<Parameter>,
-    /// The parameters, and how the search went.
+    /// Parameters, and the outcome of the solver.
     pub solution: Solution,
-    /// Of the determined parameters.
+    /// Covariance of the determined parameters.
     pub covariance: ParameterCovariance,
     /// d(parameter)/d(mount), six columns: translation m, rotation rad, on the right.
     pub by_mount: DMatrix<f64>,
-    /// What the method itself cannot determine.
+    /// Parameters that the method itself cannot determine.
     pub unobservable: Vec<Unobservable>,
 }
 
 impl CalibrationMethod {
-    /// As files and reports name it.
+    /// Returns the name of the method in files and reports.
     #[must_use]
     pub fn method(self) -> Method {
         match self {

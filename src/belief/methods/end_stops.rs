@@ -1,4 +1,4 @@
-//! One calibration by end stops alone: no view is fitted, so that every view that shows a tag is evidence.
+//! One calibration by end stops only: it fits no view, so that every view that shows a tag checks it.
 
 use crate::checks::assemble::{Evidence, Fit, Provenance, assemble, held_out_metrics};
 use crate::file::calibration::Calibration;
@@ -14,14 +14,14 @@ use crate::views::view::View;
 use armcal_core::routine::Method;
 
 /// # Errors
-/// [`CalibError::NoStops`] where no joint can be calibrated by its end stops.
+/// [`CalibError::NoStops`] if no joint can be calibrated by its end stops.
 pub(crate) fn calibrate(data: CalibrationData, prior: Option<&Calibration>) -> Result<Calibration, CalibError> {
     let CalibrationData { name, messages_hash, mut data, robot, identified, .. } = data;
     let guess = prior.map_or_else(JointParameters::default, |prior| prior.parameters(&robot));
     let readings: Vec<EndStopReading> = data.stops.iter().map(|(_, reading)| *reading).collect();
     let fitted = fit_stops(&robot, &readings, &guess)
         .map_err(|problem| CalibError::NoStops { recording: name.clone(), problem })?;
-    // Only a tag whose place is known can bear witness.
+    // Only tags of known pose can check the result.
     let of_known_tags = |view: &mut View| view.tags.retain(|tag| robot.tags[tag.tag_idx].is_known());
     data.fit.iter_mut().chain(&mut data.held_out).for_each(of_known_tags);
     let (at, covariance) = (&fitted.solution.parameters, &fitted.covariance);

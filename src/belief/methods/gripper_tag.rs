@@ -1,13 +1,13 @@
-//! What a tag on the gripper says: where the camera hangs, and the sensors of the joints between the two.
+//! Estimate from a tag on the gripper: the camera mount, and the sensors of the joints between camera and tag.
 //!
-//! `camera_from_tag = mount^-1 * W(theta) * tool_from_tag`, `W` the joints between camera and tag with
-//! `theta = center + gain * travel + offset`. From the tag's corner pixels in all views: the camera's mount, where the
-//! tag was glued, gain and offset of these joints, each about its prior (robot.toml), by Levenberg-Marquardt. Poses are
-//! perturbed on the right. A joint that turns through a wide angle parts the tag's own error, which turns with it, from
-//! the mount's, which does not; along the joint's axis the two stay together, and a turn of the mount about that axis
-//! looks like the joint's offset: there the covariance keeps the priors. The joints' nonlinearity is new at every view:
-//! `R = sigma^2 / n_frames * I + sum_j (d u / d theta_j) (d u / d theta_j)^T linearity_j^2` for the eight coordinates
-//! `u` of a view.
+//! `camera_from_tag = mount^-1 * W(theta) * tool_from_tag`: `W` is the motion of the joints between camera and tag with
+//! `theta = center + gain * travel + offset`. Levenberg-Marquardt fits the tag's corner pixels in all views. It
+//! estimates the camera mount, the tag's pose on the gripper, and gain and offset of these joints, each about its prior
+//! (robot.toml). Poses are perturbed on the right. A joint that turns through a wide angle separates the tag's own
+//! error, which turns with it, from the mount's, which does not. Along the joint's axis the two stay inseparable, and a
+//! turn of the mount about that axis looks like the joint's offset: there the covariance keeps the priors. The joints'
+//! nonlinearity is independent in every view: `R = sigma^2 / n_frames * I + sum_j (d u / d theta_j) (d u / d theta_j)^T
+//! linearity_j^2` for the eight coordinates `u` of a view.
 
 use crate::methods::constants::gripper_tag::{DAMPING, MAX_PRIOR_SIGMAS, STOP};
 use crate::model::constants::prior::MIN_STD;
@@ -26,10 +26,10 @@ use armcal_core::robot::{GripperTag, Robot};
 use armcal_core::spatial::{adjoint, exp, log};
 use armcal_core::streams::JointAngles;
 
-/// Solves for mount and joints; an error says why the tag is left out.
+/// Estimates camera mount and joints from the tag on the gripper.
 ///
 /// # Errors
-/// The reason: too few views, no convergence, or a fit that the priors rule out.
+/// The reason why the tag is not used: too few views, no convergence, or a fit that the priors rule out.
 pub fn mount_by_gripper_tag(
     robot: &Robot,
     tag: &GripperTag,
@@ -46,7 +46,7 @@ pub fn mount_by_gripper_tag(
     problem.check(&state)?;
     let covariance = normal.try_inverse().ok_or("the tag on the gripper does not determine the camera's mount")?;
     let (chi2, rms_px) = problem.misfit(&state).ok_or("the tag on the gripper fits no camera mount")?;
-    // What the model lacks shows in the residuals.
+    // The residuals contain the errors that the model lacks.
     let scale = (chi2 / (8 * problem.seen.len()) as f64).max(1.0);
     let kept: Vec<usize> = (0..6).chain(12..covariance.nrows()).collect();
     Ok(MountEstimate {
@@ -60,20 +60,20 @@ pub fn mount_by_gripper_tag(
 }
 
 impl MountEstimate {
-    /// Covariance of the mount (translation m, rotation rad), on the right.
+    /// Returns the covariance of the mount (translation m, rotation rad), on the right.
     #[must_use]
     pub fn mount_covariance(&self) -> Matrix6<f64> {
         self.covariance.fixed_view::<6, 6>(0, 0).into_owned()
     }
 
-    /// The row of a parameter in the covariance.
+    /// Returns the row of a parameter in the covariance.
     #[must_use]
     pub fn row(&self, parameter: Parameter) -> Option<usize> {
         let offset = usize::from(parameter.kind == ParameterKind::Offset);
         self.joints.contains(&parameter.joint).then(|| 6 + 2 * (parameter.joint - self.joints.start) + offset)
     }
 
-    /// The parameters that the tag determines at least twice as well as the datasheet, in order.
+    /// Returns the parameters that the tag determines at least twice as well as the datasheet, in order.
     #[must_use]
     pub fn determined(&self, robot: &Robot) -> Vec<Parameter> {
         let all = self
@@ -141,11 +141,11 @@ impl LeastSquares for Search<'_, '_> {
     }
 }
 
-/// One view's eight coordinates: measured less predicted, their Jacobian, and by each joint's angle (last `joints`
-/// columns).
+/// The eight coordinates of one view: measured minus predicted, and their derivatives by the poses and by each joint's
+/// angle.
 struct Linearized {
     residual_px: SVector<f64, 8>,
-    /// Mount, then tag.
+    /// Jacobian by the mount, then by the tag's pose.
     by_poses: SMatrix<f64, 8, 12>,
     by_angle: Vec<SVector<f64, 8>>,
 }
@@ -163,7 +163,7 @@ impl Problem<'_> {
         }
     }
 
-    /// The state of least cost and the normal matrix there.
+    /// Returns the state of least cost and the normal matrix there.
     fn solve(&self, guess: &JointParameters) -> Option<(State, DMatrix<f64>)> {
         let state = self.start(guess);
         let here = self.normal_equations(&state)?;
@@ -173,7 +173,7 @@ impl Problem<'_> {
         (outcome == Outcome::Converged).then_some((search.state, search.here.0))
     }
 
-    /// One sigma of every parameter's prior, in the order of the columns.
+    /// Returns the standard deviation of every parameter's prior, in the order of the columns.
     fn prior_std(&self) -> Vec<f64> {
         let camera = &self.robot.camera;
         let mut std = [[camera.mount_std_m; 3], [camera.mount_std_rad; 3]].concat();
@@ -185,7 +185,7 @@ impl Problem<'_> {
         std.into_iter().map(|std| std.max(MIN_STD)).collect()
     }
 
-    /// How far the state is from the priors' means, in the order of the columns.
+    /// Returns the deviation of the state from the priors' means, in the order of the columns.
     fn off_prior(&self, state: &State) -> DVector<f64> {
         let mount = log(&(self.robot.camera.mount.link_from_frame.inverse() * state.link_from_camera));
         let tag = log(&(self.tag.mount.link_from_frame.inverse() * state.link_from_tag));
@@ -209,7 +209,7 @@ impl Problem<'_> {
         next
     }
 
-    /// At `state`; `None` where a corner is out of the lens's view.
+    /// Returns the normal equations at `state`; `None` if a corner is outside of the lens's view.
     fn normal_equations(&self, state: &State) -> Option<NormalEquations> {
         let n = self.n_parameters();
         let (mut normal, mut gradient) = (DMatrix::zeros(n, n), DVector::zeros(n));
@@ -237,7 +237,7 @@ impl Problem<'_> {
         cost.is_finite().then_some((normal, gradient, cost))
     }
 
-    /// Inverse covariance of a view's coordinates, px^-2.
+    /// Returns the inverse covariance of a view's coordinates, px^-2.
     fn weight(&self, view: &Linearized, n_frames: usize) -> Option<SMatrix<f64, 8, 8>> {
         let corner_px2 = self.robot.camera.corner_std_px.powi(2) / n_frames.max(1) as f64;
         let mut covariance = SMatrix::<f64, 8, 8>::identity() * corner_px2;
@@ -250,7 +250,7 @@ impl Problem<'_> {
 
     fn linearized(&self, state: &State, travel_rad: &JointAngles, seen: &MeanCorners) -> Option<Linearized> {
         let (robot, parameters) = (self.robot, &state.parameters);
-        // What lies before the camera moves both alike; the middle of the range will do.
+        // Joints before the camera move camera and tag alike, so that the middle of their range suffices.
         let angles = JointAngles::from_fn(robot.n_joints(), |j| {
             let moved = if self.joints.contains(&j) {
                 parameters.gain[j] * travel_rad[j] + parameters.offset_rad[j]
@@ -262,7 +262,7 @@ impl Problem<'_> {
         let poses = robot.chain.link_poses(&angles);
         let camera_from_base = (poses.link(robot.camera.mount.n_joints) * state.link_from_camera).inverse();
         let camera_from_tag = camera_from_base * poses.link(self.tag.mount.n_joints) * state.link_from_tag;
-        // A motion of the tag is one of the camera the other way.
+        // A motion of the tag equals the opposite motion of the camera.
         let by_tag = -adjoint(&camera_from_tag);
         let mut view = Linearized {
             residual_px: SVector::zeros(),
@@ -300,7 +300,7 @@ impl Problem<'_> {
         Ok(())
     }
 
-    /// Sum of squared whitened residuals of all views, and the root mean square per corner, px.
+    /// Returns the sum of squared whitened residuals of all views, and the root mean square per corner, px.
     fn misfit(&self, state: &State) -> Option<(f64, f64)> {
         let (mut chi2, mut sum_px2) = (0.0, 0.0);
         for (travel_rad, seen) in &self.seen {

@@ -1,10 +1,10 @@
-//! Joint limits: a joint's sensor from its readings at its nominal end stops (Williams 1991, which the paper starts
-//! from).
+//! Joint limits: calibrates a joint's sensor from its readings at its nominal end stops (Williams 1991, the starting
+//! point of the paper).
 //!
 //! `angle = center + gain travel + offset` (the paper's equation 1 about the middle of the range) through two stops or
 //! more: the straight line of least squares. Cost: sum of squared differences between nominal and fitted angle, rad^2.
-//! It needs no camera, and knows nothing but what the drawing says of the stops; where the vehicle is in the way of one
-//! there is none.
+//! It needs no camera, and depends entirely on the stops' nominal angles. If the vehicle blocks the way to a stop,
+//! there is no reading at it.
 
 use crate::methods::constants::joint_limits::{LEAST_TRAVEL_SHARE, SAME_STOP_RAD, STOP_STD_RAD};
 use nalgebra::{DMatrix, Matrix2, Vector2};
@@ -17,21 +17,21 @@ use crate::views::view::EndStopReading;
 use armcal_core::numeric::Outcome;
 use armcal_core::robot::Robot;
 
-/// Sensors by their stops.
+/// Fit of the sensors to their end stops.
 #[derive(Clone, Debug)]
 pub struct EndStopFit {
     /// Gains and offsets of the fitted joints; the others keep the guess.
     pub solution: Solution,
-    /// Of the fitted joints' gains and offsets.
+    /// Covariance of the fitted joints' gains and offsets.
     pub covariance: ParameterCovariance,
-    /// Joints without two stops, and why.
+    /// Parameters of joints without two stops, and the reasons.
     pub left_out: Vec<Unobservable>,
 }
 
 /// Fits every joint of `robot` that has two different stops among `readings`; the others keep `guess`.
 ///
 /// # Errors
-/// Why no joint at all can be fitted.
+/// The reason why no joint at all can be fitted.
 pub fn fit_stops(robot: &Robot, readings: &[EndStopReading], guess: &JointParameters) -> Result<EndStopFit, String> {
     if readings.is_empty() {
         return Err("it holds no readings at end stops (marks `stop ANGLE_RAD` on /marks)".to_owned());
@@ -76,7 +76,7 @@ fn of_joint(joint: usize) -> [Parameter; 2] {
     [ParameterKind::Gain, ParameterKind::Offset].map(|kind| Parameter { joint, kind })
 }
 
-/// Fitted less nominal angle.
+/// Returns the fitted minus the nominal angle, rad.
 fn difference_rad(robot: &Robot, at: &JointParameters, reading: &EndStopReading) -> f64 {
     let joint = reading.joint;
     let center_rad = robot.sensors[joint].center_rad;
@@ -135,7 +135,7 @@ fn line(center_rad: f64, readings: &[EndStopReading]) -> Result<Line, String> {
     Ok(Line { gain: solved.x, offset_rad: solved.y, covariance: inverse * by_stops * inverse })
 }
 
-/// Readings by stop.
+/// Returns the readings grouped by stop.
 fn stops(readings: &[EndStopReading]) -> Vec<Vec<EndStopReading>> {
     let mut sorted = readings.to_vec();
     sorted.sort_by(|a, b| a.angle_rad.total_cmp(&b.angle_rad));

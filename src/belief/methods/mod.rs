@@ -1,8 +1,9 @@
-//! Methods other than `bundle`: positions of landmarks or end stops in, gain and offset of each joint out.
+//! Methods other than `bundle`: they estimate gain and offset of each joint from positions of landmarks or from end
+//! stops.
 //!
-//! `calibration_method` is what a method on positions has to answer; the paper's are a crate of their own above this
-//! one. `calibration` makes a calibration of such an answer, with the mount by the `gripper_tag`. `joint_limits` needs
-//! no camera: the nominal end stops of each joint against its readings there (`end_stops`).
+//! `calibration_method` is the interface of a method on positions; the paper's methods are a crate of their own above
+//! this one. `calibration` makes a calibration of such a result, with the mount by the `gripper_tag`. `joint_limits`
+//! needs no camera: it compares the nominal end stops of each joint with its readings there (`end_stops`).
 
 pub(crate) mod calibration;
 pub(crate) mod calibration_method;

@@ -1,9 +1,9 @@
-//! What the data can determine, named before solving.
+//! Check for unobservable parameters, before solving.
 //!
-//! Two ways to be undetermined. Structural: a joint behind the camera moves nothing that the camera sees. By the data:
-//! the linearized problem leaves a parameter less certain than its datasheet does. Such a parameter stays at the
-//! datasheet's value, and its name and reason go into the result; the worst goes first, for leaving it out may settle
-//! the others.
+//! A parameter is unobservable for one of two reasons. Structural: a joint distal to the camera moves nothing that the
+//! camera sees. By the data: the linearized problem leaves a parameter less certain than its datasheet does. Such a
+//! parameter stays at the datasheet's value, and the result lists its name and reason. The least determined one is
+//! removed first, because that may make the others observable.
 
 use crate::methods::constants::observability::{OPEN_SHARE, POSITION_STD_M};
 use nalgebra::DMatrix;
@@ -12,7 +12,7 @@ use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::positions::position_problem::PositionProblem;
 use crate::positions::unobservable::Unobservable;
 
-/// The parameters worth estimating, and those that are not, linearized at `guess`.
+/// Returns the parameters to estimate, and the unobservable ones, linearized at `guess`.
 #[must_use]
 pub fn free_parameters(problem: &PositionProblem<'_>, guess: &JointParameters) -> (Vec<Parameter>, Vec<Unobservable>) {
     let robot = problem.robot;
@@ -44,7 +44,7 @@ pub fn free_parameters(problem: &PositionProblem<'_>, guess: &JointParameters) -
     (free, unobservable)
 }
 
-/// The free parameter with the largest ratio of its uncertainty from data alone to its prior one.
+/// Returns the free parameter with the largest ratio of its standard deviation from the data to its prior one.
 fn least_determined(
     problem: &PositionProblem<'_>,
     free: &[Parameter],
@@ -57,7 +57,8 @@ fn least_determined(
     scaled_std.into_iter().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Standard deviation of each parameter from the data alone over its prior's; infinite in a null direction.
+/// Returns each parameter's standard deviation from the data only, relative to its prior's; infinite in a null
+/// direction.
 fn data_std_in_prior_units(problem: &PositionProblem<'_>, free: &[Parameter], guess: &JointParameters) -> Vec<f64> {
     let (_, mut jacobian) = problem.linearize(guess, free);
     for (column, parameter) in free.iter().enumerate() {
@@ -66,7 +67,7 @@ fn data_std_in_prior_units(problem: &PositionProblem<'_>, free: &[Parameter], gu
     }
     let information: DMatrix<f64> = jacobian.transpose() * &jacobian;
     let eigen = information.symmetric_eigen();
-    // Beyond this spread the direction is a null direction as far as double precision can tell.
+    // Beyond this spread double precision cannot distinguish the direction from a null direction.
     let floor = eigen.eigenvalues.amax() * 1e-13;
     (0..free.len())
         .map(|row| {

@@ -1,4 +1,4 @@
-//! Known arms at their end stops, their sensors out.
+//! Calibration of arms with known sensor errors at their end stops.
 
 use std::path::Path;
 
@@ -23,7 +23,7 @@ fn all_free() -> Vec<Parameter> {
     (0..N_SEEN).flat_map(|joint| kinds.map(|kind| Parameter { joint, kind })).collect()
 }
 
-/// Gains within 5 %, offsets within 5 deg.
+/// Draws gains within 5 %, offsets within 5 deg.
 fn drawn_sensors(rng: &mut ChaCha8Rng) -> JointParameters {
     let mut truth = JointParameters::default();
     for joint in 0..6 {
@@ -73,7 +73,8 @@ fn two_exact_stops_or_several_give_the_sensors() {
     }
 }
 
-/// Stops half a degree off their drawing: errors within the stated sigma as often as a normal one has it.
+/// Stops deviate from their nominal angle by half a degree; errors within the stated deviation are as frequent as for a
+/// normal distribution.
 #[test]
 fn stops_off_their_drawing_show_in_the_deviations() {
     let robot = titan();
@@ -85,7 +86,7 @@ fn stops_off_their_drawing_show_in_the_deviations() {
         for joint in 0..N_SEEN {
             for angle in stops_rad(&robot, joint) {
                 let off: f64 = StandardNormal.sample(&mut rng);
-                // Twice each: the stop is off by the same.
+                // Each stop is read twice with the same error.
                 readings.extend([reading(&robot, &truth, joint, angle, 0.0087 * off); 2]);
             }
         }

@@ -1,20 +1,21 @@
 //! Constants that decide something in `model`: unit, source and effect of each, by the file that uses it.
 
 pub(crate) mod blocks_clock {
-    /// One sigma, s. Assumed: clocks of one vehicle that nobody synchronized.
+    /// Standard deviation of the delay between clocks, s. Assumed: clocks of one vehicle that nobody synchronized.
     pub(crate) const CLOCK_STD_S: f64 = 0.05;
 }
 
 pub(crate) mod blocks_value {
-    /// Columns of a lens, which has the most.
+    /// Largest number of columns of a block: that of a lens.
     pub(crate) const MAX_COLUMNS: usize = 8;
 }
 
 pub(crate) mod parameters {
-    /// Standard deviation of a spot's middle and width about the bump's, in widths. Assumed: tracks wear as they are used.
+    /// Standard deviation of a worn spot's middle and width from the bump's, in widths. Assumed: tracks wear
+    /// as they are used.
     pub(crate) const SHAPE_STD: f64 = 0.3;
-    /// Standard width of a worn spot, rad. Assumed: some three degrees; a narrower one is seen at its middle alone, a
-    /// wider one takes two places.
+    /// Standard width of a worn spot, rad. Assumed: about three degrees. A narrower spot affects readings only at its
+    /// middle, a wider one needs two bumps.
     pub(crate) const SPOT_WIDTH_RAD: f64 = 0.05;
     /// Distance from a spot's middle, in widths, beyond which a reading has nothing to do with the spot.
     pub(crate) const FAR_WIDTHS: f64 = 3.0;
@@ -35,13 +36,13 @@ pub(crate) mod scales {
     pub(crate) const TIME_JITTER_STD_S: f64 = 0.005;
     /// Prior of a sensor's slip on its shaft, rad. Assumed: wide, because the views determine it.
     pub(crate) const STEP_STD_RAD: f64 = 0.1;
-    /// Height of a worn spot's bump, rad. Assumed: wide, the views tell it.
+    /// Height of a worn spot's bump, rad. Assumed: wide, because the views determine it.
     pub(crate) const BUMP_STD_RAD: f64 = 0.03;
-    /// Cameras of an arm: the first and all further ones.
+    /// Number of cameras of an arm: the first and all further ones.
     pub const MAX_CAMERAS: usize = 1 + MAX_FURTHER_CAMERAS;
-    /// A scale over what robot.toml states, as long as the views say nothing else.
+    /// Initial ratio of a scale to robot.toml's value, before the views change it.
     pub(crate) const AS_STATED: f64 = 1.0;
-    /// Error of a joint whose sensor says nothing, rad. Assumed: wide, the views determine it.
+    /// Error of a joint without a usable sensor reading, rad. Assumed: wide, because the views determine it.
     pub(crate) const FREE_JOINT_STD_RAD: f64 = 1.0;
     /// Change of an offset with the oil temperature where no datasheet states it, rad/K. Assumed; the views correct it.
     pub(crate) const OFFSET_STD_RAD_PER_K: f64 = 3e-4;
@@ -58,6 +59,6 @@ pub(crate) mod scales {
 }
 
 pub(crate) mod walk_modes {
-    /// Modes of a walk that are estimated: they hold 95 % of its variance.
+    /// Number of estimated modes of a walk: they contain 95 % of its variance.
     pub(crate) const N_WALK_MODES: usize = 4;
 }

@@ -7,36 +7,36 @@ use crate::model::parameters::{Parameter, ParameterKind};
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::time::Stamp;
 
-/// Which parameters have a column.
+/// Choice of the parameters that have a column.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model {
     /// Parameters of each joint of the arm, base first.
     pub joints: Vec<Vec<ParameterKind>>,
-    /// Number of joints, base first, with columns of their place on the parent link.
+    /// Number of joints, base first, with columns of their pose on the parent link.
     pub n_links: usize,
-    /// Number of joints, base first, with a column of their compliance, next to the base's and a load at the tool; 0:
-    /// none of these.
+    /// Number of joints, base first, with a column of their compliance, in addition to those of the base and of the
+    /// tool load. 0: none of these.
     pub n_compliant: usize,
-    /// Groups of parameters next to these; tags that no view shows have no columns all the same.
+    /// Further blocks of parameters; tags that no view shows have no columns even if they are listed.
     pub blocks: BTreeSet<Block>,
-    /// Random walk of the offsets during the views; `None`: they do not walk.
+    /// Random walk of the offsets during the views; `None` if the offsets are constant.
     pub walk: Option<Walk>,
 }
 
 /// A random walk of every joint's offset during the views.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Walk {
-    /// Ends of the first and the last view.
+    /// Stamps at the end of the first and of the last view.
     pub span: [Stamp; 2],
-    /// Probability of each joint's errors in time where its offset does not walk (`permutation_test`); one where no
-    /// view constrains the joint.
+    /// Probability of each joint's errors over time if its offset is constant (`permutation_test`); one if no view
+    /// constrains the joint.
     pub p_value: [f64; MAX_JOINTS],
-    /// Log evidence of all joints' walks over none.
+    /// Log evidence of all joints' walks relative to no walk, nats.
     pub gain_nats: f64,
 }
 
 impl Model {
-    /// A model of an arm of `n_joints` whose sensors are not estimated.
+    /// Returns a model of an arm of `n_joints` whose sensors are not estimated.
     #[must_use]
     pub fn of_blocks(n_joints: usize, blocks: impl IntoIterator<Item = Block>) -> Self {
         let joints = vec![Vec::new(); n_joints];
@@ -49,7 +49,7 @@ impl Model {
         self.blocks.contains(&block)
     }
 
-    /// The joints' parameters in the order of their columns: sensors joint by joint, links joint by joint, sag.
+    /// Returns the joints' parameters in the order of their columns: sensors joint by joint, links joint by joint, sag.
     #[must_use]
     pub fn parameters(&self) -> Vec<Parameter> {
         let of_sensors =

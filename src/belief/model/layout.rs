@@ -1,4 +1,4 @@
-//! Where each parameter's column is.
+//! Assignment of parameters to columns.
 
 use std::ops::Range;
 
@@ -7,23 +7,23 @@ use crate::model::estimated::Model;
 use crate::model::parameters::Parameter;
 use armcal_core::robot::Robot;
 
-/// The columns of a problem: the joints' parameters first, then the blocks in their order.
+/// Columns of a problem: the joints' parameters first, then the blocks in their order.
 #[derive(Clone, Debug)]
 pub(crate) struct Layout {
-    /// Columns 0.. : the joints' parameters, joint by joint.
+    /// Parameters of the joints' columns, from column 0 on, joint by joint.
     pub parameters: Vec<Parameter>,
     pub of_joint: Vec<Range<usize>>,
-    /// Six columns of each joint whose place on its parent link is estimated, base first; the last of `parameters`.
+    /// Six columns of each joint whose pose on its parent link is estimated, base first, after those of the sensors.
     pub links: Range<usize>,
-    /// Right after them those of how the arm bends.
+    /// Columns of the compliance, right after those of the links.
     pub sag: Range<usize>,
-    /// First column of each block that has any.
+    /// First column of each block; `None` for a block without columns.
     first: PerBlock<Option<usize>>,
     pub n: usize,
 }
 
 impl Layout {
-    /// With columns of those tags, if the model has any.
+    /// Returns the layout of `model`; of the tags only those with `has_column` get columns.
     pub(crate) fn new(robot: &Robot, model: &Model, has_column: impl Fn(usize) -> bool) -> Self {
         let is_wanted = |block: Block| match block {
             Block::Tag(tag) => model.has(block) && has_column(tag),
@@ -43,7 +43,7 @@ impl Layout {
         Self { parameters, of_joint, links, sag, first, n }
     }
 
-    /// A layout with one more block.
+    /// Returns a layout with one more block.
     pub(crate) fn with(&self, block: Block) -> Self {
         let mut n = self.n_joint();
         let mut first = self.first.clone();
@@ -53,30 +53,30 @@ impl Layout {
         Self { first, n, ..self.clone() }
     }
 
-    /// First column of a block.
+    /// Returns the first column of a block.
     #[inline]
     pub(crate) fn at(&self, block: Block) -> Option<usize> {
         self.first[block]
     }
 
-    /// The blocks that have columns, with the first of these, in their order.
+    /// Returns the blocks that have columns, each with its first column, in their order.
     pub(crate) fn blocks(&self) -> impl Iterator<Item = (Block, usize)> + '_ {
         self.first.iter().filter_map(|(block, at)| Some((block, (*at)?)))
     }
 
-    /// The block that a column is of, and which of its columns it is; `None` for the joints' parameters.
+    /// Returns the block of a column, and the column's index in the block; `None` for the joints' parameters.
     pub(crate) fn block_of(&self, column: usize) -> Option<(Block, usize)> {
         let mut blocks = self.blocks();
         let (block, at) = blocks.find(|(block, at)| (*at..at + block.n_columns()).contains(&column))?;
         Some((block, column - at))
     }
 
-    /// The tags about the arm that have columns, by their index, with the first of these.
+    /// Returns the index and first column of each tag around the arm that has columns.
     pub(crate) fn tags(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         self.first.tags().iter().enumerate().filter_map(|(tag, at)| Some((tag, (*at)?)))
     }
 
-    /// Columns of links and sag.
+    /// Returns the columns of links and sag.
     pub(crate) fn body(&self) -> Range<usize> {
         self.links.start..self.sag.end
     }

@@ -1,8 +1,8 @@
-//! The estimated quantities: parameters of the joints, blocks next to them, and the priors of both.
+//! The estimated quantities: parameters of the joints, blocks in addition to them, and the priors of both.
 //!
-//! `parameters` are those of a joint's sensor, its link and how the arm bends; `blocks` what else moves together
-//! (mounts, lenses, clock, tags). `estimated` says which have columns, `layout` where these are, `state` holds the
-//! values, `prior` what is known before, `scales` the sizes that the data may tell.
+//! `parameters` are those of a joint's sensor, its link and the arm's compliance; `blocks` are other groups (mounts,
+//! lenses, clock, tags). `estimated` says which have columns, `layout` where these are, and `state` holds the values.
+//! `prior` has the prior information, `scales` the standard deviations that the data may correct.
 
 pub(crate) mod blocks;
 pub(crate) mod constants;

@@ -1,5 +1,4 @@
-//! The parameters of the joint sensors: gain, offset, nonlinearity and what changes with temperature, pressure and
-//! time.
+//! Parameters of the joint sensors: gain, offset, nonlinearity, and effects of temperature, pressure and time.
 //!
 //! `theta_j = center_j + gain_j * travel_j + offset_j` (the paper's equation 2), and the terms of
 //! [`armcal_core::sensor`].
@@ -13,16 +12,16 @@ use armcal_core::sensor::{
 use armcal_core::streams::MAX_JOINTS;
 use armcal_core::time::Stamp;
 
-/// Gain (dimensionless, 1 = datasheet) and offset (rad) of every joint.
+/// Gain (dimensionless, 1 = datasheet), offset (rad) and terms of every joint, and the corrections of the links.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointParameters {
     /// Factor on the nominal travel, base first; 1 beyond the arm's joints.
     pub gain: [f64; MAX_JOINTS],
-    /// Added to the angle, base first.
+    /// Sensor error at mid-range, added to the angle, base first.
     pub offset_rad: [f64; MAX_JOINTS],
-    /// Zero under methods that estimate straight sensors.
+    /// Terms of each sensor; zero with methods that estimate straight sensors.
     pub terms: [Terms; MAX_JOINTS],
-    /// Where joints sit on their parent links beyond the drawing; zero where that was not estimated.
+    /// Corrections of the joints' poses on their parent links and of the compliance; zero where not estimated.
     pub links: LinkCorrections,
     /// Conditions at which the terms are zero.
     pub reference: Conditions,
@@ -41,7 +40,7 @@ impl Default for JointParameters {
 }
 
 impl JointParameters {
-    /// Value in the parameter's own unit.
+    /// Returns a value in the parameter's own unit.
     #[must_use]
     pub fn get(&self, parameter: Parameter) -> f64 {
         match parameter.kind {
@@ -53,7 +52,7 @@ impl JointParameters {
             ParameterKind::OffsetPerMpa => self.terms[parameter.joint].offset_rad_per_mpa,
             ParameterKind::DriftPerH => self.terms[parameter.joint].drift_rad_per_h,
             ParameterKind::HalfBacklash => self.terms[parameter.joint].half_backlash_rad,
-            // These are the sensors as they are now.
+            // The values here describe the sensors as they are now.
             ParameterKind::StepBefore(_) | ParameterKind::WalkMode(_) => 0.0,
             ParameterKind::Bump(_) => self.terms[parameter.joint].bump.height_rad,
             ParameterKind::LinkShift(axis) => self.links[parameter.joint].shift_m[usize::from(axis)],
@@ -64,7 +63,7 @@ impl JointParameters {
         }
     }
 
-    /// Sets the value in the parameter's own unit.
+    /// Sets a value in the parameter's own unit.
     pub fn set(&mut self, parameter: Parameter, value: f64) {
         match parameter.kind {
             ParameterKind::Gain => self.gain[parameter.joint] = value,
@@ -85,19 +84,19 @@ impl JointParameters {
         }
     }
 
-    /// All parameters of one joint.
+    /// Returns all sensor parameters of one joint.
     #[must_use]
     pub fn correction(&self, joint: usize) -> Correction {
         Correction { gain: self.gain[joint], offset_rad: self.offset_rad[joint], terms: self.terms[joint] }
     }
 
-    /// True if there are only gains and offsets.
+    /// Returns true if there are only gains and offsets.
     #[must_use]
     pub fn are_linear(&self) -> bool {
         self.terms.iter().all(Terms::are_zero)
     }
 
-    /// `robot` with its links as estimated.
+    /// Returns `robot` with its links as estimated.
     #[must_use]
     pub fn with_links(&self, mut robot: Robot) -> Robot {
         if self.links != LinkCorrections::default() {
@@ -106,7 +105,7 @@ impl JointParameters {
         robot
     }
 
-    /// The sensors of `robot` with these parameters.
+    /// Returns the sensors of `robot` with these parameters.
     #[must_use]
     pub fn sensors(&self, robot: &Robot) -> ArmSensors {
         let mut sensors = ArmSensors::nominal(robot);
@@ -123,9 +122,9 @@ impl JointParameters {
 pub enum ParameterKind {
     /// Factor on the nominal travel.
     Gain,
-    /// Added to the angle, rad.
+    /// Sensor error at mid-range, added to the angle, rad.
     Offset,
-    /// A coefficient of the nonlinearity, 0 .. [`N_SHAPE`](armcal_core::sensor::N_SHAPE).
+    /// A coefficient of the nonlinearity, index below [`N_SHAPE`](armcal_core::sensor::N_SHAPE).
     Shape(u8),
     /// Change of the offset with the oil temperature, rad/K.
     OffsetPerK,
@@ -137,50 +136,51 @@ pub enum ParameterKind {
     DriftPerH,
     /// Half of the backlash between joint and sensor shaft, rad.
     HalfBacklash,
-    /// Angle at the same reading before the sensor slipped, less that after it, in views that end before this stamp, rad.
+    /// Angle at the same reading before the sensor slipped minus that after it, in views that end before this stamp,
+    /// rad.
     StepBefore(Stamp),
-    /// A mode of the random walk that led to the offset as it is at the last view, rad.
+    /// Mode of the random walk that led to the offset at the last view, rad.
     WalkMode(u8),
-    /// Height of a worn spot's bump, rad; one a joint.
+    /// Height of a worn spot's bump, rad; one per joint.
     Bump(WornSpot),
     /// Shift of the joint's origin along an axis of its parent link, m.
     LinkShift(u8),
-    /// Of the joint's attitude about an axis of its parent link, rad.
+    /// Turn of the joint's frame about an axis of its parent link, rad.
     LinkTurn(u8),
-    /// Of the joint's angle behind its sensor by the torque of weight, rad/(N m).
+    /// Rotation of the joint behind its sensor per torque of weight, rad/(N m).
     Compliance,
-    /// Of the base's turn about one of its axes by the torque of weight, rad/(N m); of joint 0 alone.
+    /// Rotation of the base about one of its axes per torque of weight, rad/(N m); only for joint 0.
     MountCompliance(u8),
-    /// Weight at the tool that the drawing does not have, N; of joint 0 alone.
+    /// Weight at the tool that the URDF does not contain, N; only for joint 0.
     ToolLoad,
 }
 
 impl ParameterKind {
-    /// All that a sensor keeps, in their order.
+    /// Returns all kinds that a calibrated sensor keeps, in their order.
     pub fn all() -> impl Iterator<Item = Self> {
         let shape = (0..N_SHAPE as u8).map(Self::Shape);
         let rest = [Self::OffsetPerK, Self::GainPerK, Self::OffsetPerMpa, Self::DriftPerH, Self::HalfBacklash];
         [Self::Gain, Self::Offset].into_iter().chain(shape).chain(rest)
     }
 
-    /// All of a joint's place on its parent link, in their order.
+    /// Returns all kinds of a joint's pose on its parent link, in their order.
     pub fn all_of_link() -> impl Iterator<Item = Self> {
         (0..3).map(Self::LinkShift).chain((0..3).map(Self::LinkTurn))
     }
 
-    /// Whether it is of the link's geometry or of how the arm bends, not of a sensor.
+    /// Returns true for kinds of the link geometry or of the compliance, false for kinds of a sensor.
     #[must_use]
     pub fn is_of_body(self) -> bool {
         matches!(self, Self::LinkShift(_) | Self::LinkTurn(_)) || self.is_of_sag()
     }
 
-    /// Whether it is of how the arm bends under its weight.
+    /// Returns true for kinds of the arm's compliance under its weight.
     #[must_use]
     pub fn is_of_sag(self) -> bool {
         matches!(self, Self::Compliance | Self::MountCompliance(_) | Self::ToolLoad)
     }
 
-    /// d(angle)/d(parameter) at `travel_rad`, in rad per the parameter's unit.
+    /// Returns d(angle)/d(parameter) at `travel_rad`, in rad per the parameter's unit.
     #[must_use]
     pub fn angle_derivative(
         self,
@@ -206,54 +206,55 @@ impl ParameterKind {
     }
 }
 
-/// Where a sensor's track is worn.
+/// Worn spot of a sensor's track.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct WornSpot {
-    /// Travel of its middle from that of the joint's range, microradians: a whole number, so that kinds can be
-    /// compared.
+    /// Travel of the spot's middle from the middle of the joint's range, microradians: a whole number, so that kinds
+    /// can be compared.
     at_urad: i32,
 }
 
 impl WornSpot {
-    /// About `travel_rad` from the middle of the joint's range.
+    /// Returns the spot around `travel_rad` from the middle of the joint's range.
     #[must_use]
     pub fn about(travel_rad: f64) -> Self {
         Self { at_urad: (1e6 * travel_rad).round() as i32 }
     }
 
-    /// Travel of its middle from that of the joint's range, rad.
+    /// Returns the travel of the spot's middle from the middle of the joint's range, rad.
     #[must_use]
     pub fn at_rad(self) -> f64 {
         1e-6 * f64::from(self.at_urad)
     }
 
-    /// As high as that.
+    /// Returns the bump of this spot with a height.
     #[must_use]
     pub fn bump(self, height_rad: f64) -> Bump {
         Bump { at_rad: self.at_rad(), width_rad: SPOT_WIDTH_RAD, height_rad }
     }
 
-    /// What a track that is worn otherwise is off at a travel from the middle of the range, one sigma, as a share of
-    /// the height: by the bump's slopes along its middle and its width, about a spot half as wide again.
+    /// Returns the standard deviation of the error at a travel from the middle of the range if the spot has another
+    /// shape. It is a share of the height. It follows from the bump's slopes along its middle and its width, for a spot
+    /// half as wide again.
     #[must_use]
     pub fn shape_error_share(self, travel_rad: f64) -> f64 {
         let widths = (travel_rad - self.at_rad()) / (1.5 * SPOT_WIDTH_RAD);
         SHAPE_STD * widths.abs() * (1.0 + widths * widths).sqrt() * (-0.5 * widths * widths).exp()
     }
 
-    /// Whether a travel from the middle of the range is on it.
+    /// Returns true if a travel from the middle of the range is on the spot.
     #[must_use]
     pub fn is_about(self, travel_rad: f64) -> bool {
         (travel_rad - self.at_rad()).abs() < SPOT_WIDTH_RAD
     }
 
-    /// Whether a view at a travel from the middle of the range tells of it: more than a tenth of its height.
+    /// Returns true if a view at a travel from the middle of the range shows the spot: more than a tenth of its height.
     #[must_use]
     pub fn is_seen_from(self, travel_rad: f64) -> bool {
         (travel_rad - self.at_rad()).abs() < 2.0 * SPOT_WIDTH_RAD
     }
 
-    /// Whether what happens at a travel from the middle of the range is about something else.
+    /// Returns true if a deviation at a travel from the middle of the range cannot come from this spot.
     #[must_use]
     pub fn is_far_from(self, travel_rad: f64) -> bool {
         (travel_rad - self.at_rad()).abs() > FAR_WIDTHS * SPOT_WIDTH_RAD
@@ -262,31 +263,33 @@ impl WornSpot {
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// One number that may be estimated.
+/// A number that may be estimated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Parameter {
     /// Index of the joint, base first.
     pub joint: usize,
-    /// Which of its parameters.
+    /// Kind of the parameter.
     pub kind: ParameterKind,
 }
 
 impl Parameter {
-    /// All that a calibration may hold of an arm of `n_joints`: joint by joint its sensor's and its link's, then sag's.
+    /// Returns all parameters that a calibration of an arm of `n_joints` may hold: those of sensor and link for each
+    /// joint, then those of sag.
     pub fn all(n_joints: usize) -> impl Iterator<Item = Self> {
         let of_joint = || ParameterKind::all().chain(ParameterKind::all_of_link());
         let of_joints = (0..n_joints).flat_map(move |joint| of_joint().map(move |kind| Self { joint, kind }));
         of_joints.chain(Self::all_of_sag(n_joints))
     }
 
-    /// All of how an arm bends whose first `n_joints` give.
+    /// Returns all parameters of the compliance of an arm whose first `n_joints` are compliant.
     pub fn all_of_sag(n_joints: usize) -> impl Iterator<Item = Self> {
         let of_arm = (0..3).map(ParameterKind::MountCompliance).chain([ParameterKind::ToolLoad]);
         let of_joints = (0..n_joints).map(|joint| Self { joint, kind: ParameterKind::Compliance });
         of_joints.chain(of_arm.map(|kind| Self { joint: 0, kind }))
     }
 
-    /// One sigma of the datasheet's prior, in the parameter's unit; zero for terms that the datasheet does not know.
+    /// Returns the standard deviation of the datasheet's prior, in the parameter's unit; zero for terms that the
+    /// datasheet does not state.
     #[must_use]
     pub fn prior_std(self, robot: &Robot) -> f64 {
         let spec = &robot.sensors[self.joint];
@@ -298,19 +301,19 @@ impl Parameter {
         }
     }
 
-    /// Whether it tells of the sensor as it was, and not as it is at the last view.
+    /// Returns true if the parameter describes the sensor in the past, not at the last view.
     #[must_use]
     pub fn is_past(self) -> bool {
         self.is_step() || matches!(self.kind, ParameterKind::WalkMode(_))
     }
 
-    /// Whether it tells of the sensor before it slipped.
+    /// Returns true if the parameter describes the sensor before it slipped.
     #[must_use]
     pub fn is_step(self) -> bool {
         matches!(self.kind, ParameterKind::StepBefore(_))
     }
 
-    /// `shoulder_yaw gain`.
+    /// Returns a name such as `shoulder_yaw gain`.
     #[must_use]
     pub fn name(self, robot: &Robot) -> String {
         let kind = match self.kind {

@@ -10,20 +10,20 @@ use crate::model::scales::Hyperparameters;
 use crate::model::state::State;
 use armcal_core::robot::Robot;
 
-/// One sigma of a standard deviation that is in use: never zero.
+/// Floors a standard deviation so that its information stays finite.
 pub(crate) fn at_least(std: f64) -> f64 {
     std.max(MIN_STD)
 }
 
-/// Which columns, from the first on, a matrix of information is of. A block beyond them is known by a sigma of each
-/// column.
+/// Columns, from the first on, that a matrix of information covers. The prior of a block beyond them has a standard
+/// deviation for each column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Covers {
     /// The joints' parameters.
     Parameters,
-    /// These and the first camera's mount.
+    /// The joints' parameters and the first camera's mount.
     ParametersAndMount,
-    /// All of the layout.
+    /// All columns of the layout.
     All,
 }
 
@@ -34,7 +34,7 @@ pub struct Information {
     pub(crate) covers: Covers,
 }
 
-/// An earlier calibration's prior of the joints' parameters, and of the first camera's mount with them.
+/// Prior from an earlier calibration: the joints' parameters, and optionally the first camera's mount.
 #[derive(Clone, Debug)]
 pub struct JointPrior {
     pub(crate) mean: DVector<f64>,
@@ -42,32 +42,32 @@ pub struct JointPrior {
 }
 
 impl JointPrior {
-    /// A prior of the parameters alone.
+    /// Returns a prior of the parameters only.
     #[must_use]
     pub fn of_parameters(mean: DVector<f64>, information: DMatrix<f64>) -> Self {
         Self { mean, information: Information { matrix: information, covers: Covers::Parameters } }
     }
 
-    /// A prior of the parameters and the six columns of the mount, about where the robot has it.
+    /// Returns a prior of the parameters and the six columns of the mount, whose mean is the robot's mount.
     #[must_use]
     pub fn with_mount(mean: DVector<f64>, information: DMatrix<f64>) -> Self {
         Self { mean, information: Information { matrix: information, covers: Covers::ParametersAndMount } }
     }
 }
 
-/// Priors of all but the views' own parameters.
+/// Priors of all parameters except those local to views.
 #[derive(Clone, Debug)]
 pub(crate) struct Prior {
     /// Prior mean of the joints' parameters.
     pub joint_mean: DVector<f64>,
     pub information: Information,
     pub mean: PerBlock<Value>,
-    /// Infinite where nothing is known; not looked at where `information` covers the block.
+    /// Standard deviation of each block's columns; infinite if unknown, unused where `information` covers the block.
     pub std: PerBlock<Std>,
 }
 
 impl Prior {
-    /// The prior by datasheet, drawing and survey.
+    /// Returns the prior from datasheet, nominal model (URDF) and survey.
     pub(crate) fn drawn(robot: &Robot, parameters: &[Parameter], scales: &Hyperparameters) -> Self {
         let nominal = JointParameters::default();
         let mean = parameters.iter().map(|p| nominal.get(*p));
@@ -82,7 +82,7 @@ impl Prior {
         }
     }
 
-    /// Takes the sizes of `scales` over, where the datasheet's priors depend on them.
+    /// Adopts the standard deviations of `scales` where the datasheet's priors depend on them.
     pub(crate) fn rescale(&mut self, robot: &Robot, parameters: &[Parameter], scales: &Hyperparameters) {
         self.information.matrix = joint_information(robot, parameters, scales);
         for (block, std) in self.std.iter_mut().filter(|(block, _)| !block.is_tag()) {
@@ -90,35 +90,37 @@ impl Prior {
         }
     }
 
-    /// Forgets what is known of each block that `which` names.
+    /// Removes the prior information on each block that `which` selects.
     pub(crate) fn forget(&mut self, which: impl Fn(Block) -> bool) {
         let blocks = self.std.iter_mut().filter(|(block, _)| which(*block));
         blocks.for_each(|(_, std)| *std = [f64::INFINITY; MAX_COLUMNS]);
     }
 
-    /// Returns true where `information` covers all columns.
+    /// Returns true if `information` covers all columns.
     pub(crate) fn is_full(&self) -> bool {
         self.information.covers == Covers::All
     }
 
-    /// Number of columns that `information` covers.
+    /// Returns the number of columns that `information` covers.
     pub(crate) fn n_covered(&self) -> usize {
         self.information.matrix.nrows()
     }
 
-    /// The blocks with columns that a sigma of each column tells of: block, first column, sigmas.
+    /// Returns the blocks whose prior has a standard deviation for each column: block, first column, standard
+    /// deviations.
     pub(crate) fn by_std<'a>(&'a self, layout: &'a Layout) -> impl Iterator<Item = (Block, usize, &'a [f64])> {
         let blocks = layout.blocks().filter(|(_, at)| *at >= self.n_covered());
         blocks.map(|(block, at)| (block, at, &self.std[block][..block.n_columns()]))
     }
 
-    /// Deviations of the columns that `information` covers from their means.
+    /// Returns the deviations of the columns that `information` covers from their means.
     pub(crate) fn off(&self, layout: &Layout, state: &State) -> DVector<f64> {
         off_by(layout, (&self.joint_mean, &self.mean), state, self.n_covered())
     }
 }
 
-/// Deviations of the first `n` columns of `state` from the means of the joints' parameters and of the blocks.
+/// Returns the deviations of the first `n` columns of `state` from the means of the joints' parameters and of the
+/// blocks.
 pub(crate) fn off_by(
     layout: &Layout,
     (joint, mean): (&DVector<f64>, &PerBlock<Value>),
@@ -134,10 +136,10 @@ pub(crate) fn off_by(
     off
 }
 
-/// Information on the joints' parameters by the datasheet, under `scales`.
+/// Returns the datasheet's information on the joints' parameters, under `scales`.
 ///
-/// The datasheet tells of the offset before the sensor slipped: of the offset as it is now plus all steps. Since the
-/// slip the offset is as uncertain as the slip is.
+/// The datasheet describes the offset before the sensor slipped: the present offset plus all steps. Since the slip the
+/// offset is as uncertain as the slip is.
 fn joint_information(robot: &Robot, parameters: &[Parameter], scales: &Hyperparameters) -> DMatrix<f64> {
     let info = |p: &Parameter| {
         let std = scales.prior_std(&robot.sensors[p.joint], p.joint, p.kind);
@@ -155,7 +157,7 @@ fn joint_information(robot: &Robot, parameters: &[Parameter], scales: &Hyperpara
     matrix
 }
 
-/// Columns of what the sensor of `joint` slipped by.
+/// Returns the columns of the slips of `joint`'s sensor.
 pub(crate) fn steps_of(parameters: &[Parameter], joint: usize) -> Vec<usize> {
     let is_step = |&column: &usize| parameters[column].joint == joint && parameters[column].is_step();
     (0..parameters.len()).filter(is_step).collect()
@@ -168,7 +170,7 @@ mod tests {
     use crate::model::scales::STEP_STD_RAD;
     use armcal_core::time::SIMULATION_EPOCH;
 
-    /// Two slips of one sensor, and none of the next.
+    /// One sensor slipped twice, the next one not.
     #[test]
     fn the_datasheet_tells_of_the_offset_before_the_slips() {
         let robot = titan();

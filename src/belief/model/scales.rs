@@ -12,47 +12,47 @@ use armcal_core::joints::MAX_JOINTS;
 use armcal_core::robot::{JointSensorSpec, Robot};
 use armcal_core::sensor::shape_prior;
 
-/// Standard deviations that the data themselves may tell.
+/// Noise and prior standard deviations that the data may correct.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hyperparameters {
     /// Error of each joint beyond its sensor's model, independent in each view, rad.
     pub joint_std_rad: [f64; MAX_JOINTS],
-    /// Standard deviation of a joint whose sensor does not count, rad.
+    /// Standard deviation of a joint without a usable sensor reading, rad.
     pub free_joint_std_rad: f64,
-    /// Size of each sensor's nonlinearity.
+    /// Standard deviation of each sensor's nonlinearity, rad.
     pub shape_std_rad: [f64; MAX_JOINTS],
-    /// Change of an offset with the oil temperature.
+    /// Standard deviation of the offset's change with the oil temperature, rad/K.
     pub offset_std_rad_per_k: f64,
-    /// Change of a gain with the oil temperature.
+    /// Standard deviation of the gain's change with the oil temperature, 1/K.
     pub gain_std_per_k: f64,
-    /// Change of an offset with the ambient pressure.
+    /// Standard deviation of the offset's change with the ambient pressure, rad/MPa.
     pub offset_std_rad_per_mpa: f64,
-    /// Drift of an offset.
+    /// Standard deviation of the offset's drift, rad/h.
     pub drift_std_rad_per_h: f64,
-    /// Half of the backlash between joint and sensor shaft.
+    /// Standard deviation of half of the backlash between joint and sensor shaft, rad.
     pub half_play_std_rad: f64,
-    /// Random walk of each joint's offset from the first view to the last, rad.
+    /// Standard deviation of each offset's random walk from the first view to the last, rad.
     pub walk_std_rad: [f64; MAX_JOINTS],
-    /// Each joint's place on its parent link: shift m, turn rad.
+    /// Standard deviation of each joint's pose on its parent link: shift m, turn rad.
     pub link_std: [[f64; 2]; MAX_JOINTS],
-    /// Compliances of the joints, and of the base's mount, rad/(N m).
+    /// Standard deviation of the compliances of the joints, and of the base's mount, rad/(N m).
     pub compliance_std: [f64; 2],
-    /// Load at the tool, N.
+    /// Standard deviation of the load at the tool, N.
     pub tool_load_std_n: f64,
-    /// Factor on robot.toml's sigmas of each camera's mount (by its number): shift, turn.
+    /// Factor on robot.toml's standard deviations of each camera's mount (by its number): shift, turn.
     pub mount_scale: [[f64; 2]; MAX_CAMERAS],
-    /// Factor on the lenses' prior sigmas.
+    /// Factor on the prior standard deviations of the lenses.
     pub lens_scale: f64,
-    /// All measurements' standard deviations over what is stated for them.
+    /// Ratio of all measurements' standard deviations to their stated values.
     pub noise: f64,
-    /// Noise of positions and of poses' positions, m.
+    /// Standard deviation of measured positions and of poses' positions, m.
     pub position_std_m: f64,
-    /// Noise of poses' rotations, rad.
+    /// Standard deviation of poses' rotations, rad.
     pub rotation_std_rad: f64,
-    /// The error that all tags of a view share (positions by SLAM have it): translation m, rotation rad. `None`: there
-    /// is none.
+    /// Standard deviation of the error that all tags of a view share (positions by SLAM have it): translation m,
+    /// rotation rad. `None` if there is no such error.
     pub camera_error_std: Option<[f64; 2]>,
-    /// Error of an image's stamp, s; times a joint's rate it is the joint's error in a moving view.
+    /// Standard deviation of an image's stamp, s; times a joint's rate it is the joint's error in a moving view.
     pub time_jitter_std_s: f64,
 }
 
@@ -95,7 +95,7 @@ impl Hyperparameters {
         }
     }
 
-    /// One sigma of a joint parameter's prior, in its own unit.
+    /// Returns the standard deviation of a joint parameter's prior, in its own unit.
     #[must_use]
     pub fn prior_std(&self, spec: &JointSensorSpec, joint: usize, kind: ParameterKind) -> f64 {
         match kind {
@@ -119,7 +119,7 @@ impl Hyperparameters {
     }
 }
 
-/// A tenth of what a straight line leaves.
+/// Returns a tenth of the datasheet's linearity, rad.
 fn usual_joint_std_rad(spec: &JointSensorSpec) -> f64 {
     (0.1 * spec.linearity_std_rad).max(1e-5)
 }

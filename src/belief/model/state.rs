@@ -1,4 +1,4 @@
-//! Everything that is estimated.
+//! State of the estimate: all estimated values.
 
 use nalgebra::{DVector, Isometry3};
 
@@ -6,19 +6,19 @@ use crate::model::blocks::{Block, PerBlock, Value};
 use crate::model::layout::Layout;
 use armcal_core::joints::MAX_JOINTS;
 
-/// Parameters of the joints, blocks, and what each view has of its own.
+/// Parameters of the joints, blocks, and the parameters local to each view.
 #[derive(Clone, Debug)]
 pub(crate) struct State {
     pub joint: DVector<f64>,
     pub blocks: PerBlock<Value>,
-    /// Each joint's error beyond its sensor's model in each view, rad.
+    /// Error of each joint beyond its sensor's model in each view, rad.
     pub joint_error: Vec<[f64; MAX_JOINTS]>,
-    /// The camera's pose error in each view.
+    /// Pose error of the camera in each view.
     pub camera_error: Vec<Isometry3<f64>>,
 }
 
 impl State {
-    /// Becomes `other` in its own memory; both are of one problem.
+    /// Copies `other` into the same memory; both are of one problem.
     pub(crate) fn copy_from(&mut self, other: &Self) {
         self.joint.copy_from(&other.joint);
         self.blocks.copy_from(&other.blocks);
@@ -26,7 +26,7 @@ impl State {
         self.camera_error.copy_from_slice(&other.camera_error);
     }
 
-    /// A state with `n_views` views that have no errors of their own.
+    /// Returns a state with `n_views` views that have no errors of their own.
     pub(crate) fn with_views(&self, n_views: usize) -> Self {
         Self {
             joint: self.joint.clone(),
@@ -44,7 +44,7 @@ impl State {
         }
     }
 
-    /// The pose of a block.
+    /// Returns the pose of a block.
     #[inline]
     pub(crate) fn pose(&self, block: Block) -> &Isometry3<f64> {
         self.blocks.pose(block)

@@ -1,7 +1,7 @@
-//! Landmarks by their positions: what methods on positions and `bundle` share.
+//! Positions of landmarks: the part that methods on positions and `bundle` share.
 //!
-//! `position_problem` has residuals and Jacobians; `solution` is what a solver found, `unobservable` what the data
-//! leave open, `mount_estimate` the camera mount by a tag on the gripper.
+//! `position_problem` has residuals and Jacobians, `solution` the result of a solver. `unobservable` lists undetermined
+//! parameters, and `mount_estimate` is the camera mount from a tag on the gripper.
 
 pub(crate) mod mount_estimate;
 pub(crate) mod position_problem;

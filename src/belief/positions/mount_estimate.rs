@@ -1,4 +1,4 @@
-//! The camera mount by a tag on the gripper alone.
+//! Camera mount from a tag on the gripper only.
 
 use std::ops::Range;
 
@@ -6,19 +6,19 @@ use nalgebra::{DMatrix, Isometry3};
 
 use crate::model::parameters::JointParameters;
 
-/// Camera mount and the joints behind the camera, by the tag on the gripper.
+/// Camera mount and the joints distal to the camera, estimated from the tag on the gripper.
 #[derive(Clone, Debug)]
 pub struct MountEstimate {
     /// Estimated pose of the camera on the link that carries it.
     pub link_from_camera: Isometry3<f64>,
-    /// The joints between camera and tag.
+    /// Joints between camera and tag.
     pub joints: Range<usize>,
-    /// Theirs are estimated, the others as they were given.
+    /// Parameters: estimated for these joints, as given for the others.
     pub parameters: JointParameters,
-    /// Rows: mount (translation m, rotation rad, on the right), then gain and offset (rad) of each joint.
+    /// Covariance. Rows: mount (translation m, rotation rad, on the right), then gain and offset (rad) of each joint.
     pub covariance: DMatrix<f64>,
     /// Number of views that show the tag.
     pub views: usize,
-    /// Root mean square per corner (2D), px.
+    /// Root mean square reprojection error per corner (2D), px.
     pub rms_px: f64,
 }

@@ -18,32 +18,32 @@ use armcal_core::streams::JointAngles;
 pub struct PositionProblem<'a> {
     /// Nominal arm with surveyed landmarks.
     pub robot: &'a Robot,
-    /// Views without tags count for nothing.
+    /// Views; those without tags do not count.
     pub views: &'a [View],
 }
 
-/// One observation's residual, with all that Jacobians need.
+/// Residual of one observation, with everything that Jacobians need.
 pub struct TagResidual<'a> {
     /// Index of the view.
     pub view_idx: usize,
     /// Tag of the view.
     pub tag: &'a TagObservation,
-    /// Its view.
+    /// View with the tag.
     pub view: &'a View,
-    /// Of the view from the parameters' reference.
+    /// Departure of the view's conditions from the parameters' reference.
     pub departure: ConditionChange,
-    /// Links as predicted, in the frame of the tags.
+    /// Predicted links, in the frame of the tags.
     pub poses: &'a LinkPoses,
-    /// The camera as predicted, in the same frame.
+    /// Predicted pose of the camera, in the same frame.
     pub base_from_camera: &'a Isometry3<f64>,
-    /// The tag's centre in the base frame as predicted.
+    /// Predicted centre of the tag in the base frame, m.
     pub predicted_m: Vector3<f64>,
-    /// Predicted - surveyed, m.
+    /// Predicted minus surveyed position, m.
     pub residual_m: Vector3<f64>,
 }
 
 impl<'a> PositionProblem<'a> {
-    /// Landmarks of `views` against the survey of `robot`.
+    /// Returns the problem of landmarks in `views` against the survey of `robot`.
     #[must_use]
     pub fn new(robot: &'a Robot, views: &'a [View]) -> Self {
         Self { robot, views }
@@ -81,7 +81,7 @@ impl<'a> PositionProblem<'a> {
         }
     }
 
-    /// The same without asking for terms: this is where solvers spend their time.
+    /// Returns the joint angles without terms, a shortcut because solvers spend most of their time here.
     fn straight_angles(&self, view: &View, parameters: &JointParameters) -> JointAngles {
         JointAngles::from_fn(self.robot.n_joints(), |j| {
             let center_rad = self.robot.sensors[j].center_rad;
@@ -96,16 +96,16 @@ impl<'a> PositionProblem<'a> {
         })
     }
 
-    /// Number of tags in all views.
+    /// Returns the number of tags in all views.
     #[must_use]
     pub fn n_observations(&self) -> usize {
         self.views.iter().map(|view| view.tags.len()).sum()
     }
 
-    /// The paper's objective: the sum of distances between seen and surveyed landmarks, m.
+    /// Returns the paper's objective: the sum of distances between seen and surveyed landmarks, m.
     #[must_use]
     pub fn sum_of_distances_m(&self, parameters: &JointParameters) -> f64 {
-        // What `each` gives, without what only Jacobians need.
+        // The residuals are those of `each`, without the parts that only Jacobians need.
         let are_straight = parameters.are_linear();
         let mut sum = 0.0;
         for view in self.views {
@@ -123,7 +123,7 @@ impl<'a> PositionProblem<'a> {
         sum
     }
 
-    /// Root mean square distance between seen and surveyed landmarks, m; `None` without observations.
+    /// Returns the root mean square distance between seen and surveyed landmarks, m; `None` without observations.
     #[must_use]
     pub fn rms_m(&self, parameters: &JointParameters) -> Option<f64> {
         let (mut sum, mut n) = (0.0, 0usize);
@@ -134,14 +134,16 @@ impl<'a> PositionProblem<'a> {
         (n > 0).then(|| (sum / n as f64).sqrt())
     }
 
-    /// How far the camera is from where a landmark's measured pose has it, m; `None` where its pose was not measured.
+    /// Returns the distance of the camera from its position by a landmark's measured pose, m; `None` without such a
+    /// pose.
     pub(crate) fn camera_off_m(&self, o: &TagResidual<'_>) -> Option<f64> {
         let TagMeasurement::Pose(camera_from_tag) = o.tag.measured else { return None };
         let measured = self.robot.tags[o.tag.tag_idx].base_from_tag.isometry() * camera_from_tag.inverse();
         Some((o.base_from_camera.translation.vector - measured.translation.vector).norm())
     }
 
-    /// Root mean square reprojection error per corner (2D), px; corners predicted out of view count as unseen.
+    /// Returns the root mean square reprojection error per corner (2D), px; corners predicted out of view count as
+    /// unseen.
     #[must_use]
     pub fn reprojection_rms_px(&self, parameters: &JointParameters) -> Option<f64> {
         let (mut sum, mut n) = (0.0, 0usize);
@@ -159,7 +161,8 @@ impl<'a> PositionProblem<'a> {
         (n > 0).then(|| (sum / n as f64).sqrt())
     }
 
-    /// Residuals (m, three a tag) and their Jacobian by `parameters` in `columns`, in the parameters' own units.
+    /// Returns the residuals (m, three per tag) and their Jacobian by `parameters` in `columns`, in the parameters' own
+    /// units.
     #[must_use]
     pub fn linearize(&self, parameters: &JointParameters, columns: &[Parameter]) -> (DVector<f64>, DMatrix<f64>) {
         let rows = 3 * self.n_observations();
@@ -177,14 +180,14 @@ impl<'a> PositionProblem<'a> {
         (residuals, jacobian)
     }
 
-    /// d(residual)/d(parameter): a joint turns everything behind it, `axis x (point - origin)` times
+    /// Returns d(residual)/d(parameter). A joint turns everything distal to it: `axis x (point - origin)` times
     /// d(angle)/d(parameter).
     #[must_use]
     pub fn derivative(&self, o: &TagResidual<'_>, parameter: Parameter) -> Vector3<f64> {
         if parameter.joint >= self.robot.n_joints_seen_by(self.robot.camera_at(o.view.camera)) {
             return Vector3::zeros();
         }
-        // Before a camera that stands still the joint turns the tags' frame: the point moves the other way in it.
+        // The joint turns the tags' frame if the camera stands still: the point moves the other way in that frame.
         let sign = if self.robot.is_watched() { -1.0 } else { 1.0 };
         let by_angle = o.poses.point_jacobian(parameter.joint, &o.predicted_m) * sign;
         let (travel_rad, approach) = (o.view.travel_rad[parameter.joint], o.view.approach[parameter.joint]);
@@ -192,7 +195,8 @@ impl<'a> PositionProblem<'a> {
         by_angle * parameter.kind.angle_derivative(spec, travel_rad, &o.departure, approach)
     }
 
-    /// d(residual)/d(camera mount), perturbed on the right of `link_from_camera`: (translation m, rotation rad).
+    /// Returns d(residual)/d(camera mount), perturbed on the right of `link_from_camera`: (translation m, rotation
+    /// rad).
     #[must_use]
     pub fn mount_derivative(o: &TagResidual<'_>) -> (Matrix3<f64>, Matrix3<f64>) {
         let rotation = *o.base_from_camera.rotation.to_rotation_matrix().matrix();

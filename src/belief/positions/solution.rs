@@ -1,20 +1,20 @@
-//! What a method's solver found.
+//! Result of a method's solver.
 
 use crate::model::parameters::JointParameters;
 use armcal_core::numeric::Outcome;
 
-/// A method's answer.
+/// Result of a method's solver.
 #[derive(Clone, Debug)]
 pub struct Solution {
-    /// What was not searched for keeps the guess.
+    /// Parameters; those that were not estimated keep the initial guess.
     pub parameters: JointParameters,
-    /// How the solver ended.
+    /// Outcome of the solver.
     pub outcome: Outcome,
-    /// Of the objective, over all starts; iterations of `bundle`.
+    /// Number of evaluations of the objective over all starts; iterations with `bundle`.
     pub evaluations: usize,
-    /// The method's objective at the first guess and at the end, in its own unit: m for minimum distance, m^2 for
-    /// minimum variance and least squares, rad^2 for joint limits.
+    /// Objective at the first guess, in the method's unit: m for minimum distance, m^2 for minimum variance and least
+    /// squares, rad^2 for joint limits.
     pub cost_initial: f64,
-    /// See `cost_initial`.
+    /// Objective at the end, in the same unit.
     pub cost_final: f64,
 }

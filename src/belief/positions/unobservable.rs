@@ -3,7 +3,7 @@
 use crate::model::parameters::Parameter;
 use armcal_core::robot::Robot;
 
-/// A parameter that stays at its datasheet value, and why.
+/// Parameter that stays at its datasheet value, and the reason.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Unobservable {
     /// Gain or offset of a joint.
@@ -13,13 +13,13 @@ pub struct Unobservable {
 }
 
 impl Unobservable {
-    /// Of a joint that lies between camera and tool.
+    /// Returns the entry of a joint that lies between camera and tool.
     pub(crate) fn distal(parameter: Parameter) -> Self {
         Self { parameter, reason: "the joint is distal to the camera".to_owned() }
     }
 }
 
-/// `wrist_rotate gain and offset: why`, one line a joint and reason.
+/// Returns lines such as `wrist_rotate gain and offset: why`, one for each joint and reason.
 pub(crate) fn grouped_names(robot: &Robot, unobservable: &[Unobservable]) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     let mut rest = unobservable.iter().peekable();

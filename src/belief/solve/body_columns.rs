@@ -1,8 +1,8 @@
-//! The body's columns of the normal equations: where joints sit on their parent links, and how the arm bends.
+//! Columns of the body in the normal equations: joint poses on the parent links, and the arm's compliance.
 //!
-//! Six columns a joint for its link: shift along and turn about the parent link's axes. A turn phi acts as a rotation
-//! vector, so that a change of it turns the link by `J(phi)`, the left Jacobian of SO(3). They are one dense block,
-//! present only where links or sag are estimated.
+//! Each joint has six columns for its link: shift along and turn about the parent link's axes. A turn phi acts as a
+//! rotation vector, so that a change of it turns the link by `J(phi)`, the left Jacobian of SO(3). They are one dense
+//! block, present only if links or sag are estimated.
 
 use nalgebra::Vector6;
 
@@ -11,7 +11,7 @@ use crate::solve::linearize::NormalEquations;
 use crate::solve::schur::{BodyTwists, Columns, Directions, N_BODY_COLUMNS, SchurBlock};
 
 impl NormalEquations {
-    /// The body's own block, and what ties it to the other columns of the group.
+    /// Adds the body's own block, and its coupling to the other columns of the group.
     pub(crate) fn add_body(
         &mut self,
         columns: &Columns<'_>,
@@ -58,7 +58,7 @@ impl NormalEquations {
     }
 }
 
-/// A matrix of twists row by row, so that products with all its columns become vector instructions.
+/// A matrix of twists, stored row by row so that products with all its columns become vector instructions.
 struct RowsOf {
     rows: [[f64; N_BODY_COLUMNS]; 6],
     n: usize,
@@ -69,7 +69,7 @@ impl RowsOf {
         Self { rows: std::array::from_fn(|k| std::array::from_fn(|a| twists[(k, a)])), n }
     }
 
-    /// The product of `twist` and each column from `from` on.
+    /// Returns the product of `twist` and each column from `from` on.
     fn dot(&self, from: usize, twist: &Vector6<f64>) -> [f64; N_BODY_COLUMNS] {
         let mut out = [0.0; N_BODY_COLUMNS];
         for (row, by) in self.rows.iter().zip(twist) {

@@ -1,4 +1,4 @@
-//! Motion of frames on the arm by parameters of its body: link geometry, and bending under its weight.
+//! Motion of frames on the arm by parameters of its body: link geometry, and compliance under its weight.
 
 use std::ops::Range;
 
@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use crate::model::parameters::{Parameter, ParameterKind};
 use armcal_core::kinematics::{AboutAxes, ArmLoads, Chain, LinkPoses, Sag};
 
-/// A bending arm at one configuration.
+/// A compliant arm at one configuration.
 pub(crate) struct SagPoint {
     sag: Sag,
     /// Torque of all weights about the joint axes, N m.
@@ -22,7 +22,7 @@ impl SagPoint {
         Self { sag: *sag, torques, by_tool }
     }
 
-    /// Turns about the axes by a parameter of sag, rad per unit; none for others.
+    /// Returns the turns about the axes per unit of a sag parameter, rad; zero for other parameters.
     pub(crate) fn turns(&self, Parameter { joint, kind }: Parameter) -> AboutAxes {
         let mut turns = AboutAxes::default();
         match kind {
@@ -38,8 +38,9 @@ impl SagPoint {
 }
 
 impl Parameter {
-    /// Motion of a frame at `point_m` (base frame) behind `joints` of `chain`, per unit: its point m, itself about the
-    /// base's axes rad; `None` for parameters of sensors.
+    /// Returns the motion of a frame at `point_m` (base frame) behind `joints` of `chain` per unit of the parameter.
+    /// The motion is that of its point (m) and its rotation about the base's axes (rad); `None` for parameters of
+    /// sensors.
     pub(crate) fn body_motion(
         self,
         chain: &Chain,

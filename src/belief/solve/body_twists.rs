@@ -1,4 +1,4 @@
-//! Twists of the camera by where joints sit on their parent links, and by how the arm bends.
+//! Twists of the camera by joint poses on the parent links, and by the arm's compliance.
 
 use nalgebra::{Isometry3, Matrix6, SMatrix, Vector3, Vector6};
 
@@ -8,7 +8,7 @@ use crate::solve::schur::{BodyTwists, Group};
 use armcal_core::kinematics::{AboutAxes, LinkCorrections, LinkPoses};
 use armcal_core::spatial::left_jacobian;
 
-/// Twists of the camera by the body's columns of the joints of `group`; zero for other joints.
+/// Returns the twists of the camera by the body's columns of the joints of `group`; zero for other joints.
 pub(crate) fn body_twists(problem: &BundleProblem<'_>, group: &Group<'_>, corrections: &LinkCorrections) -> BodyTwists {
     let mut twists = BodyTwists::zeros();
     let layout = &problem.layout;
@@ -34,7 +34,7 @@ pub(crate) fn body_twists(problem: &BundleProblem<'_>, group: &Group<'_>, correc
     twists
 }
 
-/// Twist of the camera by turns of the group's joints and of the base.
+/// Returns the twist of the camera by turns of the group's joints and of the base.
 pub(crate) fn sag_twist(group: &Group<'_>, turns: &AboutAxes) -> Vector6<f64> {
     let center = group.base_from_camera.translation.vector;
     let to_camera = group.base_from_camera.rotation.inverse();
@@ -43,7 +43,7 @@ pub(crate) fn sag_twist(group: &Group<'_>, turns: &AboutAxes) -> Vector6<f64> {
     Vector6::new(moved.x, moved.y, moved.z, turned.x, turned.y, turned.z)
 }
 
-/// Twists of the camera by a shift and by a turn of a joint's place, in its parent link's axes.
+/// Returns the twists of the camera by a shift and by a turn of a joint's frame, in its parent link's axes.
 pub(crate) fn link_twist(
     poses: &LinkPoses,
     base_from_camera: &Isometry3<f64>,
@@ -60,7 +60,7 @@ pub(crate) fn link_twist(
     ]
 }
 
-/// Sums of a group with its own parameters marginalised (module `linearize`), for the links' block.
+/// Sums of a group with its view-local parameters marginalised (module `linearize`), for the body's block.
 pub(crate) struct BodySums {
     pub twists: BodyTwists,
     /// `G - G M G`.
@@ -68,7 +68,7 @@ pub(crate) struct BodySums {
     pub m: Matrix6<f64>,
     pub m_h_sum: Matrix6<f64>,
     pub h_sum: Matrix6<f64>,
-    /// Gradient by the camera's twist, the own parameters eliminated.
+    /// Gradient by the camera's twist, with the view-local parameters marginalised.
     pub g: Vector6<f64>,
     pub by_lens: SMatrix<f64, 6, 8>,
 }

@@ -1,38 +1,38 @@
 //! Constants that decide something in `solve`: unit, source and effect of each, by the file that uses it.
 
 pub(crate) mod covariance {
-    /// Distances below this do not make the objective's curvature larger: it is where pixel noise sits, m.
+    /// Least distance in the objective's curvature, m: pixel noise causes distances below it.
     pub(crate) const DISTANCE_FLOOR_M: f64 = 1e-4;
 }
 
 pub(crate) mod estimate {
     /// Width of the Cauchy loss in the first solution, standard deviations of a measurement.
     pub(crate) const CORNER_WIDTH: f64 = 3.0;
-    /// Cost per used measurement above which something does not hold. Good views have about one (corner noise is not
+    /// Cost per used measurement above which the model does not hold. Good views have about one (corner noise is not
     /// quite normal).
     pub(crate) const CONSISTENT_COST: f64 = 3.0;
-    /// Most rounds of estimates and scales.
+    /// Largest number of rounds of estimates and scales.
     pub(crate) const MAX_ROUNDS: usize = 40;
     /// Change of the scales in a round below which they have settled.
     pub(crate) const CONVERGED_CHANGE: f64 = 0.01;
-    /// Rounds after the last new scales, in which outliers may still come and go.
+    /// Number of rounds after the last new scales, in which outliers may still change.
     pub(crate) const LAST_ROUNDS: usize = 5;
 }
 
 pub(crate) mod evidence {
-    /// Pseudo-observations that the first guess of each scale counts for.
+    /// Number of pseudo-observations that the first guess of each scale counts for.
     pub(crate) const NU_JOINT: f64 = 3.0;
     pub(crate) const NU_SHAPE: f64 = 2.0;
     pub(crate) const NU_TERM: f64 = 2.0;
     pub(crate) const NU_LINK: f64 = 2.0;
     pub(crate) const NU_NOISE: f64 = 20.0;
     pub(crate) const NU_CAMERA: f64 = 6.0;
-    /// Bounds of the noise's factor, and of every other scale over its first guess.
+    /// Bounds of the noise's factor; `SCALE_BOUNDS` are those of every other scale over its first guess.
     pub(crate) const NOISE_BOUNDS: [f64; 2] = [0.1, 30.0];
-    /// Bounds of the noise of positions and rotations over its first guess, where no noise is stated.
+    /// Bounds of the noise of positions and rotations, relative to the first guess, if no noise is stated.
     pub(crate) const POSITION_BOUNDS: [f64; 2] = [1e-3, 1e3];
     pub(crate) const SCALE_BOUNDS: [f64; 2] = [0.02, 50.0];
-    /// A column with less than one entry in so many goes by its entries alone: a view sees few of many tags.
+    /// Least ratio of rows to nonzero rows at which only the nonzero ones are used: a view sees few of many tags.
     pub(crate) const FEW: usize = 4;
     pub(crate) const STEP: f64 = 1e-3;
 }
@@ -40,59 +40,60 @@ pub(crate) mod evidence {
 pub(crate) mod levenberg_marquardt {
     use armcal_core::numeric::{Damping, StopRule};
 
-    /// Near the end a step may cost a few last digits; relative error of a sum of thousands of squares.
+    /// Cost increase that a step near the end may cause, relative: the rounding error of a sum of thousands of squares.
     pub(crate) const SLACK: f64 = 1e-13;
     pub(crate) const ROUNDING: f64 = 1e-11;
-    /// Where every observation is rejected the priors alone are left, whose least cost is zero: no step ever saves too
-    /// small a share of it. Below this cost, a sum of squares in standard deviations, all is within 1e-6 of the priors.
+    /// Cost below which all parameters are within 1e-6 standard deviations of the priors. It ends a search in which
+    /// every observation is rejected: the least cost is then zero, and no step ever saves too small a share of it.
     pub(crate) const COST_AT_PRIORS: f64 = 1e-12;
-    /// From this curvature on a step has overshot: it saved less than half of what it should.
+    /// Curvature from which a step has overshot: it saved less than half of the prediction.
     pub(crate) const OVERSHOT: f64 = 1.5;
     /// Cosine of the angle between two steps, the second of which goes back along the first.
     pub(crate) const GOES_BACK: f64 = -0.9;
-    /// A step that should gain less, relative, tells nothing of the curvature: the gain is in the last digits of the
-    /// sum.
+    /// Least relative gain, as predicted, of a step that determines the curvature; smaller gains are lost in the last
+    /// digits of the sum.
     pub(crate) const TELLING_GAIN: f64 = 1e2 * ROUNDING;
     /// Levenberg-Marquardt damping, relative to the normal equations' diagonal.
     pub(crate) const DAMPING: Damping =
         Damping { first: 1e-6, min: 1e-14, max: 1e12, down: 0.1, up: 10.0, min_after_rejection: 0.0 };
-    /// Until one more step would save nothing that a sum of squares could show.
+    /// Stop rule: until one more step would save less than a sum of squares can resolve.
     pub(crate) const TIGHT: StopRule =
         StopRule { predicted_gain: 1e-15, slack: SLACK, rounding: ROUNDING, ..StopRule::after(100) };
-    /// While scales or weights still change.
+    /// Stop rule while scales or weights still change.
     pub(crate) const LOOSE: StopRule = StopRule { max_iterations: 20, predicted_gain: 1e-6, ..TIGHT };
 }
 
 pub(crate) mod model_for_views {
-    /// Fewer views of the tag on the gripper are not used.
+    /// Least number of views of the tag on the gripper that are used.
     pub const MIN_GRIPPER_VIEWS: usize = 4;
-    /// Changes of the oil's temperature, K, and of the pressure, Pa (20 m of water), over the views from which on they
-    /// tell of their effects. Assumed.
+    /// Least changes of the oil's temperature, K, and of the pressure, Pa (20 m of water), over the views that make
+    /// their effects observable. Assumed.
     pub(crate) const WARMED_K: f64 = 0.5;
     pub(crate) const DIVED_PA: f64 = 2e5;
 }
 
 pub(crate) mod outliers {
-    /// Chi-square per coordinate above which an observation belongs elsewhere, and below which it belongs here.
+    /// Chi-square per coordinate above which an observation is rejected, and below which it is readmitted.
     pub(crate) const LIMITS: [f64; 2] = [7.5, 5.0];
-    /// Chi-square of a corner: that one of four normal corners is beyond these is as likely (5e-10, 3e-6) as that an
-    /// observation with eight coordinates is beyond its own, `4 exp(-x / 2) = P(chi-square of 8 > 60, 40)`.
+    /// Chi-square of a corner at which it is rejected and readmitted. One of four normal corners exceeds them as often
+    /// (5e-10, 3e-6) as an observation with eight coordinates exceeds its own: `4 exp(-x / 2) = P(chi-square of 8 > 60,
+    /// 40)`.
     pub(crate) const CORNER_LIMITS: [f64; 2] = [45.7, 28.1];
-    /// A tag of which fewer corners belong is elsewhere, or another one.
+    /// Least number of fitting corners of a tag; with fewer the tag is elsewhere, or it is another one.
     pub(crate) const MIN_CORNERS: usize = 3;
 }
 
 pub(crate) mod problem {
     use armcal_core::joints::MAX_JOINTS;
 
-    /// Degrees of freedom that the corner noise by robot.toml counts for, beside the scatter between a view's frames.
+    /// Degrees of freedom of robot.toml's corner noise when it is combined with the scatter between a view's frames.
     pub(crate) const CORNER_PRIOR_DOF: f64 = 16.0;
-    /// A view's own parameters: an error of each joint, then the camera's six.
+    /// Number of a view's local parameters: an error of each joint, then the camera's six.
     pub(crate) const N_VIEW_PARAMETERS: usize = MAX_JOINTS + 6;
 }
 
 pub(crate) mod robust_start {
-    /// Standard deviations of the tags' positions in the robust start, one after the other, m.
+    /// Standard deviations of the tags' positions in the successive rounds of the robust start, m.
     pub(crate) const START_STD_M: [f64; 3] = [0.3, 0.1, 0.03];
     pub(crate) const START_WIDTH: f64 = 1.0;
 }
@@ -100,11 +101,11 @@ pub(crate) mod robust_start {
 pub(crate) mod schur {
     use armcal_core::joints::MAX_JOINTS;
 
-    /// Directions of the common parameters: each joint, the mount's six, time offset.
+    /// Indices of the common directions: each joint, then the mount's six, then the time offset.
     pub(crate) const MOUNT: usize = MAX_JOINTS;
     pub(crate) const TIME: usize = MOUNT + 6;
     pub(crate) const N_DIRECTIONS: usize = TIME + 1;
-    /// Columns of all links that an arm may have, of their compliances, the base's and a load at the tool.
+    /// Number of columns of all links that an arm may have, of their compliances, the base's and the tool load.
     pub(crate) const N_BODY_COLUMNS: usize = 7 * MAX_JOINTS + 4;
 }
 

@@ -1,11 +1,11 @@
 //! Covariance of the estimate, in the parameters' units and as the tool's error.
 //!
-//! For an estimator that minimizes a sum of norms, the sandwich `A^-1 B A^-1` (Huber 1967): `A` is the objective's
-//! curvature, `B` the scatter of its gradient. `B` is summed by views, for all tags of one view share one camera pose
-//! and its error. Errors common to all views (camera mount, survey of a tag) do not show in any scatter; they are added
-//! from the priors through the same curvature. What a straight line leaves of a sensor's error (nonlinearity,
-//! temperature) is there again at every new pose; at the tool it is added from the datasheet's linearity, or from more
-//! than that where the residuals say that the sensors are worse than their datasheet.
+//! An estimator that minimizes a sum of norms has the sandwich covariance `A^-1 B A^-1` (Huber 1967): `A` is the
+//! objective's curvature, `B` the scatter of its gradient. `B` is summed by views, because all tags of one view share
+//! one camera pose and its error. Errors common to all views (camera mount, survey of a tag) do not show in any
+//! scatter; they are added from the priors through the same curvature. The sensor error that a straight line leaves
+//! (nonlinearity, temperature) recurs at every new pose. At the tool it is added from the datasheet's linearity, or
+//! more if the residuals show that the sensors are worse than their datasheet.
 
 use crate::solve::constants::covariance::DISTANCE_FLOOR_M;
 use nalgebra::{Const, DMatrix, DVector, Dyn, Matrix3, Matrix6, OMatrix, Vector3, Vector6};
@@ -24,32 +24,32 @@ use armcal_core::streams::{JointAngles, MAX_JOINTS};
 /// Covariance of the free parameters, in their own units (gain: 1, offset: rad).
 #[derive(Clone, Debug)]
 pub struct ParameterCovariance {
-    /// In the order of the rows.
+    /// Parameters in the order of the rows.
     pub parameters: Vec<Parameter>,
-    /// Square and symmetric; infinite where the data determine nothing.
+    /// Square, symmetric matrix; infinite where the data determine nothing.
     pub matrix: DMatrix<f64>,
-    /// One sigma of what the parameters leave of each sensor's error at a new pose; `None` takes the datasheet's
-    /// linearity.
+    /// Standard deviation of the error that the parameters leave of each sensor at a new pose, rad; `None` means the
+    /// datasheet's linearity.
     pub residual_std_rad: Option<[f64; MAX_JOINTS]>,
 }
 
 /// A joint at a travel of its sensor.
 #[derive(Clone, Copy, Debug)]
 pub struct JointAt<'a> {
-    /// Its sensor.
+    /// Sensor of the joint.
     pub spec: &'a JointSensorSpec,
-    /// Index, base first.
+    /// Index of the joint, base first.
     pub joint: usize,
-    /// From the middle of its range by the datasheet, rad.
+    /// Travel from the middle of the joint's range by the datasheet, rad.
     pub travel_rad: f64,
 }
 
 /// Predicted position error of the tool at the task's targets.
 #[derive(Clone, Debug)]
 pub struct ToolErrorPrediction {
-    /// Over the targets that inverse kinematics reaches.
+    /// Summary over the targets that inverse kinematics reaches, m.
     pub error_m: Summary,
-    /// One by one.
+    /// Prediction at each of these targets.
     pub targets: Vec<TargetPrediction>,
 }
 
@@ -58,12 +58,12 @@ pub struct ToolErrorPrediction {
 pub struct CommonErrors {
     /// Covariance of the camera's mount (translation m, rotation rad), on the right.
     pub mount: Matrix6<f64>,
-    /// Covariance of the tags' positions in the base frame, m^2, three rows a tag of the robot.
+    /// Covariance of the tags' positions in the base frame, m^2, three rows for each tag of the robot.
     pub tags_m2: DMatrix<f64>,
 }
 
 impl CommonErrors {
-    /// Returns the standard deviations stated in robot.toml and the survey: every axis and every tag by itself.
+    /// Returns the standard deviations stated in robot.toml and the survey: every axis and every tag independently.
     #[must_use]
     pub fn priors(robot: &Robot) -> Self {
         let (std_m, std_rad) = (robot.camera.mount_std_m, robot.camera.mount_std_rad);
@@ -73,7 +73,7 @@ impl CommonErrors {
         Self { mount: Matrix6::from_diagonal(&mount), tags_m2 }
     }
 
-    /// Mount first, then the tags.
+    /// Returns the joint covariance: mount first, then the tags.
     fn matrix(&self) -> DMatrix<f64> {
         let n = 6 + self.tags_m2.nrows();
         let mut matrix = DMatrix::zeros(n, n);
@@ -84,8 +84,8 @@ impl CommonErrors {
 }
 
 impl ParameterCovariance {
-    /// Covariance of gains and offsets under other conditions than the reference's, with the effects of temperature
-    /// and pressure.
+    /// Returns the covariance of gains and offsets under other conditions than the reference's, including the effects
+    /// of temperature and pressure.
     #[must_use]
     pub fn under(&self, change: &ConditionChange) -> Self {
         let mut to = DMatrix::identity(self.parameters.len(), self.parameters.len());
@@ -105,7 +105,7 @@ impl ParameterCovariance {
         Self { matrix: &to * &self.matrix * to.transpose(), ..self.clone() }
     }
 
-    /// Variance of a joint's angle there, rad^2: by its own parameters, and what is `besides`.
+    /// Returns the variance of a joint's angle at that travel, rad^2: from its own parameters, plus the given variance.
     #[must_use]
     pub fn angle_var_rad2(&self, at: JointAt<'_>, change: &ConditionChange, besides: f64) -> f64 {
         let JointAt { spec, joint, travel_rad } = at;
@@ -121,8 +121,8 @@ impl ParameterCovariance {
         variance.max(0.0)
     }
 
-    /// Estimates the covariance at the solution, and by how much the parameters go along with an error of the mount
-    /// (d parameter / d mount, six columns). A singular curvature gives infinite variances.
+    /// Estimates the covariance at the solution, and the parameters' derivative by the mount error (d parameter / d
+    /// mount, six columns). A singular curvature gives infinite variances.
     #[must_use]
     pub fn estimate(
         problem: &PositionProblem<'_>,
@@ -189,13 +189,13 @@ impl ParameterCovariance {
         Self { parameters, matrix, ..self }
     }
 
-    /// Nothing known of the parameters of `joint`.
+    /// Returns the covariance without the parameters of `joint`.
     #[must_use]
     pub fn without_joint(&self, joint: usize) -> Self {
         self.without(|parameter| parameter.joint == joint)
     }
 
-    /// Marginal of the other parameters.
+    /// Returns the marginal covariance of the other parameters.
     #[must_use]
     pub fn without(&self, is_dropped: impl Fn(Parameter) -> bool) -> Self {
         let kept: Vec<usize> = (0..self.parameters.len()).filter(|&k| !is_dropped(self.parameters[k])).collect();
@@ -206,7 +206,7 @@ impl ParameterCovariance {
         }
     }
 
-    /// One sigma of a parameter; `None` if it is not among the estimated ones.
+    /// Returns the standard deviation of a parameter; `None` if it is not estimated.
     #[must_use]
     pub fn std(&self, parameter: Parameter) -> Option<f64> {
         let row = self.parameters.iter().position(|p| *p == parameter)?;
@@ -214,7 +214,7 @@ impl ParameterCovariance {
     }
 }
 
-/// Factor on the datasheets' linearity that explains the residuals; at least 1.
+/// Returns the factor on the datasheets' linearity that explains the residuals; at least 1.
 ///
 /// `sum |residual|^2 = sum (tr(mount) + tr(survey) + tr(corners) + s^2 tr(linearity))` over all tags of fitted and
 /// held-out views, solved for `s`. Fitted views count for the share that the parameters leave free: a view adds about
@@ -229,7 +229,7 @@ pub fn linearity_scale(
     let [mut found_m2, mut from_drawing_m2, mut from_sensors_m2] = [0.0; 3];
     let mut views = fit.views.iter().chain(held_out.views).flat_map(|view| &view.tags);
     if views.any(|tag| tag.corners().is_none()) {
-        // How good positions are nobody says; their scatter shall not count as the sensors'.
+        // The accuracy of positions is unknown; their scatter must not count as the sensors'.
         return 1.0;
     }
     for (problem, n_fitted) in [(fit, n), (held_out, 0)] {
@@ -249,7 +249,8 @@ pub fn linearity_scale(
     if scale.is_finite() { scale } else { 1.0 }
 }
 
-/// Expected square of a tag's distance from its survey with perfect sensors: mount, survey and corner noise, m^2.
+/// Returns the expected squared distance of a tag from its survey with perfect sensors, m^2: mount, survey and corner
+/// noise.
 fn drawing_variance_m2(robot: &Robot, tag: &TagObservation) -> f64 {
     let (camera, survey) = (&robot.camera, &robot.tags[tag.tag_idx]);
     let range_m = tag.center_in_camera_m.norm();
@@ -271,8 +272,8 @@ fn is_locked(robot: &Robot, joint: usize) -> bool {
     robot.failed.contains(&FailedJoint { joint, kind: FailedKind::Locked })
 }
 
-/// The arm's angles at each target that inverse kinematics reaches: from where the arm rested for it, as a `reach` goes
-/// there; where it did not, from the stowed pose or the other rests.
+/// Returns the arm's angles at each target that inverse kinematics reaches. The search starts where the arm rested for
+/// the target, as a `reach` does; otherwise from the stowed pose or the other rests.
 #[must_use]
 pub fn task_angles(robot: &Robot, task: TaskRests<'_>) -> Vec<JointAngles> {
     numbered_task_angles(robot, task).into_iter().map(|(_, angles)| angles).collect()
@@ -294,7 +295,7 @@ pub(crate) fn numbered_task_angles(robot: &Robot, TaskRests { task, rests }: Tas
             JointAngles::from_fn(rest.len(), |j| if settings.locked[j] { robot.stowed[j] } else { rest[j] })
         };
         let own = rests.get(&target_idx).map(rest).and_then(|rest| from(&rest));
-        // With a joint that is locked elsewhere the way there may lead past a limit.
+        // If a joint is locked elsewhere, the path from the rest may lead past a limit.
         let angles =
             own.or_else(|| from(&robot.stowed)).or_else(|| rests.values().find_map(|other| from(&rest(other))));
         Some((target_idx, angles?))
@@ -302,7 +303,7 @@ pub(crate) fn numbered_task_angles(robot: &Robot, TaskRests { task, rests }: Tas
     reached.collect()
 }
 
-/// Expected size of the tool's position error at each target of `task`: `sqrt(trace(covariance))`, summarized.
+/// Predicts the tool's position error at each target of `task`, `sqrt(trace(covariance))`, and its summary.
 #[must_use]
 pub fn predict_tool_error(
     robot: &Robot,
@@ -335,8 +336,8 @@ mod tests {
     use armcal_core::streams::ReachTask;
     use std::collections::BTreeMap;
 
-    /// A target is predicted for where the arm stood at it; for the stowed pose's solution where it was never reached
-    /// for, or where no solution leads from the rest.
+    /// The prediction for a target is at the configuration in which the arm rested for it. Without such a rest, or
+    /// without a solution from there, it is the solution from the stowed pose.
     #[test]
     fn a_target_is_predicted_where_the_arm_rested_for_it() {
         let robot = titan();
@@ -345,7 +346,7 @@ mod tests {
         for (joint, by_rad) in [(0, -0.6), (1, -0.5), (2, 0.8), (3, -0.9), (4, 0.5)] {
             rested[joint] += by_rad;
         }
-        // Wrong sensors: it rested beside the target.
+        // The sensors are wrong: the arm rested next to the target.
         let mut at_target = rested;
         (0..5).for_each(|joint| at_target[joint] += 0.02);
         let task =

@@ -11,10 +11,10 @@ use armcal_core::optics::square_corners;
 use armcal_core::stats::Summary;
 use armcal_core::time::Stamp;
 
-/// A fit view by view, and its task target by target.
+/// Residuals of a fit for each view, and predictions for each target of the task.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FitDetails {
-    /// In the order of the fit; those of a map or of end stops alone are none.
+    /// Residuals of the fitted views in their order; views only for a map or of end stops are not among them.
     pub views: Vec<ViewResidual>,
     /// Targets of the task that inverse kinematics reaches.
     pub targets: Vec<TargetPrediction>,
@@ -23,41 +23,41 @@ pub struct FitDetails {
 /// Residuals of one view.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ViewResidual {
-    /// Number in its capture mark.
+    /// Number of the view in its capture mark.
     pub pose_idx: u32,
     /// End of the view.
     pub end: Stamp,
-    /// Angles of its readings by the datasheet, rad.
+    /// Joint angles of the readings by the datasheet, rad.
     pub datasheet_rad: JointAngles,
     /// Joint angles as calibrated, rad.
     pub calibrated_rad: JointAngles,
     /// Error of each joint from its calibrated sensor in this view, rad; only from `bundle`.
     pub joint_error_rad: Option<JointAngles>,
-    /// In the order of the recording.
+    /// Tags of the view in the order of the recording.
     pub tags: Vec<ObservedTag>,
 }
 
-/// One tag in one view.
+/// Residual of one tag in one view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ObservedTag {
-    /// As in the image.
+    /// Id of the tag in the image.
     pub id: u32,
-    /// Between where the calibrated arm has it and where it is known to be, m.
+    /// Distance between the tag's positions by the calibrated arm and by the survey, m.
     pub off_m: f64,
-    /// Where the recording has corners; one that is predicted out of the lens's view is absent.
+    /// Residuals of the corners, if the recording has corners; absent if predicted outside of the lens's view.
     pub corners: [Option<CornerResidual>; 4],
     /// True if the fit used any of it; false if it rejected all corners.
     pub is_used: bool,
 }
 
-/// One corner of a tag, raw pixels.
+/// Residual of one corner of a tag, raw pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CornerResidual {
-    /// Mean over the frames of the view.
+    /// Mean position over the frames of the view.
     pub seen_px: [f64; 2],
-    /// Seen less predicted.
+    /// Seen minus predicted position.
     pub off_px: [f64; 2],
-    /// True if the fit used it; false if it rejected it.
+    /// True if the fit used the corner; false if it rejected it.
     pub is_used: bool,
 }
 
@@ -66,15 +66,15 @@ pub struct CornerResidual {
 pub struct TargetPrediction {
     /// Number of the target in its task, from 0.
     pub target_idx: usize,
-    /// The arm's angles there, rad.
+    /// Joint angles at the target, rad.
     pub angles: JointAngles,
     /// Covariance of the tool's position in the base frame, m^2.
     pub covariance_m2: Matrix3<f64>,
     /// Expected size of the tool's position error: `sqrt(trace(covariance))`, m.
     pub error_m: f64,
-    /// Predicted error with the unobservable parameters' stated sigmas, if requested, m.
+    /// Predicted error with the stated standard deviations of unobservable parameters, if requested, m.
     pub with_priors_m: Option<f64>,
-    /// Covariance with stated sigmas of the unobservable parameters, where that was asked for, m^2.
+    /// Covariance with the stated standard deviations of unobservable parameters, if requested, m^2.
     pub with_priors_m2: Option<Matrix3<f64>>,
     /// Distribution of the error's size, from which U95 follows.
     pub distribution: Option<ErrorDistribution>,
@@ -85,7 +85,8 @@ impl FitDetails {
         Self { views: ViewResidual::all(problem, at), targets }
     }
 
-    /// Keeps the errors with stated sigmas included, target by target in the same order; returns their sizes.
+    /// Stores the errors with stated standard deviations included, target by target in the same order; returns their
+    /// sizes.
     pub(crate) fn keep_with_priors(&mut self, errors: &[TargetError], dof_of_noise: f64) -> Option<Summary> {
         let size_m = |error: &TargetError| {
             let by_data_m = error.by_data_m2.trace().max(0.0).sqrt();
@@ -102,7 +103,7 @@ impl FitDetails {
 }
 
 impl ViewResidual {
-    /// Residuals of each view of the problem at its solution.
+    /// Returns the residuals of each view of the problem at its solution.
     pub(crate) fn all(problem: &PositionProblem<'_>, at: &JointParameters) -> Vec<Self> {
         let mut all: Vec<Self> = problem.views.iter().map(|view| Self::without_tags(problem, view, at)).collect();
         problem.each(at, |o| all[o.view_idx].tags.push(ObservedTag::of(problem, o)));
@@ -138,7 +139,7 @@ impl ObservedTag {
         Self { id: o.tag.id, off_m: o.residual_m.norm(), corners, is_used: true }
     }
 
-    /// Root mean square over the corners that are used, px.
+    /// Returns the root mean square over the corners in use, px.
     #[must_use]
     pub fn rms_px(&self) -> Option<f64> {
         let used = self.corners.iter().flatten().filter(|corner| corner.is_used && self.is_used);

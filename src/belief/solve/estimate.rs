@@ -1,5 +1,5 @@
-//! The estimate from start to end: a robust start, what does not belong left out, the scales by evidence, the rest by
-//! least squares.
+//! The estimate from start to end: a robust start, rejection of outliers, scales by evidence, least squares for the
+//! rest.
 
 use crate::measure::BlockMeasurement;
 use crate::solve::constants::estimate::{CONSISTENT_COST, CONVERGED_CHANGE, CORNER_WIDTH, LAST_ROUNDS, MAX_ROUNDS};
@@ -26,7 +26,7 @@ use armcal_core::optics::CameraModel;
 use armcal_core::robot::Robot;
 use armcal_core::spatial::Pose;
 
-/// The answer.
+/// Result of the estimate.
 #[derive(Clone)]
 pub struct Estimate<'a> {
     pub(crate) problem: BundleProblem<'a>,
@@ -38,25 +38,25 @@ pub struct Estimate<'a> {
     pub(crate) has_own_priors: bool,
     /// Estimated parameters.
     pub model: Model,
-    /// The initial guess; what has no column keeps its values, and its reference is that of the terms.
+    /// Initial guess; parameters without a column keep its values, and its reference is that of the terms.
     pub guess: JointParameters,
     /// Tag observations that the estimate rejected.
     pub outliers: Vec<Outlier>,
-    /// Steps of all solutions, the robust start included.
+    /// Number of steps of all solutions, the robust start included.
     pub iterations: usize,
-    /// The cost at the first guess and at the end, under the scales of the end.
+    /// Cost at the first guess, under the final scales.
     pub cost_initial: f64,
-    /// Sum of squared whitened residuals, priors and views' own errors included.
+    /// Sum of squared whitened residuals at the end, priors and view-local errors included.
     pub cost_final: f64,
 }
 
-/// Estimates; `None` where the views determine nothing at all (no cost that is finite).
+/// Estimates all parameters; `None` if the views determine nothing at all (no finite cost).
 #[must_use]
 pub fn estimate<'a>(input: &BundleInput<'a>) -> Option<Estimate<'a>> {
     estimate_with_lengths(input, &[])
 }
 
-/// Estimates with measured lengths between blocks that have columns.
+/// Estimates all parameters, with measured lengths between blocks that have columns.
 #[must_use]
 pub(crate) fn estimate_with_lengths<'a>(input: &BundleInput<'a>, lengths: &[BlockMeasurement]) -> Option<Estimate<'a>> {
     let RobustStart { parameters: start, steps, mut iterations } = robust_start(input);
@@ -65,7 +65,7 @@ pub(crate) fn estimate_with_lengths<'a>(input: &BundleInput<'a>, lengths: &[Bloc
     let first_state = problem.start(&input.guess);
     let mut state = problem.start(&start);
     problem.set_steps(&mut state, &steps);
-    // Robustly on the corners; straight sensors leave what the datasheet says.
+    // The loss is robust on the corners; straight sensors leave the nonlinearity that the datasheet states.
     problem.scales.joint_std_rad = straight_sensor_std(input);
     let mut solved = solve(&problem, state, Loss::Cauchy { c: CORNER_WIDTH }, LOOSE);
     iterations += solved.iterations;
@@ -115,10 +115,10 @@ pub(crate) fn estimate_with_lengths<'a>(input: &BundleInput<'a>, lengths: &[Bloc
     })
 }
 
-/// Plain least squares from the guess, every observation used, the scales as given: what a solver alone is compared by.
+/// Plain least squares from the guess, with every observation and the given scales, to compare solvers.
 #[derive(Clone, Debug)]
 pub struct LeastSquares {
-    /// Those of the least cost.
+    /// Parameters of the least cost.
     pub parameters: JointParameters,
     /// Outcome of the solver.
     pub outcome: Outcome,
@@ -152,8 +152,8 @@ fn cost_at(problem: &BundleProblem<'_>, state: &State) -> f64 {
 }
 
 impl Estimate<'_> {
-    /// True if the used observations and the priors agree about as well as their standard deviations say: the cost, a
-    /// sum of squares in standard deviations, is not many times the number of measurements.
+    /// Returns true if the used observations and the priors agree about as well as their standard deviations say. The
+    /// cost, a sum of squares in standard deviations, is then not many times the number of measurements.
     #[must_use]
     pub fn is_consistent(&self) -> bool {
         let used = self.problem.observations.iter().filter(|observation| observation.is_used);
@@ -178,14 +178,14 @@ impl Estimate<'_> {
         }
     }
 
-    /// True if any observation of the view is used.
+    /// Returns true if the estimate uses any observation of the view.
     #[must_use]
     pub fn uses(&self, view_idx: usize) -> bool {
         let observations = self.problem.views[view_idx].observations.clone();
         self.problem.observations[observations].iter().any(|observation| observation.is_used)
     }
 
-    /// One sigma of a joint's angle by its parameters, on average over the views, rad.
+    /// Returns the standard deviation of a joint's mean angle over the views, from its parameters, rad.
     #[must_use]
     pub fn mean_angle_std_rad(&self, joint: usize) -> f64 {
         let columns = self.problem.layout.of_joint[joint].clone();
@@ -198,26 +198,27 @@ impl Estimate<'_> {
         (&self.posterior.covariance * &by).dot(&by).max(0.0).sqrt()
     }
 
-    /// A joint's angle in a view as estimated, and one sigma of what is not its sensor's model, rad.
+    /// Returns a joint's estimated angle in a view, and the standard deviation of its error beyond the sensor's model,
+    /// rad.
     #[must_use]
     pub fn angle(&self, view_idx: usize, joint: usize) -> (f64, f64) {
         let angle_rad = self.problem.angles(view_idx, &self.solved.state)[joint];
         (angle_rad, self.posterior.own[view_idx][joint].max(0.0).sqrt())
     }
 
-    /// The joints' parameters.
+    /// Returns the joints' parameters.
     #[must_use]
     pub fn parameters(&self) -> JointParameters {
         parameters_of(&self.problem, &self.solved.state, &self.guess)
     }
 
-    /// Outcome of the last solution.
+    /// Returns the outcome of the last solution.
     #[must_use]
     pub fn outcome(&self) -> Outcome {
         self.solved.outcome
     }
 
-    /// `input` with the terms that were selected since.
+    /// Returns `input` with the terms that were selected since.
     pub(crate) fn with_found_terms<'b>(&self, input: &BundleInput<'b>) -> BundleInput<'b> {
         let mut scales = input.scales.clone();
         scales.camera_error_std = self.scales().camera_error_std.or(scales.camera_error_std);
@@ -225,14 +226,14 @@ impl Estimate<'_> {
         BundleInput { model: self.model.clone(), scales, ..input.clone() }
     }
 
-    /// The scales at the end.
+    /// Returns the final scales.
     #[must_use]
     pub fn scales(&self) -> &Hyperparameters {
         &self.problem.scales
     }
 
-    /// Root mean square of the standard deviation that the corners of a view have by their frames and robot.toml,
-    /// before the fitted noise, px; `None` without corners.
+    /// Returns the root mean square standard deviation of the corners from their frames and robot.toml, before the
+    /// fitted noise, px. `None` without corners.
     pub(crate) fn mean_corner_std_px(&self) -> Option<f64> {
         let variance = |observation: &ObservationTerm| match &observation.data {
             WeightedMeasurement::Corners(corners) if observation.is_used => Some(1.0 / corners.info),
@@ -245,41 +246,42 @@ impl Estimate<'_> {
         (!variances.is_empty()).then(|| (variances.iter().sum::<f64>() / variances.len() as f64).sqrt())
     }
 
-    /// True if positions or poses were measured instead of corners.
+    /// Returns true if positions or poses were measured instead of corners.
     #[must_use]
     pub fn has_positions(&self) -> bool {
         self.problem.observations.iter().any(|observation| !observation.data.is_in_pixels())
     }
 
-    /// True if poses were measured instead of corners.
+    /// Returns true if poses were measured instead of corners.
     #[must_use]
     pub fn has_poses(&self) -> bool {
         let mut observations = self.problem.observations.iter();
         observations.any(|observation| matches!(observation.data, WeightedMeasurement::Pose { .. }))
     }
 
-    /// Delay of the joint sensors' stamps after the camera's and its sigma, s; `None` if it is not estimated.
+    /// Returns the delay of the joint sensors' stamps after the camera's and its standard deviation, s; `None` if it is
+    /// not estimated.
     #[must_use]
     pub fn time_offset_s(&self) -> Option<[f64; 2]> {
         let at = self.problem.layout.at(Block::Clock)?;
         Some([self.solved.state.blocks.number(Block::Clock), self.posterior.covariance[(at, at)].sqrt()])
     }
 
-    /// The joints' parameters in the order of [`Self::joint_covariance`].
+    /// Returns the joints' parameters in the order of [`Self::joint_covariance`].
     #[must_use]
     pub fn joint_parameters(&self) -> &[Parameter] {
         &self.problem.layout.parameters
     }
 
-    /// Covariance of [`Self::joint_parameters`], in their units.
+    /// Returns the covariance of [`Self::joint_parameters`], in their units.
     #[must_use]
     pub fn joint_covariance(&self) -> DMatrix<f64> {
         let n = self.problem.layout.n_joint();
         self.wide_covariance().view((0, 0), (n, n)).into_owned()
     }
 
-    /// `link_from_camera` of the camera of that number, and its covariance (translation m, rotation rad, on the right);
-    /// the prior's where it is not estimated.
+    /// Returns the `link_from_camera` of the camera with that number, and its covariance (translation m, rotation rad,
+    /// on the right); the prior's if it is not estimated.
     #[must_use]
     pub fn mount(&self, camera: usize) -> (Isometry3<f64>, Matrix6<f64>) {
         let block = Block::Mount(camera);
@@ -293,7 +295,7 @@ impl Estimate<'_> {
         (*self.solved.state.pose(block), covariance)
     }
 
-    /// Numbers of the cameras that have views, in their order.
+    /// Returns the numbers of the cameras that have views, in their order.
     pub(crate) fn cameras(&self) -> impl Iterator<Item = usize> + '_ {
         let has_views = |camera: &usize| self.problem.views.iter().any(|view| view.camera == *camera);
         (0..=self.problem.robot.further_cameras.len()).filter(has_views)
@@ -305,13 +307,13 @@ impl Estimate<'_> {
         self.problem.layout.at(block).is_some()
     }
 
-    /// Lens of the camera of that number.
+    /// Returns the lens of the camera with that number.
     pub(crate) fn lens(&self, camera: usize) -> &CameraModel {
         self.solved.state.blocks.lens(Block::Lens(camera))
     }
 
-    /// `base_from_tag` of each of the robot's tags, and its covariance (on the right); `None` for tags that were not
-    /// seen.
+    /// Returns the `base_from_tag` of a tag of the robot, and its covariance (on the right); `None` for a tag that was
+    /// not seen.
     #[must_use]
     pub fn tag(&self, tag_idx: usize) -> (Isometry3<f64>, Option<Matrix6<f64>>) {
         let at = self.problem.layout.at(Block::Tag(tag_idx));
@@ -319,7 +321,7 @@ impl Estimate<'_> {
         (*self.solved.state.pose(Block::Tag(tag_idx)), covariance)
     }
 
-    /// Gives `robot` the lenses that were estimated.
+    /// Sets the estimated lenses of `robot`.
     pub(crate) fn give_lenses(&self, robot: &mut Robot) {
         let cameras = std::iter::once(&mut robot.camera).chain(&mut robot.further_cameras);
         for (number, camera) in cameras.enumerate().filter(|(number, _)| self.has(Block::Lens(*number))) {
@@ -327,14 +329,15 @@ impl Estimate<'_> {
         }
     }
 
-    /// Where the lens of a view's camera was estimated, the view's tags are where they are through that of `robot`.
+    /// Recomputes the positions of a view's tags with the lens of `robot`, if the lens of the view's camera was
+    /// estimated.
     pub(crate) fn see_through_found_lens(&self, view: &mut View, robot: &Robot) {
         if self.has(Block::Lens(view.camera)) {
             view.see_through(robot);
         }
     }
 
-    /// `robot` with camera and tags where they were found.
+    /// Returns `robot` with links, cameras and tags as estimated.
     #[must_use]
     pub fn as_found(&self, robot: &Robot) -> Robot {
         let (mount, covariance) = self.mount(0);

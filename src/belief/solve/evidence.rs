@@ -1,8 +1,8 @@
-//! Noise and prior sizes from the data: MacKay's fixed point of the evidence.
+//! Noise and prior standard deviations from the data: MacKay's fixed point of the evidence.
 //!
-//! For a group of parameters x with prior variance s^2 and posterior variances v, `gamma = sum (1 - v / s^2)` of them
-//! are told by the data, and `s^2 = (sum x^2 + nu s0^2) / (gamma + nu)` (MacKay 1992, eq. 4.9), with nu
-//! pseudo-observations of the datasheet's s0. The noise: `(sum chi^2 + nu) / (N - gamma_all + nu)`.
+//! A group of parameters x has the prior variance s^2 and posterior variances v. The data determine `gamma = sum (1 - v
+//! / s^2)` of them, and `s^2 = (sum x^2 + nu s0^2) / (gamma + nu)` (MacKay 1992, eq. 4.9), with nu pseudo-observations
+//! of the datasheet's s0. The noise: `(sum chi^2 + nu) / (N - gamma_all + nu)`.
 
 use crate::solve::constants::evidence::{FEW, NU_CAMERA, NU_LINK, NU_NOISE, NU_SHAPE, NU_TERM, STEP};
 pub(crate) use crate::solve::constants::evidence::{NOISE_BOUNDS, NU_JOINT, POSITION_BOUNDS, SCALE_BOUNDS};
@@ -22,14 +22,14 @@ use armcal_core::numeric::Loss;
 use armcal_core::sensor::shape_prior;
 use armcal_core::spatial::log;
 
-/// The posterior at the scales of the problem.
+/// Posterior at the scales of the problem.
 #[derive(Clone, Debug)]
 pub(crate) struct Posterior {
     /// Covariance of the common parameters.
     pub covariance: DMatrix<f64>,
-    /// Variances of each view's own parameters.
+    /// Variances of each view's local parameters.
     pub own: Vec<[f64; N_VIEW_PARAMETERS]>,
-    /// The part of these that is left by the common ones.
+    /// Part of these variances that comes from the common parameters.
     pub by_common: Vec<[f64; N_VIEW_PARAMETERS]>,
 }
 
@@ -40,12 +40,12 @@ pub(crate) struct Marginal {
     pub covariance: DMatrix<f64>,
     /// Standard deviation of each joint's error at a new pose, rad.
     pub joint_std_rad: [f64; MAX_JOINTS],
-    /// Factor on the variances, by the held-out cameras.
+    /// Factor on the variances, from the held-out cameras.
     pub factor: f64,
 }
 
 impl Posterior {
-    /// `None` where the normal equations have no inverse.
+    /// Computes the posterior; `None` if the normal equations have no inverse.
     pub(crate) fn of(problem: &BundleProblem<'_>, normal: &NormalEquations) -> Option<Self> {
         let factor = Cholesky::new(normal.matrix.clone())?;
         let covariance = factor.inverse();
@@ -68,7 +68,7 @@ impl Posterior {
     }
 }
 
-/// `b^T N^-1 b` of each column b of `right`, by the factor of N or by its inverse, the covariance.
+/// Returns `b^T N^-1 b` of each column b of `right`, from the factor of N or from its inverse, the covariance.
 fn squares_over(factor: &Cholesky<f64, Dyn>, covariance: &DMatrix<f64>, mut right: DMatrix<f64>) -> Vec<f64> {
     let touched: Vec<usize> = (0..right.nrows()).filter(|&k| right.row(k).iter().any(|v| *v != 0.0)).collect();
     if FEW * touched.len() < right.nrows() {
@@ -80,7 +80,7 @@ fn squares_over(factor: &Cholesky<f64, Dyn>, covariance: &DMatrix<f64>, mut righ
     right.column_iter().map(|column| column.norm_squared()).collect()
 }
 
-/// Sums over one group of parameters with a common prior size.
+/// Sums over one group of parameters with a common prior standard deviation.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sums {
     squares: f64,
@@ -88,16 +88,16 @@ struct Sums {
 }
 
 impl Sums {
-    /// `std`: the prior's; `value` and `variance` of the posterior.
+    /// Adds a parameter with `std` of the prior, and `value` and `variance` of the posterior.
     fn add(&mut self, value: f64, variance: f64, std: f64) {
         self.squares += value * value;
         self.gamma += (1.0 - variance / (std * std)).clamp(0.0, 1.0);
     }
 
-    /// Expected square of an error of variance s^2 that n views share, each under a prior of n s^2. `left`: the shares of that which it
-    /// has after the views, all of it and what the common parameters leave open. With g = 1 - what its own view leaves
-    /// open, the estimate has the square `s^2 g (g + n (1 - g))` on average, less n times what the common parameters
-    /// take up; it counts once.
+    /// Adds an error of variance s^2 that n views share, each under a prior of n s^2. `left` is its posterior variance
+    /// over that prior: in total, and the part from the common parameters. Let g = 1 - the share that its own view
+    /// leaves open. The estimate's mean square is then `s^2 g (g + n (1 - g))`, less n times the common parameters'
+    /// part. The error counts once.
     fn add_shared(&mut self, value: f64, [left, by_common]: [f64; 2], n: f64) {
         let g = (1.0 - left + by_common).clamp(0.0, 1.0);
         self.squares += value * value / n;
@@ -110,18 +110,18 @@ impl Sums {
     }
 }
 
-/// Which square of a scale is taken of its inverse chi-square distribution.
+/// Choice of the squared scale from its inverse chi-square distribution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ScaleMoment {
-    /// The sum of squares over the degrees of freedom: what the evidence asks for.
+    /// The sum of squares over the degrees of freedom: the maximum of the evidence.
     Fitted,
-    /// The mean.
+    /// The mean of the distribution.
     Mean,
 }
 
 impl ScaleMoment {
-    /// Divisor of a sum of squares of `dof` degrees of freedom. A mean needs more than two; below four it counts as twice the
-    /// fitted square.
+    /// Returns the divisor of a sum of squares of `dof` degrees of freedom. A mean needs more than two degrees; below
+    /// four it counts as twice the fitted square.
     fn divisor(self, dof: f64) -> f64 {
         match self {
             Self::Fitted => dof,
@@ -130,7 +130,7 @@ impl ScaleMoment {
     }
 }
 
-/// Where the scales began, and which squares of them are wanted.
+/// First guess of the scales, and the kind of square that is fitted.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ScaleTarget<'a> {
     first: &'a Hyperparameters,
@@ -147,7 +147,7 @@ impl<'a> ScaleTarget<'a> {
     }
 }
 
-/// The scales that `posterior` asks for.
+/// Returns the scales that follow from `posterior`.
 pub(crate) fn updated(
     problem: &BundleProblem<'_>,
     state: &State,
@@ -279,8 +279,8 @@ impl ScaleUpdate<'_, '_> {
         }
     }
 
-    /// Each link's shift and turn has a size of its own, so that one wrong link does not loosen the others (automatic
-    /// relevance determination, MacKay 1994); the camera mount's likewise.
+    /// Updates the shift and the turn of each link separately, so that one wrong link does not loosen the others
+    /// (automatic relevance determination, MacKay 1994). The camera mounts are updated likewise.
     fn update_links(&self, next: &mut Hyperparameters) {
         let Self { problem, state, posterior, .. } = *self;
         let ScaleTarget { first, moment } = *self.target;
@@ -304,7 +304,8 @@ impl ScaleUpdate<'_, '_> {
         }
     }
 
-    /// New scales (shift, turn) of a mount whose columns begin at `at`, whose prior is `std`, and which is `off` nominal.
+    /// Returns the new scales (shift, turn) of a mount whose columns begin at `at`, whose prior is `std`, and whose
+    /// deviation from nominal is `off`.
     fn mount_scale(&self, (at, std): (usize, &Std), off: &Std, now: [f64; 2]) -> [f64; 2] {
         let Self { posterior, .. } = *self;
         let unit = std.map(at_least);
@@ -318,7 +319,7 @@ impl ScaleUpdate<'_, '_> {
         })
     }
 
-    /// Joints share a size of their compliances; the base has its own.
+    /// Updates the compliances' scales: joints share one, and the base has its own.
     fn update_sag(&self, next: &mut Hyperparameters) {
         let Self { problem, state, posterior, .. } = *self;
         let ScaleTarget { first, moment } = *self.target;
@@ -351,7 +352,7 @@ impl ScaleUpdate<'_, '_> {
         next.camera_error_std = Some([0, 1].map(|k| sums[k].std(NU_CAMERA, first[k], moment)));
     }
 
-    /// The noise of corners; of a recording with positions or poses in their place theirs, each by itself.
+    /// Updates the noise of corners; in a recording with positions or poses, the noise of these, each separately.
     fn update_noise(&self, normal: &NormalEquations, next: &mut Hyperparameters) {
         let Self { problem, state, posterior, .. } = *self;
         let used = || problem.observations.iter().enumerate().filter(|(_, observation)| observation.is_used);
@@ -402,15 +403,15 @@ impl NoiseKind {
         }
     }
 
-    /// Standard deviation of positions or rotations, m or rad.
+    /// Returns the standard deviation of positions or rotations, m or rad.
     fn std(self, scales: &Hyperparameters) -> f64 {
         if self == Self::Rotation { scales.rotation_std_rad } else { scales.position_std_m }
     }
 }
 
-/// Chi-square of positions or of rotations, and the number of parameters that they determine. With the information of that kind
-/// times `1 + e`, chi-square grows by `e` times its part, and `ln det` of the normal matrix, the views' own parameters
-/// with it, by `ln (1 + e)` times the parameters told.
+/// Returns the chi-square of positions or of rotations, and the number of parameters that they determine. With the
+/// information of that kind times `1 + e`, chi-square grows by `e` times its part. `ln det` of the normal matrix,
+/// view-local parameters included, grows by `ln (1 + e)` times the number of determined parameters.
 fn share_of(problem: &BundleProblem<'_>, state: &State, normal: &NormalEquations, kind: NoiseKind) -> (f64, f64) {
     let mut stiffer = problem.clone();
     let by = |wanted: NoiseKind| if kind == wanted { 1.0 + STEP } else { 1.0 };
@@ -428,7 +429,7 @@ fn share_of(problem: &BundleProblem<'_>, state: &State, normal: &NormalEquations
     (chi2.max(0.0), if told.is_finite() { told.max(0.0) } else { 0.0 })
 }
 
-/// Number of parameters that the data determine, including the views' own.
+/// Returns the number of parameters that the data determine, view-local ones included.
 pub(crate) fn determined(problem: &BundleProblem<'_>, posterior: &Posterior) -> f64 {
     let layout = &problem.layout;
     let information = &problem.prior.information.matrix;
@@ -459,7 +460,7 @@ impl PartialEq for Sums {
     }
 }
 
-/// The largest relative change of any scale.
+/// Returns the largest relative change of any scale.
 pub(crate) fn change(a: &Hyperparameters, b: &Hyperparameters) -> f64 {
     let numbers = |s: &Hyperparameters| {
         let mut all = vec![

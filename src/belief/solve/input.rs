@@ -15,27 +15,27 @@ pub struct BundleInput<'a> {
     pub robot: &'a Robot,
     /// Fitted views.
     pub views: &'a [View],
-    /// Which parameters have a column.
+    /// Choice of the parameters that have a column.
     pub model: Model,
     /// Standard deviations of priors and noise, at the start.
     pub scales: Hyperparameters,
-    /// Where the search begins, and the reference of the terms.
+    /// Initial guess, and the reference of the terms.
     pub guess: JointParameters,
     /// Prior of the joints' parameters; `None` uses the datasheet's.
     pub joint_prior: Option<JointPrior>,
-    /// How the scales are set.
+    /// Choice between fitted and given scales.
     pub evidence: HyperparameterMode,
 }
 
 impl BundleInput<'_> {
-    /// With columns of the tags that the views show.
+    /// Returns the layout with columns of the tags that the views show.
     pub(crate) fn layout(&self) -> Layout {
         let is_seen = |tag_idx: usize| self.views.iter().flat_map(|v| &v.tags).any(|tag| tag.tag_idx == tag_idx);
         Layout::new(self.robot, &self.model, is_seen)
     }
 
-    /// The prior by datasheet, drawing and survey with these scales; of the joints' parameters the earlier
-    /// calibration's, if there is one.
+    /// Returns the prior from datasheet, nominal model (URDF) and survey with these scales. For the joints' parameters
+    /// it is the earlier calibration's, if there is one.
     pub(crate) fn prior(&self) -> Prior {
         let mut prior = Prior::drawn(self.robot, &self.model.parameters(), &self.scales);
         if let Some(known) = &self.joint_prior {
@@ -43,7 +43,7 @@ impl BundleInput<'_> {
         }
         for (tag_idx, std) in prior.std.tags_mut().iter_mut().enumerate() {
             let mut seen = self.views.iter().flat_map(|view| &view.tags).filter(|seen| seen.tag_idx == tag_idx);
-            // A landmark that is seen as a position alone has no attitude to speak of.
+            // A landmark that is measured only by its position has no observable attitude.
             if seen.all(|seen| matches!(seen.measured, TagMeasurement::Position)) {
                 std[3..6].fill(1.0);
             }
@@ -52,11 +52,11 @@ impl BundleInput<'_> {
     }
 }
 
-/// How the scales (noise and prior standard deviations) are set.
+/// Choice between fitted and given scales (noise and prior standard deviations).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HyperparameterMode {
-    /// Fitted by the evidence of the data.
+    /// The evidence of the data determines the scales.
     Fitted,
-    /// As in [`BundleInput::scales`].
+    /// The scales are those of [`BundleInput::scales`].
     Given,
 }

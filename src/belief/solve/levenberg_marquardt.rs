@@ -1,8 +1,8 @@
-//! Levenberg-Marquardt over the common parameters; the views' own follow by back substitution.
+//! Levenberg-Marquardt over the common parameters; view-local ones follow by back substitution.
 //!
-//! Gauss-Newton leaves out how the residuals bend. Where that matters (a compliance times an unknown load, both small)
-//! its steps overshoot to and fro along one direction, each by the same share. So what a step gained tells the
-//! curvature along it, and the next step is as much shorter, if it only goes back (the secant's rule along a line).
+//! Gauss-Newton neglects the residuals' second derivatives. If they matter (a compliance times an unknown load, both
+//! small), its steps overshoot alternately along one direction, each by the same share. So the gain of a step gives the
+//! curvature along it. If the next step only goes back, it is shortened accordingly (the secant's rule along a line).
 
 use crate::solve::constants::levenberg_marquardt::{COST_AT_PRIORS, DAMPING, GOES_BACK, OVERSHOT, TELLING_GAIN, TIGHT};
 use nalgebra::{Cholesky, DMatrix, DVector, Vector6};
@@ -15,12 +15,12 @@ use armcal_core::joints::MAX_JOINTS;
 use armcal_core::numeric::{LeastSquares, Loss, Outcome, Proposal, StopRule, minimize};
 use armcal_core::spatial::exp;
 
-/// Until one more step would save less than `predicted_gain` of the cost.
+/// Returns the rule that stops when one more step would save less than `predicted_gain` of the cost.
 pub(crate) const fn until(max_iterations: usize, predicted_gain: f64) -> StopRule {
     StopRule { max_iterations, predicted_gain, ..TIGHT }
 }
 
-/// The state at the end, its normal equations, and how it went.
+/// Final state, its normal equations, and the outcome of the solver.
 #[derive(Clone)]
 pub(crate) struct Solved {
     pub state: State,
@@ -31,7 +31,7 @@ pub(crate) struct Solved {
     pub cost_initial: f64,
 }
 
-/// The problem as the loop sees it, with the memory of one step.
+/// Problem as the loop needs it, with the memory of one step.
 struct Solver<'a, 'b> {
     problem: &'a BundleProblem<'b>,
     loss: Loss,
@@ -47,18 +47,18 @@ struct Solver<'a, 'b> {
     last: LastStep,
 }
 
-/// The step that led here, and what it told.
+/// The step that led to the current state, and the curvature along it.
 struct LastStep {
     step: DVector<f64>,
-    /// Its square in the metric of the normal equations.
+    /// Squared length of the step in the metric of the normal equations.
     square: f64,
-    /// Curvature of the cost along it, over that of the linear problem; 1 where nothing is known.
+    /// Curvature of the cost along the step, relative to that of the linear problem; 1 if unknown.
     curvature: f64,
 }
 
 impl LastStep {
-    /// The share of a step that leads to the least cost: all of it, unless it goes back along a step that overshot.
-    /// `pull`: the right side of the normal equations that `step` solves.
+    /// Returns the share of a step that leads to the least cost: all of it, unless it goes back along a step that
+    /// overshot. `pull`: the right side of the normal equations that `step` solves.
     fn share(&self, step: &DVector<f64>, pull: &DVector<f64>) -> f64 {
         if self.curvature < OVERSHOT {
             return 1.0;
@@ -90,9 +90,9 @@ impl LeastSquares for Solver<'_, '_> {
     }
 
     fn accept(&mut self) {
-        // The gain of a share s of a step that should save P, under the curvature c: (2 s - s^2 c) P.
+        // Gain of a share s of a step with predicted gain P, under the curvature c: (2 s - s^2 c) P.
         let (share, gain) = (self.share, self.normal.cost - self.trial_normal.cost);
-        // A gain of the sum's last digits tells nothing.
+        // A gain in the last digits of the sum does not determine the curvature.
         if self.predicted_gain > TELLING_GAIN * self.normal.cost {
             self.last.curvature = (2.0 * share - gain / self.predicted_gain) / (share * share);
         }
@@ -103,7 +103,7 @@ impl LeastSquares for Solver<'_, '_> {
     }
 }
 
-/// Minimizes the problem's cost from `state`. Where every observation is rejected it stalls at the priors.
+/// Minimizes the problem's cost from `state`. If every observation is rejected, it stalls at the priors.
 pub(crate) fn solve(problem: &BundleProblem<'_>, state: State, loss: Loss, stop: StopRule) -> Solved {
     let mut observations = problem.observations.iter();
     let is_without_data = !problem.observations.is_empty() && observations.all(|observation| !observation.is_used);
@@ -131,7 +131,7 @@ pub(crate) fn solve(problem: &BundleProblem<'_>, state: State, loss: Loss, stop:
     Solved { state, normal, iterations: report.iterations, outcome, cost_initial }
 }
 
-/// The step by the matrix with its diagonal raised, factored in `room`; `None` where it has no Cholesky factor.
+/// Computes the step with the raised diagonal, factored in `room`; `None` if the matrix has no Cholesky factor.
 fn solve_damped(
     normal: &NormalEquations,
     damping: f64,
@@ -142,7 +142,7 @@ fn solve_damped(
     if raised.shape() == normal.matrix.shape() {
         raised.copy_from(&normal.matrix);
     } else {
-        // A matrix that could not be factored took its room along.
+        // A matrix that could not be factored has consumed its memory.
         raised.clone_from(&normal.matrix);
     }
     for k in 0..raised.nrows() {
@@ -155,7 +155,7 @@ fn solve_damped(
     Some(())
 }
 
-/// Decrease of the cost by a step of the views' own parameters with the common ones held.
+/// Returns the decrease of the cost by a step of the view-local parameters with the common ones fixed.
 pub(crate) fn own_gain(normal: &NormalEquations) -> f64 {
     normal.eliminated.iter().filter(|own| own.has_any).map(|own| own.gradient.dot(&(own.inverse * own.gradient))).sum()
 }
@@ -172,7 +172,7 @@ pub(crate) fn stepped(
     next
 }
 
-/// Makes `next` of `state` by a step of the common parameters, the views' own following.
+/// Sets `next` to `state` after a step of the common parameters and the resulting step of the view-local ones.
 pub(crate) fn take_step(
     problem: &BundleProblem<'_>,
     state: &State,
@@ -192,7 +192,7 @@ pub(crate) fn take_step(
     }
 }
 
-/// The step of a view's own parameters, where the common ones push the camera's twist by `pushed`.
+/// Adds the step of a view's local parameters, given the push `pushed` of the common ones on the camera's twist.
 fn add_own(problem: &BundleProblem<'_>, own: &SchurBlock, view_idx: usize, pushed: &Vector6<f64>, next: &mut State) {
     let own_step = own.inverse * (own.gradient - own.twists.tr_mul(pushed));
     for joint in 0..MAX_JOINTS {

@@ -1,11 +1,11 @@
-//! Normal equations of one state, the views' own parameters eliminated (Schur complement).
+//! Normal equations at one state, with view-local parameters marginalised (Schur complement).
 //!
-//! In a view all acts through the twist u of the camera (right, camera frame) that each observation i sees:
-//! `u_i = S l + T y - Ad_i tau_i`: l the view's own parameters (joint errors, camera error) with prior `L^-1`, y the
-//! common ones along the directions T (joints, links, mount, time offset), tau_i the tag's pose. With `H_i` of each
-//! observation and `G = sum H_i`, elimination of l leaves, for the blocks a and b,
-//! `sum A_a^T H_i A_b - (sum A_a^T H_i) M (sum H_i A_b)`, `M = S (S^T G S + L)^-1 S^T`: all of it 6x6 algebra, whatever
-//! the number of corners.
+//! In a view everything acts through the twist u of the camera (right, camera frame) that each observation i sees: `u_i
+//! = S l + T y - Ad_i tau_i`. Here l are the view-local parameters (joint errors, camera error) with prior `L^-1`. The
+//! common parameters y act along the directions T (joints, links, mount, time offset), and tau_i is the tag's pose.
+//! With `H_i` of each observation, `G = sum H_i` and `M = S (S^T G S + L)^-1 S^T`, marginalising l leaves, for the
+//! blocks a and b, `sum A_a^T H_i A_b - (sum A_a^T H_i) M (sum H_i A_b)`. All of this is 6x6 algebra, regardless of the
+//! number of corners.
 
 use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, SVector, Vector6};
 
@@ -21,7 +21,7 @@ use armcal_core::kinematics::LinkCorrections;
 use armcal_core::numeric::Loss;
 use armcal_core::spatial::log;
 
-/// Where to linearize, and under which loss.
+/// Point of linearization, and the loss.
 struct Point<'a, 'b> {
     problem: &'a BundleProblem<'b>,
     state: &'a State,
@@ -29,7 +29,7 @@ struct Point<'a, 'b> {
     loss: Loss,
 }
 
-/// Over the observations of a group.
+/// Sums over the observations of a group.
 struct Sums {
     h: Matrix6<f64>,
     g: Vector6<f64>,
@@ -50,10 +50,10 @@ impl Sums {
     }
 }
 
-/// The normal equations at one state.
+/// Normal equations at one state.
 #[derive(Clone, Debug)]
 pub(crate) struct NormalEquations {
-    /// Lower triangle.
+    /// Matrix, of which only the lower triangle is used.
     pub matrix: DMatrix<f64>,
     pub right: DVector<f64>,
     pub cost: f64,
@@ -90,7 +90,7 @@ impl NormalEquations {
 
     /// Linearizes `problem` at `state`.
     pub(crate) fn update(&mut self, problem: &BundleProblem<'_>, state: &State, loss: Loss) {
-        // A prior of all columns is copied in the place of zeros.
+        // A full prior is copied into the matrix instead of zeros.
         let is_full = problem.prior.is_full();
         if is_full {
             self.start_with_full_prior(problem, state);
@@ -100,7 +100,7 @@ impl NormalEquations {
             self.cost = 0.0;
         }
         let at = Point { problem, state, corrections: problem.link_corrections(state), loss };
-        // Lent, and filled in place: the blocks are large.
+        // The blocks are moved out and updated in place because they are large.
         let mut eliminated = std::mem::take(&mut self.eliminated);
         let mut blocks = eliminated.iter_mut();
         for view_idx in 0..problem.views.len() {
@@ -161,7 +161,7 @@ impl NormalEquations {
         own.by_lens = sums.by_lens;
     }
 
-    /// The tags' own blocks, and what ties them to the common parameters and to one another.
+    /// Adds the tags' own blocks, and their coupling to the common parameters and to one another.
     fn add_tags(
         &mut self,
         columns: &Columns<'_>,
@@ -179,10 +179,10 @@ impl NormalEquations {
             let mut own_right = self.right.fixed_rows_mut::<6>(column);
             own_right -= info.adjoint.tr_mul(&(info.g - info.h * *shift));
             self.add_block(column, column, &(info.adjoint.transpose() * u));
-            // Common by tag: T^T (H_i - G M H_i)(-Ad_i).
+            // Coupling of common parameters and tag: T^T (H_i - G M H_i)(-Ad_i).
             let cross = if block.has_any { u - h_sum_m * u } else { u };
             self.subtract_cross(columns, column, &cross.transpose(), directions);
-            // Only what is eliminated ties a view's tags to one another.
+            // Only marginalised parameters couple a view's tags to one another.
             if !block.has_any {
                 continue;
             }
@@ -190,7 +190,7 @@ impl NormalEquations {
             for other in 0..=k {
                 let (before, Some(at)) = &self.by_tag[first + other] else { continue };
                 let (before, at) = (*before, *at);
-                // Rows: this tag; columns: the other's.
+                // Rows: this tag; columns: the other tag.
                 let block = -(m_u_transposed * before);
                 if at < column {
                     self.add_block(column, at, &block);
@@ -201,7 +201,7 @@ impl NormalEquations {
         }
     }
 
-    /// Linearized observations, weighted by the loss, their cost added.
+    /// Linearizes the observations, weights them by the loss, and adds their cost.
     fn linearize_sightings(&mut self, point: &Point<'_, '_>, group: &Group<'_>) {
         let Point { problem, state, loss, .. } = point;
         self.infos.clear();
@@ -233,7 +233,7 @@ impl NormalEquations {
         }
     }
 
-    /// Adds at rows `row`, columns `column`, row >= column; on the diagonal the lower triangle matters.
+    /// Adds a block at rows `row`, columns `column`, row >= column; on the diagonal only the lower triangle matters.
     pub(crate) fn add_block(&mut self, row: usize, column: usize, block: &Matrix6<f64>) {
         let mut view = self.matrix.fixed_view_mut::<6, 6>(row, column);
         view += block;
@@ -242,7 +242,7 @@ impl NormalEquations {
     fn add_common(&mut self, columns: &Columns<'_>, block: &SMatrix<f64, N_DIRECTIONS, N_DIRECTIONS>) {
         for b in columns.directions() {
             let (first, by_columns) = columns.of(b);
-            // Directions come in the order of their columns; what falls above the diagonal is not read.
+            // Directions are in the order of their columns; entries above the diagonal are not read.
             for a in columns.directions().skip_while(|a| *a < b) {
                 let (first_row, by_rows) = columns.of(a);
                 for (k, by_column) in by_columns.iter().enumerate() {
@@ -254,14 +254,14 @@ impl NormalEquations {
         }
     }
 
-    /// Cells of a column, from a row on.
+    /// Returns the cells of a column, from a row on.
     #[inline]
     pub(crate) fn cells(&mut self, column: usize, first_row: usize, n: usize) -> &mut [f64] {
         let start = column * self.matrix.nrows() + first_row;
         &mut self.matrix.as_mut_slice()[start..start + n]
     }
 
-    /// As many as there are in a pose, or a lens.
+    /// Returns a fixed number of cells of a column, such as those of a pose or a lens.
     #[inline]
     pub(crate) fn few_cells<const N: usize>(&mut self, column: usize, first_row: usize) -> &mut [f64; N] {
         let cells = self.cells(column, first_row, N).first_chunk_mut();
@@ -274,7 +274,8 @@ impl NormalEquations {
         }
     }
 
-    /// `by_twist`: tag by twist of the camera. Common parameters come before the tags, so that these are the rows.
+    /// Subtracts the coupling of a tag (`by_twist`: tag by twist of the camera). Common parameters come before the
+    /// tags, so that these are the rows.
     fn subtract_cross(&mut self, columns: &Columns<'_>, tag: usize, by_twist: &Matrix6<f64>, directions: &Directions) {
         for a in columns.directions() {
             let by_direction = by_twist * directions.column(a);
@@ -315,7 +316,7 @@ impl NormalEquations {
     }
 }
 
-/// Takes the group's own parameters out; `block` becomes what is left of them. What they cost by their priors.
+/// Marginalises the group's view-local parameters into `block`; returns their cost under the priors.
 fn eliminate(
     at: &Point<'_, '_>,
     group: &Group<'_>,
@@ -330,7 +331,7 @@ fn eliminate(
     let mut info = SVector::<f64, N_VIEW_PARAMETERS>::repeat(1.0);
     let mut own = SVector::<f64, N_VIEW_PARAMETERS>::zeros();
     for joint in group.joints.clone() {
-        // An exact sensor has no error to eliminate.
+        // An exact sensor has no error to marginalise.
         if problem.joint_error_var(view, joint) <= 0.0 {
             continue;
         }
@@ -355,7 +356,7 @@ fn eliminate(
     }
     let cost = own.component_mul(&own).dot(&info) - block.time_error.pull(&own).dot(&own);
     block.gradient = block.twists.tr_mul(&sums.g) + prior_gradient;
-    // Most views have no error of the camera: the rest of their matrix is one.
+    // Most views have no camera error: the rest of their matrix is the identity.
     let log_det = if block.moves_camera() {
         block.invert::<N_VIEW_PARAMETERS>(&sums.h, &info)
     } else {
@@ -365,7 +366,7 @@ fn eliminate(
     cost
 }
 
-/// A group whose own parameters are eliminated, with `M`, their own motion, and `M sum H_i`.
+/// A group whose view-local parameters are marginalised, with `M`, their own motion, and `M sum H_i`.
 struct Eliminated<'a> {
     block: &'a SchurBlock,
     m: Matrix6<f64>,
@@ -377,7 +378,7 @@ struct LensSums<'a> {
     at: usize,
     infos: &'a [PoseInformation],
     lens_infos: &'a [LensInformation],
-    /// Place of the group's first observation.
+    /// Index of the group's first observation.
     first: usize,
     directions: &'a Directions,
     m: Matrix6<f64>,
@@ -386,7 +387,7 @@ struct LensSums<'a> {
     by_lens: SMatrix<f64, 6, 8>,
 }
 
-/// Twists of the camera (right, camera frame) by each common direction.
+/// Returns the twists of the camera (right, camera frame) by each common direction.
 fn directions(Point { problem, corrections, .. }: &Point<'_, '_>, group: &Group<'_>) -> Directions {
     let Group { poses, base_from_camera, .. } = group;
     let sag = &corrections.sag;

@@ -1,8 +1,8 @@
 //! The estimate: maximum a posteriori over everything that the measurements depend on.
 //!
-//! `input` is what a solution takes, `model_for_views` says what has a column, `problem` puts views and priors into
-//! form, `linearize` sums the normal equations (views eliminated: `schur`), `levenberg_marquardt` solves them.
-//! `estimate` is the whole with outliers and the sizes that `evidence` fits; `covariance` what it means for the tool.
+//! `input` is the input of a solution, `model_for_views` chooses the columns, and `problem` prepares views and priors.
+//! `linearize` sums the normal equations (views marginalised: `schur`), `levenberg_marquardt` solves them. `estimate`
+//! runs everything, with outliers and the scales that `evidence` fits; `covariance` gives the effect on the tool.
 
 pub(crate) mod body_columns;
 pub(crate) mod body_motion;

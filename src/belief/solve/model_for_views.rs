@@ -1,4 +1,4 @@
-//! The choice of the estimated quantities, by the contents of a recording.
+//! Choice of the estimated quantities from the content of a recording.
 
 use crate::model::blocks::{Block, Shown};
 use crate::model::estimated::Model;
@@ -9,12 +9,12 @@ use crate::views::view::View;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::{Conditions, N_SHAPE};
 
-/// All coefficients of the nonlinearity.
+/// Returns all coefficients of the nonlinearity.
 pub(crate) fn shape_kinds() -> impl Iterator<Item = ParameterKind> {
     (0..N_SHAPE).map(|h| ParameterKind::Shape(h as u8))
 }
 
-/// Model by what the recording can tell: terms whose cause did not change have no column.
+/// Returns the model that the views can determine: terms whose cause did not change have no column.
 #[must_use]
 pub fn model_for(robot: &Robot, views: &[View]) -> Model {
     let spread = |f: &dyn Fn(&Conditions) -> Option<f64>| {
@@ -31,28 +31,28 @@ pub fn model_for(robot: &Robot, views: &[View]) -> Model {
     model_of(robot, &Scope { warmed, dived, from_both_sides: &from_both_sides, shown })
 }
 
-/// Returns true where the camera of that number shows tags, as the first one always does.
+/// Returns true if the camera with that number shows tags; the first one always counts.
 pub(crate) fn has_views(views: &[View], camera: usize) -> bool {
     camera == 0 || views.iter().any(|view| view.camera == camera && !view.tags.is_empty())
 }
 
 /// Effects that a recording can constrain.
 pub(crate) struct Scope<'a> {
-    /// The oil's temperature and the pressure change.
+    /// True if the oil's temperature changes; `dived`: true if the pressure changes.
     pub warmed: bool,
     pub dived: bool,
-    /// True for a joint (by index) that came to rest from both sides.
+    /// Returns true for a joint (by index) that came to rest from both sides.
     pub from_both_sides: &'a dyn Fn(usize) -> bool,
     pub shown: Shown<'a>,
 }
 
-/// Sensors before the camera, or before the tag on the gripper, with the mount and the tags.
+/// Returns the model of the sensors before the camera, or before the tag on the gripper, with the mount and the tags.
 pub(crate) fn model_of(robot: &Robot, scope: &Scope<'_>) -> Model {
     let gripper_joints = robot.gripper_tag.filter(|_| scope.shown.gripper_tag).map_or(0, |tag| tag.mount.n_joints);
     let last = gripper_joints.max(robot.n_seen_joints());
     let joint = |joint: usize| {
         let spec = &robot.sensors[joint];
-        // A datasheet that leaves nothing open leaves nothing to estimate.
+        // A sensor whose datasheet is exact has nothing to estimate.
         if joint >= last || (spec.gain_std <= 0.0 && spec.offset_std_rad <= 0.0) {
             return Vec::new();
         }
@@ -72,7 +72,7 @@ pub(crate) fn model_of(robot: &Robot, scope: &Scope<'_>) -> Model {
     Model { joints, ..Model::of_blocks(0, blocks) }
 }
 
-/// The middle of the views' conditions.
+/// Returns the middle of the views' conditions.
 #[must_use]
 pub fn reference(views: &[View]) -> Conditions {
     let mean = |f: &dyn Fn(&Conditions) -> Option<f64>| {

@@ -1,8 +1,8 @@
-//! Tag observations and corners that do not fit the rest: rejected by their chi-square between two solutions, and
-//! readmitted where they fit.
+//! Outliers: tag observations and corners that do not fit the rest. They are rejected by their chi-square between two
+//! solutions, and readmitted if they fit.
 //!
-//! One corner that does not belong (occluded, blurred, beside an edge) leaves the other three in use if these fit. Two
-//! such corners, or chi-square of all without any, are a tag that is elsewhere or another one: all four go.
+//! One outlying corner (occluded, blurred, at an edge) leaves the other three in use if these fit. Two such corners, or
+//! a large chi-square of all without any, mean that the tag is elsewhere or another one: all four are rejected.
 
 use crate::measure::{ObservationTerm, WeightedMeasurement};
 use crate::solve::constants::outliers::{CORNER_LIMITS, LIMITS, MIN_CORNERS};
@@ -11,25 +11,25 @@ use crate::solve::linearize::NormalEquations;
 use crate::solve::problem::BundleProblem;
 use crate::views::view::View;
 
-/// A tag observation, or a corner of one, that does not fit the rest.
+/// Tag observation, or a corner of one, that does not fit the rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outlier {
-    /// Index into the views of the input.
+    /// Index of the view among those of the input.
     pub view_idx: usize,
-    /// Id of the tag, which may be that on the gripper.
+    /// Id of the tag, possibly the one on the gripper.
     pub tag_id: u32,
-    /// The corner, in the detector's order; `None` where all of the observation is rejected.
+    /// Index of the corner in the detector's order; `None` if the whole observation is rejected.
     pub corner: Option<usize>,
     /// Root mean square of the rejected coordinates' residuals in standard deviations.
     pub sigmas: f64,
 }
 
-/// Limit of each by its use so far: an observation is rejected beyond the one and comes back below the other.
+/// Returns the limits by the present use: an observation is rejected above the one and readmitted below the other.
 fn limits_of<const N: usize>(used: [bool; N], [reject, readmit]: [f64; 2]) -> [f64; N] {
     used.map(|is_used| if is_used { reject } else { readmit })
 }
 
-/// Marks what does not belong; whether anything changed.
+/// Flags outliers; returns true if any flag changed.
 pub(crate) fn reject(problem: &mut BundleProblem<'_>, solved: &Solved) -> bool {
     reject_by(problem, &solved.normal)
 }
@@ -53,7 +53,7 @@ pub(crate) fn reject_by(problem: &mut BundleProblem<'_>, normal: &NormalEquation
     changed
 }
 
-/// The corners that belong: all, three, or none.
+/// Returns true for the corners that fit: all, three, or none.
 fn fitting_corners(before: [bool; 4], chi2: &[f64; 4]) -> [bool; 4] {
     let limits = limits_of(before, CORNER_LIMITS);
     let used = [0, 1, 2, 3].map(|corner| chi2[corner] < limits[corner]);
@@ -81,7 +81,8 @@ pub(crate) fn rejected(observation: &ObservationTerm) -> Rejected {
     Rejected { n_coordinates: 2 * n_corners, chi2: corner_limit * n_corners as f64 }
 }
 
-/// Positions and poses come with a standard deviation that is a guess until the scales are fitted.
+/// Returns a factor on the limits: the standard deviation of positions and poses is a guess until the scales are
+/// fitted.
 fn noise_excess(seen: &WeightedMeasurement) -> f64 {
     match seen {
         WeightedMeasurement::Corners(_) | WeightedMeasurement::Board { .. } => 1.0,
@@ -89,7 +90,7 @@ fn noise_excess(seen: &WeightedMeasurement) -> f64 {
     }
 }
 
-/// Those that the solution rejected.
+/// Returns the observations and corners that the solution rejected.
 pub(crate) fn outliers(problem: &BundleProblem<'_>, views: &[View], solved: &Solved) -> Vec<Outlier> {
     let mut out = Vec::new();
     for (view_idx, view) in problem.views.iter().enumerate() {

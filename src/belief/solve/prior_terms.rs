@@ -1,4 +1,4 @@
-//! Parts of the normal equations that come from no view: priors and measurements of blocks.
+//! Parts of the normal equations that do not come from views: priors and measurements of blocks.
 
 use nalgebra::{Dyn, Matrix6, OMatrix, U6, Vector6};
 
@@ -29,8 +29,9 @@ impl NormalEquations {
         }
     }
 
-    /// One of all columns: with `d` how far a pose is off, a small motion of the pose changes it by the inverse of the
-    /// right Jacobian at `d`. Taken as one it would let what is well known leak into what is not. The lower triangle.
+    /// Starts with a prior on all columns. If a pose is off its mean by `d`, a small motion changes `d` by the inverse
+    /// of the right Jacobian there. With the identity instead, well-known directions would leak into unknown ones. Only
+    /// the lower triangle is valid.
     pub(crate) fn start_with_full_prior(&mut self, problem: &BundleProblem<'_>, state: &State) {
         let (layout, info) = (&problem.layout, &problem.prior.information.matrix);
         let off = problem.prior.off(layout, state);
@@ -79,7 +80,7 @@ impl NormalEquations {
         self.cost += info * off * off;
     }
 
-    /// Prior of a pose that is `d` off its mean.
+    /// Adds the prior of a pose that is off its mean by `d`.
     fn add_pose_prior(&mut self, at: usize, d: &Vector6<f64>, std: &[f64]) {
         let info = Vector6::from_fn(|k, _| if std[k].is_finite() { at_least(std[k]).powi(-2) } else { 0.0 });
         let jacobian = right_jacobian_inverse(d);

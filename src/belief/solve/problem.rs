@@ -1,4 +1,4 @@
-//! The least-squares problem: views and observations as the solver's loops read them, with columns and priors.
+//! The least-squares problem: views and observations in the form that the solver's loops read, with columns and priors.
 
 use crate::solve::constants::problem::CORNER_PRIOR_DOF;
 pub(crate) use crate::solve::constants::problem::N_VIEW_PARAMETERS;
@@ -22,7 +22,7 @@ use armcal_core::kinematics::{ArmLoads, LinkCorrections, LinkPoses};
 use armcal_core::robot::{CameraSpec, Robot};
 use armcal_core::time::Stamp;
 
-/// A view as the loops want it.
+/// Data of a view in the form that the solver's loops read.
 #[derive(Clone, Debug)]
 pub(crate) struct ViewData {
     /// Angles without the estimated parameters, rad.
@@ -30,19 +30,19 @@ pub(crate) struct ViewData {
     /// d(angle)/d(parameter) of each column.
     pub basis: Vec<f64>,
     pub rate_rad_s: [f64; MAX_JOINTS],
-    /// Variance of the mean reading by its noise, rad^2.
+    /// Variance of the mean reading from its noise, rad^2.
     pub reading_var: [f64; MAX_JOINTS],
     pub observations: Range<usize>,
     pub gripper: Option<usize>,
-    /// Joints whose sensor says nothing in this view.
+    /// True for joints without a usable sensor reading in this view.
     pub is_free: [bool; MAX_JOINTS],
-    /// Against gravity, base frame, where the view knows better than robot.toml.
+    /// Unit vector against gravity, base frame, if the view knows it better than robot.toml.
     pub up: Option<Vector3<f64>>,
     /// Number of the camera that saw the observations.
     pub camera: usize,
-    /// Joints, base first, that move it and the tags against each other.
+    /// Number of joints, base first, that move the camera relative to the tags.
     pub n_seen_joints: usize,
-    /// Cameras with a view of the same pose.
+    /// Number of cameras with a view of the same pose.
     pub n_cameras: f64,
 }
 
@@ -52,13 +52,13 @@ pub(crate) struct BundleProblem<'a> {
     pub layout: Layout,
     pub views: Vec<ViewData>,
     pub observations: Vec<ObservationTerm>,
-    /// Between blocks that have columns.
+    /// Measurements between blocks that have columns.
     pub block_measurements: Vec<BlockMeasurement>,
     pub prior: Prior,
     pub scales: Hyperparameters,
-    /// Links as they were known before.
+    /// Prior corrections of the links.
     pub guess_links: LinkCorrections,
-    /// Joints that move camera and tags against each other.
+    /// Number of joints that move the camera relative to the tags.
     pub n_seen_joints: usize,
 }
 
@@ -66,12 +66,12 @@ pub(crate) struct BundleProblem<'a> {
 pub(crate) type Own = SMatrix<f64, N_VIEW_PARAMETERS, N_VIEW_PARAMETERS>;
 
 impl<'a> BundleProblem<'a> {
-    /// With columns of what the views show.
+    /// Returns the problem with columns of everything that the views show.
     pub(crate) fn new(input: &BundleInput<'a>, prior: Prior) -> Self {
         Self::with_layout(input, input.layout(), prior)
     }
 
-    /// With columns that may be more than the views' own.
+    /// Returns the problem with a layout that may have further columns.
     pub(crate) fn with_layout(input: &BundleInput<'a>, layout: Layout, prior: Prior) -> Self {
         let BundleInput { robot, views, model, scales, .. } = input;
         let (robot, scales) = (*robot, scales.clone());
@@ -114,12 +114,12 @@ impl<'a> BundleProblem<'a> {
         Self { robot, layout, views: data, observations, block_measurements, prior, scales, guess_links, n_seen_joints }
     }
 
-    /// Makes the datasheet's priors those of the scales.
+    /// Adjusts the datasheet's priors to the scales.
     pub(crate) fn rescale_priors(&mut self) {
         self.prior.rescale(self.robot, &self.layout.parameters, &self.scales);
     }
 
-    /// Takes `scales` over, with the weights that depend on them.
+    /// Adopts `scales`, and the weights that depend on them.
     pub(crate) fn set_scales(&mut self, scales: Hyperparameters) {
         self.scales = scales;
         self.weigh_positions([1.0; 2]);
@@ -140,7 +140,7 @@ impl<'a> BundleProblem<'a> {
         }
     }
 
-    /// The state where nothing is off its prior, but for the joints' parameters, which are `guess`'s.
+    /// Returns the state at the prior means, except the joints' parameters, which are `guess`'s.
     pub(crate) fn start(&self, guess: &JointParameters) -> State {
         let parameters = &self.layout.parameters;
         State {
@@ -151,7 +151,7 @@ impl<'a> BundleProblem<'a> {
         }
     }
 
-    /// The steps of sensors that slipped.
+    /// Returns the steps of sensors that slipped.
     pub(crate) fn steps(&self, state: &State) -> Vec<(Parameter, f64)> {
         let all = self.layout.parameters.iter().copied().zip(state.joint.iter().copied());
         all.filter(|(p, _)| p.is_step()).collect()
@@ -165,16 +165,17 @@ impl<'a> BundleProblem<'a> {
         }
     }
 
-    /// Variance of what a joint is off in a view beyond the sensor's model, rad^2.
+    /// Returns the variance of a joint's error in a view beyond the sensor's model, rad^2.
     pub(crate) fn joint_error_var(&self, view: &ViewData, joint: usize) -> f64 {
         self.joint_own_var(view, joint) + self.jitter_rad(view, joint).powi(2)
     }
 
-    /// The part of it that is the joint's own: the image's time error moves all joints of a view together.
+    /// Returns the part of that variance that is the joint's own: the image's time error moves all joints of a view
+    /// together.
     ///
-    /// Cameras that see one pose share it. Each of n has a view of its own here, under n times the variance: whatever
-    /// the errors have to do with each other, what they tell together is not more than it is (covariance intersection
-    /// with equal weights, Julier and Uhlmann 1997).
+    /// Cameras with a view of the same pose share this error. Each of the n cameras has a view of its own here, under n
+    /// times the variance. So their joint information never exceeds that of the one error, regardless of the
+    /// correlation (covariance intersection with equal weights, Julier and Uhlmann 1997).
     pub(crate) fn joint_own_var(&self, view: &ViewData, joint: usize) -> f64 {
         if view.is_free[joint] {
             return self.scales.free_joint_std_rad.powi(2);
@@ -182,7 +183,7 @@ impl<'a> BundleProblem<'a> {
         view.n_cameras * (self.scales.joint_std_rad[joint].powi(2) + view.reading_var[joint])
     }
 
-    /// Motion of a joint within one sigma of the image's time error, rad.
+    /// Returns the motion of a joint within one standard deviation of the image's time error, rad.
     pub(crate) fn jitter_rad(&self, view: &ViewData, joint: usize) -> f64 {
         if view.is_free[joint] { 0.0 } else { view.rate_rad_s[joint] * self.scales.time_jitter_std_s }
     }
@@ -199,7 +200,7 @@ impl<'a> BundleProblem<'a> {
         })
     }
 
-    /// The links' corrections in `state`; those of the guess where they are not estimated.
+    /// Returns the links' corrections in `state`; those of the guess if they are not estimated.
     pub(crate) fn link_corrections(&self, state: &State) -> LinkCorrections {
         let mut corrections = self.guess_links;
         let columns = self.layout.links.clone();
@@ -218,18 +219,18 @@ impl<'a> BundleProblem<'a> {
         all.links
     }
 
-    /// Weights that the arm carries in a view, whose base may lean.
+    /// Returns the weights that the arm carries in a view, whose base may lean.
     pub(crate) fn loads(&self, view_idx: usize) -> ArmLoads {
         let loads = self.robot.chain.loads();
         self.views[view_idx].up.map_or(*loads, |up| loads.with_up(up))
     }
 
-    /// Poses of all links in a view, in the frame of the tags.
+    /// Returns the poses of all links in a view, in the frame of the tags.
     pub(crate) fn link_poses(&self, view_idx: usize, state: &State) -> LinkPoses {
         self.corrected_link_poses(view_idx, state, &self.link_corrections(state))
     }
 
-    /// Link poses of a view at `state`, with the given link corrections.
+    /// Returns the link poses of a view at `state`, with the given link corrections.
     pub(crate) fn corrected_link_poses(
         &self,
         view_idx: usize,
@@ -246,7 +247,8 @@ impl<'a> BundleProblem<'a> {
     }
 }
 
-/// Corners with the variance of their mean: the scatter between frames, with robot.toml's figure for a few frames more.
+/// Returns corners with the variance of their mean: the scatter between frames, combined with robot.toml's noise as for
+/// a few more frames.
 fn corners(camera: &CameraSpec, seen: &MeanCorners, size_m: f64) -> WeightedMeasurement {
     let dof = 8.0 * seen.n_frames.saturating_sub(1) as f64;
     let info = seen.n_frames.max(1) as f64 / one_frame_px2(camera, seen.scatter_px2, dof);
@@ -254,7 +256,7 @@ fn corners(camera: &CameraSpec, seen: &MeanCorners, size_m: f64) -> WeightedMeas
     WeightedMeasurement::Corners(WeightedCorners { corners_px, half_size_m, info, used })
 }
 
-/// Corners of a board in the same way.
+/// Returns the corners of a board, weighted in the same way.
 fn board(camera: &CameraSpec, seen: &BoardPoints) -> WeightedMeasurement {
     let variance_px2 = one_frame_px2(camera, seen.scatter_px2, seen.n_free as f64);
     let weighted = |point: &BoardPoint| {
@@ -264,7 +266,7 @@ fn board(camera: &CameraSpec, seen: &BoardPoints) -> WeightedMeasurement {
     WeightedMeasurement::Board { points: seen.points.iter().map(weighted).collect() }
 }
 
-/// Variance of a corner in one frame, px^2.
+/// Returns the variance of a corner in one frame, px^2.
 fn one_frame_px2(camera: &CameraSpec, scatter_px2: f64, dof: f64) -> f64 {
     let known_px2 = camera.corner_std_px.powi(2);
     (CORNER_PRIOR_DOF * known_px2 + scatter_px2) / (CORNER_PRIOR_DOF + dof)
@@ -310,7 +312,8 @@ fn view_data(
     data
 }
 
-/// d(angle)/d(parameter) in a view that ends at `end`, of what tells of the sensor as it was; `None` for all else.
+/// Returns d(angle)/d(parameter) in a view that ends at `end`, for parameters of the sensor in the past; `None` for
+/// others.
 pub(crate) fn past_derivative(kind: ParameterKind, walk: Option<Walk>, end: Stamp) -> Option<f64> {
     match kind {
         ParameterKind::StepBefore(since) => Some(f64::from(end < since)),
@@ -319,7 +322,7 @@ pub(crate) fn past_derivative(kind: ParameterKind, walk: Option<Walk>, end: Stam
     }
 }
 
-/// `base` with the estimated parameters of `state`.
+/// Returns `base` with the estimated parameters of `state`.
 pub(crate) fn parameters_of(problem: &BundleProblem<'_>, state: &State, base: &JointParameters) -> JointParameters {
     let mut parameters = *base;
     for (parameter, value) in problem.layout.parameters.iter().zip(state.joint.iter()) {

@@ -1,4 +1,4 @@
-//! Where the estimate starts: gains and offsets from the tags' positions alone, under a robust loss that narrows.
+//! Start of the estimate: gains and offsets from the tags' positions only, under a robust loss that narrows.
 
 use crate::model::estimated::Model;
 use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
@@ -12,7 +12,7 @@ use crate::views::view::TagMeasurement;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::numeric::Loss;
 
-/// Where the estimate starts.
+/// Start of the estimate.
 pub(crate) struct RobustStart {
     pub parameters: JointParameters,
     /// Estimated slips of the sensors.
@@ -20,7 +20,7 @@ pub(crate) struct RobustStart {
     pub iterations: usize,
 }
 
-/// Gain, offset and steps from the tags' positions in the camera frame; what is far counts little.
+/// Estimates gain, offset and steps from the tags' positions in the camera frame; distant ones have little weight.
 pub(crate) fn robust_start(input: &BundleInput<'_>) -> RobustStart {
     let mut views = input.views.to_vec();
     for view in &mut views {
@@ -58,7 +58,7 @@ pub(crate) fn robust_start(input: &BundleInput<'_>) -> RobustStart {
     RobustStart { parameters, steps, iterations }
 }
 
-/// At least the datasheet's linearity: what straight sensors leave.
+/// Returns the residual error of straight sensors: at least the datasheet's linearity, rad.
 pub(crate) fn straight_sensor_std(input: &BundleInput<'_>) -> [f64; MAX_JOINTS] {
     let mut std = input.scales.joint_std_rad;
     for (std, spec) in std.iter_mut().zip(&input.robot.sensors) {

@@ -1,4 +1,4 @@
-//! A view with its own parameters marginalised (Schur complement), and the map from directions to columns.
+//! A view with its local parameters marginalised (Schur complement), and the map from directions to columns.
 
 use std::ops::Range;
 
@@ -19,26 +19,26 @@ pub(crate) type Directions = SMatrix<f64, 6, N_DIRECTIONS>;
 /// Twists of the camera (right, camera frame) by each column of links and sag, in the order of [`Layout::body`].
 pub(crate) type BodyTwists = SMatrix<f64, 6, N_BODY_COLUMNS>;
 
-/// Recovers a view's own parameters and their covariance after the common step.
+/// Marginalised group, from which a view's local parameters and their covariance follow after the common step.
 #[derive(Clone, Debug)]
 pub(crate) struct SchurBlock {
-    /// `S`, and the inverse of `S^T G S + L`.
+    /// Twists `S` of the camera by the view-local parameters; `inverse` is the inverse of `S^T G S + L`.
     pub twists: SMatrix<f64, 6, N_VIEW_PARAMETERS>,
     pub inverse: Own,
     pub gradient: SVector<f64, N_VIEW_PARAMETERS>,
-    /// Rows of own parameters by common columns: `S^T sum H_i A`; filled where it is asked for.
+    /// Rows of view-local parameters by common columns: `S^T sum H_i A`; filled on demand.
     pub by_common: SMatrix<f64, 6, N_DIRECTIONS>,
     /// Observations of the group, as indices into the problem's list.
     pub range: Range<usize>,
-    /// `ln|L| - ln|S^T G S + L|`: how much the prior's volume shrank.
+    /// `ln|L| - ln|S^T G S + L|`: logarithm of the reduction of the prior's volume.
     pub log_ratio: f64,
     /// The lens's part, `sum H_ic`.
     pub by_lens: SMatrix<f64, 6, 8>,
-    /// `sum H_i T` of the columns of links and sag, as many as there are.
+    /// `sum H_i T` of the columns of links and sag that exist.
     pub by_body: Matrix6xX<f64>,
     /// Time error of the view's image.
     pub time_error: TimeError,
-    /// True if the group has parameters of its own.
+    /// True if the group has view-local parameters.
     pub has_any: bool,
 }
 
@@ -47,7 +47,7 @@ pub(crate) struct Group<'a> {
     pub view_idx: usize,
     /// Number of the camera.
     pub camera: usize,
-    /// The joints whose motion the observations see, and how.
+    /// Joints whose motion the observations see; `sign` is the sign of that motion.
     pub joints: Range<usize>,
     pub sign: f64,
     /// Twist of the camera by that of the mount.
@@ -56,12 +56,12 @@ pub(crate) struct Group<'a> {
     pub observations: Range<usize>,
     pub poses: &'a LinkPoses,
     pub base_from_camera: Isometry3<f64>,
-    /// Carrier of the tags; `None`: they stand in the frame of the poses.
+    /// Carrier of the tags; `None`: they are fixed in the frame of the poses.
     pub carrier: Option<Isometry3<f64>>,
 }
 
 impl<'a> Group<'a> {
-    /// The groups of a view: the tags about the arm, then the tag on the gripper where it is seen.
+    /// Returns the groups of a view: the tags around the arm, then the tag on the gripper if it is seen.
     pub(crate) fn of_view(
         problem: &BundleProblem<'_>,
         state: &'a State,
@@ -76,7 +76,7 @@ impl<'a> Group<'a> {
             view_idx,
             camera: view.camera,
             joints: 0..view.n_seen_joints,
-            // Before a camera that stands still the joints move the tags.
+            // If the camera stands still, the joints move the tags.
             sign: if problem.robot.is_watched() { -1.0 } else { 1.0 },
             by_mount: adjoint(&error.inverse()),
             camera_error: problem.scales.camera_error_std.is_some().then_some(error),
@@ -103,7 +103,7 @@ impl<'a> Group<'a> {
 }
 
 impl Group<'_> {
-    /// A tag of the group in the camera's frame.
+    /// Returns the pose of a tag of the group in the camera's frame.
     pub(crate) fn camera_from_tag(&self, state: &State, tag: Block) -> Isometry3<f64> {
         let pose = state.pose(tag);
         match &self.carrier {
@@ -116,12 +116,12 @@ impl Group<'_> {
 /// `H_i Ad_i` and column of the tag of each observation.
 pub(crate) type ByTag = [(Matrix6<f64>, Option<usize>)];
 
-/// From directions to columns.
+/// Map from directions to columns.
 pub(crate) struct Columns<'a> {
     layout: &'a Layout,
     view: &'a ViewData,
     joints: Range<usize>,
-    /// First columns of mount and lens of the camera that the view is of, and of the clock.
+    /// First columns of mount and lens of the view's camera, and of the clock.
     mount: Option<usize>,
     pub lens: Option<usize>,
     clock: Option<usize>,
@@ -141,14 +141,14 @@ impl<'a> Columns<'a> {
         self.layout
     }
 
-    /// The directions that have columns.
+    /// Returns the directions that have columns.
     pub(crate) fn directions(&self) -> impl Iterator<Item = usize> + use<> {
         let mount = if self.mount.is_some() { MOUNT..MOUNT + 6 } else { 0..0 };
         let time = if self.clock.is_some() { TIME..TIME + 1 } else { 0..0 };
         self.joints.clone().chain(mount).chain(time)
     }
 
-    /// The columns of a direction, which lie side by side: the first of them, and the direction's derivative by each.
+    /// Returns the adjacent columns of a direction: the first of them, and the direction's derivative by each.
     #[inline]
     pub(crate) fn of(&self, direction: usize) -> (usize, &'a [f64]) {
         let one = |at: Option<usize>, k: usize| at.map_or((0, &[][..]), |at| (at + k, &[1.0][..]));
@@ -187,7 +187,7 @@ impl SchurBlock {
         }
     }
 
-    /// Resets the block to that of a group without parameters of its own.
+    /// Resets the block to that of a group without view-local parameters.
     pub(crate) fn set_none(&mut self) {
         if !self.has_any {
             return;
@@ -200,8 +200,8 @@ impl SchurBlock {
         self.has_any = false;
     }
 
-    /// Inverts `S^T G S + L` of the first `N` own parameters, where `info` is the diagonal of L but for the time error;
-    /// the logarithm of its determinant.
+    /// Inverts `S^T G S + L` of the first `N` view-local parameters, where `info` is the diagonal of L without the time
+    /// error. Returns the logarithm of its determinant.
     pub(crate) fn invert<const N: usize>(&mut self, g: &Matrix6<f64>, info: &SVector<f64, N_VIEW_PARAMETERS>) -> f64 {
         let twists = self.twists.fixed_columns::<N>(0);
         let mut normal = twists.tr_mul(&(g * twists));
@@ -209,7 +209,8 @@ impl SchurBlock {
             normal[(k, k)] += info[k];
         }
         self.time_error.loosen(&mut normal);
-        // Positive definite: its diagonal has the priors. Only overflow makes it fail.
+        // The matrix is positive definite because its diagonal has the priors. Only overflow makes the factorization
+        // fail.
         let factor = normal.cholesky();
         let log_det = factor.as_ref().map_or(0.0, |f| 2.0 * f.l_dirty().diagonal().map(f64::ln).sum());
         match factor {
@@ -219,12 +220,12 @@ impl SchurBlock {
         log_det
     }
 
-    /// True if the camera's own pose error is among the parameters.
+    /// Returns true if the camera's own pose error is among the parameters.
     pub(crate) fn moves_camera(&self) -> bool {
         self.twists[(0, MAX_JOINTS)] != 0.0
     }
 
-    /// `M`, and how far the own parameters alone would move the camera.
+    /// Returns `M` and the camera twist caused by the view-local step.
     pub(crate) fn reach(&self) -> (Matrix6<f64>, Vector6<f64>) {
         if !self.has_any {
             return (Matrix6::zeros(), Vector6::zeros());
@@ -238,7 +239,8 @@ impl SchurBlock {
         (weighted * twists.transpose(), weighted * self.gradient.fixed_rows::<MAX_JOINTS>(0))
     }
 
-    /// `sum H_i A step`: what a step of the common parameters adds to the observations' pull on the camera's twist.
+    /// Returns `sum H_i A step`: the change of the observations' pull on the camera's twist by a step of the common
+    /// parameters.
     pub(crate) fn push(
         &self,
         problem: &BundleProblem<'_>,
@@ -275,7 +277,7 @@ impl SchurBlock {
         Columns::of_view(&problem.layout, view, joints)
     }
 
-    /// `sum H_i A`: the observations' pull on the camera's twist by the common columns.
+    /// Returns `sum H_i A`: the observations' pull on the camera's twist by the common columns.
     pub(crate) fn twist_by_columns(
         &self,
         problem: &BundleProblem<'_>,
@@ -307,8 +309,8 @@ impl SchurBlock {
         out
     }
 
-    /// `S^T sum H_i A`: own parameters by the common columns; multiplied by a step it is what the step adds to the
-    /// gradient.
+    /// Returns `S^T sum H_i A`: view-local parameters by the common columns. Multiplied by a step it is the step's
+    /// contribution to the gradient.
     pub(crate) fn own_by_columns(&self, problem: &BundleProblem<'_>, by_tag: &ByTag, view_idx: usize) -> DMatrix<f64> {
         let layout = &problem.layout;
         let mut out = DMatrix::zeros(N_VIEW_PARAMETERS, layout.n);

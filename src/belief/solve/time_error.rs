@@ -1,15 +1,15 @@
 //! The time error of one image: it moves all joints of a view together, each by its rate.
 //!
-//! The joints' errors of a view have the covariance `D + j j^T`, D of what each is off by itself and j the rates times
-//! one sigma of the time error. Its inverse is `D^-1 - u u^T / (1 + s)`, `u = D^-1 j`, `s = j^T u` (Sherman and
-//! Morrison 1950).
+//! The joints' errors of a view have the covariance `D + j j^T`. D is the covariance of the joints' own errors, and j
+//! the rates times the standard deviation of the time error. Its inverse is `D^-1 - u u^T / (1 + s)`, `u = D^-1 j`, `s
+//! = j^T u` (Sherman and Morrison 1950).
 
 use crate::solve::constants::time_error::LEAST_OWN_VAR;
 use nalgebra::{SMatrix, SVector};
 
 use crate::solve::problem::{BundleProblem, N_VIEW_PARAMETERS, ViewData};
 
-/// Reduction of the information on a view's own parameters by the image's time error.
+/// Reduction of the information on a view's local parameters by the image's time error.
 #[derive(Clone, Debug)]
 pub(crate) struct TimeError {
     /// `D^-1 j`.
@@ -18,11 +18,11 @@ pub(crate) struct TimeError {
     told: f64,
 }
 
-/// Estimate of the time error of one view's image, in its sigmas.
+/// Estimate of the time error of one view's image, in its standard deviations.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct TimeErrorOfView {
     pub sigmas: f64,
-    /// Variance with all that the view told.
+    /// Variance after all measurements of the view.
     pub var: f64,
 }
 
@@ -32,7 +32,7 @@ impl TimeError {
         Self { by_sigma: SVector::zeros(), told: 0.0 }
     }
 
-    /// Takes a joint in; the inverse of what it is off by itself, 1/rad^2.
+    /// Adds a joint; returns the inverse variance of its own error, 1/rad^2.
     pub(crate) fn add(&mut self, problem: &BundleProblem<'_>, view: &ViewData, joint: usize) -> f64 {
         self.add_joint(joint, problem.joint_own_var(view, joint), problem.jitter_rad(view, joint))
     }
@@ -44,12 +44,12 @@ impl TimeError {
         info
     }
 
-    /// `u u^T own / (1 + s)`.
+    /// Returns `u u^T own / (1 + s)`.
     pub(crate) fn pull(&self, own: &SVector<f64, N_VIEW_PARAMETERS>) -> SVector<f64, N_VIEW_PARAMETERS> {
         self.by_sigma * (self.by_sigma.dot(own) / (1.0 + self.told))
     }
 
-    /// Takes `u u^T / (1 + s)` off the information on the first `N` own parameters.
+    /// Subtracts `u u^T / (1 + s)` from the information on the first `N` view-local parameters.
     pub(crate) fn loosen<const N: usize>(&self, info: &mut SMatrix<f64, N, N>) {
         if self.told > 0.0 {
             let by_sigma = self.by_sigma.fixed_rows::<N>(0);
@@ -57,12 +57,12 @@ impl TimeError {
         }
     }
 
-    /// `ln det (D + j j^T) - ln det D`.
+    /// Returns `ln det (D + j j^T) - ln det D`.
     pub(crate) fn log_det(&self) -> f64 {
         self.told.ln_1p()
     }
 
-    /// From the joints' errors and their covariance after the view.
+    /// Returns the estimate from the joints' errors and their covariance after the view.
     pub(crate) fn of_view(
         &self,
         own: &SVector<f64, N_VIEW_PARAMETERS>,
@@ -82,7 +82,8 @@ mod tests {
 
     use super::*;
 
-    /// Joints of one view, rad: what each is off by itself, and how far it moves in one sigma of the time error.
+    /// Standard deviations of the joints of one view, rad: own errors, and motion in one standard deviation of the time
+    /// error.
     const OWN_STD: [f64; 3] = [2e-4, 3e-4, 1e-4];
     const JITTER: [f64; 3] = [1e-3, -4e-4, 2e-4];
 
@@ -113,7 +114,7 @@ mod tests {
     #[test]
     fn a_view_tells_its_time_by_all_joints_together() {
         let (error, ..) = of_three();
-        // Errors that are two sigma of time, known exactly.
+        // Errors that correspond to two standard deviations of time, known exactly.
         let mut own = SVector::<f64, N_VIEW_PARAMETERS>::zeros();
         (0..3).for_each(|joint| own[joint] = 2.0 * JITTER[joint]);
         let told = error.of_view(&own, &Own::zeros());

@@ -1,8 +1,8 @@
 //! Covariance of the tool's position and orientation, from the covariance of the sensors' parameters.
 //!
-//! `J P J^T + sum_j (dx/dtheta_j) (dx/dtheta_j)^T s_j^2`: P the covariance of the estimated parameters, J the tool's
-//! derivative by them, and s_j^2 what each joint has besides: the datasheet's variance of what was not estimated, and
-//! of what no parameter describes.
+//! `J P J^T + sum_j (dx/dtheta_j) (dx/dtheta_j)^T s_j^2`: P is the covariance of the estimated parameters, and J the
+//! tool's derivative by them. The further variance s_j^2 of each joint is the datasheet's for parameters that were not
+//! estimated, and the part that no parameter describes.
 
 use nalgebra::{DMatrix, Matrix3, Matrix6, SMatrix, SVector, Vector3, Vector6};
 
@@ -14,17 +14,17 @@ use armcal_core::sensor::{ArmSensors, ConditionChange, Conditions};
 use armcal_core::streams::JointAngles;
 
 impl ParameterCovariance {
-    /// Covariance of the tool's position (base frame, m^2) for an arm at `angles` under the sensors' reference
-    /// conditions.
+    /// Returns the covariance of the tool's position (base frame, m^2) for an arm at `angles` under the sensors'
+    /// reference conditions.
     #[must_use]
     pub fn tool_position_m2(&self, robot: &Robot, sensors: &ArmSensors, angles: &JointAngles) -> Matrix3<f64> {
         self.tool_position_under_m2(robot, sensors, angles, &sensors.reference)
     }
 
-    /// Covariance of the tool's position (base frame, m^2) for an arm at `angles` under `conditions`.
+    /// Returns the covariance of the tool's position (base frame, m^2) for an arm at `angles` under `conditions`.
     ///
-    /// Estimated parameters enter with their covariance, the others with the datasheet's sigma, and every sensor with
-    /// what its parameters leave (`residual_std_rad`) and its play.
+    /// Estimated parameters contribute their covariance, the others the datasheet's variance. Every sensor adds the
+    /// error that its parameters leave (`residual_std_rad`) and its backlash.
     #[must_use]
     pub fn tool_position_under_m2(
         &self,
@@ -37,8 +37,8 @@ impl ParameterCovariance {
         self.propagated(&at, |moved, _| moved)
     }
 
-    /// Covariance of the tool's pose: position (m) in the first three rows, then orientation (rad, a small turn about
-    /// the axes of the base frame), both in the base frame.
+    /// Returns the covariance of the tool's pose, in the base frame: position (m) in the first three rows, then
+    /// orientation (rad, a small turn about the axes of the base frame).
     #[must_use]
     pub fn tool_pose(
         &self,
@@ -51,7 +51,8 @@ impl ParameterCovariance {
         self.propagated(&at, |moved, turned| Vector6::new(moved.x, moved.y, moved.z, turned.x, turned.y, turned.z))
     }
 
-    /// To what `of_twist` makes of the tool's motion: of its point, and about the base's axes.
+    /// Returns the covariance of the quantity that `of_twist` computes from the tool's motion (of its point, and about
+    /// the base's axes).
     fn propagated<const R: usize>(
         &self,
         at: &Posture<'_>,
@@ -91,12 +92,13 @@ impl ParameterCovariance {
         covariance + full.fixed_view::<R, R>(0, 0)
     }
 
-    /// One sigma of what the parameters leave of the error of `joint`'s sensor.
+    /// Returns the standard deviation of the error of `joint`'s sensor that the parameters leave, rad.
     fn residual_std_rad(&self, robot: &Robot, joint: usize) -> f64 {
         self.residual_std_rad.map_or(robot.sensors[joint].linearity_std_rad, |std_rad| std_rad[joint])
     }
 
-    /// Variance of the datasheet's random walk since the reference, where no drift was estimated.
+    /// Returns the variance of the datasheet's random walk since the reference if no drift was estimated, rad^2;
+    /// otherwise zero.
     fn wandered_rad2(&self, at: &Posture<'_>, joint: usize) -> f64 {
         let drift = Parameter { joint, kind: ParameterKind::DriftPerH };
         if self.parameters.contains(&drift) {
@@ -106,14 +108,14 @@ impl ParameterCovariance {
     }
 }
 
-/// An arm at angles under conditions.
+/// An arm at a configuration under conditions.
 struct Posture<'a> {
     robot: &'a Robot,
     sensors: &'a ArmSensors,
     angles: &'a JointAngles,
     departure: ConditionChange,
     poses: LinkPoses,
-    /// Base frame.
+    /// Position of the tool, base frame.
     tool_m: Vector3<f64>,
 }
 
@@ -124,7 +126,7 @@ impl<'a> Posture<'a> {
         Self { robot, sensors, angles, departure: conditions.departure_from(&sensors.reference), poses, tool_m }
     }
 
-    /// The tool's motion by a parameter of the arm's body; `None` for others.
+    /// Returns the tool's motion by a parameter of the arm's body; `None` for others.
     fn by_body(&self, parameter: Parameter) -> Option<[Vector3<f64>; 2]> {
         parameter.body_motion(&self.robot.chain, &self.poses, 0..self.robot.tool.mount.n_joints, &self.tool_m)
     }

@@ -1,8 +1,8 @@
-//! From messages to views: which readings and which corners belong to one arm at rest.
+//! Conversion of messages to views: the readings and corners of one arm at rest.
 //!
 //! A capture mark gives the span by the joint sensors' clock. Readings in it are averaged as travel (never as raw
-//! words, which wrap), corners of one tag over the frames in it. The arm is at rest there, so that a camera clock some
-//! ten milliseconds late changes nothing.
+//! words, which wrap), and the corners of one tag over its frames. The arm is at rest there, so that a camera clock
+//! late by about 10 ms changes nothing.
 
 pub(crate) use crate::views::constants::association::MAX_SQUARE_RMS_PX;
 use std::borrow::Cow;
@@ -27,7 +27,7 @@ use armcal_core::streams::{
 };
 use armcal_core::time::Stamp;
 
-/// The survey that a recording carries, and its index among the messages; the earliest, should there be several.
+/// Returns the survey in a recording, and its index among the messages; the earliest if there are several.
 fn recorded_survey(recording: &Recording) -> Option<(usize, &RecordedSurvey)> {
     let surveys = recording.messages.iter().enumerate().filter_map(|(idx, (_, message))| match message {
         Message::Survey(survey) => Some((idx, survey)),
@@ -36,7 +36,7 @@ fn recorded_survey(recording: &Recording) -> Option<(usize, &RecordedSurvey)> {
     surveys.min_by_key(|(_, survey)| survey.stamp)
 }
 
-/// `robot` with the tags that the recording says were around it; with those of its own file where it says nothing.
+/// Returns `robot` with the tags that the recording states; with those of its own file if the recording states none.
 #[must_use]
 pub fn surveyed<'a>(recording: &Recording, robot: &'a Robot) -> Cow<'a, Robot> {
     match recorded_survey(recording) {
@@ -45,7 +45,8 @@ pub fn surveyed<'a>(recording: &Recording, robot: &'a Robot) -> Cow<'a, Robot> {
     }
 }
 
-/// `robot` of which the joints have failed that the recording says have by the end of `span`; `None` is all of it.
+/// Returns `robot` with the joints marked as failed that the recording declares by the end of `span`; `None` means all
+/// of it.
 #[must_use]
 pub(crate) fn declared_failed(recording: &Recording, robot: &Robot, span: Option<(Stamp, Stamp)>) -> Robot {
     let failed: Vec<FailedJoint> = recording
@@ -62,15 +63,15 @@ pub(crate) fn declared_failed(recording: &Recording, robot: &Robot, span: Option
     robot.clone().with_failed(&failed)
 }
 
-/// Collects the captured views of `recording`; `robot` as [`surveyed`] gives it.
+/// Collects the captured views of `recording`; `robot` is as [`surveyed`] returns it.
 #[must_use]
 pub fn associate(recording: &Recording, robot: &Robot) -> CaptureData {
     associate_within(recording, robot, None)
 }
 
-/// Collects the views that were captured within a span by the joint sensors' clock; `None` is the whole recording.
+/// Collects the views captured within a span by the joint sensors' clock; `None` means the whole recording.
 ///
-/// Views of `identify` marks count wherever they lie before the span's end: what they tell of a sensor stays true.
+/// Views of `identify` marks count anywhere before the span's end, because a sensor's scale does not change.
 #[must_use]
 pub fn associate_within(recording: &Recording, robot: &Robot, span: Option<(Stamp, Stamp)>) -> CaptureData {
     let (from, to) = span.unwrap_or((Stamp { nanos: i64::MIN }, Stamp { nanos: i64::MAX }));
@@ -100,8 +101,8 @@ pub fn associate_within(recording: &Recording, robot: &Robot, span: Option<(Stam
     association.data
 }
 
-/// The view of the span `start ..= end` among `messages`, which hold what was read shortly before it, too. `None`
-/// where no joint was read in the span.
+/// Returns the view of the span `start ..= end` among `messages`, which also contain earlier readings. `None` if the
+/// span has no joint readings.
 pub(crate) fn view_of_span(
     messages: &[(Stamp, Message)],
     robot: &Robot,
@@ -123,7 +124,7 @@ pub(crate) fn view_of_span(
     association.data.fit.pop()
 }
 
-/// A recording on its way to views.
+/// State while the views of a recording are collected.
 struct Association<'a> {
     robot: &'a Robot,
     sensors: ArmSensors,
@@ -131,7 +132,7 @@ struct Association<'a> {
     conditions: ConditionHistory,
     from: Stamp,
     data: CaptureData,
-    /// End of the last rest for each target.
+    /// End of the last rest at each target.
     rested: BTreeMap<u32, Stamp>,
 }
 
@@ -171,7 +172,8 @@ impl Association<'_> {
         }
     }
 
-    /// Where the arm rested for a target: of several rests the last, whatever calibration it was for.
+    /// Notes where the arm rested at a target: the last of several rests, regardless of the calibration that it
+    /// followed.
     fn add_rest(&mut self, idx: usize, mark: &Mark, target_idx: u32) {
         if self.rested.get(&target_idx).is_some_and(|last| *last > mark.end) {
             return;
@@ -198,7 +200,7 @@ impl Association<'_> {
         }
         self.data.used.push(idx);
         let (start, end) = (touch.stamp, touch.stamp.plus_s(touch.duration_s));
-        // Neither phase nor kind is looked at.
+        // Neither phase nor kind is used.
         let span = Mark { start, end, kind: MarkKind::Calibrate(PriorSource::Fresh) };
         let Some(mut view) = self.view(&span, 0) else { return };
         view.tags.clear();
@@ -215,7 +217,7 @@ impl Association<'_> {
         });
     }
 
-    /// The view of a mark's span; `None` where no joint was read in it.
+    /// Returns the view of a mark's span; `None` if no joint was read in it.
     fn view(&mut self, mark: &Mark, pose_idx: u32) -> Option<View> {
         let n_joints = self.robot.n_joints();
         let (mut stamps, mut readings) = (Vec::new(), Vec::new());
@@ -298,8 +300,8 @@ fn tag_observation(robot: &Robot, id: u32, seen: &MeanCorners) -> Result<TagObse
     Ok(TagObservation { id, tag_idx, center_in_camera_m, measured: TagMeasurement::Corners(*seen) })
 }
 
-/// The tag's pose by its corners, if they are those of a square of that size. Their order is looked at first: of a
-/// square seen from its edge the wrong order would fit as well.
+/// Returns the tag's pose if its corners are those of a square of that size. Checks their order first, because a wrong
+/// order would also fit a square seen from its edge.
 pub(crate) fn check_square(
     camera: &CameraSpec,
     size_m: f64,
@@ -315,7 +317,8 @@ pub(crate) fn check_square(
     if solved.rms_px > MAX_SQUARE_RMS_PX { Err(ObservationRejection::NotASquare) } else { Ok(solved) }
 }
 
-/// Seen from the front, the corners run counterclockwise with v downwards: each turn from side to side is to the left.
+/// Returns true if the corners turn right. Seen from the front, they run counterclockwise with v downwards: each turn
+/// from side to side is to the left.
 fn turns_right(corners_px: &[[f64; 2]; 4]) -> bool {
     let side = |k: usize| [0, 1].map(|axis| corners_px[(k + 1) % 4][axis] - corners_px[k % 4][axis]);
     let turns = [0, 1, 2, 3].map(|k| {

@@ -1,4 +1,4 @@
-//! Views that are ready to be fitted, wherever they come from.
+//! Views that are ready to be fitted, regardless of their source.
 
 use armcal_core::log::{Recording, hash_messages};
 use armcal_core::robot::Robot;
@@ -7,35 +7,35 @@ use armcal_core::routine::Method;
 use crate::views::scale_identification::IdentifiedScale;
 use crate::views::view::CaptureData;
 
-/// Which views the verdict rests on.
+/// Views that the verdict is based on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HeldOut {
-    /// Those that the recording marks; the fit never sees them.
+    /// Views that the recording marks; the fit never uses them.
     AsMarked,
-    /// All, each by what was learnt from the views of other folds; the answer is fitted to all.
+    /// All views, each predicted from the views of the other folds; the final fit uses all.
     CrossValidation,
 }
 
-/// Views that are ready to be fitted, wherever they come from.
+/// Views that are ready to be fitted, regardless of their source.
 #[derive(Clone)]
 pub struct CalibrationData {
-    /// The recording or recordings, for messages.
+    /// Names of the recordings, for messages.
     pub name: String,
-    /// Of the messages that the views come from.
+    /// Hash of the messages that the views come from.
     pub messages_hash: String,
     /// Fitted and held-out views, task and end stops.
     pub data: CaptureData,
-    /// The views that tell of the camera's mount, where they are others than `data`'s.
+    /// Views that determine the camera mount, if they differ from `data`'s.
     pub gripper_tag_data: Option<CaptureData>,
-    /// Which views the verdict rests on.
+    /// Views that the verdict is based on.
     pub held_out: HeldOut,
-    /// With the tags that were around it, and the scales of `identified`.
+    /// Robot with the tags around it, and with the scales of `identified`.
     pub robot: Robot,
-    /// Scales that were measured because nobody knew them; empty as a rule.
+    /// Sensor scales that were measured because they were unknown; usually empty.
     pub identified: Vec<IdentifiedScale>,
 }
 
-/// What `method` has used of a recording, ascending.
+/// Returns the indices of a recording's messages that `method` has used, ascending.
 pub(crate) fn used_by(method: Method, used: &[usize], data: &CaptureData) -> Vec<usize> {
     let mut all = used.to_vec();
     if method == Method::Bundle {

@@ -1,8 +1,8 @@
-//! What surrounds a standing arm in a recording: how warm its oil is, how deep it is, and which way each joint came
-//! from.
+//! Conditions of an arm at rest in a recording: oil temperature, pressure, and the last direction of each joint's
+//! motion.
 //!
-//! Thermometers and the depth gauge speak once in a while; a reading inside of a span counts as the span's, else the
-//! line between the nearest before and after it. All is found by the messages' own stamps.
+//! Thermometers and the depth gauge report at long intervals. Readings inside a span give its value; otherwise the line
+//! between the nearest before and after it does. All of this uses the messages' own stamps.
 
 pub(crate) use crate::views::constants::conditions::{BACK_S, NEAR_S, ROUNDING_COUNTS};
 use crate::views::constants::conditions::{CLEAR_READINGS, CLEAR_SIGMAS, MIN_READINGS_OF_RATE};
@@ -19,11 +19,11 @@ use armcal_core::time::Stamp;
 struct Sample {
     stamp: Stamp,
     value: f64,
-    /// Among the recording's messages.
+    /// Index among the recording's messages.
     idx: usize,
 }
 
-/// The slow sensors of a recording, by time.
+/// Readings of a recording's slow sensors, by time.
 #[derive(Clone, Debug, Default)]
 pub struct ConditionHistory {
     oil_c: Vec<Sample>,
@@ -31,14 +31,14 @@ pub struct ConditionHistory {
 }
 
 impl ConditionHistory {
-    /// All readings of the recording.
+    /// Returns all readings of the recording.
     #[must_use]
     pub fn of(recording: &Recording) -> Self {
         Self::heard_until(recording, Stamp { nanos: i64::MAX })
     }
 
-    /// What was measured and recorded by `until`: all that a calibration at that time could know, so that the finished
-    /// recording gives the same result as the one that was still growing.
+    /// Returns the readings that were measured and recorded by `until`: all that a calibration at that time could use.
+    /// So the finished recording gives the same result as the one that was still growing.
     #[must_use]
     pub fn heard_until(recording: &Recording, until: Stamp) -> Self {
         Self::of_messages(&recording.messages, until)
@@ -66,7 +66,7 @@ impl ConditionHistory {
         found.sorted()
     }
 
-    /// All readings of a recording of a real arm; `idx` is their place among them.
+    /// Returns all readings of a recording of a real arm; `idx` is their index among them.
     pub(crate) fn of_external(readings: &[ConditionReading]) -> Self {
         let mut found = Self::default();
         for (idx, reading) in readings.iter().enumerate() {
@@ -79,7 +79,7 @@ impl ConditionHistory {
         found.sorted()
     }
 
-    /// By value where stamps are the same: the order of messages in the file does not matter.
+    /// Sorts by stamp, and by value if stamps are equal, so that the order of messages in the file does not matter.
     fn sorted(mut self) -> Self {
         for samples in [&mut self.oil_c, &mut self.pressure_pa] {
             samples.sort_by(|a, b| a.stamp.cmp(&b.stamp).then(a.value.total_cmp(&b.value)));
@@ -87,13 +87,13 @@ impl ConditionHistory {
         self
     }
 
-    /// The conditions over the span `start ..= end`, at its middle.
+    /// Returns the conditions over the span `start ..= end`, at its middle.
     #[must_use]
     pub fn over(&self, start: Stamp, end: Stamp) -> Conditions {
         self.over_noting(start, end, &mut Vec::new())
     }
 
-    /// The same; appends the indices of the messages that it took.
+    /// Returns the conditions over the span, as [`Self::over`]; appends the indices of the messages used.
     pub(crate) fn over_noting(&self, start: Stamp, end: Stamp, used: &mut Vec<usize>) -> Conditions {
         Conditions {
             oil_c: value_over(&self.oil_c, start, end, used),
@@ -107,7 +107,7 @@ fn middle(start: Stamp, end: Stamp) -> Stamp {
     start.plus_s(0.5 * end.since_s(start))
 }
 
-/// Mean within the span, else by the nearest on both sides, else by the nearer one alone.
+/// Returns the mean within the span; else from the nearest on both sides; else from the nearer one.
 fn value_over(samples: &[Sample], start: Stamp, end: Stamp, used: &mut Vec<usize>) -> Option<f64> {
     let from = samples.partition_point(|sample| sample.stamp < start);
     let to = samples.partition_point(|sample| sample.stamp <= end).max(from);
@@ -129,7 +129,7 @@ fn value_over(samples: &[Sample], start: Stamp, end: Stamp, used: &mut Vec<usize
     }
 }
 
-/// How fast each joint's travel changed over a span: the slope of the least-squares line.
+/// Rate of each joint's travel over a span: the slope of the least-squares line.
 #[derive(Clone, Debug)]
 pub(crate) struct TravelRate {
     middle: Stamp,
@@ -161,7 +161,7 @@ impl TravelRate {
         }
     }
 
-    /// rad/s; zero with too few readings, or all at one time.
+    /// Returns the rate, rad/s; zero with too few readings, or if all have one time.
     pub fn rad_s(&self, n_joints: usize) -> JointAngles {
         let spread_s2 = self.sum_s2 - self.sum_s * self.sum_s / self.n.max(1) as f64;
         if self.n < MIN_READINGS_OF_RATE || spread_s2 <= 0.0 {
@@ -172,15 +172,15 @@ impl TravelRate {
     }
 }
 
-/// From travel `b` to travel `a`, the short way round the word.
+/// Returns the difference from travel `b` to travel `a`, the short way round the word.
 pub(crate) fn apart_rad(spec: &JointSensorSpec, a: f64, b: f64) -> f64 {
     wrap_symmetric(a - b, (spec.wrap_counts / spec.counts_per_rad).abs())
 }
 
 impl MessageIndex<'_> {
-    /// The way that each joint came to where it rests over `mark`, at the mean travel `rest_rad`: by the last readings
-    /// before the mark that are clearly elsewhere. -1 or 1, 0 where it has not moved for long. Appends the messages
-    /// that decided it.
+    /// Returns the direction in which each joint moved to its rest over `mark`, at the mean travel `rest_rad`. The last
+    /// readings before the mark that clearly differ decide it: -1 or 1, 0 if it has not moved for long. Appends the
+    /// messages that decided it.
     pub(crate) fn approach(
         &self,
         mark: &Mark,
@@ -200,18 +200,19 @@ impl MessageIndex<'_> {
     }
 }
 
-/// Where an arm rests.
+/// Configuration in which an arm rests.
 pub(crate) struct RestPose<'a> {
-    /// The mean of its readings.
+    /// Mean travel of its readings.
     pub travel_rad: &'a JointAngles,
     pub sensors: &'a ArmSensors,
-    /// One sigma of what readings are rounded to.
+    /// Standard deviation of the rounding of readings, counts.
     pub rounding_counts: f64,
 }
 
 impl RestPose<'_> {
-    /// The way that each joint came here, by the readings before, the latest first, each with its place: by the last
-    /// that are clearly elsewhere. -1 or 1, 0 where it has not moved. Appends the readings that decided it.
+    /// Returns the direction in which each joint moved here, from earlier `readings`, the latest first, each with its
+    /// index. The last ones that clearly differ decide it: -1 or 1, 0 if it has not moved. Appends the readings that
+    /// decided it.
     pub(crate) fn approach<R>(
         &self,
         readings: impl Iterator<Item = (usize, R)>,
@@ -219,7 +220,7 @@ impl RestPose<'_> {
         travel_rad: impl Fn(&R, usize) -> f64,
     ) -> [f64; MAX_JOINTS] {
         let mut approach = [0.0; MAX_JOINTS];
-        // Side on which the readings before lay, and how many in a row.
+        // Side of the earlier readings, and their number in a row.
         let mut seen = [(0.0, 0_usize, 0_usize); MAX_JOINTS];
         let mut left = self.sensors.models.len();
         for (idx, reading) in readings {

@@ -1,4 +1,4 @@
-//! Recordings that no method can make sense of, refused by name before anything is fitted.
+//! Checks that refuse unusable recordings by name before anything is fitted.
 
 use crate::views::constants::data_checks::{ALIKE_SHARE, MAX_NOT_FINITE_SHARE, MIN_ALIKE_VIEWS, MOVED_SIGMAS};
 use crate::views::error::CalibError;
@@ -25,8 +25,8 @@ pub fn check_joints(recording: &Recording, robot: &Robot) -> Result<(), CalibErr
     Ok(())
 }
 
-/// Stamps that go backwards leave open which reading belongs to which view, and numbers that are none which sensor
-/// works.
+/// Refuses stamps that go backwards, which make the assignment of readings to views ambiguous. Refuses too many numbers
+/// that are not finite, which mean a failing sensor.
 pub(crate) fn check_order(recording: &Recording) -> Result<(), CalibError> {
     let streams = [Stream::JointSensors, Stream::Detections];
     for stream in streams {
@@ -49,8 +49,8 @@ pub(crate) fn check_order(recording: &Recording) -> Result<(), CalibError> {
     })
 }
 
-/// Why no view shows a tag: what rejected most of those seen. Each arm moves between its poses, so that counts where
-/// nothing else does.
+/// Returns the reason why no view shows a tag: the one that rejected most detections. Motion counts only if there is no
+/// other reason, because each arm moves between its poses.
 pub(crate) fn no_views(recording: String, robot: &Robot, data: &CaptureData) -> CalibError {
     if let Err(error) = check_corner_order(&recording, data) {
         return error;
@@ -66,7 +66,7 @@ pub(crate) fn no_views(recording: String, robot: &Robot, data: &CaptureData) -> 
     CalibError::NoTags { recording, robot: robot.name.clone(), known, seen: data.ids_seen.clone() }
 }
 
-/// Refuses corners most of which run the wrong way round: what is left of them are squares seen from their edge.
+/// Refuses corners most of which run the wrong way round: the rest of them are squares seen from their edge.
 pub(crate) fn check_corner_order(name: &str, data: &CaptureData) -> Result<(), CalibError> {
     let n = data.rejected.get(&ObservationRejection::CornerOrder).copied().unwrap_or(0);
     let views = data.fit.iter().chain(&data.held_out);
@@ -78,7 +78,7 @@ pub(crate) fn check_corner_order(name: &str, data: &CaptureData) -> Result<(), C
     Err(CalibError::CornerOrder { recording: name.to_owned(), n, of: n + kept, todo })
 }
 
-/// The arm must have moved for its sensors to show anything.
+/// Refuses an arm that did not move: its sensors cannot be calibrated.
 pub(crate) fn check_pose_variation(name: &str, data: &CaptureData, robot: &Robot) -> Result<(), CalibError> {
     let views = || data.fit.iter().chain(&data.held_out).filter(|view| !view.tags.is_empty());
     let mut most: Option<(usize, f64)> = None;
@@ -101,13 +101,13 @@ pub(crate) fn check_pose_variation(name: &str, data: &CaptureData, robot: &Robot
     })
 }
 
-/// Least span of a sensor's readings where its joint moved.
+/// Returns the least span of a sensor's readings if its joint moved.
 fn least_motion_rad(spec: &JointSensorSpec) -> f64 {
     MOVED_SIGMAS * spec.noise_std_counts / spec.counts_per_rad.abs()
 }
 
-/// The joint that has the same readings as `joint`, possibly in another unit: they lie on one straight line in all
-/// views, which two sensors' noise would not allow.
+/// Returns the joint with the same readings as `joint`, possibly in another unit. They lie on one straight line in all
+/// views, which the noise of two sensors would prevent.
 pub(crate) fn joint_with_same_readings(views: &[View], robot: &Robot, joint: usize) -> Option<usize> {
     (0..robot.n_seen_joints()).find(|&other| other != joint && are_alike(views, robot, [joint, other]))
 }
@@ -136,7 +136,7 @@ mod tests {
     use armcal_core::time::SIMULATION_EPOCH;
     use rand::RngExt;
 
-    /// Readings of the third joint that are `third` of those of the second.
+    /// Returns views in which the third joint's readings are `third` of the second's.
     fn views(seed: u64, third: impl Fn(f64, f64) -> f64) -> Vec<View> {
         let mut rng = stream_rng(seed, "alike");
         let one = |number: u32| {
@@ -153,9 +153,9 @@ mod tests {
         for seed in 0..8 {
             let same = |third: &dyn Fn(f64, f64) -> f64| joint_with_same_readings(&views(seed, third), &robot, 2);
             assert_eq!(same(&|second, _| second), Some(1));
-            // Another zero, unit or sign.
+            // The readings differ in zero, unit or sign.
             assert_eq!(same(&|second, _| 0.3 - 1e-3 * second.to_degrees()), Some(1));
-            // Moved alike, each with its own noise; moved by itself; not moved.
+            // The joint moved alike with its own noise; it moved by itself; it did not move.
             assert_eq!(same(&|second, noise| second + 1e-4 * noise), None);
             assert_eq!(same(&|_, own| own), None);
             assert_eq!(same(&|_, _| 0.2), None);

@@ -1,13 +1,13 @@
-//! Readings of an arm at rest that are none: a sensor that drops out for moments.
+//! Removal of invalid readings of an arm at rest: momentary drop-outs of a sensor.
 //!
 //! One reading at the end of the track among a hundred moves their mean by more than the whole error of a calibrated
-//! joint. The median does not care while fewer than half drop out.
+//! joint. The median is unaffected while fewer than half drop out.
 
 use crate::views::constants::dropouts::AT_REST_RAD;
 use armcal_core::stats::quantile;
 use armcal_core::streams::JointAngles;
 
-/// Puts each joint's median in the place of readings that cannot be of a joint at rest; all others stay as they are.
+/// Replaces readings that cannot be of a joint at rest by that joint's median; all others stay as they are.
 pub(crate) fn replace_dropouts(readings: &mut [JointAngles]) {
     let n_joints = readings.first().map_or(0, |angles| angles.len());
     for joint in 0..n_joints {

@@ -1,9 +1,9 @@
-//! Why no calibration came out at all.
+//! Errors that prevent a calibration.
 
 use armcal_core::codes::{Code, Coded};
 use armcal_core::log::StampRegression;
 
-/// Why no calibration came out at all; a poor one comes out refused instead.
+/// Reason why there is no calibration at all; a poor calibration is refused instead.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum CalibError {
@@ -66,7 +66,7 @@ pub enum CalibError {
     Disorder { recording: String, topic: String, disorder: StampRegression },
 }
 
-/// Which tags there are and which were seen, and what to do.
+/// Returns the known tags, the detected tags, and the remedy, in words.
 fn no_tags(robot: &str, known: &[u32], seen: &[u32]) -> String {
     let todo = if seen.is_empty() {
         "the camera saw no tag at all: check its images, light and water, and the topic of the tags"

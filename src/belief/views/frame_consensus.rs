@@ -1,8 +1,9 @@
-//! Frames of one view that agree about a tag.
+//! Selection of the frames of one view that agree about a tag.
 //!
-//! The arm stands still, so a tag's corners stay where they are but for noise. A detector that reads one id wrongly in
-//! one frame puts another tag's corners under this id: the mean of all frames would be off by a share of the distance
-//! between the two tags. A frame with the numbers of another is the same image, delivered twice: it tells nothing more.
+//! The arm stands still, so that a tag's corners change only by noise. A detector that misreads an id in one frame
+//! assigns another tag's corners to this id. The mean of all frames would then be off by a share of the distance
+//! between the two tags. A frame that repeats another's numbers is the same image delivered twice: it adds no
+//! information.
 
 use crate::views::constants::frame_consensus::{CLOSE_SIGMAS, ELSEWHERE_SIGMAS, USUAL_DISTANCES};
 use crate::views::view::MeanCorners;
@@ -10,17 +11,17 @@ use crate::views::view::MeanCorners;
 /// Corners of one tag in one frame, px.
 type Corners = [[f64; 2]; 4];
 
-/// The mean over the frames that agree, and how many do not; no mean where fewer than half of them do.
+/// Returns the mean over the frames that agree, and the number of the others; no mean if fewer than half agree.
 ///
-/// Frames agree that lie within a gate of one of them, in every coordinate; the largest such set counts. Where all
-/// frames lie within ten sigma (`corner_std_px`, per coordinate) of each other nothing is left out.
+/// Frames agree if they lie within a gate of one of them, in every coordinate; the largest such set counts. If all
+/// frames lie within ten sigma (`corner_std_px`, per coordinate) of each other, none is rejected.
 pub(crate) fn agreeing_mean(frames: &[Corners], corner_std_px: f64) -> (Option<MeanCorners>, usize) {
     if spread_px(frames) <= CLOSE_SIGMAS * corner_std_px {
         return (mean(frames.iter()), 0);
     }
     let gate_px = gate_px(frames, corner_std_px);
     let near = |center: Corners| frames.iter().filter(move |frame| distance_px(&center, frame) <= gate_px);
-    // The tightest of equally large sets, whatever their order.
+    // The tightest of equally large sets wins, regardless of their order.
     let rank = |center: Corners| {
         let sum_px: f64 = near(center).map(|frame| distance_px(&center, frame)).sum();
         (near(center).count(), -sum_px)
@@ -35,7 +36,7 @@ pub(crate) fn agreeing_mean(frames: &[Corners], corner_std_px: f64) -> (Option<M
     }
 }
 
-/// Frames within it show the same tag, px.
+/// Returns the largest distance between frames that show the same tag, px.
 fn gate_px(frames: &[Corners], corner_std_px: f64) -> f64 {
     let mut to_next: Vec<f64> = (0..frames.len())
         .map(|k| {
@@ -52,7 +53,7 @@ fn distance_px(a: &Corners, b: &Corners) -> f64 {
     a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-/// The largest range of any coordinate.
+/// Returns the largest range of any coordinate, px.
 fn spread_px(frames: &[Corners]) -> f64 {
     let range = |corner: usize, axis: usize| {
         let values = frames.iter().map(|frame| frame[corner][axis]);
@@ -80,7 +81,7 @@ fn mean<'a>(frames: impl Iterator<Item = &'a Corners>) -> Option<MeanCorners> {
     (n_frames > 0).then_some(MeanCorners { corners_px, n_frames, scatter_px2 })
 }
 
-/// Frames without those that repeat another one to the bit.
+/// Returns the frames without exact repetitions.
 pub(crate) fn different<'a, Points: Copy + PartialEq + 'a>(frames: impl Iterator<Item = &'a Points>) -> Vec<Points> {
     frames.fold(Vec::new(), |mut different, frame| {
         if !different.contains(frame) {
@@ -135,7 +136,8 @@ mod tests {
         }
     }
 
-    /// A camera that stands still delivers the same image again: no noise, and no more than one frame tells.
+    /// A camera that stands still delivers the same image again, without noise: it adds no information to the first
+    /// frame.
     #[test]
     fn an_image_that_is_delivered_again_counts_once() {
         let once = frames(5, 300.0, STD_PX, 1);

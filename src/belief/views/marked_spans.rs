@@ -1,5 +1,5 @@
-//! What of a recording its marked views are made of. The rest stays in the file: memory grows with the views of a
-//! recording, not with its hours.
+//! The parts of a recording that its marked views are made of. The rest stays in the file, so that memory grows with
+//! the views of a recording, not with its hours.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -9,19 +9,19 @@ use armcal_core::log::{Choice, LogError, Recording, TopicMap, read_chosen};
 use armcal_core::streams::{Mark, MarkKind, Message};
 use armcal_core::time::Stamp;
 
-/// Reads what a calibration uses of a recording: all of it is looked through, what lies about its marks is kept.
+/// Reads the parts of a recording that a calibration uses: scans all of it and keeps the messages near its marks.
 ///
 /// # Errors
-/// As [`armcal_core::log::read_recording`].
+/// The errors of [`armcal_core::log::read_recording`].
 pub fn read_marked(path: &Path) -> Result<Recording, LogError> {
     read_chosen(path, &TopicMap::default(), &mut Marked::default())
 }
 
-/// What of a recording lies about its marks.
+/// Choice of the messages of a recording near its marks.
 #[derive(Default)]
 struct Marked {
     rests: Vec<(Stamp, Stamp)>,
-    /// Parts of the file, with the earliest and the latest stamp of what may be used of them; `None` where something
+    /// Parts of the file, each with the earliest and latest stamp of its messages that may be used. `None` if a message
     /// is used in any case.
     parts: Vec<(u64, Option<(Stamp, Stamp)>)>,
     spans: MarkedSpans,
@@ -54,18 +54,18 @@ impl Choice for Marked {
     }
 }
 
-/// The spans in which the arm was at rest for something, by the joint sensors' clock.
+/// Spans in which the arm was at rest for a measurement, by the joint sensors' clock.
 #[derive(Clone, Debug, Default)]
 pub struct MarkedSpans {
     rests: Spans,
-    /// With the motion before.
+    /// Spans with the motion before each rest.
     approaches: Spans,
-    /// With the readings of slow sensors nearest to them.
+    /// Spans with the nearest readings of slow sensors.
     conditions: Spans,
 }
 
 impl MarkedSpans {
-    /// Those of the marks and touches of a recording.
+    /// Returns the spans of the marks and touches of a recording.
     #[must_use]
     pub fn of(recording: &Recording) -> Self {
         let rests: Vec<(Stamp, Stamp)> = recording.messages.iter().filter_map(|(_, message)| rest(message)).collect();
@@ -79,7 +79,7 @@ impl MarkedSpans {
         Self { rests: widened(0.0, 0.0), approaches: widened(BACK_S, 0.0), conditions: widened(NEAR_S, NEAR_S) }
     }
 
-    /// Whether a calibration may use the message.
+    /// Returns true if a calibration may use the message.
     #[must_use]
     pub fn hold(&self, message: &Message) -> bool {
         match use_of(message) {
@@ -91,16 +91,16 @@ impl MarkedSpans {
         }
     }
 
-    /// Whether any of them has a moment from the first of these stamps to the second.
+    /// Returns true if any span overlaps the time between these stamps.
     fn meet(&self, (first, last): (Stamp, Stamp)) -> bool {
         [&self.rests, &self.approaches, &self.conditions].iter().any(|spans| spans.meet(first, last))
     }
 }
 
-/// What a calibration uses a message for.
+/// Use of a message in a calibration.
 enum Use {
     Always,
-    /// As the arm's way to a rest and in it.
+    /// Motion of the arm to a rest and in it.
     Approach(Stamp),
     Rest(Stamp),
     Condition(Stamp),
@@ -124,7 +124,7 @@ fn use_of(message: &Message) -> Option<Use> {
     }
 }
 
-/// The span of a mark or touch whose readings count.
+/// Returns the span of a mark or touch whose readings count.
 fn rest(message: &Message) -> Option<(Stamp, Stamp)> {
     match message {
         Message::Touch(touch) => Some((touch.stamp, touch.stamp.plus_s(touch.duration_s))),
@@ -156,7 +156,7 @@ impl Spans {
         Self(joined)
     }
 
-    /// Whether one of them has a moment from `first` to `last`.
+    /// Returns true if a span overlaps the time from `first` to `last`.
     fn meet(&self, first: Stamp, last: Stamp) -> bool {
         let after = self.0.partition_point(|(start, _)| *start <= last);
         after.checked_sub(1).is_some_and(|n| first <= self.0[n].1)
@@ -168,7 +168,7 @@ mod tests {
     use super::*;
     use armcal_core::log::{Stream, scan_recording};
 
-    /// The same in two passes over everything, the marks first.
+    /// Reads the same messages in two passes over the whole file, the marks first.
     fn read_all_twice(path: &Path) -> Recording {
         let marks = TopicMap { only: Some([Stream::Marks, Stream::Touch].into()), ..TopicMap::default() };
         let (marked, _) = scan_recording(path, &marks, |_| {}, |_, _| true).unwrap();

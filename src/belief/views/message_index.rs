@@ -1,17 +1,17 @@
-//! The messages of a recording by their own stamps.
+//! Index of a recording's messages by their own stamps.
 
 use armcal_core::streams::{Mark, Message};
 use armcal_core::time::Stamp;
 
-/// Messages of a recording sorted by their own stamps.
+/// Messages of a recording, sorted by their own stamps.
 pub(crate) struct MessageIndex<'a> {
     pub(crate) messages: &'a [(Stamp, Message)],
     pub(crate) by_stamp: Vec<(Stamp, usize)>,
 }
 
 impl<'a> MessageIndex<'a> {
-    /// Those that were recorded by `until`: what came later, such as an image that was long on its way, no calibration
-    /// at that time could know.
+    /// Returns the messages that were recorded by `until`. A calibration at that time could not know later ones, such
+    /// as a delayed image.
     pub(crate) fn heard_until(messages: &'a [(Stamp, Message)], until: Stamp) -> Self {
         let mut by_stamp: Vec<(Stamp, usize)> = messages
             .iter()

@@ -1,10 +1,10 @@
-//! From messages to views of an arm at rest.
+//! Conversion of messages to views of an arm at rest.
 //!
-//! `association` finds the readings and corners of each captured view, `frame_consensus` the frames of it that agree,
-//! `conditions` the temperatures and the pressure under which it was captured, `dropouts` readings that are none.
+//! `association` finds the readings and corners of each captured view, `frame_consensus` its frames that agree.
+//! `conditions` gives the temperatures and the pressure of the capture, and `dropouts` replaces invalid readings.
 //! `external` does the same for recordings that mark no views, `pooling` for several recordings. `scale_identification`
-//! measures the scale of an unknown sensor; `data_checks` refuses unusable recordings; `error` says what is refused
-//! before any estimate; `marked_spans` reads what views are made of and leaves the rest in the file.
+//! measures the scale of an unknown sensor. `data_checks` refuses unusable recordings. `error` lists the errors before
+//! any estimate. `marked_spans` reads the messages that views are made of and leaves the rest in the file.
 
 pub(crate) mod association;
 pub(crate) mod calibration_data;

@@ -14,11 +14,13 @@ use armcal_core::routine::Method;
 use armcal_core::streams::{Message, ReachTask, RecordedSurvey};
 use armcal_core::time::Stamp;
 
-/// Makes the captured views of all recordings ready, whatever calibrations they mark; `survey` instead of what they say
-/// of the tags, `task` where none of them names one. The order of the recordings does not matter.
+/// Prepares the captured views of all recordings, regardless of the calibrations that they mark. `survey` overrides
+/// their statements about the tags, and `task` counts if no recording names one. The order of the recordings does not
+/// matter.
 ///
 /// # Errors
-/// [`CalibError`]: other joints, stamps that go backwards, nothing captured, one recording twice, different surveys.
+/// [`CalibError`] for other joints, stamps that go backwards, no views, one recording given twice, or different
+/// surveys.
 pub fn prepare_pooled(
     recordings: &[Recording],
     robot: &Robot,
@@ -57,7 +59,7 @@ pub fn prepare_pooled(
     })
 }
 
-/// The recordings must agree about the tags: they stand where they stood.
+/// Returns `robot` with the survey that all recordings agree on, because the tags must not have moved.
 fn common_survey(recordings: &[Recording], robot: &Robot) -> Result<Robot, CalibError> {
     let of = |recording: &Recording| {
         recording.messages.iter().find_map(|(_, message)| match message {

@@ -1,9 +1,10 @@
-//! The scale of a sensor of which nobody knows how many counts a radian has, nor which way they run.
+//! Measurement of a sensor's scale if the counts per radian and their sign are unknown.
 //!
 //! One joint moves a little while the others stand still. Between two such views the camera turns by the joint's own
-//! rotation, whatever the other joints' errors are: `R_0^T R_v = exp(axis * (theta_v - theta_0))` with the axis fixed
-//! in the camera. Each view's camera pose comes from all its tags' corners; the turn's common axis is the principal one
-//! of the rotation vectors, its direction the drawing's; the slope of the turn against the readings is the gain.
+//! rotation, regardless of the other joints' errors: `R_0^T R_v = exp(axis * (theta_v - theta_0))` with the axis fixed
+//! in the camera. Each view's camera pose comes from all its tags' corners. The common axis is the principal one of the
+//! rotation vectors, and the nominal model (URDF) gives its sign. The slope of the rotation against the readings is the
+//! gain.
 
 use crate::views::constants::scale_identification::{
     CONSTANT_RAD2, DAMPING, DRAWING_STD, MAX_RELATIVE_STD, MIN_VIEWS, STOP, TURN_FLOOR_RAD,
@@ -19,21 +20,21 @@ use armcal_core::robot::Robot;
 use armcal_core::spatial::exp;
 use armcal_core::streams::JointAngles;
 
-/// A sensor's measured scale.
+/// Measured scale of a sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IdentifiedScale {
     /// Index of the joint, base first.
     pub joint: usize,
-    /// Counts per radian over the datasheet's; negative when they run the other way.
+    /// Ratio of the counts per radian to the datasheet's; negative if they run the other way.
     pub ratio: f64,
-    /// One sigma of the ratio over itself.
+    /// Standard deviation of the ratio, relative to the ratio.
     pub relative_std: f64,
 }
 
-/// Measures the scale of every joint with `identify` views; gives the robot with these scales.
+/// Measures the scale of every joint with `identify` views; returns the robot with these scales.
 ///
 /// # Errors
-/// [`CalibError::Identify`] when the views of a joint do not determine its scale.
+/// [`CalibError::Identify`] if the views of a joint do not determine its scale.
 pub fn identify_scales(data: &CaptureData, robot: &Robot) -> Result<(Robot, Vec<IdentifiedScale>), CalibError> {
     let mut scaled = robot.clone();
     let mut identified = Vec::new();
@@ -75,7 +76,7 @@ fn identify(robot: &Robot, joint: usize, views: &[View]) -> Result<IdentifiedSca
     Ok(IdentifiedScale { joint, ratio: 1.0 / gain, relative_std })
 }
 
-/// Slope of `y` against `x` and its standard deviation; `None` if `x` is constant.
+/// Returns the slope of `y` against `x` and its standard deviation; `None` if `x` is constant.
 fn slope(x: &DVector<f64>, y: &DVector<f64>) -> Option<(f64, f64)> {
     let (x, y) = (x.add_scalar(-x.mean()), y.add_scalar(-y.mean()));
     let spread = x.norm_squared();
@@ -88,16 +89,16 @@ fn slope(x: &DVector<f64>, y: &DVector<f64>) -> Option<(f64, f64)> {
     Some((slope, residual_std.max(TURN_FLOOR_RAD) / spread.sqrt()))
 }
 
-/// The axis of `joint` in the camera frame by the drawing; the joint's own angle does not matter.
+/// Returns the nominal axis of `joint` in the camera frame; the joint's own angle does not matter.
 fn drawn_axis(robot: &Robot, joint: usize, travel_rad: &JointAngles) -> Vector3<f64> {
     let angles = JointAngles::from_fn(robot.n_joints(), |j| robot.sensors[j].center_rad + travel_rad[j]);
     let poses = robot.chain.link_poses(&angles);
     let axis = poses.frame(&robot.camera.mount).rotation.inverse() * poses.axis(joint);
-    // Tags that a joint turns one way see a camera that stands still turn the other way.
+    // If a joint turns the tags one way, a camera that stands still seems to turn the other way.
     if robot.is_watched() { -axis } else { axis }
 }
 
-/// Principal direction of the rotation vectors, towards `drawn`.
+/// Returns the principal direction of the rotation vectors, towards `drawn`.
 fn common_axis(turns: &[Vector3<f64>], drawn: &Vector3<f64>) -> Vector3<f64> {
     let scatter: Matrix3<f64> = turns.iter().map(|turn| turn * turn.transpose()).sum();
     let eigen = scatter.symmetric_eigen();
@@ -105,14 +106,14 @@ fn common_axis(turns: &[Vector3<f64>], drawn: &Vector3<f64>) -> Vector3<f64> {
     if axis.dot(drawn) < 0.0 { -axis } else { axis }
 }
 
-/// `base_from_camera` that fits all corners of the view best; `None` without a tag.
+/// Returns the `base_from_camera` that fits all corners of the view best; `None` without a tag.
 fn camera_pose(robot: &Robot, view: &View) -> Option<Isometry3<f64>> {
     let starts = view.tags.iter().filter_map(|seen| {
         let tag = &robot.tags[seen.tag_idx];
         let solved = solve_square(&robot.camera.lens, tag.size_m, &seen.corners()?.corners_px).ok()?;
         Some(tag.base_from_tag.isometry() * solved.camera_from_tag.isometry().inverse())
     });
-    // A tag seen head-on may start from its mirrored tilt; the other tags then tell.
+    // A tag seen head-on may start from its mirrored tilt; the other tags then decide.
     let refined = starts.filter_map(|start| refine(robot, view, start));
     refined.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(pose, _)| pose)
 }
@@ -178,7 +179,7 @@ impl LeastSquares for Refinement<'_> {
     }
 }
 
-/// The pose of least cost from `start` on, and the cost, px^2.
+/// Returns the pose of least cost from `start` on, and the cost, px^2.
 fn refine(robot: &Robot, view: &View, start: Isometry3<f64>) -> Option<(Isometry3<f64>, f64)> {
     let here = Linearized::at(robot, view, start)?;
     let mut refinement = Refinement { robot, view, here, trial_pose: start, there: None };

@@ -16,36 +16,36 @@ use armcal_core::time::Stamp;
 /// Averaged data of an arm at rest that looks at tags.
 #[derive(Clone, Debug)]
 pub struct View {
-    /// Number in its capture mark, 0 under other marks; of external recordings, by time.
+    /// Number of the view in its capture mark, 0 under other marks; by time in external recordings.
     pub pose_idx: u32,
-    /// End of the capture mark; of external recordings, the stamp of the last image.
+    /// End of the capture mark; the stamp of the last image in external recordings.
     pub end: Stamp,
     /// Mean travel of each joint from the middle of its range by the datasheet, rad.
     pub travel_rad: JointAngles,
-    /// How many readings that mean has.
+    /// Number of readings in that mean.
     pub n_readings: usize,
-    /// How fast the travel changed over the view, rad/s.
+    /// Rate of the travel over the view, rad/s.
     pub rate_rad_s: JointAngles,
-    /// The way that each joint moved last before the view: -1, 1, or 0 where that is not known.
+    /// Direction in which each joint last moved before the view: -1, 1, or 0 if unknown.
     pub approach: [f64; MAX_JOINTS],
-    /// Joints whose reading says nothing in this view: `travel_rad` is then but a guess.
+    /// True for joints without a usable reading in this view: `travel_rad` is then only a guess.
     pub is_free: [bool; MAX_JOINTS],
     /// Oil temperature, pressure and time of the readings.
     pub conditions: Conditions,
-    /// Against gravity in the base frame, unit, by an attitude sensor; `None`: as robot.toml has it.
+    /// Unit vector against gravity in the base frame, from an attitude sensor; `None`: the direction of robot.toml.
     pub up: Option<Vector3<f64>>,
     /// Number of the robot's camera that saw the tags.
     pub camera: usize,
-    /// How many cameras have a view of this pose: what the joints are off there is in each of them.
+    /// Number of cameras with a view of this pose; they share the joints' errors there.
     pub n_cameras: usize,
-    /// Surveyed tags that were seen, by id, each once.
+    /// Surveyed tags that were seen, in the order of their ids, each once.
     pub tags: Vec<TagObservation>,
-    /// The tag on the gripper, where the robot has one and it was seen.
+    /// Corners of the tag on the gripper, if the robot has one and it was seen.
     pub gripper_tag: Option<MeanCorners>,
 }
 
 impl View {
-    /// The view without the tags whose place nobody knows; `None` where nothing is left of it.
+    /// Returns the view without the tags of unknown pose; `None` if nothing is left of it.
     #[must_use]
     pub(crate) fn of_known_tags(&self, robot: &Robot) -> Option<Self> {
         let mut view = self.clone();
@@ -53,7 +53,7 @@ impl View {
         (!view.tags.is_empty() || view.gripper_tag.is_some()).then_some(view)
     }
 
-    /// Returns true where readings and tags are those of `other` to the bit, as in no second measurement.
+    /// Returns true if readings and tags equal those of `other` to the bit, as in no second measurement.
     fn repeats(&self, other: &Self) -> bool {
         let of_tag = |seen: &TagObservation| (seen.tag_idx, seen.center_in_camera_m);
         self.travel_rad == other.travel_rad
@@ -62,14 +62,15 @@ impl View {
             && self.tags.iter().map(of_tag).eq(other.tags.iter().map(of_tag))
     }
 
-    /// What the sensors read `by_s` later, at the rates of the view.
+    /// Moves the travel to `by_s` later, at the rates of the view.
     pub(crate) fn read_later(&mut self, by_s: f64) {
         for (travel_rad, rate_rad_s) in self.travel_rad.iter_mut().zip(self.rate_rad_s.iter()) {
             *travel_rad += rate_rad_s * by_s;
         }
     }
 
-    /// Places the tags in the first camera's frame by the lens of `robot`; a square that this lens does not show stays.
+    /// Computes the tags' positions in the first camera's frame with the lens of `robot`; keeps those that it cannot
+    /// show as a square.
     pub(crate) fn see_through(&mut self, robot: &Robot) {
         for tag in &mut self.tags {
             let TagMeasurement::Corners(seen) = &tag.measured else { continue };
@@ -80,12 +81,12 @@ impl View {
         }
     }
 
-    /// Whether the tag of that index is in it.
+    /// Returns true if the tag with that index is in the view.
     pub(crate) fn sees(&self, tag_idx: usize) -> bool {
         self.tags.iter().any(|seen| seen.tag_idx == tag_idx)
     }
 
-    /// One reading of an arm at rest under unknown conditions, no tags yet.
+    /// Returns a view of one reading of an arm at rest under unknown conditions, without tags.
     #[must_use]
     pub fn of_reading(pose_idx: u32, end: Stamp, travel_rad: JointAngles) -> Self {
         Self {
@@ -113,7 +114,7 @@ pub struct MeanCorners {
     pub corners_px: [[f64; 2]; 4],
     /// Number of averaged frames.
     pub n_frames: usize,
-    /// Sum over frames and the eight coordinates of the squared deviation from the mean; it has `8 (n_frames - 1)`
+    /// Sum over frames and the eight coordinates of the squared deviation from the mean, with `8 (n_frames - 1)`
     /// degrees of freedom.
     pub scatter_px2: f64,
 }
@@ -121,7 +122,7 @@ pub struct MeanCorners {
 /// One inner corner of a board, averaged over the frames of a view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoardPoint {
-    /// In the board's frame, m; z is zero.
+    /// Position in the board's frame, m; z is zero.
     pub on_board: Point3<f64>,
     /// Mean over the frames, raw pixels.
     pub pixel: [f64; 2],
@@ -132,9 +133,9 @@ pub struct BoardPoint {
 /// Corners of a board, averaged over the frames of a view.
 #[derive(Clone, Debug)]
 pub struct BoardPoints {
-    /// Four or more, not on a line.
+    /// Four or more corners, not on a line.
     pub points: Arc<[BoardPoint]>,
-    /// By these points alone.
+    /// Pose estimated from these points only.
     pub camera_from_board: Isometry3<f64>,
     /// Sum over frames and coordinates of the squared deviation from the mean.
     pub scatter_px2: f64,
@@ -142,14 +143,14 @@ pub struct BoardPoints {
     pub n_free: usize,
 }
 
-/// What was measured of a tag or landmark in a view.
+/// Measurement of a tag or landmark in a view.
 #[derive(Clone, Debug)]
 pub enum TagMeasurement {
-    /// Its corners in the image.
+    /// Corners of the tag in the image.
     Corners(MeanCorners),
-    /// Its position in the camera frame, and no more.
+    /// Position of the tag in the camera frame, and no more.
     Position,
-    /// `camera_from_tag`.
+    /// Pose `camera_from_tag`.
     Pose(Isometry3<f64>),
     /// Corners of a board in the image.
     Board(BoardPoints),
@@ -158,18 +159,18 @@ pub enum TagMeasurement {
 /// One tag in one view.
 #[derive(Clone, Debug)]
 pub struct TagObservation {
-    /// Number of the tag, or that which stands for a named landmark.
+    /// Number of the tag, or the number that stands for a named landmark.
     pub id: u32,
     /// Index into the robot's surveyed tags.
     pub tag_idx: usize,
-    /// The tag's centre in the camera frame, m.
+    /// Centre of the tag in the camera frame, m.
     pub center_in_camera_m: Vector3<f64>,
-    /// Corners, position or pose.
+    /// Measured corners, position or pose.
     pub measured: TagMeasurement,
 }
 
 impl TagObservation {
-    /// Its corners, where the recording has them.
+    /// Returns the corners, if the recording has them.
     #[must_use]
     pub fn corners(&self) -> Option<&MeanCorners> {
         match &self.measured {
@@ -178,8 +179,8 @@ impl TagObservation {
         }
     }
 
-    /// Points in the tag's frame, m, and where in the image they were seen, px; of a tag of `size_m` or of a board.
-    /// Empty where the recording has no pixels.
+    /// Returns points in the tag's frame, m, and their positions in the image, px. The points are those of a tag of
+    /// `size_m` or of a board; empty if the recording has no pixels.
     #[must_use]
     pub fn points(&self, size_m: f64) -> Vec<(Point3<f64>, [f64; 2])> {
         match &self.measured {
@@ -189,14 +190,14 @@ impl TagObservation {
         }
     }
 
-    /// Whether pixels were measured.
+    /// Returns true if pixels were measured.
     #[must_use]
     pub fn is_in_pixels(&self) -> bool {
         matches!(self.measured, TagMeasurement::Corners(_) | TagMeasurement::Board(_))
     }
 }
 
-/// Why a detection was not used.
+/// Reason why a detection was not used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ObservationRejection {
     /// The robot's survey does not know this id.
@@ -209,20 +210,20 @@ pub enum ObservationRejection {
     OutOfView,
     /// The mark's span holds no joint readings.
     NoReadings,
-    /// In some frame of a view a tag lies elsewhere than in most: one of them is another tag, misread.
+    /// In some frame of a view a tag lies elsewhere than in most: a misread id of another tag.
     InconsistentFrame,
-    /// The arm was on its way.
+    /// The arm was moving.
     ArmMoving,
-    /// Its view has the numbers of another one: the same data, recorded twice.
+    /// The view has the same numbers as another one: the same data, recorded twice.
     RepeatedView,
-    /// It does not fit the other observations.
+    /// The observation does not fit the others.
     Outlier,
-    /// The detector itself did not believe it.
+    /// The detector itself rejected the tag.
     Detector(RejectReason),
 }
 
 impl ObservationRejection {
-    /// As files write it.
+    /// Returns the name of the reason in files.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -260,24 +261,24 @@ impl ObservationRejection {
     }
 }
 
-/// The views of a recording, and what else a calibration takes from it.
+/// Views of a recording, and the other data that a calibration uses.
 #[derive(Clone, Debug, Default)]
 pub struct CaptureData {
     /// Views that the fit uses.
     pub fit: Vec<View>,
-    /// Views marked as held out; `bundle` fits them, too, and cross-validates all.
+    /// Views marked as held out; `bundle` also fits them, and cross-validates all.
     pub held_out: Vec<View>,
-    /// Views in which only one joint moved, by that joint; in the order of time.
+    /// Views in which only one joint moved, by that joint, in the order of time.
     pub identify: BTreeMap<u32, Vec<View>>,
     /// Readings at nominal end stops, in the order of time.
     pub stops: Vec<(Stamp, EndStopReading)>,
-    /// The tool against surveyed surfaces, in the order of time.
+    /// Contacts of the tool with surveyed surfaces, in the order of time.
     pub touches: Vec<Touch>,
-    /// The first one of the recording; `None` where it has none.
+    /// First task of the recording; `None` if it has none.
     pub task: Option<ReachTask>,
-    /// Angles by the datasheet at which the arm last rested for a target of the task, by the target's number.
+    /// Joint angles by the datasheet at the arm's last rest for each target of the task, by the target's number.
     pub rests: BTreeMap<u32, JointAngles>,
-    /// Number of capture marks, those without a view included; of external recordings, of views.
+    /// Number of capture marks, including those without a view; number of views in external recordings.
     pub n_marks: usize,
     /// Number of detections by reason, over all views.
     pub rejected: BTreeMap<ObservationRejection, usize>,
@@ -287,40 +288,40 @@ pub struct CaptureData {
     pub smallest_px: [f64; 2],
     /// The largest column and row of any corner, px; zero without corners.
     pub largest_px: [f64; 2],
-    /// Stated noise of positions and poses of tags, where there is one.
+    /// Stated noise of tag positions and poses, if any.
     pub tag_noise: Option<TagNoise>,
     /// Names of landmarks that are no numbered tags, by the number that stands for them.
     pub landmark_names: BTreeMap<u32, String>,
-    /// Lowest and highest reading over the captured spans, C.
+    /// Lowest and highest oil temperature over the captured spans, C.
     pub oil_c: Option<(f64, f64)>,
-    /// The same of the water, C.
+    /// Lowest and highest water temperature over the captured spans, C.
     pub water_c: Option<(f64, f64)>,
-    /// Lowest and highest pressure over the captured spans, absolute.
+    /// Lowest and highest absolute pressure over the captured spans, Pa.
     pub pressure_pa: Option<(f64, f64)>,
     /// Indices of the recording's messages that were used, ascending.
     pub used: Vec<usize>,
-    /// Those beyond them that only sensors with terms rest on: thermometers near the views, readings before them.
-    /// Ascending.
+    /// Indices of further messages that only sensors with terms use, ascending: thermometers near the views, readings
+    /// before them.
     pub used_for_terms: Vec<usize>,
 }
 
-/// The task, and the configurations in which the arm rested for its targets.
+/// Task, and the configurations in which the arm rested at its targets.
 #[derive(Clone, Copy, Debug)]
 pub struct TaskRests<'a> {
     /// Targets and tolerance.
     pub task: &'a ReachTask,
-    /// By the target's number; those that were not reached for are absent.
+    /// Configuration at each target, by the target's number; targets without a rest are absent.
     pub rests: &'a BTreeMap<u32, JointAngles>,
 }
 
 impl CaptureData {
-    /// `None` without a task.
+    /// Returns the task with its rests; `None` without a task.
     #[must_use]
     pub fn task_rests(&self) -> Option<TaskRests<'_>> {
         Some(TaskRests { task: self.task.as_ref()?, rests: &self.rests })
     }
 
-    /// Widens `smallest_px` and `largest_px`; each corner once.
+    /// Widens `smallest_px` and `largest_px` to contain these corners.
     pub(crate) fn note_corners(&mut self, corners_px: &[[f64; 2]]) {
         for corner in corners_px {
             self.smallest_px = std::array::from_fn(|axis| self.smallest_px[axis].min(corner[axis]));
@@ -328,7 +329,7 @@ impl CaptureData {
         }
     }
 
-    /// Leaves no views but those of the first camera; how many are gone.
+    /// Removes all views except those of the first camera; returns the number of removed views.
     pub fn keep_first_camera(&mut self) -> usize {
         let n_before = self.fit.len() + self.held_out.len();
         self.fit.retain(|view| view.camera == 0);
@@ -339,7 +340,7 @@ impl CaptureData {
         n_before - self.fit.len() - self.held_out.len()
     }
 
-    /// Leaves out views that repeat an earlier one: they would count, and be held out, as if they told something more.
+    /// Removes views that repeat an earlier one: they would count, and be held out, as if they added information.
     pub(crate) fn leave_out_repeated(&mut self) {
         let all: Vec<&View> = self.fit.iter().chain(&self.held_out).collect();
         let repeats = |(k, view): (usize, &&View)| all[..k].iter().any(|earlier| view.repeats(earlier));
@@ -359,7 +360,7 @@ impl CaptureData {
         *self.rejected.entry(why).or_default() += n;
     }
 
-    /// Puts everything in an order that does not depend on when it was marked.
+    /// Sorts everything into an order that does not depend on when it was marked.
     pub(crate) fn sort(&mut self) {
         self.stops.sort_by_key(|(end, _)| *end);
         self.touches.sort_by_key(|touch| touch.view.end);
@@ -377,7 +378,7 @@ impl CaptureData {
         self.ids_seen.dedup();
     }
 
-    /// How many were rejected under each name; what the detector and the estimator reject alike has one.
+    /// Returns the number of rejected detections under each reason's name; detector and estimator share names.
     #[must_use]
     pub fn rejected_by_reason(&self) -> BTreeMap<String, usize> {
         let mut counts = BTreeMap::new();
@@ -388,18 +389,18 @@ impl CaptureData {
     }
 }
 
-/// The tool's tip against a surveyed plane, by readings of the arm at rest there: `normal . (tool - point) = radius`.
+/// Contact of the tool's tip with a surveyed plane, from readings at rest: `normal . (tool - point) = radius`.
 #[derive(Clone, Debug)]
 pub struct Touch {
     pub surface: String,
-    /// Base frame.
+    /// Point on the surface, base frame.
     pub point_m: Vector3<f64>,
-    /// Out of the surface, base frame.
+    /// Normal out of the surface, base frame.
     pub normal: Vector3<f64>,
     pub tip_radius_m: f64,
-    /// One sigma along the normal.
+    /// Standard deviation along the normal.
     pub std_m: f64,
-    /// Readings and conditions; its tags are not looked at.
+    /// Readings and conditions; the tags are not used.
     pub view: View,
 }
 
@@ -408,7 +409,7 @@ pub struct Touch {
 pub struct EndStopReading {
     /// Index of the joint, base first.
     pub joint: usize,
-    /// Where the drawing has the stop.
+    /// Nominal angle of the stop.
     pub angle_rad: f64,
     /// Mean travel of the joint from the middle of its range by the datasheet.
     pub travel_rad: f64,

@@ -1,4 +1,4 @@
-//! There and back, and what a broken file is told.
+//! Round trips, and error messages of broken files.
 
 use rand::RngExt;
 
@@ -34,7 +34,7 @@ fn terms_come_back_as_they_were() {
         assert_eq!(Calibration { covariance_hash: None, ..read.clone() }, full);
         assert_eq!(read.to_toml(), text);
         assert!(text.contains("[joint.terms]") && text.contains("[reference]") && text.contains("phi_h(x) = sin"));
-        // Joint 5 has none.
+        // Joint 5 has no terms.
         assert_eq!(read.joint[5].terms, None);
         let back = read.parameters(&robot);
         assert_eq!((back.terms, back.reference), (parameters.terms, parameters.reference));
@@ -62,7 +62,7 @@ fn terms_come_back_as_they_were() {
     }
 }
 
-/// A few parameters keep all digits.
+/// With few parameters, the covariance keeps all digits.
 #[test]
 fn a_small_covariance_loses_nothing() {
     let robot = titan();
@@ -75,7 +75,7 @@ fn a_small_covariance_loses_nothing() {
     assert_eq!((again.matrix, again.residual_std_rad), (covariance.matrix, None));
 }
 
-/// Terms are in radians of the measured scale, whichever robot the file meets.
+/// Terms are in radians of the measured scale, regardless of the robot that the file is applied to.
 #[test]
 fn a_measured_scale_holds_for_the_terms_too() {
     let robot = titan();
@@ -122,7 +122,7 @@ fn what_is_wrong_with_terms_is_named() {
     let mut words: Vec<String> = changes.into_iter().map(told).collect();
     let unknown = good.to_toml().replace("half_backlash_rad =", "half_backlash_m =");
     words.push(parsed(&unknown).expect_err("refused").to_string());
-    // The keys of before.
+    // Older files name the keys so.
     let before = good.to_toml().replace("nonlinearity_rad", "shape_rad").replace("half_backlash_rad", "half_play_rad");
     assert_eq!(parsed(&before).expect("it reads").joint, good.joint);
     // A shape that doubles back has no inverse.
@@ -141,7 +141,7 @@ fn what_lies_beyond_is_named_and_what_lies_within_is_not() {
     let stamp = armcal_core::time::Stamp { nanos: calibration.valid.time_nanos };
     let mut angles =
         JointAngles::from_fn(6, |j| 0.5 * (calibration.joint[j].covered_rad[0] + calibration.joint[j].covered_rad[1]));
-    // Nothing was estimated of the last: it has no range.
+    // The last joint has no range because none of its parameters was estimated.
     angles[5] = 3.0;
     let within = Conditions { oil_c: Some(21.5), pressure_pa: Some(0.6e6), stamp: Some(stamp.plus_s(3600.0)) };
     assert_eq!(calibration.beyond(&angles, &within), [""; 0]);

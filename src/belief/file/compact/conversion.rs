@@ -1,4 +1,4 @@
-//! From a full calibration to the compact one, rounded as its text will be, and from there to sensors.
+//! Conversion of a full calibration to the compact one, rounded as its text will be, and from there to sensors.
 
 use crate::file::calibration::{Calibration, JointResult};
 use crate::file::compact::content::{CompactCalibration, CompactJoint, PredictedToolError};
@@ -13,7 +13,7 @@ use armcal_core::sensor::{ArmSensors, Correction};
 use armcal_core::streams::MAX_JOINTS;
 
 impl CompactCalibration {
-    /// The compact form of `calibration`, rounded as its text will be.
+    /// Returns the compact form of `calibration`, rounded as its text will be.
     ///
     /// # Errors
     /// [`CompactError`] when a value is not finite or beyond the form's range.
@@ -56,7 +56,7 @@ impl CompactCalibration {
         }
     }
 
-    /// As fine as fits.
+    /// Adds the terms with the finest step that fits into the text.
     fn with_terms(mut self, calibration: &Calibration, reference: &ReferenceTable) -> Result<Self, CompactError> {
         self.format = text::FORMAT_WITH_TERMS;
         let of_table = |joint: &JointResult| joint.terms.as_ref().map(|terms| terms.half_range_rad);
@@ -78,7 +78,7 @@ impl CompactCalibration {
         Ok(self)
     }
 
-    /// The text, one line without its end.
+    /// Returns the text, one line without its end.
     ///
     /// # Errors
     /// [`CompactError::TooLong`].
@@ -87,18 +87,18 @@ impl CompactCalibration {
         if text.len() < MAX_COMPACT_BYTES { Ok(text) } else { Err(CompactError::TooLong { bytes: text.len() }) }
     }
 
-    /// Reads a text; runs of white space count as one space, for links break lines.
+    /// Reads a text. A run of white space counts as one space because links break lines.
     ///
     /// # Errors
-    /// [`CompactError`] whatever the text is.
+    /// [`CompactError`] if the text is no valid compact calibration.
     pub fn from_text(text: &str) -> Result<Self, CompactError> {
         text::read(text)
     }
 
-    /// Whether it was made for `robot`'s name and joints.
+    /// Returns true if the calibration was made for `robot`'s name and joints.
     #[must_use]
     pub fn fits(&self, robot: &Robot) -> bool {
-        // The joints with terms are known by the text.
+        // The text shows which joints have terms.
         let has_terms = |j: usize| self.joint.get(j).is_some_and(|joint| joint.terms.is_some());
         let joints = robot
             .sensors
@@ -110,7 +110,7 @@ impl CompactCalibration {
             && self.joints_hash == joints_hash(joints)
     }
 
-    /// The sensors of `robot` under this calibration.
+    /// Returns the sensors of `robot` under this calibration.
     ///
     /// # Errors
     /// [`CompactError::OtherRobot`].
@@ -147,8 +147,8 @@ fn compact_joint(calibration: &Calibration, joint: &JointResult, per_unit: f64) 
     })
 }
 
-/// Gain over the datasheet's. Where an older calibration.toml does not name it, an estimated gain's deviation stands in
-/// it twice, absolute and (in the covariance) relative; one that was not estimated is the datasheet's.
+/// Returns the ratio of the gain to the datasheet's. Older files do not state it, but hold an estimated gain's
+/// deviation twice: absolute and, in the covariance, relative. A gain that was not estimated is the datasheet's.
 fn relative_gain(calibration: &Calibration, joint: &JointResult) -> Result<f64, CompactError> {
     if let Some(gain) = joint.gain_over_datasheet {
         return Ok(gain);
@@ -166,9 +166,9 @@ fn relative_gain(calibration: &Calibration, joint: &JointResult) -> Result<f64, 
         .ok_or_else(|| CompactError::NoRelativeGain { joint: joint.name.clone() })
 }
 
-/// A deviation is rounded up, so that nothing looks surer than it is; beyond the range it is as good as unknown.
+/// Rounds a standard deviation up, so that it never becomes too small; returns `None` beyond the range.
 fn rounded_std(std: f64, per_unit: f64) -> Option<f64> {
-    // Not from 1.0000000001 steps to 2: what was rounded before stays.
+    // Tolerance: a value that was rounded before stays, instead of growing from 1.0000000001 steps to 2.
     let steps = (std * per_unit - 1e-6).ceil();
     (0.0..=MAX_STEPS as f64).contains(&steps).then_some(steps / per_unit)
 }
@@ -178,7 +178,7 @@ fn whole_micrometres(error_m: f64) -> Option<f64> {
     (0.0..=MAX_STEPS as f64).contains(&um).then_some(um / UM_PER_M)
 }
 
-/// Eight digits that tell one robot's joints from another's.
+/// Returns a hash of eight digits that identifies a robot's joints.
 fn joints_hash<'a>(joints: impl Iterator<Item = (&'a str, f64, Option<f64>)>) -> String {
     let mut hasher = blake3::Hasher::new();
     for (name, center_rad, half_range_rad) in joints {
@@ -192,7 +192,7 @@ fn joints_hash<'a>(joints: impl Iterator<Item = (&'a str, f64, Option<f64>)>) ->
     hasher.finalize().to_hex()[..8].to_owned()
 }
 
-/// Returns the code of the first refusal; `other` where a file holds its sentence only.
+/// Returns the code of the first refusal; `other` where a file holds only its sentence.
 fn refusal_code(calibration: &Calibration) -> Option<&'static str> {
     let unnamed = calibration.refusal.as_ref().map(|_| "other");
     calibration.refusals.first().map(|refusal| refusal.code().as_str()).or(unnamed)

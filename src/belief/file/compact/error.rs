@@ -1,10 +1,10 @@
-//! What can be wrong with a compact calibration.
+//! Errors of a compact calibration.
 
 use crate::file::compact::precision::MAX_COMPACT_BYTES;
 use armcal_core::codes::{Code, Coded};
 use armcal_core::streams::MAX_JOINTS;
 
-/// Why a calibration has no compact form, or a text is none.
+/// Reason why a calibration has no compact form, or why a text is no compact calibration.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum CompactError {

@@ -1,7 +1,7 @@
-//! What `armcal2` has beyond `armcal1`: the reference, and each joint's terms in whole steps.
+//! Parts of `armcal2` beyond `armcal1`: the reference, and each joint's terms in whole steps.
 //!
-//! A number of steps is one to four printable characters: digits of base 45, the last from the first half of
-//! [`DIGITS`], those before it from the second half, so that small numbers are short and none needs a space between.
+//! A number of steps is one to four printable characters: digits of base 45. The last is from the first half of
+//! [`DIGITS`], those before it from the second half. So small numbers are short and need no space between them.
 
 pub(crate) use crate::file::constants::compact_terms::SHAPE_STEPS_RAD;
 use crate::file::constants::compact_terms::{
@@ -16,24 +16,24 @@ use crate::file::terms_table::ReferenceTable;
 use armcal_core::sensor::{Conditions, N_SHAPE, Terms};
 use armcal_core::time::Stamp;
 
-/// Printable ASCII but quotes, backslash and backquote.
+/// Printable ASCII except quotes, backslash and backquote.
 const DIGITS: &[u8; 90] = b"0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz!#$%&()*+,-./:;<=>?@[]^_{|}~";
 
-/// What the terms are counted from, and how finely they are written.
+/// Reference conditions of the terms, and the step of the written coefficients.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct CompactReference {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub oil_c: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pressure_pa: Option<f64>,
-    /// Seconds after the calibration's time.
+    /// Reference time, in seconds after the calibration's time.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub after_time_s: Option<i64>,
     /// Step of the shapes' coefficients.
     pub shape_step_rad: f64,
 }
 
-/// As [`Terms`].
+/// Terms of one joint, as in [`Terms`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct CompactTerms {
     pub nonlinearity_rad: [f64; N_SHAPE],
@@ -69,7 +69,7 @@ impl CompactReference {
         Conditions { oil_c: self.oil_c, pressure_pa: self.pressure_pa, stamp }
     }
 
-    /// `c2050/20100/-1200/5`: 0.01 C, kPa, s, 1e-6 rad; `x` for what is unknown.
+    /// Returns text such as `c2050/20100/-1200/5`, in 0.01 C, kPa, s and 1e-6 rad; `x` for an unknown value.
     pub(crate) fn to_text(self) -> String {
         let steps = |value: Option<f64>, per_unit: f64| {
             value.map_or_else(|| "x".to_owned(), |value| ((value * per_unit).round() as i64).to_string())
@@ -99,7 +99,7 @@ impl CompactReference {
     }
 }
 
-/// The terms that are no shape, in the order of the text, each with its steps per unit.
+/// Returns the terms other than the shape, in the order of the text, each with its steps per unit.
 fn scalars(terms: &mut CompactTerms) -> [(&mut f64, f64); 5] {
     [
         (&mut terms.offset_rad_per_k, OFFSET_STEPS),
@@ -110,18 +110,18 @@ fn scalars(terms: &mut CompactTerms) -> [(&mut f64, f64); 5] {
     ]
 }
 
-/// In 1e-6 rad.
+/// Returns the step in units of 1e-6 rad.
 fn step_in_words(step_rad: f64) -> String {
     format!("{:.0}", step_rad * 1e6)
 }
 
-/// A whole number, so that what is read looks as it was written.
+/// Returns steps per radian as a whole number, so that a value read back prints as it was written.
 fn per_rad(step_rad: f64) -> f64 {
     (1.0 / step_rad).round()
 }
 
 impl CompactTerms {
-    /// Rounded as the text will be.
+    /// Returns `terms` rounded as the text will be.
     pub(crate) fn of(terms: &Terms, shape_step_rad: f64, joint: &str) -> Result<Self, CompactError> {
         let Terms {
             nonlinearity_rad,
@@ -130,7 +130,7 @@ impl CompactTerms {
             offset_rad_per_mpa,
             drift_rad_per_h,
             half_backlash_rad,
-            // No calibration has any.
+            // No calibration has a bump.
             bump: _,
         } = *terms;
         let mut rounded = Self {
@@ -173,7 +173,7 @@ impl CompactTerms {
         }
     }
 
-    /// The five scalars, then the shape up to its last coefficient that is not zero.
+    /// Returns the text of the five scalars, then of the shape up to its last nonzero coefficient.
     pub(crate) fn to_text(mut self, shape_step_rad: f64) -> String {
         let mut text = String::new();
         let mut push = |value: f64, per_unit: f64| push_steps(&mut text, (value * per_unit).round() as i64);
@@ -207,7 +207,8 @@ impl CompactTerms {
     }
 }
 
-/// 0, -1, 1, -2, .. become 0, 1, 2, 3, ..; numbers of n digits follow those of n - 1, so that each has one form.
+/// Writes a number of steps. The codes of 0, -1, 1, -2, ... are 0, 1, 2, 3, ...; codes of n digits follow those of n -
+/// 1, so that each number has one form.
 fn push_steps(text: &mut String, steps: i64) {
     let mut code = if steps < 0 { -2 * steps - 1 } else { 2 * steps };
     let mut digits = vec![DIGITS[(code % BASE) as usize]];
@@ -220,7 +221,7 @@ fn push_steps(text: &mut String, steps: i64) {
     text.extend(digits.iter().rev().map(|digit| char::from(*digit)));
 }
 
-/// The first number, and what follows it.
+/// Returns the first number and the text that follows it.
 fn read_steps(text: &[u8]) -> Option<(i64, &[u8])> {
     let mut code = 0;
     for (n, byte) in text.iter().enumerate().take(MAX_DIGITS + 1) {

@@ -1,4 +1,4 @@
-//! `armcal2`: there and back, how exact it is at the tool, and that nothing is lost without a word.
+//! `armcal2`: round trips, their error at the tool, and errors for everything that is lost.
 
 use rand::RngExt;
 
@@ -12,7 +12,7 @@ use armcal_core::stats::{quantile, stream_rng};
 use armcal_core::streams::JointAngles;
 use armcal_core::time::SIMULATION_EPOCH;
 
-/// Largest distance between the tool by `a` and by `b` over the arm's range, m.
+/// Returns the largest distance between the tool's positions by `a` and by `b` over the arm's range, m.
 fn worst_m(robot: &Robot, a: &ArmSensors, b: &ArmSensors, away: f64, seed: u64) -> f64 {
     let mut rng = stream_rng(seed, "poses");
     let tool_m = |angles: &JointAngles| robot.chain.link_poses(angles).frame(&robot.tool.mount).translation.vector;
@@ -31,7 +31,7 @@ fn worst_m(robot: &Robot, a: &ArmSensors, b: &ArmSensors, away: f64, seed: u64) 
     distance_m.fold(0.0, f64::max)
 }
 
-/// Six joints with every term, nonlinearity of 0.1 % of the range and of 0.5 %.
+/// Six joints have every term, with a nonlinearity of 0.1 % of the range and of 0.5 %.
 #[test]
 fn a_calibration_with_terms_fits_into_the_line_and_comes_back() {
     let robot = titan();
@@ -95,7 +95,7 @@ fn what_does_not_fit_is_refused_and_not_cut() {
     assert!(matches!(CompactCalibration::of(&full), Err(CompactError::MeasuredScale { .. })));
 }
 
-/// The shape is over half of the range: another range is another robot.
+/// The shape refers to half of the range, so that another range means another robot.
 #[test]
 fn another_range_is_another_robot() {
     let mut robot = titan();
@@ -124,7 +124,7 @@ fn every_single_change_of_a_line_with_terms_is_noticed() {
         }
         assert!(CompactCalibration::from_text(&text[..at]).is_err());
     }
-    // With a right checksum, too, what is no number is named.
+    // Fields that are no numbers are named even if the checksum is right.
     let body = &text[..text.len() - 10];
     let reference = body.split(' ').find(|word| word.starts_with('c')).expect("a reference");
     let last = body.split(' ').nth(9).expect("a joint");

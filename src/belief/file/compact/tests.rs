@@ -1,4 +1,4 @@
-//! Round trips, the limit of its length, and what a bad link makes of it.
+//! Round trips, the limit of the text's length, and texts that a bad link changed.
 
 use proptest::prelude::*;
 
@@ -14,7 +14,7 @@ use armcal_core::numeric::Outcome;
 use armcal_core::routine::Method;
 use armcal_core::stats::Summary;
 
-/// Gain and offset corrections with deviations; `None` where the datasheet's stays.
+/// Gain and offset corrections with standard deviations; `None` where the datasheet's value stays.
 #[derive(Clone, Debug)]
 struct Joint {
     name: String,
@@ -140,7 +140,7 @@ fn what_is_not_finite_is_unknown_or_refused() {
     assert!(matches!(CompactCalibration::of(&full), Err(CompactError::NoRelativeGain { .. })));
 }
 
-/// Each reason that the verdict can give has a code of its own.
+/// Each reason of the verdict has its own code.
 #[test]
 fn every_refusal_has_a_code() {
     use crate::checks::refusal_conditions::{AcceptanceData, HeldOutLimit, refusal};
@@ -178,7 +178,7 @@ fn every_refusal_has_a_code() {
     }
 }
 
-/// Any one character changed, lost, doubled or swapped, and any cut, is noticed.
+/// Any one character changed, lost, doubled or swapped, and any cut, is detected.
 #[test]
 fn every_single_change_is_noticed() {
     let text = text_of(&calibration("titan4", &six(), None));
@@ -200,7 +200,7 @@ fn every_single_change_is_noticed() {
     }
 }
 
-/// With a right checksum, too, nothing that is wrong gets through, and nothing panics.
+/// Wrong fields are rejected without a panic, even if the checksum is right.
 #[test]
 fn wrong_fields_are_named() {
     let text = text_of(&calibration("titan4", &six(), None));

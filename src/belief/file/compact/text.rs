@@ -1,4 +1,4 @@
-//! The line itself: fields between single spaces, a checksum at the end.
+//! Text of the compact line: fields between single spaces, a checksum at the end.
 
 use crate::file::constants::compact_text::{MAX_CODE, MAX_NAME_BYTES, SUM_DIGITS};
 use std::fmt::Write as _;
@@ -44,7 +44,7 @@ pub(crate) fn write(c: &CompactCalibration) -> String {
     format!("{body} #{sum}")
 }
 
-/// `+242479~12078` if estimated, `=0~300000` if the datasheet's.
+/// Returns text such as `+242479~12078` if estimated, `=0~300000` if the datasheet's.
 fn estimated_or_datasheet(value: f64, per_unit: f64) -> [String; 2] {
     let steps = (value * per_unit).round() as i64;
     [format!("{steps:+}"), format!("={steps}")]
@@ -61,7 +61,8 @@ fn checksum(body: &str) -> String {
     blake3::hash(body.as_bytes()).to_hex()[..SUM_DIGITS].to_owned()
 }
 
-/// A robot's name as it is sent: letters, digits, `-`, `_` and `.`; other bytes as `%xx`; the end of a long one hashed.
+/// Returns a robot's name as it is sent: letters, digits, `-`, `_` and `.`; other bytes as `%xx`; the end of a long one
+/// hashed.
 pub(crate) fn short_name(name: &str) -> String {
     let mut short = String::new();
     for byte in name.bytes() {
@@ -96,7 +97,7 @@ pub(crate) fn read(text: &str) -> Result<CompactCalibration, CompactError> {
     fields(words)
 }
 
-/// The words between format and checksum; the checksum holds, so an error here is of another writer's making.
+/// Parses the words between format and checksum. The checksum is right, so that an error here is the writer's.
 fn fields(words: &[&str]) -> Result<CompactCalibration, CompactError> {
     let word = |n: usize, field: &'static str| words.get(n).copied().ok_or_else(|| bad(field, "", "there"));
     let tagged = |n: usize, field: &'static str, tag: char| {
@@ -167,7 +168,7 @@ fn hex(word: &str, field: &str, digits: usize) -> Result<String, CompactError> {
 fn joint(n: usize, word: &str, reference: Option<&CompactReference>) -> Result<CompactJoint, CompactError> {
     let wrong = || bad(format!("joint {n}"), word, "gain~std,offset~std");
     let (gain, rest) = word.split_once(',').ok_or_else(wrong)?;
-    // Whatever stands in the terms, commas among it, is behind the second one.
+    // The terms may contain commas: everything after the second comma belongs to them.
     let (offset, terms) = match (rest.split_once(','), reference) {
         (Some((offset, terms)), Some(reference)) => {
             let wrong = || bad(format!("joint {n}: terms"), terms, "numbers in base 45");
@@ -181,7 +182,7 @@ fn joint(n: usize, word: &str, reference: Option<&CompactReference>) -> Result<C
     Ok(CompactJoint { gain_correction, gain_std, gain_estimated, offset_rad, offset_std_rad, offset_estimated, terms })
 }
 
-/// The other way of [`parameter`].
+/// Parses a word that [`parameter`] wrote.
 fn read_parameter(word: &str, per_unit: f64) -> Option<(f64, Option<f64>, bool)> {
     let (value, std) = word.split_once('~')?;
     let (is_estimated, value) = match value.strip_prefix('=') {

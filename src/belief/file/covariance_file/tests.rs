@@ -1,11 +1,11 @@
-//! Two files that belong together, and what is said when they do not.
+//! Two files that belong together, and the errors of files that do not.
 
 use crate::file::calibration::Calibration;
 use crate::file::covariance_file::*;
 use crate::fixture::{estimate, titan, with_terms};
 use armcal_core::stats::stream_rng;
 
-/// Writes both files; gives the calibration's place.
+/// Writes both files; returns the calibration's path.
 fn written(folder: &Path, calibration: &Calibration) -> PathBuf {
     let (file, texts) = (folder.join("calibration.toml"), calibration.to_files());
     std::fs::write(&file, texts.calibration).expect("written");
@@ -67,14 +67,14 @@ fn a_missing_a_foreign_and_a_broken_one_are_named() {
     let missing = told();
     assert!(matches!(missing, CalibrationFileError::NoCovariance { .. }), "{missing}");
     insta::assert_snapshot!("covariance_files", [foreign, broken, missing].each_ref().map(in_words).join("\n"));
-    // Alone it still tells angles.
+    // The calibration file without its covariance still gives angles.
     let text = std::fs::read_to_string(&file).expect("it reads");
     let alone = Calibration::parse(&file, &text).expect("it reads alone");
     assert!(alone.sensors(&titan()).is_ok() && alone.covariance.parameters.is_empty());
     assert_eq!(alone.to_toml(), text, "the hash of what was not read stays");
 }
 
-/// Files of before there were two.
+/// Older files hold the covariance as a table.
 #[test]
 fn a_covariance_inside_the_file_still_reads() {
     let (folder, full) = (tempfile::tempdir().expect("a folder"), with_covariance(3));

@@ -1,7 +1,7 @@
-//! The distance of two tags' centres, by tape or laser: `|p_i - p_j|`.
+//! The distance between the centres of two tags, measured by tape or laser: `|p_i - p_j|`.
 //!
-//! With the unit vector u from j to i, a small motion of tag i (right, its own axes) lengthens it by `u^T R_i` times
-//! its shift, one of tag j by `-u^T R_j`; a turn about the centre does not change it.
+//! The unit vector u points from j to i. A small motion of tag i (right, its own axes) lengthens the distance by `u^T
+//! R_i` times its shift, one of tag j by `-u^T R_j`; a turn about the centre does not change it.
 
 use nalgebra::{Isometry3, Vector3, Vector6};
 
@@ -10,7 +10,7 @@ use crate::model::blocks::{Block, PerBlock, Value};
 use armcal_core::robot::Robot;
 use armcal_core::robot::geometry::TagDistance;
 
-/// A stated distance, with the tags by their index among the robot's.
+/// A stated distance, with the tags' indices among the robot's.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DistanceTerm {
     stated: TagDistance,
@@ -54,7 +54,7 @@ impl DistanceTerm {
     }
 }
 
-/// Of a length along `along` by the columns of the pose at one end.
+/// Returns the derivative of a length along `along` by the columns of the pose at one end.
 fn by_shift(pose: &Isometry3<f64>, along: &Vector3<f64>) -> Vector6<f64> {
     let by = pose.rotation.inverse() * along;
     Vector6::new(by.x, by.y, by.z, 0.0, 0.0, 0.0)

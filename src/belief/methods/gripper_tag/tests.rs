@@ -1,4 +1,4 @@
-//! Jacobians against differences, and what the covariance must say of what cannot be seen.
+//! Jacobians against differences, and the covariance of unobservable directions.
 
 use std::path::Path;
 
@@ -15,7 +15,7 @@ fn titan() -> Robot {
         .expect("the robot reads")
 }
 
-/// Corners without noise at these travels of the last joint, by the drawing.
+/// Returns nominal corners without noise at these travels of the last joint.
 fn views(robot: &Robot, travels_rad: &[f64]) -> Vec<View> {
     let tag = robot.gripper_tag.expect("a tag");
     let view = |&travel_rad: &f64| {
@@ -36,7 +36,7 @@ fn views(robot: &Robot, travels_rad: &[f64]) -> Vec<View> {
 #[test]
 fn jacobians_agree_with_central_differences() {
     const STEP: f64 = 1e-6;
-    /// Of the largest entry: the second difference of a projection over that step.
+    /// Tolerance relative to the largest entry: the second difference of a projection over that step.
     const TOLERANCE: f64 = 1e-6;
     let robot = titan();
     let tag = robot.gripper_tag.expect("a tag");
@@ -58,7 +58,7 @@ fn jacobians_agree_with_central_differences() {
                 let step = DVector::from_fn(14, |row, _| if row == column { step } else { 0.0 });
                 problem.linearized(&problem.stepped(&state, &step), travel_rad, seen).expect("in view").residual_px
             });
-            // The residual is measured less predicted.
+            // The residual is measured minus predicted.
             let difference = (low - high) / (2.0 * STEP);
             let error = (difference - analytic).amax();
             assert!(error < TOLERANCE * analytic.amax().max(1.0), "column {column}: {error} of {}", analytic.amax());
@@ -66,7 +66,7 @@ fn jacobians_agree_with_central_differences() {
     }
 }
 
-/// A turn of the mount about the joint's axis looks like the joint's offset: the sum of both is known, neither alone.
+/// A turn of the mount about the joint's axis looks like the joint's offset: only the sum of both is determined.
 #[test]
 fn what_cannot_be_parted_keeps_its_prior() {
     let robot = titan();
@@ -84,7 +84,7 @@ fn what_cannot_be_parted_keeps_its_prior() {
     let across = axis.cross(&Vector3::x()).normalize();
     assert!(std_about(&axis) > 0.9 * prior, "{}", std_about(&axis));
     assert!(std_about(&across) < 0.25 * prior, "{}", std_about(&across));
-    // The same few angles again and again tell nothing of the gain.
+    // Views at the same few angles do not determine the gain.
     let narrow = mount_by_gripper_tag(&robot, &tag, &views(&robot, &[0.3; 30]), &JointParameters::default());
     let gain = Parameter { joint: 5, kind: ParameterKind::Gain };
     assert!(found.determined(&robot).contains(&gain));

@@ -1,4 +1,4 @@
-//! Where the tag on the gripper is on its link.
+//! Pose of the tag on the gripper, on its link.
 
 use nalgebra::Isometry3;
 

@@ -19,7 +19,7 @@ pub(super) fn name(robot: &Robot, camera: usize, column: usize) -> String {
     }
 }
 
-/// One sigma of each column as robot.toml states it.
+/// Returns the standard deviation of each column as robot.toml states it.
 fn lens_std(camera: &CameraSpec) -> Std {
     let LensPriors { focal_std, center_std_px, distortion_std } = camera.lens_priors;
     let [fx, fy] = camera.lens.focal_px().map(|px| px * focal_std);

@@ -1,4 +1,4 @@
-//! The list of blocks; the variants stand in the order of their columns.
+//! List of blocks; the variants are in the order of their columns.
 
 use crate::model::blocks::{MAX_COLUMNS, Std, Value, clock, gripper_tag, lens, mount, tag};
 use crate::model::scales::Hyperparameters;
@@ -19,18 +19,18 @@ pub enum Block {
     GripperTag,
 }
 
-/// Contents of views.
+/// Content of the views that decides which blocks are estimated.
 pub(crate) struct Shown<'a> {
-    /// The arm while it moves.
+    /// True if the arm moves in some views.
     pub motion: bool,
-    /// The tag on the gripper, often enough.
+    /// True if enough views show the tag on the gripper.
     pub gripper_tag: bool,
-    /// True for the number of a camera that sees tags.
+    /// Returns true for the number of a camera that sees tags.
     pub by_camera: &'a dyn Fn(usize) -> bool,
 }
 
 impl Block {
-    /// All that `robot` has, in the order of their columns.
+    /// Returns all blocks of `robot`, in the order of their columns.
     pub fn all(robot: &Robot) -> impl Iterator<Item = Self> + use<> {
         Self::in_order(1 + robot.further_cameras.len(), robot.tags.len())
     }
@@ -41,7 +41,7 @@ impl Block {
         mounts.chain([Self::Clock]).chain(lenses).chain((0..n_tags).map(Self::Tag)).chain([Self::GripperTag])
     }
 
-    /// Where it stands in that order.
+    /// Returns the block's index in that order.
     #[inline]
     pub(super) fn place(self, n_cameras: usize, n_tags: usize) -> usize {
         match self {
@@ -53,12 +53,12 @@ impl Block {
         }
     }
 
-    /// Those of its tags.
+    /// Returns the blocks of the robot's tags.
     pub fn tags(robot: &Robot) -> impl Iterator<Item = Self> + use<> {
         (0..robot.tags.len()).map(Self::Tag)
     }
 
-    /// Number of columns.
+    /// Returns the number of columns.
     #[inline]
     pub(crate) fn n_columns(self) -> usize {
         match self {
@@ -68,7 +68,7 @@ impl Block {
         }
     }
 
-    /// Returns true where it is estimated from the start; a lens only where the views call for it.
+    /// Returns true if the block is estimated from the start; a lens is added only if the views require it.
     pub(crate) fn is_told(self, robot: &Robot, shown: &Shown<'_>) -> bool {
         match self {
             Self::Mount(camera) => mount::is_loose(robot.camera_at(camera)) && (shown.by_camera)(camera),
@@ -79,7 +79,7 @@ impl Block {
         }
     }
 
-    /// Value by the drawing, robot.toml or the survey.
+    /// Returns the nominal value: from the URDF, robot.toml or the survey.
     pub(crate) fn drawn(self, robot: &Robot) -> Value {
         match self {
             Self::Mount(camera) => mount::drawn(robot, camera),
@@ -90,7 +90,7 @@ impl Block {
         }
     }
 
-    /// One sigma of that, column by column, in the columns' units; infinite where nothing is known.
+    /// Returns the standard deviation of the nominal value for each column, in the column's unit; infinite if unknown.
     pub(crate) fn drawn_std(self, robot: &Robot, scales: &Hyperparameters) -> Std {
         match self {
             Self::Mount(camera) => mount::drawn_std(robot, camera, scales),
@@ -101,7 +101,7 @@ impl Block {
         }
     }
 
-    /// One of its columns in words.
+    /// Returns the name of one of the block's columns.
     pub(crate) fn name(self, robot: &Robot, column: usize) -> String {
         match self {
             Self::Mount(camera) => mount::name(robot, camera, column),
@@ -112,12 +112,12 @@ impl Block {
         }
     }
 
-    /// Returns true where its columns are a position and an attitude: shifts in m, then turns in rad.
+    /// Returns true if the columns are a position and an attitude: shifts in m, then turns in rad.
     pub(crate) fn is_pose(self) -> bool {
         matches!(self, Self::Mount(_) | Self::Tag(_) | Self::GripperTag)
     }
 
-    /// Index of a tag that stands about the arm.
+    /// Returns the index of a tag around the arm; `None` for other blocks.
     pub(crate) fn tag_about_arm(self) -> Option<usize> {
         match self {
             Self::Tag(tag) => Some(tag),
@@ -125,7 +125,7 @@ impl Block {
         }
     }
 
-    /// Returns true for a tag about the arm or on its gripper.
+    /// Returns true for a tag around the arm or on its gripper.
     pub(crate) fn is_tag(self) -> bool {
         matches!(self, Self::Tag(_) | Self::GripperTag)
     }

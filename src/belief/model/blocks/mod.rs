@@ -1,7 +1,7 @@
-//! Blocks: parameters that move together, next to those of the joints.
+//! Blocks: parameters that move together, in addition to those of the joints.
 //!
-//! Each has a file with what the drawing says of it, how well, and its name; `value` is what a step does to it. A new
-//! block is a file, and in `list` a variant and a line in each function; everything else iterates.
+//! Each block has a file with its nominal value, the standard deviation of that and its name; `value` applies a step. A
+//! new block needs a file, and a variant and a line in each function of `list`; everything else iterates.
 
 mod clock;
 mod gripper_tag;

@@ -1,4 +1,4 @@
-//! A camera's mount on its link.
+//! Mount of a camera on its link.
 
 use crate::model::blocks::value::pose_column;
 use crate::model::blocks::{Std, Value, six};
@@ -22,7 +22,7 @@ pub(super) fn name(robot: &Robot, camera: usize, column: usize) -> String {
     }
 }
 
-/// Returns true where the drawing leaves anything of a camera's mount open.
+/// Returns true if the nominal mount of a camera is not exact.
 pub(super) fn is_loose(camera: &CameraSpec) -> bool {
     camera.mount_std_m > 0.0 || camera.mount_std_rad > 0.0
 }

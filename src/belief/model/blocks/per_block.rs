@@ -1,4 +1,4 @@
-//! Something of each block of an arm, found by the block.
+//! A value for each block of an arm, found by the block.
 
 use nalgebra::Isometry3;
 
@@ -15,29 +15,29 @@ pub(crate) struct PerBlock<T> {
 }
 
 impl<T> PerBlock<T> {
-    /// `of` each block that `robot` has.
+    /// Returns `of` each block that `robot` has.
     pub(crate) fn new(robot: &Robot, of: impl FnMut(Block) -> T) -> Self {
         let (n_cameras, n_tags) = (1 + robot.further_cameras.len(), robot.tags.len());
         Self { all: Block::all(robot).map(of).collect(), n_cameras, n_tags }
     }
 
-    /// Each with its block.
+    /// Returns each value with its block.
     pub(crate) fn iter(&self) -> impl Iterator<Item = (Block, &T)> {
         self.blocks().zip(&self.all)
     }
 
-    /// Each with its block, to be changed.
+    /// Returns each value, mutable, with its block.
     pub(crate) fn iter_mut(&mut self) -> impl Iterator<Item = (Block, &mut T)> {
         self.blocks().zip(&mut self.all)
     }
 
-    /// Those of the tags about the arm.
+    /// Returns the values of the tags around the arm.
     pub(crate) fn tags(&self) -> &[T] {
         let first = self.place(Block::Tag(0));
         &self.all[first..first + self.n_tags]
     }
 
-    /// Entries of the tags, mutable.
+    /// Returns the values of these tags, mutable.
     pub(crate) fn tags_mut(&mut self) -> &mut [T] {
         let first = self.place(Block::Tag(0));
         &mut self.all[first..first + self.n_tags]
@@ -54,7 +54,7 @@ impl<T> PerBlock<T> {
 }
 
 impl<T: Copy> PerBlock<T> {
-    /// Becomes `other` in its own memory; both are of one arm.
+    /// Copies `other` into the same memory; both are of one arm.
     pub(crate) fn copy_from(&mut self, other: &Self) {
         self.all.copy_from_slice(&other.all);
     }
@@ -78,7 +78,7 @@ impl<T> std::ops::IndexMut<Block> for PerBlock<T> {
 }
 
 impl PerBlock<Value> {
-    /// The pose of a block.
+    /// Returns the pose of a block.
     #[inline]
     pub(crate) fn pose(&self, block: Block) -> &Isometry3<f64> {
         match &self[block] {
@@ -87,7 +87,7 @@ impl PerBlock<Value> {
         }
     }
 
-    /// The lens of a block.
+    /// Returns the lens of a block.
     #[inline]
     pub(crate) fn lens(&self, block: Block) -> &CameraModel {
         match &self[block] {
@@ -96,7 +96,7 @@ impl PerBlock<Value> {
         }
     }
 
-    /// The number of a block.
+    /// Returns the number that is the value of a block.
     #[inline]
     pub(crate) fn number(&self, block: Block) -> f64 {
         match &self[block] {

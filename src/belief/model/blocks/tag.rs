@@ -1,4 +1,4 @@
-//! Where a tag is that the views show.
+//! Pose of a tag that the views show.
 
 use crate::model::blocks::value::pose_column;
 use crate::model::blocks::{Std, Value, six};

@@ -6,22 +6,22 @@ use nalgebra::{Isometry3, Vector6};
 use armcal_core::optics::CameraModel;
 use armcal_core::spatial::{exp, log};
 
-/// One sigma of each column; zero beyond the block's own.
+/// Standard deviation of each column; zero beyond the block's own columns.
 pub(crate) type Std = [f64; MAX_COLUMNS];
 
-/// The value of a block.
+/// Value of a block.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Value {
-    /// Six columns: a small motion on the right, shift m before turn rad.
+    /// Pose with six columns: a small motion on the right, shift m before turn rad.
     Pose(Isometry3<f64>),
-    /// One column.
+    /// Number with one column.
     Number(f64),
-    /// Eight columns: focal lengths and centre px, then distortion.
+    /// Lens with eight columns: focal lengths and centre px, then distortion.
     Lens(CameraModel),
 }
 
 impl Value {
-    /// Moved by a step of its columns.
+    /// Returns the value moved by a step of its columns.
     pub(crate) fn moved(&self, step: &[f64]) -> Self {
         match self {
             Self::Pose(pose) => Self::Pose(pose * exp(&Vector6::from_fn(|k, _| step[k]))),
@@ -33,7 +33,7 @@ impl Value {
         }
     }
 
-    /// The step that leads here from `mean`, zero beyond the block's own columns; both are of one block.
+    /// Returns the step from `mean` to this value, zero beyond the block's own columns; both are of one block.
     pub(crate) fn off(&self, mean: &Self) -> [f64; MAX_COLUMNS] {
         let mut off = [0.0; MAX_COLUMNS];
         match (self, mean) {
@@ -49,12 +49,12 @@ impl Value {
     }
 }
 
-/// Sigmas of a pose.
+/// Returns the standard deviations of a pose's columns.
 pub(crate) fn six(shift_m: f64, turn_rad: f64) -> Std {
     [shift_m, shift_m, shift_m, turn_rad, turn_rad, turn_rad, 0.0, 0.0]
 }
 
-/// A column of a pose in words.
+/// Returns the name of a column of a pose.
 pub(super) fn pose_column(column: usize) -> &'static str {
     ["along x", "along y", "along z", "turn about x", "turn about y", "turn about z"][column]
 }

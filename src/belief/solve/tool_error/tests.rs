@@ -1,4 +1,4 @@
-//! Against samples: parameters drawn from the covariance, the tool by forward kinematics.
+//! Comparison with samples: parameters drawn from the covariance, the tool by forward kinematics.
 
 use nalgebra::DVector;
 use rand::RngExt;
@@ -37,7 +37,7 @@ fn some_terms() -> JointParameters {
     at
 }
 
-/// Standard deviations that matter alike at the tool.
+/// Returns standard deviations with similar effects at the tool.
 fn std_of(kind: ParameterKind) -> f64 {
     match kind {
         ParameterKind::Gain => 1e-3,
@@ -55,7 +55,7 @@ fn std_of(kind: ParameterKind) -> f64 {
     }
 }
 
-/// A correlated covariance of all parameters of the first five joints.
+/// Returns a correlated covariance of all parameters of the first five joints.
 fn covariance(rng: &mut ChaCha8Rng) -> ParameterCovariance {
     let parameters: Vec<Parameter> =
         (0..5).flat_map(|joint| ParameterKind::all().map(move |kind| Parameter { joint, kind })).collect();
@@ -69,7 +69,7 @@ fn covariance(rng: &mut ChaCha8Rng) -> ParameterCovariance {
 #[test]
 fn the_pose_covariance_is_that_of_drawn_parameters() {
     let mut robot = titan();
-    // The last joint is not estimated: the datasheet's sigma, by hand below.
+    // The last joint is not estimated: the datasheet's variance is added by hand below.
     robot.sensors[5].temperature_std_rad_per_k = 4e-4;
     let mut rng = stream_rng(4, "tool error");
     let covariance = covariance(&mut rng);
@@ -107,7 +107,8 @@ fn the_pose_covariance_is_that_of_drawn_parameters() {
             for column in 0..6 {
                 let scale = (predicted[(row, row)] * predicted[(column, column)]).sqrt();
                 let apart = (predicted[(row, column)] - sum[(row, column)]) / scale;
-                // Five sigma of a sample covariance, and the second order of the kinematics.
+                // The tolerance covers five standard deviations of a sample covariance, and the second order of the
+                // kinematics.
                 assert!(apart.abs() < 0.06, "{row} {column}: {apart}\n{predicted}{sum}");
             }
         }
@@ -144,11 +145,11 @@ fn residuals_play_and_drift_add_what_they_are() {
     near(position(&empty(Some(only_third)), &sensors, &reference()) - none, by(2) * 1e-4);
     let linearity: Matrix3<f64> = (0..6).map(|j| by(j) * robot.sensors[j].linearity_std_rad.powi(2)).sum();
     near(position(&empty(None), &sensors, &reference()) - none, linearity);
-    // Four hours of a random walk: twice that of one.
+    // Four hours of a random walk have twice the standard deviation of one hour.
     let late = Conditions { stamp: Some(SIMULATION_EPOCH.plus_s(4.0 * 3600.0)), ..reference() };
     let drifted: Matrix3<f64> = (0..6).map(|j| by(j) * 4e-6).sum();
     near(position(&empty(Some([0.0; MAX_JOINTS])), &sensors, &late) - none, drifted);
-    // The play's side is not known where the tool is used.
+    // The side of the backlash is unknown at the tool.
     let mut with_play = at;
     with_play.terms[1].half_backlash_rad = 2e-3;
     let found = position(&empty(Some([0.0; MAX_JOINTS])), &with_play.sensors(&robot), &reference());
@@ -163,7 +164,7 @@ fn residuals_play_and_drift_add_what_they_are() {
     );
 }
 
-/// Where nothing was seen the prior of the shape speaks. At the ends of the range it is narrower: the functions vanish
+/// Without observations, the shape has its prior. It is narrower at the ends of the range, because the functions vanish
 /// beyond.
 #[test]
 fn a_shape_that_nothing_determined_is_as_wide_as_its_prior() {

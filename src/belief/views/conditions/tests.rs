@@ -39,7 +39,7 @@ fn mark(start_s: f64, end_s: f64) -> Message {
     Message::Mark(Mark { start: at(start_s), end: at(end_s), kind })
 }
 
-/// Readings at 100 Hz of joints at `travel_rad(seconds)`, with the datasheet's noise.
+/// Returns readings at 100 Hz of joints at `travel_rad(seconds)`, with the datasheet's noise.
 fn readings(robot: &Robot, until_s: f64, seed: u64, travel_rad: impl Fn(f64, usize) -> f64) -> Vec<Message> {
     let mut rng = stream_rng(seed, "readings");
     let one = |k: usize| {
@@ -76,10 +76,10 @@ fn samples_within_a_span_are_averaged_and_others_joined_by_a_line() {
     assert_eq!(used, [1, 2, 3, 4]);
     let between = surroundings.over(at(4.0), at(6.0));
     assert!((between.oil_c.expect("known") - 11.0).abs() < 1e-9);
-    // Only one side is near.
+    // Only one side has a reading near enough.
     assert_eq!(surroundings.over(at(65.0), at(66.0)).oil_c, Some(13.0));
     assert_eq!(surroundings.over(at(65.0), at(66.0)).pressure_pa, Some(2e6));
-    // None is.
+    // Neither side has one.
     let far = surroundings.over(at(110.0), at(111.0));
     assert_eq!((far.oil_c, far.pressure_pa), (None, None));
 }
@@ -112,7 +112,7 @@ fn a_view_knows_its_rate_and_the_side_that_each_joint_came_from() {
         let found = associate(&recording(&robot, messages), &robot);
         let view = &found.fit[0];
         assert_eq!(view.approach[..6], [1.0, -1.0, -1.0, 0.0, 0.0, 1.0], "seed {seed}");
-        // One sigma of the slope: noise / (sqrt(n / 12) * 1 s).
+        // Standard deviation of the slope: noise / (sqrt(n / 12) * 1 s).
         let sigma_rad_s = 2.02 / (46.0 * 57.3) / (100.0_f64 / 12.0).sqrt();
         for (j, expected) in [0.0, 0.0, 0.0, 0.0, 0.0, 0.002].into_iter().enumerate() {
             assert!(
@@ -123,7 +123,7 @@ fn a_view_knows_its_rate_and_the_side_that_each_joint_came_from() {
         }
         assert!((view.conditions.oil_c.expect("known") - 22.5).abs() < 1e-9);
         assert_eq!(view.conditions.pressure_pa, None);
-        // What the method without terms hashes is as ever; the rest stands beside it.
+        // The messages that a method without terms hashes are the same as before; the others are in `used_for_terms`.
         assert!(found.used.iter().all(|&idx| idx >= 400 && idx != n - 2 && idx != n - 3), "{:?}", found.used);
         assert!(found.used_for_terms.contains(&(n - 2)) && found.used_for_terms.contains(&(n - 3)));
         assert!(found.used_for_terms.iter().all(|idx| found.used.binary_search(idx).is_err()));
@@ -131,14 +131,14 @@ fn a_view_knows_its_rate_and_the_side_that_each_joint_came_from() {
     }
 }
 
-/// A calibration made on the way and one from the finished recording agree: what came later was not known then.
+/// A calibration during the recording equals one from the finished recording: later messages were not known then.
 #[test]
 fn what_was_heard_after_the_calibration_does_not_matter() {
     let robot = titan();
     let mut messages = readings(&robot, 3.0, 1, |_, _| 0.1);
     messages.extend([oil(1.0, 20.0), pressure(1.0, 1e5), mark(2.5, 3.0)]);
     let growing = recording(&robot, messages.clone());
-    // The last was measured before the end and came after it.
+    // The last message was measured before the end and arrived after it.
     messages.extend([oil(5.0, 30.0), pressure(5.0, 2e5), oil(2.9, 40.0)]);
     let mut finished = recording(&robot, messages);
     finished.messages.last_mut().expect("messages").0 = at(3.3);
@@ -151,7 +151,7 @@ fn what_was_heard_after_the_calibration_does_not_matter() {
     assert_eq!(associate(&finished, &robot).fit[0].conditions.oil_c, Some(40.0));
 }
 
-/// The same messages in any order say the same.
+/// The same messages in any order give the same result.
 #[test]
 fn the_order_of_messages_does_not_matter() {
     let robot = titan();

@@ -1,4 +1,4 @@
-//! A board over the frames of a view: the mean place of each corner, and the board's pose by them.
+//! A board over the frames of a view: the mean position of each corner, and the board's pose from them.
 
 use crate::views::constants::external_board::{FAR_SIGMAS, MAX_LEFT_OUT, SIGMA_OF_MEDIAN};
 use crate::views::constants::frame_consensus::CLOSE_SIGMAS;
@@ -12,16 +12,17 @@ use crate::views::frame_consensus::different;
 use crate::views::view::{BoardPoint, BoardPoints, ObservationRejection};
 use armcal_core::optics::{BoardPose, CameraModel, Chessboard, SquareError, solve_board};
 
-/// A board, and the camera that sees it.
+/// A board and the camera that sees it.
 #[derive(Clone, Copy)]
 pub(crate) struct BoardBefore<'a> {
     pub board: Chessboard,
     pub lens: &'a CameraModel,
-    /// One sigma of a corner in one frame, px.
+    /// Standard deviation of a corner in one frame, px.
     pub corner_std_px: f64,
 }
 
-/// Corners of the board by their numbers, over all frames of a view; and how many of them were left out.
+/// Averages the board's corners by their numbers over all frames of a view; also returns the number of rejected
+/// corners.
 pub(crate) fn mean_board(
     seen: &[(u32, [f64; 2])],
     before: &BoardBefore<'_>,
@@ -60,7 +61,7 @@ pub(crate) fn mean_board(
     }
 }
 
-/// The corners that fit one pose of the board, that pose, and how many do not fit it.
+/// Corners that fit one pose of the board, that pose, and the number of corners that do not fit it.
 type Fitting = (Vec<BoardPoint>, nalgebra::Isometry3<f64>, usize);
 
 fn fitting(mut points: Vec<BoardPoint>, before: &BoardBefore<'_>) -> Result<Fitting, ObservationRejection> {
@@ -111,7 +112,7 @@ mod tests {
 
     const BOARD: Chessboard = Chessboard { squares: [7, 5], square_m: 0.04 };
 
-    /// Every corner in `n_frames` frames, each off by a few hundredths of a pixel.
+    /// Returns every corner in `n_frames` frames, each with an error of a few hundredths of a pixel.
     fn seen(n_frames: u32) -> (Isometry3<f64>, Vec<(u32, [f64; 2])>) {
         let pose = Isometry3::new(Vector3::new(-0.1, -0.1, 0.6), Vector3::new(0.2, -0.3, 0.1));
         let mut out = Vec::new();
@@ -131,7 +132,7 @@ mod tests {
         let (pose, mut seen) = seen(4);
         let lens = lens();
         let before = BoardBefore { board: BOARD, lens: &lens, corner_std_px: 0.1 };
-        // One frame shows corner 5 elsewhere; all frames corner 8; a number that the board lacks.
+        // One frame shows corner 5 elsewhere, and all frames corner 8. One number does not exist on the board.
         seen.iter_mut().filter(|(number, _)| *number == 5).take(1).for_each(|(_, pixel)| pixel[0] += 9.0);
         seen.iter_mut().filter(|(number, _)| *number == 8).for_each(|(_, pixel)| pixel[1] -= 4.0);
         seen.push((24, [600.0, 500.0]));
@@ -144,7 +145,7 @@ mod tests {
         };
         assert_eq!((frames_of(4), frames_of(5), frames_of(8)), (Some(4), Some(3), None));
         assert!((found.camera_from_board.translation.vector - pose.translation.vector).norm() < 2e-4);
-        // Of 23 corners in 4 frames, one in 3, and corner 8, whose frames agree.
+        // Used are 23 corners in 4 frames, one in 3, and corner 8, whose frames agree.
         assert_eq!(found.n_free, 2 * (23 * 3 + 2));
     }
 
@@ -155,7 +156,7 @@ mod tests {
         let before = BoardBefore { board: BOARD, lens: &lens, corner_std_px: 0.1 };
         let few: Vec<_> = seen.iter().copied().take(3).collect();
         assert_eq!(mean_board(&few, &before).0.map(|_| ()), Err(ObservationRejection::NotASquare));
-        // Numbered along the other side: as the mirror image of this board.
+        // Corners numbered along the other side form the mirror image of this board.
         for (number, _) in &mut seen {
             *number = (*number % 6) * 4 + *number / 6;
         }

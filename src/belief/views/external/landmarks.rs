@@ -12,22 +12,22 @@ use armcal_core::input::RawMeasurement;
 use armcal_core::optics::Chessboard;
 use armcal_core::robot::CameraSpec;
 
-/// The one landmark that the input map names.
+/// Landmark without a number that the input map names.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PlainLandmark {
-    /// Its number.
+    /// Number of the landmark.
     pub id: Option<u32>,
-    /// Where it is a board with corners of its own.
+    /// Board, if the landmark is a board with corners of its own.
     pub board: Option<Chessboard>,
 }
 
-/// What a view tells of a landmark.
+/// Measurement of a landmark in a view.
 pub(crate) struct Averaged {
     pub center_in_camera_m: Vector3<f64>,
     pub measured: TagMeasurement,
 }
 
-/// The mean of a board's corners over the frames, and how many of them were left out.
+/// Returns the mean of a board's corners over the frames, and the number of rejected corners.
 pub(crate) fn average_board(
     seen: &[RawMeasurement],
     camera: &CameraSpec,
@@ -47,7 +47,7 @@ pub(crate) fn average_board(
     (averaged, n_apart)
 }
 
-/// The mean of the frames that agree, and how many do not; nothing where fewer than half of them do.
+/// Returns the mean of the frames that agree, and the number of the others; no mean if fewer than half agree.
 pub(crate) fn average(
     seen: &[RawMeasurement],
     camera: &CameraSpec,
@@ -84,7 +84,7 @@ fn position(seen: &RawMeasurement) -> Option<Vector3<f64>> {
     }
 }
 
-/// Of positions, and of rotations about the first one: they are close to each other.
+/// Returns the mean of the positions, and of the rotations about the first one, which is close to the others.
 fn mean(near: &[&RawMeasurement]) -> Averaged {
     let n = near.len() as f64;
     let center_in_camera_m = near.iter().filter_map(|seen| position(seen)).sum::<Vector3<f64>>() / n;

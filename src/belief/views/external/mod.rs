@@ -1,8 +1,8 @@
-//! Views from recordings of real arms, which mark nothing.
+//! Views from recordings of real arms, which have no marks.
 //!
-//! `pairing` finds the joint reading that belongs to a tag message; `views` merges what was seen while the arm stood
-//! still into one view; `landmarks` averages a landmark over its frames, `board` a board's corners. Here the views of
-//! all recordings come together, by their stamps; all are fitted, and held out in turn for the verdict.
+//! `pairing` finds the joint reading that belongs to a tag message. `views` merges the detections of an arm at rest
+//! into one view. `landmarks` averages a landmark over its frames, `board` a board's corners. `preparation` merges the
+//! views of all recordings by their stamps; all are fitted, and cross-validated for the verdict.
 
 mod board;
 mod landmarks;

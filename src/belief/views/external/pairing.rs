@@ -1,8 +1,7 @@
-//! Which joint reading belongs to a stamp.
+//! Assignment of joint readings to stamps.
 //!
-//! A stream of readings is continuous where neighbours are a quarter of a second apart or less: between them the travel
-//! is interpolated, and its rate is known. Recordings with one reading a pose have no neighbours to go between: the
-//! nearest counts.
+//! A stream of readings is continuous where neighbours are at most a quarter of a second apart: there the travel is
+//! interpolated, and its rate is known. In recordings with one reading per pose the nearest reading counts.
 
 use crate::views::conditions::{BACK_S, ROUNDING_COUNTS, RestPose};
 pub(crate) use crate::views::constants::external_pairing::{CONTINUOUS_WITHIN_S, RATE_WINDOW_S};
@@ -12,27 +11,27 @@ use armcal_core::sensor::{ArmSensors, wrap_symmetric};
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
 use armcal_core::time::Stamp;
 
-/// The travel at a stamp.
+/// Travel at a stamp.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TravelSample {
     pub travel_rad: JointAngles,
-    /// Whether it lies within a continuous stream.
+    /// True if the stamp lies within a continuous stream.
     pub is_continuous: bool,
-    /// Where the stream is continuous about it.
+    /// Rate of the travel, if the stream is continuous around the stamp.
     pub rate_rad_s: Option<JointAngles>,
-    /// Indices of the readings that it comes from, first and last.
+    /// Indices of the first and last reading that the travel comes from.
     pub readings: (usize, usize),
 }
 
-/// The readings of a recording as travel from the middle of each joint's range.
+/// Readings of a recording as travel from the middle of each joint's range.
 pub(crate) struct TravelSeries<'a> {
     pub readings: &'a [Reading],
     pub travel_rad: Vec<JointAngles>,
-    /// Travel after which a reading repeats, by joint.
+    /// Travel after which a reading repeats, for each joint.
     period_rad: Vec<f64>,
     max_gap_s: f64,
     sensors: ArmSensors,
-    /// One sigma of what readings are rounded to.
+    /// Standard deviation of the rounding of readings, counts.
     rounding_counts: f64,
 }
 
@@ -57,8 +56,8 @@ impl<'a> TravelSeries<'a> {
         }
     }
 
-    /// The way that each joint came to where it rests, at `rest_rad` from reading number `from` on; 0 where it has not
-    /// moved in the stream of readings before. Appends the readings that decided it.
+    /// Returns the direction in which each joint moved to its rest, at `rest_rad` from reading number `from` on. It is
+    /// 0 if the joint has not moved in the stream of earlier readings. Appends the readings that decided it.
     pub fn approach(&self, from: usize, rest_rad: &JointAngles, used: &mut Vec<usize>) -> [f64; MAX_JOINTS] {
         let start = self.readings[from].stamp;
         let is_before = |idx: &usize| {
@@ -70,12 +69,12 @@ impl<'a> TravelSeries<'a> {
         rest.approach(earlier, used, |travel_rad, joint| travel_rad[joint])
     }
 
-    /// Travel from `from` to `to` the short way round.
+    /// Returns the travel from `from` to `to` the short way round.
     pub fn difference(&self, to: &JointAngles, from: &JointAngles, joint: usize) -> f64 {
         wrap_symmetric(to[joint] - from[joint], self.period_rad[joint])
     }
 
-    /// `None` where no reading is near enough.
+    /// Returns the travel at a stamp; `None` if no reading is near enough.
     pub fn at(&self, stamp: Stamp) -> Option<TravelSample> {
         if let Some((travel_rad, readings)) = self.between(stamp) {
             return Some(TravelSample { travel_rad, is_continuous: true, rate_rad_s: self.rate(stamp), readings });
@@ -92,7 +91,7 @@ impl<'a> TravelSeries<'a> {
         })
     }
 
-    /// Interpolated within a continuous stream, and the two readings that it is between.
+    /// Returns the travel interpolated within a continuous stream, and the indices of the readings on both sides.
     fn between(&self, stamp: Stamp) -> Option<(JointAngles, (usize, usize))> {
         let mut after = self.readings.partition_point(|reading| reading.stamp < stamp);
         if after == 0 && self.readings.first()?.stamp == stamp {
@@ -119,7 +118,7 @@ impl<'a> TravelSeries<'a> {
     }
 }
 
-/// Whether all readings are whole numbers, as words of a sensor are.
+/// Returns true if all readings are whole numbers, as a sensor's words are.
 fn is_whole(readings: &[Reading]) -> bool {
     readings.iter().flat_map(|reading| reading.counts.iter()).all(|counts| counts.fract() == 0.0)
 }

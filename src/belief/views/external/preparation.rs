@@ -1,5 +1,4 @@
-//! The views of all recordings of an arm together, by their stamps; all are fitted, and held out in turn for the
-//! verdict.
+//! Views of all recordings of an arm together, by their stamps; all are fitted, and cross-validated for the verdict.
 
 use std::collections::BTreeMap;
 
@@ -13,22 +12,22 @@ use armcal_core::input::{ExternalRecording, InputMap, RawMeasurement};
 use armcal_core::robot::Robot;
 use armcal_core::streams::ReachTask;
 
-/// What is known beside the recordings.
+/// Information in addition to the recordings.
 #[derive(Clone, Debug, Default)]
 pub struct ExternalContext {
-    /// `None`: no tool error is predicted.
+    /// Task; without it no tool error is predicted.
     pub task: Option<ReachTask>,
-    /// Names of landmarks that are no numbered tags.
+    /// Names of landmarks that are no numbered tags, by the number that stands for them.
     pub landmark_names: BTreeMap<u32, String>,
-    /// The landmark of a plain `child_frame`.
+    /// Landmark of a plain `child_frame`.
     pub plain: PlainLandmark,
 }
 
-/// Makes views of recordings of one arm; `robot` has the landmarks that were around it.
+/// Returns the views of recordings of one arm; `robot` has the landmarks around it.
 ///
 /// # Errors
-/// [`CalibError::Twice`] for a recording that is given twice; without any view [`CalibError::Clocks`] where it is the
-/// clocks, else [`CalibError::NoTags`] or [`CalibError::AllRejected`].
+/// [`CalibError::Twice`] for a recording that is given twice. Without any view, [`CalibError::Clocks`] if the clocks
+/// cause it, else [`CalibError::NoTags`] or [`CalibError::AllRejected`].
 pub fn prepare_external(
     recordings: &[ExternalRecording],
     map: &InputMap,
@@ -63,8 +62,8 @@ pub fn prepare_external(
             *data.rejected.entry(why).or_default() += n;
         }
     }
-    // Recordings may overlap in time; the message's hash settles the order of equal stamps whatever the order of the
-    // arguments.
+    // Recordings may overlap in time. The message's hash settles the order of equal stamps, so that the order of the
+    // arguments does not matter.
     views.sort_by(|(a, of_a), (b, of_b)| a.end.cmp(&b.end).then(of_a.cmp(of_b)));
     data.n_marks = views.len();
     let numbered = |(k, (view, _))| View { pose_idx: k as u32, ..view };
@@ -91,7 +90,7 @@ pub fn prepare_external(
     })
 }
 
-/// The arm whose sensors know how the input map states their readings.
+/// Returns the arm with the form in which the input map states each sensor's readings.
 fn with_stated_angles(robot: &Robot, map: &InputMap) -> Robot {
     let mut robot = robot.clone();
     robot.sensors.iter_mut().for_each(|spec| spec.stated = map.stated(spec));
@@ -104,7 +103,7 @@ fn names_of(recordings: &[ExternalRecording]) -> String {
     names.join(", ")
 }
 
-/// Of the messages that the views come from, in whatever order and files they were.
+/// Returns the hash of the messages that the views come from, independent of their order and files.
 fn hash(digests: &mut Vec<[u8; 32]>) -> String {
     digests.sort_unstable();
     digests.dedup();

@@ -1,4 +1,4 @@
-//! From tag messages to views: what was seen while the arm stood still is one view.
+//! Conversion of tag messages to views: all detections while the arm stood still form one view.
 
 use crate::views::constants::external_views::{
     ATTITUDE_WITHIN_S, MIN_MEAN_UP, RATE_SIGMAS, REST_RATE_RAD_S, SAME_POSE_SIGMAS,
@@ -16,40 +16,40 @@ use armcal_core::robot::Robot;
 use armcal_core::streams::JointAngles;
 use armcal_core::time::Stamp;
 
-/// A view, the hash of its first message, and the first and the last reading that it comes from.
+/// A view, the hash of its first message, and the first and last reading that it comes from.
 pub(crate) struct MadeView {
     pub view: View,
     pub first: [u8; 32],
     readings: (usize, usize),
 }
 
-/// The views of one recording.
+/// Views of one recording.
 #[derive(Default)]
 pub(crate) struct RecordingViews {
     pub views: Vec<MadeView>,
-    /// Hashes of all messages that they come from.
+    /// Hashes of all messages that the views come from.
     pub digests: Vec<[u8; 32]>,
     pub ids_seen: Vec<u32>,
     pub rejected: BTreeMap<ObservationRejection, usize>,
 }
 
-/// One tag message with its reading.
+/// A tag message with its joint reading.
 struct PairedFrame<'a> {
     frame: &'a TagFrame,
     paired: TravelSample,
 }
 
-/// Makes the views of one camera.
+/// Builder of the views of one camera.
 struct Maker<'a> {
     robot: &'a Robot,
-    /// The camera's number.
+    /// Number of the camera.
     camera: usize,
     plain: PlainLandmark,
     while_moving: WhileMoving,
     travels: TravelSeries<'a>,
     recording: &'a ExternalRecording,
     conditions: ConditionHistory,
-    /// One sigma of a reading, rad, of the joints that move the camera.
+    /// Standard deviation of a reading of each joint that moves the camera, rad.
     noise_rad: Vec<f64>,
     out: RecordingViews,
 }
@@ -71,7 +71,7 @@ impl RecordingViews {
         all
     }
 
-    /// Readings that two cameras' views share are of one pose.
+    /// Counts the cameras with a view of each pose: views of two cameras that share readings are of one pose.
     fn count_cameras(&mut self) {
         let spans: Vec<_> = self.views.iter().map(|made| (made.view.camera, made.readings)).collect();
         for MadeView { view, readings: (from, to), .. } in &mut self.views {
@@ -134,10 +134,10 @@ impl Maker<'_> {
         *self.out.rejected.entry(why).or_default() += n;
     }
 
-    /// Only a continuous stream of readings can tell.
+    /// Returns true if the arm is moving, which only a continuous stream of readings can show.
     fn is_moving(&self, paired: &TravelSample) -> bool {
         let Some(rate) = paired.rate_rad_s else { return false };
-        // Two readings' noise over twice the window.
+        // Noise of two readings over twice the window.
         let of_noise = |noise_rad: f64| noise_rad * std::f64::consts::FRAC_1_SQRT_2 / RATE_WINDOW_S;
         self.noise_rad
             .iter()
@@ -150,8 +150,8 @@ impl Maker<'_> {
         self.noise_rad.iter().enumerate().all(|(joint, noise)| close(joint, *noise))
     }
 
-    /// Whether the arm has stood still since the group began. Only a continuous stream can tell; of the others each
-    /// reading is a pose that somebody recorded, and what was seen about it is of that pose.
+    /// Returns true if the arm has stood still since the group began, which only a continuous stream can show.
+    /// Otherwise each reading is a pose that somebody recorded, and detections near it belong to that pose.
     fn belongs(&self, group: &[PairedFrame<'_>], next: &PairedFrame<'_>) -> bool {
         let (Some(first), Some(last)) = (group.first(), group.last()) else { return true };
         if !(last.paired.is_continuous && next.paired.is_continuous) {
@@ -163,7 +163,7 @@ impl Maker<'_> {
             && self.travels.travel_rad[between].iter().all(|travel| self.is_same_pose(travel, pose))
     }
 
-    /// Makes a view of the group, which is empty afterwards.
+    /// Makes a view of the group, and empties the group.
     fn close(&mut self, group: &mut Vec<PairedFrame<'_>>) {
         let frames = std::mem::take(group);
         let (Some(first), Some(last)) = (frames.first(), frames.last()) else { return };
@@ -184,8 +184,8 @@ impl Maker<'_> {
         }
         let mut deciding = Vec::new();
         if self.while_moving == WhileMoving::Use {
-            // An arm settles from both sides: the side that it is on is known in motion alone. A slower joint has the
-            // sign of its noise.
+            // An arm settles from both sides, so that the side is known only in motion. The rate of a slower joint has
+            // the sign of its noise.
             for (approach, rate) in view.approach.iter_mut().zip(view.rate_rad_s.iter()) {
                 *approach = if rate.abs() < REST_RATE_RAD_S { 0.0 } else { rate.signum() };
             }
@@ -205,7 +205,8 @@ impl Maker<'_> {
         self.out.views.push(MadeView { view, first: first.frame.digests[0], readings: (from, to) });
     }
 
-    /// The mean against gravity over the span, else the nearest in time; `None` without an attitude near enough.
+    /// Returns the mean direction against gravity over the span, else the nearest in time; `None` without an attitude
+    /// near enough.
     fn up_over(&mut self, start: Stamp, end: Stamp) -> Option<Vector3<f64>> {
         let attitudes = &self.recording.attitudes;
         let from = attitudes.partition_point(|attitude| attitude.stamp < start);
@@ -222,7 +223,8 @@ impl Maker<'_> {
         sum.try_normalize(MIN_MEAN_UP * used.len() as f64)
     }
 
-    /// Over the readings while the group was seen; of one frame between two readings what lies between them.
+    /// Returns the mean travel over the readings during the group; for one frame between two readings, the interpolated
+    /// travel.
     fn mean_travel(&self, frames: &[PairedFrame<'_>]) -> (JointAngles, usize) {
         let first = &frames[0].paired.travel_rad;
         let (start, end) = (frames[0].frame.stamp, frames[frames.len() - 1].frame.stamp);
