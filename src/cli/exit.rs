@@ -87,14 +87,18 @@ pub(super) fn not_built(command: &str) -> anyhow::Error {
     UsageError::new(Code::BuildFeatureMissing, format!("{command}: {problem}")).into()
 }
 
-/// Input that cannot be used gives 2, recordings with nothing to fit too; all else 1.
+/// Input that cannot be used gives 2, recordings with nothing to fit too; a map that is refused 4, all else 1.
 pub(super) fn of_error(error: &anyhow::Error) -> Exit {
     of_cause(error.as_ref())
 }
 
 /// The same for an error as the library gives it.
 pub(super) fn of_cause(error: &(dyn std::error::Error + 'static)) -> Exit {
-    let invalid = std::iter::successors(Some(error), |error| error.source()).any(|cause| {
+    let causes = || std::iter::successors(Some(error), |error| error.source());
+    if causes().any(|cause| matches!(cause.downcast_ref(), Some(TagMapError::Refused(_)))) {
+        return Exit::Refused;
+    }
+    let invalid = causes().any(|cause| {
         cause.is::<UsageError>()
             || cause.is::<RobotError>()
             || cause.is::<FileIssue>()

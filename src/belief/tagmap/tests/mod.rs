@@ -2,6 +2,7 @@
 
 mod bodies;
 mod bound;
+mod checked;
 mod corridor;
 mod data;
 mod fixture;
