@@ -126,6 +126,9 @@ pub(crate) mod lens_test {
     pub(crate) const NOISY: f64 = 2.0;
     /// Log evidence that another lens must bring, beyond what its unknowns cost: as of a calibration's drawing.
     pub(crate) const MIN_GAIN_NATS: f64 = 6.0;
+    /// Another lens leaves at most this share of the corners' variance: what explains less is within what no lens
+    /// model has, and a map holds it. Assumed.
+    pub(crate) const LEFT_SHARE: f64 = 0.9;
     /// Another lens keeps this share of the detections.
     pub(crate) const MIN_USED_SHARE: f64 = 0.95;
     /// Another reading leaves this share of the variance that the stated lens with other figures leaves. Assumed.

@@ -8,8 +8,8 @@ use crate::say::wrong_input::WrongInputKind;
 use crate::tagmap::blind::{Blind, Misfit};
 use crate::tagmap::constants::lens_fit::PER_CAMERA;
 use crate::tagmap::constants::lens_test::{
-    AS_GOOD, FOCAL_STRIDE, MAX_ROUNDS, MAX_STARTS, MIN_GAIN_NATS, MIN_USED_SHARE, MUCH_BETTER, NOISY, SURE_SIGMAS,
-    WORTH_A_ROUND,
+    AS_GOOD, FOCAL_STRIDE, LEFT_SHARE, MAX_ROUNDS, MAX_STARTS, MIN_GAIN_NATS, MIN_USED_SHARE, MUCH_BETTER, NOISY,
+    SURE_SIGMAS, WORTH_A_ROUND,
 };
 use crate::tagmap::lens_fit::{fit_lenses, lens_errors};
 use crate::tagmap::types::MapSettings;
@@ -53,7 +53,8 @@ pub(super) fn other_lenses(blind: &Blind, stated: &[CameraModel]) -> Option<Othe
     let n = (PER_CAMERA * stated.len()) as f64;
     let gain_nats = best.misfit.gain_over(&as_stated) - 0.5 * n * (as_stated.freedom as f64).ln();
     let is_of_as_many = best.misfit.n_used as f64 >= MIN_USED_SHARE * as_stated.n_used as f64;
-    if !(is_of_as_many && gain_nats > MIN_GAIN_NATS) {
+    let is_large = best.misfit.variance < LEFT_SHARE * as_stated.variance;
+    if !(is_of_as_many && is_large && gain_nats > MIN_GAIN_NATS) {
         return None;
     }
     let errors = lens_errors(&blind.solved(&best.lenses)?.problem)?;

@@ -2,10 +2,11 @@
 //!
 //! `screen` validates detections and solves each square; `vote`, `initial_guess` and `incremental_layout` lay out
 //! groups of tags; `linearize`, `normal_equations`, `sparse` and `adjust` are the bundle adjustment on corner pixels
-//! (Triggs et al. 2000); `result` is the map with its accuracy; `scale` finds wrong tag sizes. `checked` gives
-//! a map out where its files are not contradicted: `known_places` reads them otherwise, `lens_test` and `lens_fit` look
-//! for another lens, `odd_tags` for sizes and moves, by `columns` of a map without known places (`blind`). `tag_mapping` maps the
-//! tags of a calibration; `files` reads and writes files of tags and cameras, `recording` gets views from recordings.
+//! (Triggs et al. 2000); `result` is the map with its accuracy; `scale` finds wrong tag sizes. `checked` gives a map
+//! out where its files are not contradicted: `known_places` reads them otherwise, `lens_test` and `lens_fit` look for
+//! another lens, `odd_tags` for sizes and moves, by `columns` of a map without known places (`blind`). `tag_mapping`
+//! maps the tags of a calibration; `files` reads and writes files of tags and cameras, `recording` gets views from
+//! recordings.
 
 mod adjust;
 mod assemble;

@@ -76,10 +76,9 @@ fn a_focal_length_far_off_is_refused_with_what_the_views_show() {
 fn a_lens_that_is_a_little_off_is_estimated_with_the_map() {
     let (mut all, mut n_estimated) = (Vec::new(), 0);
     for seed in 50..58 {
-        let mut scene = scene(pinhole(), seed);
-        let [fx, fy, cx, cy, rest @ ..] = with_focal(&pinhole(), 0.98).intrinsics();
-        let [a, b, c, d] = rest;
-        scene.cameras = vec![pinhole().with_intrinsics([fx, fy, cx + 15.0, cy - 10.0, a, b, c, d])];
+        let mut scene = scene(fisheye(), seed);
+        let [fx, fy, cx, cy, a, b, c, d] = with_focal(&fisheye(), 0.98).intrinsics();
+        scene.cameras = vec![fisheye().with_intrinsics([fx, fy, cx + 6.0, cy - 4.0, a, b, c, d])];
         let map = checked(&scene, MapMode::Unknown).unwrap();
         n_estimated += usize::from(map.warnings.iter().any(|warning| warning.code == Code::Lens));
         all.extend(distances(&scene, &map));
