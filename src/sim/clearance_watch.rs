@@ -1,7 +1,7 @@
-//! The least clearance of the arm over all steps, not only at the samples of the truth's record.
+//! Search for the least clearance of the arm over all steps, not only at the samples of the truth's record.
 //!
-//! Distances are measured now and then; in between, the paths of joints and ground bound what a group of pairs can have
-//! lost. Only a step in which some pair may be nearer than any was before is measured.
+//! Distances are measured at intervals. In between, the paths of joints and ground bound the approach of a group of
+//! pairs. Only a step in which some pair may have a new least distance is measured.
 
 use crate::body_poses::BodyPoses;
 use crate::pair_motion::{ArmPlace, PairGroup, PairMotion};
@@ -9,31 +9,31 @@ use crate::solids::{Carrier, Nearest, Solids};
 use armcal_core::kinematics::Chain;
 use armcal_core::streams::MAX_JOINTS;
 
-/// What a least distance may be below the one that is found, m.
+/// Largest error of the found least distance, m.
 const RESOLUTION_M: f64 = 0.0002;
-/// Beyond the least distance so far, how far distances are measured, m.
+/// Range beyond the least distance so far within which distances are measured, m.
 const FAR_M: f64 = 0.3;
-/// What touches is a contact; it is looked at again after so much of a path, m.
+/// Path after which pairs in contact are measured again, m.
 const AFTER_CONTACT_M: f64 = 0.02;
 
-/// Follows the arm step by step.
+/// Watch of the clearance, step by step.
 pub(super) struct ClearanceWatch {
     groups: Vec<Group>,
     motion: PairMotion,
-    /// Of any point of the arm from any joint's axis.
+    /// Largest distance of any point of the arm from each joint's axis, m.
     most_levers_m: [f64; MAX_JOINTS],
-    /// Path of any pair that is left until one must be looked at, m.
+    /// Path that any pair may move before one must be measured, m.
     slack_m: f64,
-    /// Of pairs that do not touch.
+    /// Least distance of pairs that do not touch, m.
     least_m: f64,
-    /// The least since the last sample, if it is the least of all, and its step.
+    /// Nearest pair since the last sample with its step, if its distance is the least of all.
     low: Option<(Nearest, u64)>,
 }
 
-/// Pairs of a link's shapes with what is not the arm.
+/// Pairs of a link's shapes with shapes that do not belong to the arm.
 struct Group {
     pairs: PairGroup,
-    /// At the last measurement, and the path until then.
+    /// Distance at the last measurement; `path_m` is the path until then.
     distance_m: f64,
     path_m: f64,
 }
@@ -77,7 +77,7 @@ impl ClearanceWatch {
         }
     }
 
-    /// Measures what may be nearer than anything was; `put` puts the solids in their places.
+    /// Measures pairs that may have a new least distance; `put` moves the solids to their present poses.
     fn look(&mut self, solids: &mut Solids, step: u64, put: impl FnOnce(&mut Solids)) {
         let mut put = Some(put);
         self.slack_m = f64::INFINITY;
@@ -105,7 +105,8 @@ impl ClearanceWatch {
         }
     }
 
-    /// The least since the last sample with its step, if none was less before; `sampled_m` is measured now.
+    /// Returns the nearest pair since the last sample with its step, if its distance is the least so far. `sampled_m`
+    /// is the present distance.
     pub(super) fn take_low(&mut self, sampled_m: f64) -> Option<(Nearest, u64)> {
         let low = self.low.take().filter(|(low, _)| low.distance_m < sampled_m);
         if sampled_m > 0.0 {
@@ -129,8 +130,8 @@ mod tests {
     use armcal_core::stats::stream_rng;
     use armcal_core::streams::JointAngles;
 
-    /// Arms that wander about over a seafloor that heaves: the least of all steps is found whenever there is a new one,
-    /// and samples alone miss it.
+    /// Arms move at random over a seafloor that heaves. The watch finds each new least distance over all steps, and
+    /// samples alone miss it.
     #[test]
     fn no_step_is_nearer_than_the_least_that_is_found() {
         const SAMPLE_STEPS: u64 = 100;
@@ -155,7 +156,7 @@ mod tests {
                 }
                 angles = JointAngles::from_fn(6, |j| angles[j] + rates[j]);
                 ground.translation.z += rng.random_range(-1e-3..1e-3);
-                // A mount that gives.
+                // A mount that yields.
                 mount.translation.y += mount_rng.random_range(-3e-4..3e-4);
                 let mut chain = robot.chain.clone();
                 chain.set_first_place(&mount);

@@ -6,7 +6,7 @@ use crate::solids::PairTable;
 /// Two parts that touch again within this time have not parted, s.
 const DEBOUNCE_S: f64 = 0.1;
 
-/// Remembers when each pair last touched.
+/// Last contact of each pair.
 #[derive(Clone, Debug)]
 pub(super) struct ContactOnsets {
     n_parts: usize,
@@ -27,7 +27,7 @@ impl ContactOnsets {
         }
     }
 
-    /// The pairs that began to touch in this step, smaller part first, in order.
+    /// Returns the pairs that began to touch in this step, smaller part first, in order.
     pub(super) fn update(&mut self, physics: &ArmPhysics, step: u64) -> &[(usize, usize)] {
         self.began.clear();
         let Self { n_parts, last_touch, began, debounce_steps } = self;

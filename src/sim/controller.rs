@@ -10,20 +10,20 @@ use crate::spec::{CONTROL_PERIOD_S, HydraulicsSpec};
 use armcal_core::robot::JointSensorSpec;
 use armcal_core::streams::{JointCounts, MAX_JOINTS};
 
-/// Set-points that come no farther apart than this make a path with a rate, periods.
+/// Largest interval of set-points that form a path with a rate, periods.
 const PATH_PERIODS: u32 = 10;
 
 /// Distance from the set-point within which creep is learnt, rest bands.
 const FAR_BANDS: f64 = 8.0;
-/// What a joint may do, over what its open valve gives it, before its readings count as wild: it swings on its oil.
+/// Largest rate of a joint over that of its open valve before its readings count as wild: the joint swings on its oil.
 const REACHABLE: f64 = 2.0;
-/// Noise that no reading is called wild for.
+/// Noise within which no reading counts as wild, standard deviations.
 const NOISE_SIGMAS: f64 = 8.0;
-/// A valve that has been open near its set-point for longer than this works against creep, s.
+/// Time of an open valve near its set-point after which the controller counteracts creep, s.
 const CREEP_TIME_S: f64 = 1.0;
-/// Slower creep is left to the rest band, rad/s.
+/// Creep that is left to the rest band, rad/s.
 const CREEP_RAD_S: f64 = 1e-3;
-/// Faster creep, as a share of the rate limit, is not held.
+/// Largest creep that is held, as a share of the rate limit.
 const CREEP_LIMIT: f64 = 0.05;
 
 #[derive(Clone, Debug)]
@@ -31,7 +31,7 @@ pub(super) struct Controller {
     joints: Vec<JointLoop>,
     tuning: Tuning,
     periods_since_command: u32,
-    /// How long the present feed-forward holds, periods.
+    /// Duration of the present feed-forward, periods.
     path_periods: u32,
 }
 
@@ -49,14 +49,14 @@ struct JointLoop {
     rate_limit_rad_s: f64,
     noise_counts: f64,
     set_counts: f64,
-    /// The last reading that was believed, and the readings left out since.
+    /// Last accepted reading; `n_rejected` counts the rejected readings since then.
     believed_counts: f64,
     n_rejected: f64,
     filtered_counts: f64,
     feed_forward_rad_s: f64,
-    /// Negative creep of the joint, learnt at rest.
+    /// Counter-command for the joint's creep, learnt at rest, rad/s.
     hold_rad_s: f64,
-    /// With the valve open near the set-point.
+    /// Number of periods with the valve open near the set-point.
     periods_near: u32,
     /// Last command to the spool.
     spool: f64,
@@ -71,8 +71,8 @@ enum Rest {
 }
 
 impl Controller {
-    /// Starts at rest where `measured` says. `gear_ratio`, one a joint: it was tuned on this arm and knows which way
-    /// the counts run, else it would drive away from its set-points.
+    /// Starts at rest at `measured`. `gear_ratio` has one value per joint: the controller was tuned on this arm and
+    /// knows the sense of the counts. Otherwise it would move joints away from their set-points.
     pub(super) fn new(
         spec: &HydraulicsSpec,
         sensors: &[JointSensorSpec],
@@ -118,7 +118,7 @@ impl Controller {
         self.periods_since_command = 0;
     }
 
-    /// Valve commands, -1..1, for the readings of this period.
+    /// Returns the valve commands, -1..1, for the readings of this period.
     pub(super) fn update(&mut self, measured: &JointCounts) -> [f64; MAX_JOINTS] {
         let on_path = self.periods_since_command < self.path_periods;
         self.periods_since_command = self.periods_since_command.saturating_add(1);
@@ -150,7 +150,7 @@ impl JointLoop {
         self.valve_command(spec, rate)
     }
 
-    /// Leaves out a reading that the joint cannot have come to since the last believed one, but not too many in a row.
+    /// Rejects a reading that the joint cannot have reached since the last accepted one, but not too many in a row.
     fn believe(&mut self, spec: &HydraulicsSpec, counts: f64) {
         let elapsed_s = (self.n_rejected + 1.0) * CONTROL_PERIOD_S;
         let travel_rad = REACHABLE * self.rate_limit_rad_s * spec.rate_margin * elapsed_s;
@@ -164,8 +164,8 @@ impl JointLoop {
         }
     }
 
-    /// The valve closes within the rest band, and opens again for a path or beyond twice the band. It stays open to
-    /// hold a joint against its creep.
+    /// Closes the valve within the rest band, and opens it again for a path or beyond twice the band. The valve stays
+    /// open to hold a joint against its creep.
     fn open_or_close(&mut self, spec: &HydraulicsSpec, error_rad: f64) {
         let band_rad = match self.rest {
             Rest::Closed => 2.0 * spec.rest_band_rad,
@@ -181,7 +181,8 @@ impl JointLoop {
         }
     }
 
-    /// A joint that does not arrive creeps faster than the error asks for: from then on the error's integral holds it.
+    /// Integrates the error of a joint that does not arrive, because it creeps faster than the error corrects. The
+    /// integral holds it from then on.
     fn integrate(&mut self, spec: &HydraulicsSpec, error_rad: f64) {
         if self.feed_forward_rad_s != 0.0 || error_rad.abs() >= FAR_BANDS * spec.rest_band_rad {
             self.periods_near = 0;
@@ -200,7 +201,8 @@ impl JointLoop {
         wanted.clamp(-self.rate_limit_rad_s, self.rate_limit_rad_s)
     }
 
-    /// The valve's command for a rate: over the deadband, and over the play to the side that the spool moves to.
+    /// Returns the valve's command for a rate, which compensates the deadband, and the backlash on the side to which
+    /// the spool moves.
     fn valve_command(&mut self, spec: &HydraulicsSpec, rate_rad_s: f64) -> f64 {
         let share = rate_rad_s / (self.rate_limit_rad_s * spec.rate_margin);
         let spool =
@@ -221,7 +223,7 @@ impl JointLoop {
     }
 }
 
-/// `value` modulo `period`, in -period/2 .. period/2.
+/// Returns `value` modulo `period`, in -period/2 .. period/2.
 fn wrap(value: f64, period: f64) -> f64 {
     (value + 0.5 * period).rem_euclid(period) - 0.5 * period
 }
@@ -276,7 +278,7 @@ mod tests {
         assert_eq!(controller.joints[0].feed_forward_rad_s, 0.0);
     }
 
-    /// The command after each reading, for a controller that rests at 1000 counts.
+    /// Returns the command after each reading, for a controller that rests at 1000 counts.
     fn commands(controller_jump_reject: f64, readings: &[f64]) -> Vec<f64> {
         let mut controller = controller(1000.0);
         controller.tuning.spec.controller_jump_reject = controller_jump_reject;

@@ -6,14 +6,14 @@ use std::path::PathBuf;
 use armcal_core::robot::{FileIssue, RobotError};
 use armcal_core::streams::SinkError;
 
-/// Why there is no simulated world.
+/// Reason why a simulated world could not be built.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum SimError {
-    /// A wrong value in the routine's `[world]`.
+    /// Wrong value in the routine's `[world]`.
     #[error(transparent)]
     Spec(#[from] FileIssue),
-    /// The robot lacks what a simulated arm needs.
+    /// Robot without the data of a simulated arm.
     #[error(transparent)]
     Robot(#[from] RobotError),
     #[error("{}: joint `{joint}` has effort limit {effort_n_m}; a simulated joint needs one above 0", file.display())]

@@ -2,7 +2,7 @@
 
 use armcal_core::robot::{JointSensorSpec, SensorKind};
 
-/// A potentiometer of joint `j` without errors, for tests: zero counts at zero, 16 bits.
+/// Returns a potentiometer of joint `j` without errors, for tests: zero counts at zero, 16 bits.
 pub(crate) fn exact_sensor(counts_per_rad: f64, max_rate_rad_s: f64) -> JointSensorSpec {
     JointSensorSpec {
         joint: "j".into(),

@@ -1,11 +1,11 @@
 //! The gripper's jaws: they follow their command at a limited rate behind a valve's lag.
 //!
-//! `v` is the rate of the gap, `w = clamp((command - gap)/(4 lag), +-rate)` the rate wanted: `dv/dt = (w - v)/lag`.
+//! `v` is the rate of the gap, `w = clamp((command - gap)/(4 lag), +-rate)` the commanded rate: `dv/dt = (w - v)/lag`.
 //! With that gain the loop is critically damped: the jaws do not overshoot their command.
 
 use armcal_core::robot::GripperSpec;
 
-/// The gap between the jaws and how it changes.
+/// Gap between the jaws and its rate.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Gripper {
     pub opening_m: f64,
@@ -17,7 +17,7 @@ pub(super) struct Gripper {
 }
 
 impl Gripper {
-    /// At rest, as the arm carries it.
+    /// Starts at rest with the gap in which the arm carries the gripper.
     pub(super) fn new(spec: &GripperSpec, lag_s: f64) -> Self {
         Self {
             opening_m: spec.rest_opening_m,
@@ -29,12 +29,12 @@ impl Gripper {
         }
     }
 
-    /// `opening` is 0 (closed) .. 1 (open).
+    /// Commands a gap; `opening` is 0 (closed) .. 1 (open).
     pub(super) fn command(&mut self, opening: f64) {
         self.told_m = opening * self.opening_max_m;
     }
 
-    /// Lets `step_s` pass.
+    /// Advances by `step_s`.
     pub(super) fn step(&mut self, step_s: f64) {
         let gain_per_s = 0.25 / self.lag_s;
         let wanted_m_s = (gain_per_s * (self.told_m - self.opening_m)).clamp(-self.rate_max_m_s, self.rate_max_m_s);
@@ -42,12 +42,12 @@ impl Gripper {
         self.opening_m = (self.opening_m + self.rate_m_s * step_s).clamp(0.0, self.opening_max_m);
     }
 
-    /// Comes to rest at its command, for time that is skipped.
+    /// Moves to the commanded gap at once, for time that is skipped.
     pub(super) fn arrive(&mut self) {
         (self.opening_m, self.rate_m_s) = (self.told_m, 0.0);
     }
 
-    /// Whether the gap still changes by more than is measured.
+    /// Returns true if the gap still changes by a measurable amount.
     pub(super) fn is_moving(&self) -> bool {
         self.rate_m_s.abs() > 1e-4 || (self.told_m - self.opening_m).abs() > 1e-4
     }

@@ -1,4 +1,4 @@
-//! TRUTH: a simulated arm on a vehicle at sea, with the errors that real ones have.
+//! TRUTH: a simulated arm on a vehicle at sea, with realistic errors.
 //!
 //! [`World`] is an `Arm`: it takes set-points in raw counts and returns messages. Its truth (as-built sensors, true
 //! poses, contacts) goes into a stream of its own, which only the score reads. Arm and vehicle are one multibody in

@@ -1,4 +1,4 @@
-//! How far pairs of shapes can have moved against each other: a bound by the paths of joints, ground and mount.
+//! Bound on the relative motion of pairs of shapes, from the paths of joints, ground and mount.
 
 use nalgebra::Isometry3;
 
@@ -6,39 +6,39 @@ use crate::solids::{Carrier, Solids};
 use armcal_core::kinematics::Chain;
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
-/// Where the arm is at one step.
+/// Configuration of the arm, pose of the ground and pose of the mount at one step.
 #[derive(Clone, Copy)]
 pub(super) struct ArmPlace {
     pub angles: JointAngles,
     pub base_from_ground: Isometry3<f64>,
-    /// Of the first joint on the base: a mount that gives moves it.
+    /// Pose of the first joint on the base, which moves if the mount yields.
     pub first_place: Isometry3<f64>,
 }
 
 /// Paths since the start.
 pub(super) struct PairMotion {
-    /// After the last step.
+    /// State after the last step.
     at: ArmPlace,
     path_rad: [f64; MAX_JOINTS],
-    /// Bounds within the arm's reach, m.
+    /// Bounds on the paths of ground and mount within the arm's reach, m.
     ground_path_m: f64,
     mount_path_m: f64,
     reach_m: f64,
 }
 
-/// Pairs of shapes that the same joints move against each other.
+/// Pairs of shapes that are moved against each other by the same joints.
 pub(super) struct PairGroup {
     pub pairs: Vec<(usize, usize)>,
-    /// By what each joint can move the pairs against each other, m/rad; zero for other joints.
+    /// Largest relative motion of the pairs per motion of each joint, m/rad; zero for other joints.
     pub levers_m: [f64; MAX_JOINTS],
-    /// From the base's origin, every point of the vehicle; zero where the pairs are of the arm.
+    /// Largest distance of the vehicle's points from the base's origin, m; zero for pairs of the arm.
     vehicle_reach_m: f64,
     is_on_ground: bool,
-    /// Of the arm against the base or the ground.
+    /// True for pairs of the arm with the base or the ground.
     is_on_mount: bool,
 }
 
-/// A step's path: of each joint, of the ground and of the mount.
+/// Paths of each joint, of the ground and of the mount in one step.
 pub(super) struct StepPath {
     pub joints_rad: [f64; MAX_JOINTS],
     pub ground_m: f64,
@@ -46,7 +46,8 @@ pub(super) struct StepPath {
 }
 
 impl PairMotion {
-    /// From the base's origin and not from the first joint's axis, every point that is watched is within `reach_m`.
+    /// Starts at `start`. All watched points are within `reach_m` of the base's origin, which differs from the first
+    /// joint's axis.
     pub(super) fn new(groups: &[PairGroup], start: &ArmPlace) -> Self {
         let first_m = start.first_place.translation.vector.norm();
         let reach_m = |group: &PairGroup| (first_m + group.levers_m[0]).max(group.vehicle_reach_m);
@@ -59,7 +60,7 @@ impl PairMotion {
         }
     }
 
-    /// Takes the place after a step.
+    /// Takes the state after a step.
     pub(super) fn follow(&mut self, place: &ArmPlace) -> StepPath {
         let mut path = StepPath { joints_rad: [0.0; MAX_JOINTS], ground_m: 0.0, mount_m: 0.0 };
         for (joint, (now, before)) in place.angles.iter().zip(self.at.angles.iter()).enumerate() {
@@ -82,7 +83,7 @@ impl PairMotion {
         path
     }
 
-    /// What the pairs of a group can have moved since the start, m.
+    /// Returns the largest possible relative motion of a group's pairs since the start, m.
     pub(super) fn path_m(&self, group: &PairGroup) -> f64 {
         let ground_m = if group.is_on_ground { self.ground_path_m } else { 0.0 };
         let mount_m = if group.is_on_mount { self.mount_path_m } else { 0.0 };
@@ -92,7 +93,7 @@ impl PairMotion {
 }
 
 impl PairGroup {
-    /// Watched pairs of what `inner` carries and the body `outer`; `None` where there is none.
+    /// Returns the watched pairs of shapes on `inner` and on the body `outer`; `None` if there are none.
     pub(super) fn new(chain: &Chain, solids: &Solids, inner: Carrier, outer: usize) -> Option<Self> {
         let first = if let Carrier::Body(body) = inner { body } else { 0 };
         let pairs = solids.watched_pairs(inner, outer);

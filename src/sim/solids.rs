@@ -12,15 +12,15 @@ use armcal_core::robot::{PlacedShape, Robot, Shape, Vehicle, parry_pose};
 use armcal_core::routine::Scene;
 use armcal_core::streams::MAX_JOINTS;
 
-/// Solid shapes with their places in the base frame, and which pairs of parts may touch.
+/// Solid shapes with their poses in the base frame, and the pairs of parts that are watched.
 #[derive(Clone)]
 pub(super) struct Solids {
     names: Vec<String>,
     shapes: Vec<Solid>,
-    /// `base_from_shape` of each shape, as last placed.
+    /// Pose `base_from_shape` of each shape, as last placed.
     placed: Vec<Pose3>,
     pairs: PairTable,
-    /// Watched pairs of parts that overlap where the drawings have the arm stowed.
+    /// Watched pairs of parts that overlap in the stowed pose of the nominal model.
     overlaps: Vec<(usize, usize)>,
     n_bodies: usize,
     first_obstacle: usize,
@@ -33,7 +33,7 @@ pub(super) struct Solid {
     pub carrier_from_shape: Pose3,
     pub shape: SharedShape,
     radius_m: f64,
-    /// Of a box about the shape's origin, in its own axes.
+    /// Half extents of a box about the shape's origin, in its own axes.
     half_extents_m: Vec3,
 }
 
@@ -46,7 +46,7 @@ pub(super) enum Carrier {
     World,
 }
 
-/// Which pairs of parts are looked at.
+/// Pairs of parts that are watched.
 #[derive(Clone, Debug)]
 pub(super) struct PairTable {
     n_parts: usize,
@@ -61,13 +61,13 @@ pub(super) struct Nearest {
     pub part_b: usize,
 }
 
-/// Shapes nearer to the camera's eye than this are its own housing, m.
+/// Distance from the camera's eye within which shapes belong to its own housing, m.
 pub(super) const HOUSING_M: f64 = 0.03;
 /// Side of the seafloor, m: wider than any arm's reach.
 const SEAFLOOR_SIDE_M: f64 = 40.0;
 
 impl Solids {
-    /// Parts 0..=n are the bodies of the arm, then those of the vehicle, then seafloor and obstacles.
+    /// Builds the parts: 0..=n are the bodies of the arm, then those of the vehicle, then seafloor and obstacles.
     pub(super) fn new(robot: &Robot, vehicle: &Vehicle, scene: &Scene) -> Self {
         let mut solids = Self {
             names: Vec::new(),
@@ -117,8 +117,8 @@ impl Solids {
         self.placed.push(pose);
     }
 
-    /// Watches every link against everything, except neighbours in the chain and what touches by design (the robot's
-    /// `allowed_pairs`): what planning keeps apart, too.
+    /// Watches every link against all parts, except neighbours in the chain and pairs that touch by design (the robot's
+    /// `allowed_pairs`). Planning keeps the same pairs apart.
     fn watch_pairs(&mut self, robot: &Robot, base_from_world: &Isometry3<f64>) {
         let (n_bodies, n_parts) = (self.n_bodies, self.names.len());
         self.pairs = PairTable { n_parts, watched: vec![false; n_parts * n_parts] };
@@ -135,8 +135,8 @@ impl Solids {
         }
     }
 
-    /// Watches what the vehicle carries against obstacles, too: for one that is not moved as prescribed. The seafloor
-    /// below it is soft ground.
+    /// Watches what the vehicle carries against obstacles, too, for a vehicle whose motion is not prescribed. The
+    /// seafloor below it is soft ground and is not watched.
     pub(super) fn watch_vehicle(&mut self) {
         let (n_bodies, first_obstacle) = (self.n_bodies, self.first_obstacle);
         for a in (0..first_obstacle).filter(|&a| !(1..n_bodies).contains(&a)) {
@@ -164,7 +164,7 @@ impl Solids {
         nearest
     }
 
-    /// Distance of two shapes, m; infinite where parry has no answer (it has one for every shape of `Shape`).
+    /// Returns the distance of two shapes, m; infinite if parry has no answer (it has one for every shape of `Shape`).
     fn distance(&self, i: usize, j: usize) -> f64 {
         let (a, b) = (&self.shapes[i], &self.shapes[j]);
         query::distance(&self.placed[i], a.shape.as_ref(), &self.placed[j], b.shape.as_ref())
@@ -179,7 +179,7 @@ impl Solids {
         &self.pairs
     }
 
-    /// Names of the parts that overlap where the drawings have the arm stowed, and should not.
+    /// Returns the names of parts that overlap in the stowed pose of the nominal model, and should not.
     pub(super) fn overlaps(&self) -> Vec<String> {
         let names = |&(a, b): &(usize, usize)| format!("`{}` and `{}`", self.names[a], self.names[b]);
         self.overlaps.iter().map(names).collect()
@@ -189,7 +189,7 @@ impl Solids {
         &self.names[part]
     }
 
-    /// Brings every shape to where it is now.
+    /// Moves every shape to its present pose.
     pub(super) fn place(&mut self, links: &BodyPoses, base_from_world: &Isometry3<f64>) {
         let ground = parry_pose(base_from_world);
         for (placed, solid) in self.placed.iter_mut().zip(&self.shapes) {
@@ -201,21 +201,21 @@ impl Solids {
         }
     }
 
-    /// Smallest distance of the given shapes as placed, at most `far_m`.
+    /// Returns the smallest distance of the given shapes as placed, at most `far_m`.
     pub(super) fn least_distance_m(&self, pairs: &[(usize, usize)], far_m: f64) -> f64 {
         pairs.iter().fold(far_m, |least_m, &(i, j)| {
             if self.is_farther(i, j, least_m) { least_m } else { least_m.min(self.distance(i, j)) }
         })
     }
 
-    /// Whether a cheap bound already puts two shapes at least `distance_m` apart.
+    /// Returns true if a cheap bound shows that two shapes are at least `distance_m` apart.
     fn is_farther(&self, i: usize, j: usize, distance_m: f64) -> bool {
         let (a, b) = (&self.shapes[i], &self.shapes[j]);
         let between = self.placed[j].translation - self.placed[i].translation;
         if between.length() - a.radius_m - b.radius_m >= distance_m {
             return true;
         }
-        // One shape's box in its own axes against the other's sphere.
+        // Compares one shape's box in its own axes with the other's sphere.
         let beside = |place: &Pose3, half: Vec3, center: Vec3, radius_m: f64| {
             let local = place.inverse_transform_point(center);
             (local.abs() - half).max(Vec3::ZERO).length() - radius_m >= distance_m
@@ -224,7 +224,8 @@ impl Solids {
             || beside(&self.placed[i], a.half_extents_m, self.placed[j].translation, b.radius_m)
     }
 
-    /// For each joint between two bodies, an upper bound on the distance of the outer one's shapes from its axis, m.
+    /// Returns, for each joint between two bodies, an upper bound on the distance of the outer body's shapes from its
+    /// axis, m.
     pub(super) fn levers_m(&self, chain: &Chain, inner: usize, outer: usize) -> [f64; MAX_JOINTS] {
         let own_m = self.extent_m(Carrier::Body(outer));
         let mut levers_m = [0.0; MAX_JOINTS];
@@ -235,7 +236,7 @@ impl Solids {
         levers_m
     }
 
-    /// Shapes on `inner` and on the body `outer` that are watched against each other.
+    /// Returns the pairs of shapes on `inner` and on the body `outer` that are watched against each other.
     pub(super) fn watched_pairs(&self, inner: Carrier, outer: usize) -> Vec<(usize, usize)> {
         let on = |carrier: Carrier| self.shapes.iter().enumerate().filter(move |(_, solid)| solid.carrier == carrier);
         on(inner)
@@ -245,12 +246,12 @@ impl Solids {
             .collect()
     }
 
-    /// Whether a shape belongs to the arm or its base link.
+    /// Returns true if a shape belongs to the arm or its base link.
     pub(super) fn is_of_arm(&self, shape: usize) -> bool {
         self.shapes[shape].part < self.n_bodies
     }
 
-    /// The nearest of the given shapes as placed, if nearer than `far_m`.
+    /// Returns the nearest of the given pairs as placed, if it is nearer than `far_m`.
     pub(super) fn nearest_of(&self, pairs: &[(usize, usize)], far_m: f64) -> Option<Nearest> {
         pairs.iter().fold(None, |nearest: Option<Nearest>, &(i, j)| {
             let best_m = nearest.map_or(far_m, |nearest| nearest.distance_m);
@@ -258,19 +259,19 @@ impl Solids {
                 return nearest;
             }
             let distance_m = self.distance(i, j);
-            // As in `nearest`: the arm's part first.
+            // The arm's part is first, as in `nearest`.
             let (part_a, part_b) = (self.shapes[j].part, self.shapes[i].part);
             if distance_m < best_m { Some(Nearest { distance_m, part_a, part_b }) } else { nearest }
         })
     }
 
-    /// Largest distance of a carrier's shapes from its origin, m.
+    /// Returns the largest distance of a carrier's shapes from its origin, m.
     pub(super) fn extent_m(&self, carrier: Carrier) -> f64 {
         let on_it = self.shapes.iter().filter(|solid| solid.carrier == carrier);
         on_it.map(|solid| solid.carrier_from_shape.translation.length() + solid.radius_m).fold(0.0, f64::max)
     }
 
-    /// The smallest distance of a moving link to anything that is not the arm, as placed; `None` if nothing is watched.
+    /// Returns the moving link and the part outside the arm that are nearest, as placed; `None` if nothing is watched.
     pub(super) fn nearest(&self) -> Option<Nearest> {
         let is_link = |solid: &Solid| (1..self.n_bodies).contains(&solid.part);
         let mut nearest: Option<Nearest> = None;
@@ -292,7 +293,7 @@ impl Solids {
         nearest
     }
 
-    /// Shapes that make up the camera's housing: on its link, and near its eye by the drawing.
+    /// Returns the shapes of the camera's housing: on its link, and near its eye by the nominal model.
     pub(super) fn housing(&self, robot: &Robot) -> Vec<usize> {
         let mount = &robot.camera.mount;
         let eye = to_rapier(&mount.link_from_frame.translation.vector);
@@ -304,7 +305,7 @@ impl Solids {
         (0..self.shapes.len()).filter(|&i| on_link(&self.shapes[i]) && is_near(&self.shapes[i])).collect()
     }
 
-    /// Whether any shape but those in `ignored` lies on the way from `eye` to `target` (base frame).
+    /// Returns true if any shape except those in `ignored` is between `eye` and `target` (base frame).
     pub(super) fn hides(&self, eye: &Point3<f64>, target: &Point3<f64>, ignored: &[usize]) -> bool {
         let way: Vector3<f64> = target - eye;
         let length = way.norm();
@@ -317,12 +318,12 @@ impl Solids {
     }
 }
 
-/// A shape's pose in its owner's frame as parry has it, its axis turned.
+/// Returns a shape's pose in its owner's frame as parry has it, with its axis turned.
 fn shape_pose(placed: &PlacedShape) -> Pose3 {
     parry_pose(&(placed.owner_from_shape * placed.shape.axis_fix()))
 }
 
-/// A slab of 1 m with its upper face at `z_m`.
+/// Returns a slab of 1 m with its upper face at `z_m`.
 pub(super) fn seafloor(z_m: f64) -> PlacedShape {
     PlacedShape {
         owner_from_shape: Isometry3::translation(0.0, 0.0, z_m - 0.5),

@@ -1,8 +1,8 @@
-//! True temperatures: water over depth and time, oil that warms and follows it.
+//! True temperatures: water over depth and time, and oil that warms and follows the water.
 //!
-//! Prescribed oil: `start + rise (1 - exp(-t / b)) + change (1 - (a exp(-t / a) - b exp(-t / b)) / (a - b))`: its own
-//! warming with time constant b, and the water's change (time constant a) behind the same lag. Oil that warms with
-//! work: `dT/dt = power / capacity - (T - water) / b`, in steps that are exact for constant power and water.
+//! Prescribed oil: `start + rise (1 - exp(-t / b)) + change (1 - (a exp(-t / a) - b exp(-t / b)) / (a - b))`. The rise
+//! is its own warming with time constant b. The change is the water's (time constant a) with the same lag. Oil that
+//! warms with work: `dT/dt = power / capacity - (T - water) / b`, in steps that are exact for constant power and water.
 
 use crate::spec::TemperatureSpec;
 
@@ -10,9 +10,9 @@ use crate::spec::TemperatureSpec;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Temperatures {
     spec: TemperatureSpec,
-    /// Of the vehicle.
+    /// Depth of the vehicle, m.
     depth_m: f64,
-    /// For oil that warms with work.
+    /// Bath of oil that warms with work.
     bath: Option<OilBath>,
 }
 
@@ -26,7 +26,7 @@ impl Temperatures {
         Self { spec: *spec, depth_m, bath: (spec.oil_heat_capacity_j_per_k > 0.0).then_some(bath) }
     }
 
-    /// Time passes until `t_s`, at a depth, while the hydraulics lose power to the oil.
+    /// Advances to `t_s` at a depth, while the hydraulics lose power to the oil.
     pub(crate) fn advance(&mut self, t_s: f64, elapsed_s: f64, lost_power_w: f64, depth_m: f64) {
         self.depth_m = depth_m;
         let water_c = self.water_c(t_s);
@@ -35,7 +35,7 @@ impl Temperatures {
         }
     }
 
-    /// Celsius; where the oil warms with work, that of the last [`Self::advance`].
+    /// Returns the oil temperature, Celsius; for oil that warms with work, at the last [`Self::advance`].
     pub(crate) fn oil_c(&self, t_s: f64) -> f64 {
         if let Some(bath) = self.bath {
             return bath.oil_c;
@@ -52,14 +52,14 @@ impl Temperatures {
         spec.oil_start_c + spec.oil_rise_k * (1.0 - by_oil) + spec.water_change_k * followed
     }
 
-    /// `water + change (1 - exp(-t / a))` at the vehicle's depth, Celsius.
+    /// Returns the water temperature at the vehicle's depth, `water + change (1 - exp(-t / a))`, Celsius.
     pub(crate) fn water_c(&self, t_s: f64) -> f64 {
         let spec = &self.spec;
         spec.water_at_c(self.depth_m) + spec.water_change_k * (1.0 - (-t_s / spec.water_time_constant_s).exp())
     }
 }
 
-/// Oil with what it warms, cooled by the water.
+/// Oil that warms with work, cooled by the water.
 #[derive(Clone, Copy, Debug)]
 struct OilBath {
     heat_capacity_j_per_k: f64,
@@ -85,7 +85,8 @@ mod tests {
         assert!(temperatures.oil_c(600.0) - temperatures.oil_c(0.0) > 6.0);
     }
 
-    /// 20 L of oil, ten minutes of 500 W and ten of rest, in steps of any length: the closed form of a first-order lag.
+    /// 20 L of oil, ten minutes at 500 W and ten at rest, in steps of any length, follow the closed form of a
+    /// first-order lag.
     #[test]
     fn oil_that_works_follows_the_closed_form() {
         let spec = TemperatureSpec {
@@ -111,7 +112,7 @@ mod tests {
         }
     }
 
-    /// Without work the bath in water that changes is the prescribed oil without a rise: one integral, two forms.
+    /// Without work, a bath in changing water equals the prescribed oil without a rise: one integral in two forms.
     #[test]
     fn an_idle_bath_follows_the_water_as_prescribed_oil_does() {
         let prescribed = TemperatureSpec {

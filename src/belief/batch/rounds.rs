@@ -440,6 +440,7 @@ impl<'a> BundleCalibration<'a> {
         };
         let views = estimate.as_read_now(&with_steps);
         estimate.widen(&innovations, &setup.input().scales);
+        estimate.widen_unusual();
         let parameters = estimate.joint_parameters().to_vec();
         let residual_std_rad = std::array::from_fn(|joint| match robot.sensors.get(joint) {
             // Nothing is known of a joint distal to the camera but its datasheet.

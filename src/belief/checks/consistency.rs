@@ -3,11 +3,12 @@
 
 use crate::checks::block_measurements::LengthInnovation;
 use crate::checks::constants::consistency::{
-    FAR_BEYOND, HELD, LEAST, MAX_NONLINEARITY, MAX_OVER_LINEARITY, MAX_UNCONFIRMED, NAMED_WALK_NATS, WALK_SIGNIFICANCE,
-    WALKED, WORN, WORTH_M,
+    FAR_BEYOND, HELD, LEAST, MAX_NONLINEARITY, MAX_OVER_LINEARITY, MAX_UNCONFIRMED, NAMED_SIGMAS, NAMED_WALK_NATS,
+    WALK_SIGNIFICANCE, WALKED, WORN, WORTH_M,
 };
 pub(crate) use crate::checks::constants::consistency::{MAX_OUTLIERS, MAX_SIGMAS_OFF};
 use crate::checks::innovations::{Innovations, JointInnovation};
+use crate::checks::marginal::FromDatasheet;
 use crate::checks::observability::{Observability, observability};
 use crate::explain::constants::tags_departure::TAILS;
 use crate::explain::score_test::{GeometryElement, ScoreTestResult};
@@ -69,7 +70,7 @@ impl VerdictInput<'_> {
             self.nonlinearity(calibration, &mut table),
             self.corner_noise(&mut table),
             self.rotation_noise(&mut table),
-            self.beyond_datasheet(&mut table),
+            self.beyond_datasheet(calibration, &mut table),
             self.outliers(calibration, &mut table),
             self.innovations(&mut table),
         ];
@@ -296,22 +297,30 @@ impl VerdictInput<'_> {
     }
 
     /// Gains and offsets beyond what a sensor of that datasheet can have: a joint that does not move, or another
-    /// sensor.
-    fn beyond_datasheet(&self, table: &mut VerdictTable) -> Option<Refusal> {
+    /// sensor. Those that are not refused, and that few sensors have, are named.
+    fn beyond_datasheet(&self, calibration: &mut Calibration, table: &mut VerdictTable) -> Option<Refusal> {
         let robot = self.input.robot;
-        let linear = self.found.joint_parameters().iter().filter(|p| p.prior_std(robot) > 0.0);
-        let of_sensor = linear.filter(|p| matches!(p.kind, ParameterKind::Gain | ParameterKind::Offset));
-        let sigmas = of_sensor.map(|p| {
-            let nominal = if p.kind == ParameterKind::Gain { 1.0 } else { 0.0 };
-            let off = self.found.before_slips(*p) - nominal;
-            (*p, off.abs() / p.prior_std(robot), off)
-        });
-        let (worst, sigmas, off) = sigmas.max_by(|a, b| a.1.total_cmp(&b.1))?;
-        let parameter = worst.name(robot);
-        let is_gain = worst.kind == ParameterKind::Gain;
-        let unit = if is_gain { FindingUnit::One } else { FindingUnit::of_joint(robot.sensors[worst.joint].moves) };
-        let check = Check::at_most(format!("{parameter}: sigma from its datasheet"), sigmas, MAX_SIGMAS_OFF);
-        let refusal = (!check.holds).then_some(Refusal::BeyondDatasheet { parameter, sigmas, off, unit });
+        let apart = self.found.from_datasheet();
+        let FromDatasheet { parameter, sigmas, off } =
+            apart.into_iter().max_by(|a, b| a.sigmas.total_cmp(&b.sigmas))?;
+        let name = parameter.name(robot);
+        let unit = match parameter.kind {
+            ParameterKind::Gain => FindingUnit::One,
+            _ => FindingUnit::of_joint(robot.sensors[parameter.joint].moves),
+        };
+        let check = Check::at_most(format!("{name}: sigma from its datasheet"), sigmas, MAX_SIGMAS_OFF);
+        if check.holds && sigmas > NAMED_SIGMAS {
+            calibration.findings.push(Finding {
+                kind: FindingKind::SensorUnusual,
+                name: name.clone(),
+                size: Some(off),
+                unit: Some(unit),
+                tool_error_m: None,
+                time_s: None,
+                repaired: true,
+            });
+        }
+        let refusal = (!check.holds).then_some(Refusal::BeyondDatasheet { parameter: name, sigmas, off, unit });
         table.checks.push(check);
         refusal
     }

@@ -121,6 +121,9 @@ pub(crate) mod consistency {
     pub(crate) const MAX_NONLINEARITY: f64 = 10.0;
     /// Gains and offsets farther from the datasheet than this are no calibration any more.
     pub(crate) const MAX_SIGMAS_OFF: f64 = 5.0;
+    /// Sigmas of its datasheet from which a gain or offset is named, and its datasheet's sigma is believed no more: of
+    /// 14 in a good arm one is beyond as seldom (0.1 %) as one alone 3.3.
+    pub(crate) const NAMED_SIGMAS: f64 = 4.0;
     /// Sensors that move the tool by more than this many times its predicted error claim more than chance.
     pub(crate) const MAX_UNCONFIRMED: f64 = 3.0;
     /// Share of the tag observations that may be outliers.

@@ -7,7 +7,7 @@
 
 use crate::judge::constants::baseline_comparison::LEAST_P;
 pub use crate::judge::constants::baseline_comparison::SIGNIFICANCE;
-use armcal_core::stats::student_t_above;
+use armcal_core::stats::StudentT;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -33,7 +33,7 @@ impl BaselineComparison {
         let mean = log_ratios.iter().sum::<f64>() / n as f64;
         let variance = log_ratios.iter().map(|l| (l - mean).powi(2)).sum::<f64>() / (n - 1) as f64;
         let t = if mean == 0.0 { 0.0 } else { mean / (variance / n as f64).sqrt() };
-        let p_value = student_t_above(t, n - 1).clamp(LEAST_P, 1.0 - LEAST_P);
+        let p_value = StudentT::new(n - 1).above(t).clamp(LEAST_P, 1.0 - LEAST_P);
         Some(Self { rms_m, ratio: (-mean).exp(), p_value })
     }
 

@@ -7,7 +7,7 @@
 
 pub use crate::judge::constants::coverage::COVERAGE;
 use crate::judge::constants::coverage::{ANGLES, INFINITE_DOF, KNOWN_TO, NEWTON_STEPS, NODES, STEPS};
-use armcal_core::stats::{chi_square_above, student_t_above};
+use armcal_core::stats::{StudentT, chi_square_above};
 use nalgebra::Matrix3;
 
 /// Distribution of the tool's position error at one configuration of the arm.
@@ -15,8 +15,17 @@ use nalgebra::Matrix3;
 pub struct ErrorDistribution {
     /// Eigenvalues of the covariance, m^2, the largest first; none is negative.
     eigenvalues_m2: [f64; 3],
-    /// Degrees of freedom of the covariance's size; `None` where it is known.
-    dof: Option<usize>,
+    /// `None` where the covariance's size is known.
+    fitted_size: Option<FittedSize>,
+}
+
+/// A size of the noise that was estimated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct FittedSize {
+    dof: f64,
+    student: StudentT,
+    /// `B(1/2, dof / 2)`.
+    beta: f64,
 }
 
 impl ErrorDistribution {
@@ -31,8 +40,8 @@ impl ErrorDistribution {
         eigenvalues_m2.sort_by(|a, b| b.total_cmp(a));
         let eigenvalues_m2 = eigenvalues_m2.map(|value| value.max(0.0));
         // The GUM (G.4.1) takes the next lower integer.
-        let dof = (dof < INFINITE_DOF).then(|| dof.max(1.0) as usize);
-        Some(Self { eigenvalues_m2, dof })
+        let fitted_size = (dof < INFINITE_DOF).then(|| FittedSize::new(dof.max(1.0) as usize));
+        Some(Self { eigenvalues_m2, fitted_size })
     }
 
     /// Probability that the error exceeds `radius_m`.
@@ -80,15 +89,24 @@ impl ErrorDistribution {
 
     /// Probability that `rho^2` exceeds `x`.
     fn radius_above(&self, x: f64) -> f64 {
-        let Some(dof) = self.dof else { return chi_square_above(x, 3) };
+        self.fitted_size.map_or_else(|| chi_square_above(x, 3), |size| size.radius_above(x))
+    }
+}
+
+impl FittedSize {
+    fn new(dof: usize) -> Self {
+        Self { dof: dof as f64, student: StudentT::new(dof), beta: beta_with_half(dof) }
+    }
+
+    /// Probability that `3 F(3, dof)` exceeds `x`.
+    fn radius_above(&self, x: f64) -> f64 {
         if x.is_infinite() {
             return 0.0;
         }
         // The tail of |t| in one dimension, and the term that two more dimensions add: a recurrence of the incomplete
         // beta function.
-        let nu = dof as f64;
-        let share = x / (x + nu);
-        2.0 * student_t_above(x.sqrt(), dof) + 2.0 * share.sqrt() * (1.0 - share).powf(0.5 * nu) / beta_with_half(dof)
+        let share = x / (x + self.dof);
+        2.0 * self.student.above(x.sqrt()) + 2.0 * share.sqrt() * (1.0 - share).powf(0.5 * self.dof) / self.beta
     }
 }
 

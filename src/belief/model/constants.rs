@@ -11,12 +11,12 @@ pub(crate) mod blocks_value {
 }
 
 pub(crate) mod parameters {
-    /// How far a spot's middle and its width are from the bump's, in widths. Assumed: tracks wear as they are used.
+    /// Standard deviation of a spot's middle and width about the bump's, in widths. Assumed: tracks wear as they are used.
     pub(crate) const SHAPE_STD: f64 = 0.3;
     /// Standard width of a worn spot, rad. Assumed: some three degrees; a narrower one is seen at its middle alone, a
     /// wider one takes two places.
     pub(crate) const SPOT_WIDTH_RAD: f64 = 0.05;
-    /// What happens farther from a spot's middle than this, in widths, is about something else.
+    /// Distance from a spot's middle, in widths, beyond which a reading has nothing to do with the spot.
     pub(crate) const FAR_WIDTHS: f64 = 3.0;
 }
 
@@ -31,9 +31,9 @@ pub(crate) mod scales {
     /// Correlation length of a sensor's nonlinearity, half ranges. Assumed: four waves over the range are then still
     /// half as likely as one.
     pub const SHAPE_LENGTH: f64 = 0.16;
-    /// Of an image's stamp about the camera's clock, with what sensors of moving joints are late by, s. Assumed.
+    /// Error of an image's stamp, including the delay of moving joints' sensors, s. Assumed.
     pub(crate) const TIME_JITTER_STD_S: f64 = 0.005;
-    /// How far a sensor may slip on its shaft, rad. Assumed: wide, the views tell it.
+    /// Prior of a sensor's slip on its shaft, rad. Assumed: wide, because the views determine it.
     pub(crate) const STEP_STD_RAD: f64 = 0.1;
     /// Height of a worn spot's bump, rad. Assumed: wide, the views tell it.
     pub(crate) const BUMP_STD_RAD: f64 = 0.03;

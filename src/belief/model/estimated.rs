@@ -10,12 +10,12 @@ use armcal_core::time::Stamp;
 /// Which parameters have a column.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model {
-    /// Of each joint of the arm, base first.
+    /// Parameters of each joint of the arm, base first.
     pub joints: Vec<Vec<ParameterKind>>,
-    /// How many joints, base first, have columns of their place on the parent link, about the drawing's.
+    /// Number of joints, base first, with columns of their place on the parent link.
     pub n_links: usize,
-    /// How many joints, base first, have a column of their compliance, with the base's and a load at the tool; 0: none
-    /// of these.
+    /// Number of joints, base first, with a column of their compliance, next to the base's and a load at the tool; 0:
+    /// none of these.
     pub n_compliant: usize,
     /// Groups of parameters next to these; tags that no view shows have no columns all the same.
     pub blocks: BTreeSet<Block>,

@@ -24,7 +24,7 @@ pub struct JointParameters {
     pub terms: [Terms; MAX_JOINTS],
     /// Where joints sit on their parent links beyond the drawing; zero where that was not estimated.
     pub links: LinkCorrections,
-    /// What the terms are counted from.
+    /// Conditions at which the terms are zero.
     pub reference: Conditions,
 }
 
@@ -91,7 +91,7 @@ impl JointParameters {
         Correction { gain: self.gain[joint], offset_rad: self.offset_rad[joint], terms: self.terms[joint] }
     }
 
-    /// Whether there is nothing but gains and offsets.
+    /// True if there are only gains and offsets.
     #[must_use]
     pub fn are_linear(&self) -> bool {
         self.terms.iter().all(Terms::are_zero)
@@ -118,7 +118,7 @@ impl JointParameters {
     }
 }
 
-/// What a parameter of a joint sensor acts on.
+/// Kinds of parameters of a joint and its sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ParameterKind {
     /// Factor on the nominal travel.
@@ -137,13 +137,13 @@ pub enum ParameterKind {
     DriftPerH,
     /// Half of the backlash between joint and sensor shaft, rad.
     HalfBacklash,
-    /// What the angle was more at the same reading before the sensor slipped: in views that end before this stamp, rad.
+    /// Angle at the same reading before the sensor slipped, less that after it, in views that end before this stamp, rad.
     StepBefore(Stamp),
     /// A mode of the random walk that led to the offset as it is at the last view, rad.
     WalkMode(u8),
     /// Height of a worn spot's bump, rad; one a joint.
     Bump(WornSpot),
-    /// Of the joint's origin along an axis of its parent link, m.
+    /// Shift of the joint's origin along an axis of its parent link, m.
     LinkShift(u8),
     /// Of the joint's attitude about an axis of its parent link, rad.
     LinkTurn(u8),

@@ -58,7 +58,7 @@ impl JointPrior {
 /// Priors of all but the views' own parameters.
 #[derive(Clone, Debug)]
 pub(crate) struct Prior {
-    /// Of the joints' parameters.
+    /// Prior mean of the joints' parameters.
     pub joint_mean: DVector<f64>,
     pub information: Information,
     pub mean: PerBlock<Value>,

@@ -1,4 +1,4 @@
-//! How large the things are that are not known exactly: standard deviations that the data themselves may tell.
+//! Noise and prior scales: standard deviations that the data may correct.
 
 use crate::model::constants::scales::{
     AS_STATED, DRIFT_STD_RAD_PER_H, FREE_JOINT_STD_RAD, GAIN_STD_PER_K, HALF_PLAY_STD_RAD, OFFSET_STD_RAD_PER_K,
@@ -15,9 +15,9 @@ use armcal_core::sensor::shape_prior;
 /// Standard deviations that the data themselves may tell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hyperparameters {
-    /// What each joint is off in each view anew, rad: what the sensor's model leaves.
+    /// Error of each joint beyond its sensor's model, independent in each view, rad.
     pub joint_std_rad: [f64; MAX_JOINTS],
-    /// Of a joint whose sensor says nothing.
+    /// Standard deviation of a joint whose sensor does not count, rad.
     pub free_joint_std_rad: f64,
     /// Size of each sensor's nonlinearity.
     pub shape_std_rad: [f64; MAX_JOINTS],
@@ -31,33 +31,33 @@ pub struct Hyperparameters {
     pub drift_std_rad_per_h: f64,
     /// Half of the backlash between joint and sensor shaft.
     pub half_play_std_rad: f64,
-    /// Of the random walk of each joint's offset from the first view to the last, rad.
+    /// Random walk of each joint's offset from the first view to the last, rad.
     pub walk_std_rad: [f64; MAX_JOINTS],
-    /// Of each joint's place on its parent link: shift m, turn rad.
+    /// Each joint's place on its parent link: shift m, turn rad.
     pub link_std: [[f64; 2]; MAX_JOINTS],
-    /// Of the joints' compliances, and of the base's on what carries it, rad/(N m).
+    /// Compliances of the joints, and of the base's mount, rad/(N m).
     pub compliance_std: [f64; 2],
-    /// Of the load at the tool, N.
+    /// Load at the tool, N.
     pub tool_load_std_n: f64,
-    /// Of each camera's mount, by its number, over what robot.toml says of it: shift, turn.
+    /// Factor on robot.toml's sigmas of each camera's mount (by its number): shift, turn.
     pub mount_scale: [[f64; 2]; MAX_CAMERAS],
-    /// Of the lenses, over their priors'.
+    /// Factor on the lenses' prior sigmas.
     pub lens_scale: f64,
     /// All measurements' standard deviations over what is stated for them.
     pub noise: f64,
-    /// Of positions and poses that a recording gives in place of corners.
+    /// Noise of positions and of poses' positions, m.
     pub position_std_m: f64,
-    /// Of poses that a recording gives in place of corners.
+    /// Noise of poses' rotations, rad.
     pub rotation_std_rad: f64,
     /// The error that all tags of a view share (positions by SLAM have it): translation m, rotation rad. `None`: there
     /// is none.
     pub camera_error_std: Option<[f64; 2]>,
-    /// Of an image's stamp about the camera's clock, s: what a moving arm's angles are off by, times its rates.
+    /// Error of an image's stamp, s; times a joint's rate it is the joint's error in a moving view.
     pub time_jitter_std_s: f64,
 }
 
 impl Hyperparameters {
-    /// What robot.toml says, and where it is silent what is usual (assumed; the data correct it).
+    /// Returns robot.toml's values, and usual ones where it states none (assumed; the data correct them).
     #[must_use]
     pub fn datasheet(robot: &Robot) -> Self {
         let mut joint_std_rad = [1e-3; MAX_JOINTS];

@@ -11,9 +11,9 @@ use armcal_core::joints::MAX_JOINTS;
 pub(crate) struct State {
     pub joint: DVector<f64>,
     pub blocks: PerBlock<Value>,
-    /// Of each view: what each joint is off beyond the sensor's model, rad.
+    /// Each joint's error beyond its sensor's model in each view, rad.
     pub joint_error: Vec<[f64; MAX_JOINTS]>,
-    /// Of each view: the camera's pose error.
+    /// The camera's pose error in each view.
     pub camera_error: Vec<Isometry3<f64>>,
 }
 

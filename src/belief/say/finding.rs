@@ -67,6 +67,8 @@ pub enum FindingKind {
     SensorFailed,
     /// A sensor with more error from view to view than its datasheet allows; the size is one sigma.
     SensorWorn,
+    /// A gain or offset that few sensors of the datasheet have; the size is how far it is off.
+    SensorUnusual,
     /// A sensor whose offset walks at random; the size is one sigma over the views.
     OffsetWalks,
     /// Tag observations that the fit rejected; the size is their number.
@@ -92,6 +94,7 @@ impl Coded for FindingKind {
             Self::SensorScale => Code::SensorScale,
             Self::SensorFailed => Code::SensorFailed,
             Self::SensorWorn => Code::SensorWorn,
+            Self::SensorUnusual => Code::SensorUnusual,
             Self::OffsetWalks => Code::OffsetWalks,
             Self::Outliers => Code::Outliers,
         }

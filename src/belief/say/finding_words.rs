@@ -23,6 +23,7 @@ impl FindingKind {
             Self::SensorScale => "sensor scale differs",
             Self::SensorFailed => "joint or sensor failed",
             Self::SensorWorn => "sensor worn",
+            Self::SensorUnusual => "far from its datasheet",
             Self::OffsetWalks => "offset walks at random",
             Self::Outliers => "tag observations rejected",
         }

@@ -1,4 +1,4 @@
-//! How frames on the arm move by parameters of its body: link geometry, and how it bends under its weight.
+//! Motion of frames on the arm by parameters of its body: link geometry, and bending under its weight.
 
 use std::ops::Range;
 
@@ -10,9 +10,9 @@ use armcal_core::kinematics::{AboutAxes, ArmLoads, Chain, LinkPoses, Sag};
 /// A bending arm at one configuration.
 pub(crate) struct SagPoint {
     sag: Sag,
-    /// Of all weights, N m.
+    /// Torque of all weights about the joint axes, N m.
     torques: AboutAxes,
-    /// Of one newton at the tool, N m.
+    /// Torque of one newton at the tool about the joint axes, N m.
     by_tool: AboutAxes,
 }
 

@@ -8,7 +8,7 @@ use crate::solve::schur::{BodyTwists, Group};
 use armcal_core::kinematics::{AboutAxes, LinkCorrections, LinkPoses};
 use armcal_core::spatial::left_jacobian;
 
-/// Of the joints of `group`; zero elsewhere.
+/// Twists of the camera by the body's columns of the joints of `group`; zero for other joints.
 pub(crate) fn body_twists(problem: &BundleProblem<'_>, group: &Group<'_>, corrections: &LinkCorrections) -> BodyTwists {
     let mut twists = BodyTwists::zeros();
     let layout = &problem.layout;
@@ -60,7 +60,7 @@ pub(crate) fn link_twist(
     ]
 }
 
-/// What the links' block takes from a group whose own parameters are eliminated (module `linearize`).
+/// Sums of a group with its own parameters marginalised (module `linearize`), for the links' block.
 pub(crate) struct BodySums {
     pub twists: BodyTwists,
     /// `G - G M G`.

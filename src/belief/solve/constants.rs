@@ -29,7 +29,7 @@ pub(crate) mod evidence {
     pub(crate) const NU_CAMERA: f64 = 6.0;
     /// Bounds of the noise's factor, and of every other scale over its first guess.
     pub(crate) const NOISE_BOUNDS: [f64; 2] = [0.1, 30.0];
-    /// Of positions and rotations over their first guess, which nobody stated.
+    /// Bounds of the noise of positions and rotations over its first guess, where no noise is stated.
     pub(crate) const POSITION_BOUNDS: [f64; 2] = [1e-3, 1e3];
     pub(crate) const SCALE_BOUNDS: [f64; 2] = [0.02, 50.0];
     /// A column with less than one entry in so many goes by its entries alone: a view sees few of many tags.
@@ -53,7 +53,7 @@ pub(crate) mod levenberg_marquardt {
     /// A step that should gain less, relative, tells nothing of the curvature: the gain is in the last digits of the
     /// sum.
     pub(crate) const TELLING_GAIN: f64 = 1e2 * ROUNDING;
-    /// Of the normal equations' diagonal, relative.
+    /// Levenberg-Marquardt damping, relative to the normal equations' diagonal.
     pub(crate) const DAMPING: Damping =
         Damping { first: 1e-6, min: 1e-14, max: 1e12, down: 0.1, up: 10.0, min_after_rejection: 0.0 };
     /// Until one more step would save nothing that a sum of squares could show.
@@ -109,6 +109,6 @@ pub(crate) mod schur {
 }
 
 pub(crate) mod time_error {
-    /// Of what a joint of a moving arm is off by itself, rad^2: the inverse takes differences.
+    /// Smallest variance of a moving arm's own joint error, rad^2; keeps the differences of inverses finite.
     pub(crate) const LEAST_OWN_VAR: f64 = 1e-14;
 }

@@ -1,4 +1,4 @@
-//! How sure the answer is, in its own units and in millimetres at the tool.
+//! Covariance of the estimate, in the parameters' units and as the tool's error.
 //!
 //! For an estimator that minimizes a sum of norms, the sandwich `A^-1 B A^-1` (Huber 1967): `A` is the objective's
 //! curvature, `B` the scatter of its gradient. `B` is summed by views, for all tags of one view share one camera pose
@@ -44,7 +44,7 @@ pub struct JointAt<'a> {
     pub travel_rad: f64,
 }
 
-/// What the tool's position error is expected to be at the task's targets.
+/// Predicted position error of the tool at the task's targets.
 #[derive(Clone, Debug)]
 pub struct ToolErrorPrediction {
     /// Over the targets that inverse kinematics reaches.
@@ -63,7 +63,7 @@ pub struct CommonErrors {
 }
 
 impl CommonErrors {
-    /// What robot.toml and the survey say: every axis and every tag by itself.
+    /// Returns the standard deviations stated in robot.toml and the survey: every axis and every tag by itself.
     #[must_use]
     pub fn priors(robot: &Robot) -> Self {
         let (std_m, std_rad) = (robot.camera.mount_std_m, robot.camera.mount_std_rad);
@@ -84,8 +84,8 @@ impl CommonErrors {
 }
 
 impl ParameterCovariance {
-    /// The same with gains and offsets as they are under other conditions than the reference's: what temperature and
-    /// pressure do is in them.
+    /// Covariance of gains and offsets under other conditions than the reference's, with the effects of temperature
+    /// and pressure.
     #[must_use]
     pub fn under(&self, change: &ConditionChange) -> Self {
         let mut to = DMatrix::identity(self.parameters.len(), self.parameters.len());
@@ -169,7 +169,7 @@ impl ParameterCovariance {
         (Self { parameters: free.to_vec(), matrix, residual_std_rad: None }, by_mount)
     }
 
-    /// The same with the joints that the tag on the gripper determined; `by_mount` as [`Self::estimate`] gives it.
+    /// Adds the joints that the tag on the gripper determined; `by_mount` comes from [`Self::estimate`].
     #[must_use]
     pub fn with_gripper_tag(self, mount: &MountEstimate, determined: &[Parameter], by_mount: &DMatrix<f64>) -> Self {
         let rows: Vec<usize> = determined.iter().filter_map(|p| mount.row(*p)).collect();
@@ -214,7 +214,7 @@ impl ParameterCovariance {
     }
 }
 
-/// How many times the datasheets' linearity the sensors must have for the residuals to be what they are; at least 1.
+/// Factor on the datasheets' linearity that explains the residuals; at least 1.
 ///
 /// `sum |residual|^2 = sum (tr(mount) + tr(survey) + tr(corners) + s^2 tr(linearity))` over all tags of fitted and
 /// held-out views, solved for `s`. Fitted views count for the share that the parameters leave free: a view adds about

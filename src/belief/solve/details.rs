@@ -1,4 +1,4 @@
-//! What a fit left in each view, and what is expected at each target: for reports. It is in no file.
+//! Residuals of each view and predicted errors at each target, for reports only (in no file).
 
 use nalgebra::{Matrix3, Point3, Vector2};
 
@@ -16,11 +16,11 @@ use armcal_core::time::Stamp;
 pub struct FitDetails {
     /// In the order of the fit; those of a map or of end stops alone are none.
     pub views: Vec<ViewResidual>,
-    /// Of the task, those that inverse kinematics reaches.
+    /// Targets of the task that inverse kinematics reaches.
     pub targets: Vec<TargetPrediction>,
 }
 
-/// What the calibrated arm leaves unexplained in one view.
+/// Residuals of one view.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ViewResidual {
     /// Number in its capture mark.
@@ -29,9 +29,9 @@ pub struct ViewResidual {
     pub end: Stamp,
     /// Angles of its readings by the datasheet, rad.
     pub datasheet_rad: JointAngles,
-    /// The same as calibrated, rad.
+    /// Joint angles as calibrated, rad.
     pub calibrated_rad: JointAngles,
-    /// How far each joint is off its calibrated sensor in this view, rad; of `bundle` alone.
+    /// Error of each joint from its calibrated sensor in this view, rad; only from `bundle`.
     pub joint_error_rad: Option<JointAngles>,
     /// In the order of the recording.
     pub tags: Vec<ObservedTag>,
@@ -46,7 +46,7 @@ pub struct ObservedTag {
     pub off_m: f64,
     /// Where the recording has corners; one that is predicted out of the lens's view is absent.
     pub corners: [Option<CornerResidual>; 4],
-    /// Whether the fit used it, or rejected all of it.
+    /// True if the fit used any of it; false if it rejected all corners.
     pub is_used: bool,
 }
 
@@ -57,11 +57,11 @@ pub struct CornerResidual {
     pub seen_px: [f64; 2],
     /// Seen less predicted.
     pub off_px: [f64; 2],
-    /// Whether the fit used it, or rejected it.
+    /// True if the fit used it; false if it rejected it.
     pub is_used: bool,
 }
 
-/// What is expected of the tool at one target.
+/// Predicted error of the tool at one target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TargetPrediction {
     /// Number of the target in its task, from 0.
@@ -72,7 +72,7 @@ pub struct TargetPrediction {
     pub covariance_m2: Matrix3<f64>,
     /// Expected size of the tool's position error: `sqrt(trace(covariance))`, m.
     pub error_m: f64,
-    /// The same with what the drawing leaves open, where that was asked for, m.
+    /// Predicted error with the unobservable parameters' stated sigmas, if requested, m.
     pub with_priors_m: Option<f64>,
     /// Covariance with stated sigmas of the unobservable parameters, where that was asked for, m^2.
     pub with_priors_m2: Option<Matrix3<f64>>,
@@ -102,7 +102,7 @@ impl FitDetails {
 }
 
 impl ViewResidual {
-    /// Of each view of the problem at its solution.
+    /// Residuals of each view of the problem at its solution.
     pub(crate) fn all(problem: &PositionProblem<'_>, at: &JointParameters) -> Vec<Self> {
         let mut all: Vec<Self> = problem.views.iter().map(|view| Self::without_tags(problem, view, at)).collect();
         problem.each(at, |o| all[o.view_idx].tags.push(ObservedTag::of(problem, o)));

@@ -32,11 +32,11 @@ pub struct Estimate<'a> {
     pub(crate) problem: BundleProblem<'a>,
     pub(crate) solved: Solved,
     pub(crate) posterior: Posterior,
-    /// What covariances count besides, where it was asked for.
+    /// Widened covariance, if requested.
     pub(crate) marginal: Option<Marginal>,
-    /// Whether the joints' prior is the datasheet's under the fitted scales.
+    /// True if the joints' prior is the datasheet's under the fitted scales.
     pub(crate) has_own_priors: bool,
-    /// What was estimated.
+    /// Estimated parameters.
     pub model: Model,
     /// The initial guess; what has no column keeps its values, and its reference is that of the terms.
     pub guess: JointParameters,
@@ -120,13 +120,13 @@ pub(crate) fn estimate_with_lengths<'a>(input: &BundleInput<'a>, lengths: &[Bloc
 pub struct LeastSquares {
     /// Those of the least cost.
     pub parameters: JointParameters,
-    /// How the solver ended.
+    /// Outcome of the solver.
     pub outcome: Outcome,
     /// Number of steps.
     pub iterations: usize,
     /// Sum of squared whitened residuals at the guess.
     pub cost_initial: f64,
-    /// The same at the end.
+    /// Cost at the end.
     pub cost_final: f64,
 }
 
@@ -152,8 +152,8 @@ fn cost_at(problem: &BundleProblem<'_>, state: &State) -> f64 {
 }
 
 impl Estimate<'_> {
-    /// Whether the observations that are used and the priors fit together about as well as their standard deviations
-    /// say: the cost, a sum of squares in standard deviations, is not many times the number of measurements.
+    /// True if the used observations and the priors agree about as well as their standard deviations say: the cost, a
+    /// sum of squares in standard deviations, is not many times the number of measurements.
     #[must_use]
     pub fn is_consistent(&self) -> bool {
         let used = self.problem.observations.iter().filter(|observation| observation.is_used);
@@ -161,7 +161,7 @@ impl Estimate<'_> {
         n > 0 && self.cost_final < CONSISTENT_COST * n as f64
     }
 
-    /// What `bundle` knows beyond the arm's residuals: what it rejected, and what each joint was off in each view.
+    /// Adds to `details` the rejected observations and each joint's error in each view.
     pub(crate) fn complete(&self, details: &mut FitDetails) {
         let n_joints = self.problem.robot.n_joints();
         for (view, error_rad) in details.views.iter_mut().zip(&self.solved.state.joint_error) {
@@ -178,7 +178,7 @@ impl Estimate<'_> {
         }
     }
 
-    /// Whether any observation of a view is used.
+    /// True if any observation of the view is used.
     #[must_use]
     pub fn uses(&self, view_idx: usize) -> bool {
         let observations = self.problem.views[view_idx].observations.clone();
@@ -211,7 +211,7 @@ impl Estimate<'_> {
         parameters_of(&self.problem, &self.solved.state, &self.guess)
     }
 
-    /// How the last solution ended.
+    /// Outcome of the last solution.
     #[must_use]
     pub fn outcome(&self) -> Outcome {
         self.solved.outcome
@@ -245,20 +245,20 @@ impl Estimate<'_> {
         (!variances.is_empty()).then(|| (variances.iter().sum::<f64>() / variances.len() as f64).sqrt())
     }
 
-    /// Whether positions or poses were measured in place of corners.
+    /// True if positions or poses were measured instead of corners.
     #[must_use]
     pub fn has_positions(&self) -> bool {
         self.problem.observations.iter().any(|observation| !observation.data.is_in_pixels())
     }
 
-    /// Whether poses were measured in place of corners.
+    /// True if poses were measured instead of corners.
     #[must_use]
     pub fn has_poses(&self) -> bool {
         let mut observations = self.problem.observations.iter();
         observations.any(|observation| matches!(observation.data, WeightedMeasurement::Pose { .. }))
     }
 
-    /// How much later the joint sensors' stamps are than the camera's, and one sigma; `None` where it is not estimated.
+    /// Delay of the joint sensors' stamps after the camera's and its sigma, s; `None` if it is not estimated.
     #[must_use]
     pub fn time_offset_s(&self) -> Option<[f64; 2]> {
         let at = self.problem.layout.at(Block::Clock)?;

@@ -25,7 +25,7 @@ use armcal_core::spatial::log;
 /// The posterior at the scales of the problem.
 #[derive(Clone, Debug)]
 pub(crate) struct Posterior {
-    /// Of the common parameters.
+    /// Covariance of the common parameters.
     pub covariance: DMatrix<f64>,
     /// Variances of each view's own parameters.
     pub own: Vec<[f64; N_VIEW_PARAMETERS]>,
@@ -33,14 +33,14 @@ pub(crate) struct Posterior {
     pub by_common: Vec<[f64; N_VIEW_PARAMETERS]>,
 }
 
-/// What leaves an estimate as its covariance.
+/// Covariance that an estimate reports.
 #[derive(Clone)]
 pub(crate) struct Marginal {
-    /// Of the common parameters.
+    /// Covariance of the common parameters.
     pub covariance: DMatrix<f64>,
-    /// What each joint is off at a new pose.
+    /// Standard deviation of each joint's error at a new pose, rad.
     pub joint_std_rad: [f64; MAX_JOINTS],
-    /// Of the variances, by the held-out cameras.
+    /// Factor on the variances, by the held-out cameras.
     pub factor: f64,
 }
 
@@ -94,7 +94,7 @@ impl Sums {
         self.gamma += (1.0 - variance / (std * std)).clamp(0.0, 1.0);
     }
 
-    /// Of an error of variance s^2 that n views share, each under a prior of n s^2. `left`: the shares of that which it
+    /// Expected square of an error of variance s^2 that n views share, each under a prior of n s^2. `left`: the shares of that which it
     /// has after the views, all of it and what the common parameters leave open. With g = 1 - what its own view leaves
     /// open, the estimate has the square `s^2 g (g + n (1 - g))` on average, less n times what the common parameters
     /// take up; it counts once.
@@ -120,7 +120,7 @@ pub(crate) enum ScaleMoment {
 }
 
 impl ScaleMoment {
-    /// Of a sum of squares of `dof` degrees of freedom. A mean needs more than two; below four it counts as twice the
+    /// Divisor of a sum of squares of `dof` degrees of freedom. A mean needs more than two; below four it counts as twice the
     /// fitted square.
     fn divisor(self, dof: f64) -> f64 {
         match self {
@@ -164,7 +164,7 @@ pub(crate) fn updated(
     next
 }
 
-/// What new scales follow from.
+/// Inputs of new scales.
 struct ScaleUpdate<'a, 'b> {
     problem: &'a BundleProblem<'b>,
     state: &'a State,
@@ -304,7 +304,7 @@ impl ScaleUpdate<'_, '_> {
         }
     }
 
-    /// Of a mount whose columns begin at `at`, whose prior is `std`, and which is `off` its drawing: shift and turn.
+    /// New scales (shift, turn) of a mount whose columns begin at `at`, whose prior is `std`, and which is `off` nominal.
     fn mount_scale(&self, (at, std): (usize, &Std), off: &Std, now: [f64; 2]) -> [f64; 2] {
         let Self { posterior, .. } = *self;
         let unit = std.map(at_least);
@@ -384,7 +384,7 @@ impl ScaleUpdate<'_, '_> {
     }
 }
 
-/// What has a noise of its own.
+/// Kinds of measurements with a noise of their own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum NoiseKind {
     Corner,
@@ -402,13 +402,13 @@ impl NoiseKind {
         }
     }
 
-    /// Of positions and rotations.
+    /// Standard deviation of positions or rotations, m or rad.
     fn std(self, scales: &Hyperparameters) -> f64 {
         if self == Self::Rotation { scales.rotation_std_rad } else { scales.position_std_m }
     }
 }
 
-/// Of positions or of rotations: chi-square, and how many parameters they determine. With the information of that kind
+/// Chi-square of positions or of rotations, and the number of parameters that they determine. With the information of that kind
 /// times `1 + e`, chi-square grows by `e` times its part, and `ln det` of the normal matrix, the views' own parameters
 /// with it, by `ln (1 + e)` times the parameters told.
 fn share_of(problem: &BundleProblem<'_>, state: &State, normal: &NormalEquations, kind: NoiseKind) -> (f64, f64) {
@@ -428,7 +428,7 @@ fn share_of(problem: &BundleProblem<'_>, state: &State, normal: &NormalEquations
     (chi2.max(0.0), if told.is_finite() { told.max(0.0) } else { 0.0 })
 }
 
-/// How many parameters, the views' own among them, the data determine.
+/// Number of parameters that the data determine, including the views' own.
 pub(crate) fn determined(problem: &BundleProblem<'_>, posterior: &Posterior) -> f64 {
     let layout = &problem.layout;
     let information = &problem.prior.information.matrix;

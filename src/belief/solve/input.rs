@@ -1,4 +1,4 @@
-//! What `bundle` estimates from.
+//! Input of `bundle`.
 
 use crate::model::estimated::Model;
 use crate::model::layout::Layout;
@@ -8,7 +8,7 @@ use crate::model::scales::Hyperparameters;
 use crate::views::view::{TagMeasurement, View};
 use armcal_core::robot::Robot;
 
-/// What to estimate from.
+/// Robot, views and settings of one estimate.
 #[derive(Clone)]
 pub struct BundleInput<'a> {
     /// Nominal arm with its tags; their poses are priors.
@@ -21,9 +21,9 @@ pub struct BundleInput<'a> {
     pub scales: Hyperparameters,
     /// Where the search begins, and the reference of the terms.
     pub guess: JointParameters,
-    /// Of the joints' parameters, where there is more than the datasheet.
+    /// Prior of the joints' parameters; `None` uses the datasheet's.
     pub joint_prior: Option<JointPrior>,
-    /// Whether those are fitted.
+    /// How the scales are set.
     pub evidence: HyperparameterMode,
 }
 
@@ -52,10 +52,10 @@ impl BundleInput<'_> {
     }
 }
 
-/// Whether the scales are fitted or taken as given.
+/// How the scales (noise and prior standard deviations) are set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HyperparameterMode {
-    /// By the evidence of the data.
+    /// Fitted by the evidence of the data.
     Fitted,
     /// As in [`BundleInput::scales`].
     Given,

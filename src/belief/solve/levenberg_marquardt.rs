@@ -27,7 +27,7 @@ pub(crate) struct Solved {
     pub normal: NormalEquations,
     pub iterations: usize,
     pub outcome: Outcome,
-    /// Of the start.
+    /// Cost at the start.
     pub cost_initial: f64,
 }
 
@@ -41,7 +41,7 @@ struct Solver<'a, 'b> {
     trial_normal: NormalEquations,
     room: DMatrix<f64>,
     step: DVector<f64>,
-    /// What the whole step saves if the problem is linear, and the share of it that is taken.
+    /// Decrease of the cost by the whole step if the problem is linear; `share` of that step is taken.
     predicted_gain: f64,
     share: f64,
     last: LastStep,
@@ -155,7 +155,7 @@ fn solve_damped(
     Some(())
 }
 
-/// What the views' own parameters would save if the common ones stayed.
+/// Decrease of the cost by a step of the views' own parameters with the common ones held.
 pub(crate) fn own_gain(normal: &NormalEquations) -> f64 {
     normal.eliminated.iter().filter(|own| own.has_any).map(|own| own.gradient.dot(&(own.inverse * own.gradient))).sum()
 }

@@ -57,17 +57,17 @@ pub(crate) struct NormalEquations {
     pub matrix: DMatrix<f64>,
     pub right: DVector<f64>,
     pub cost: f64,
-    /// Of each view, then those of the gripper's tag.
+    /// Marginalised blocks of the views, then those of the gripper's tag.
     pub eliminated: Vec<SchurBlock>,
     /// `H_i Ad_i` and column of the tag of each observation.
     pub by_tag: Vec<(Matrix6<f64>, Option<usize>)>,
     /// Sum of squares of each observation's whitened residuals.
     pub chi2: Vec<f64>,
-    /// The same of each corner, used or not.
+    /// Sum of squares of each corner's whitened residuals, used or not.
     pub corner_chi2: Vec<[f64; 4]>,
-    /// Of the group at hand; kept, so that the loop does not allocate.
+    /// Information of the current group's observations; kept so that the loop does not allocate.
     infos: Vec<PoseInformation>,
-    /// As many, where the lens has columns.
+    /// Lens information of the same observations; empty where the lens has no columns.
     lens_infos: Vec<LensInformation>,
 }
 

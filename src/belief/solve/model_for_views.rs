@@ -36,12 +36,12 @@ pub(crate) fn has_views(views: &[View], camera: usize) -> bool {
     camera == 0 || views.iter().any(|view| view.camera == camera && !view.tags.is_empty())
 }
 
-/// What a recording can tell of.
+/// Effects that a recording can constrain.
 pub(crate) struct Scope<'a> {
     /// The oil's temperature and the pressure change.
     pub warmed: bool,
     pub dived: bool,
-    /// Whether a joint came to rest from both sides.
+    /// True for a joint (by index) that came to rest from both sides.
     pub from_both_sides: &'a dyn Fn(usize) -> bool,
     pub shown: Shown<'a>,
 }

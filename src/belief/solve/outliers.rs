@@ -34,7 +34,7 @@ pub(crate) fn reject(problem: &mut BundleProblem<'_>, solved: &Solved) -> bool {
     reject_by(problem, &solved.normal)
 }
 
-/// The same by normal equations at the solution.
+/// Flags outliers by normal equations at the solution; returns true if any flag changed.
 pub(crate) fn reject_by(problem: &mut BundleProblem<'_>, normal: &NormalEquations) -> bool {
     let mut changed = false;
     for (at, observation) in problem.observations.iter_mut().enumerate() {
@@ -63,10 +63,10 @@ fn fitting_corners(before: [bool; 4], chi2: &[f64; 4]) -> [bool; 4] {
     if n >= MIN_CORNERS && sum < limit * 2.0 * n as f64 { used } else { [false; 4] }
 }
 
-/// What is rejected of an observation.
+/// Rejected part of an observation.
 pub(crate) struct Rejected {
     pub n_coordinates: usize,
-    /// What it was rejected at.
+    /// Chi-square at which it was rejected.
     pub chi2: f64,
 }
 

@@ -1,4 +1,4 @@
-//! What no view shows: the parts of the normal equations by priors and by what is measured of blocks.
+//! Parts of the normal equations that come from no view: priors and measurements of blocks.
 
 use nalgebra::{Dyn, Matrix6, OMatrix, U6, Vector6};
 

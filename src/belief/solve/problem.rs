@@ -1,4 +1,4 @@
-//! What is solved: views and observations in the form that the loops want, with columns and priors.
+//! The least-squares problem: views and observations as the solver's loops read them, with columns and priors.
 
 use crate::solve::constants::problem::CORNER_PRIOR_DOF;
 pub(crate) use crate::solve::constants::problem::N_VIEW_PARAMETERS;
@@ -62,7 +62,7 @@ pub(crate) struct BundleProblem<'a> {
     pub n_seen_joints: usize,
 }
 
-/// Of a view's own parameters by one another.
+/// Square matrix over a view's own parameters.
 pub(crate) type Own = SMatrix<f64, N_VIEW_PARAMETERS, N_VIEW_PARAMETERS>;
 
 impl<'a> BundleProblem<'a> {
@@ -182,7 +182,7 @@ impl<'a> BundleProblem<'a> {
         view.n_cameras * (self.scales.joint_std_rad[joint].powi(2) + view.reading_var[joint])
     }
 
-    /// How far a joint moves in one sigma of the image's time error, rad.
+    /// Motion of a joint within one sigma of the image's time error, rad.
     pub(crate) fn jitter_rad(&self, view: &ViewData, joint: usize) -> f64 {
         if view.is_free[joint] { 0.0 } else { view.rate_rad_s[joint] * self.scales.time_jitter_std_s }
     }
@@ -218,7 +218,7 @@ impl<'a> BundleProblem<'a> {
         all.links
     }
 
-    /// What the arm has to carry in a view, which may lean.
+    /// Weights that the arm carries in a view, whose base may lean.
     pub(crate) fn loads(&self, view_idx: usize) -> ArmLoads {
         let loads = self.robot.chain.loads();
         self.views[view_idx].up.map_or(*loads, |up| loads.with_up(up))
@@ -229,7 +229,7 @@ impl<'a> BundleProblem<'a> {
         self.corrected_link_poses(view_idx, state, &self.link_corrections(state))
     }
 
-    /// The same by the corrections of that state.
+    /// Link poses of a view at `state`, with the given link corrections.
     pub(crate) fn corrected_link_poses(
         &self,
         view_idx: usize,

@@ -15,7 +15,7 @@ use armcal_core::numeric::Loss;
 /// Where the estimate starts.
 pub(crate) struct RobustStart {
     pub parameters: JointParameters,
-    /// What the sensors slipped by.
+    /// Estimated slips of the sensors.
     pub steps: Vec<(Parameter, f64)>,
     pub iterations: usize,
 }

@@ -1,4 +1,4 @@
-//! What is left of a view once its own parameters are eliminated, and the way from directions to columns.
+//! A view with its own parameters marginalised (Schur complement), and the map from directions to columns.
 
 use std::ops::Range;
 
@@ -19,7 +19,7 @@ pub(crate) type Directions = SMatrix<f64, 6, N_DIRECTIONS>;
 /// Twists of the camera (right, camera frame) by each column of links and sag, in the order of [`Layout::body`].
 pub(crate) type BodyTwists = SMatrix<f64, 6, N_BODY_COLUMNS>;
 
-/// What is needed to get a view's own parameters back, and their covariance.
+/// Recovers a view's own parameters and their covariance after the common step.
 #[derive(Clone, Debug)]
 pub(crate) struct SchurBlock {
     /// `S`, and the inverse of `S^T G S + L`.
@@ -28,7 +28,7 @@ pub(crate) struct SchurBlock {
     pub gradient: SVector<f64, N_VIEW_PARAMETERS>,
     /// Rows of own parameters by common columns: `S^T sum H_i A`; filled where it is asked for.
     pub by_common: SMatrix<f64, 6, N_DIRECTIONS>,
-    /// Of each observation: its place among `infos`.
+    /// Observations of the group, as indices into the problem's list.
     pub range: Range<usize>,
     /// `ln|L| - ln|S^T G S + L|`: how much the prior's volume shrank.
     pub log_ratio: f64,
@@ -36,13 +36,13 @@ pub(crate) struct SchurBlock {
     pub by_lens: SMatrix<f64, 6, 8>,
     /// `sum H_i T` of the columns of links and sag, as many as there are.
     pub by_body: Matrix6xX<f64>,
-    /// Of the view's image.
+    /// Time error of the view's image.
     pub time_error: TimeError,
-    /// Whether the group has any parameters of its own.
+    /// True if the group has parameters of its own.
     pub has_any: bool,
 }
 
-/// What carries a group of observations.
+/// Observations of one view by one camera or of the gripper's tag, with the frames that carry them.
 pub(crate) struct Group<'a> {
     pub view_idx: usize,
     /// Number of the camera.
@@ -171,7 +171,7 @@ impl<'a> Columns<'a> {
 }
 
 impl SchurBlock {
-    /// Of a group that was not looked at yet, with room for the body's columns.
+    /// Creates the block of a group before its first linearization, with room for `n_body` columns.
     pub(crate) fn new(n_body: usize) -> Self {
         Self {
             twists: SMatrix::zeros(),
@@ -187,7 +187,7 @@ impl SchurBlock {
         }
     }
 
-    /// Of a group without parameters of its own, as a new one is.
+    /// Resets the block to that of a group without parameters of its own.
     pub(crate) fn set_none(&mut self) {
         if !self.has_any {
             return;
@@ -219,7 +219,7 @@ impl SchurBlock {
         log_det
     }
 
-    /// Whether the camera's own error is among the parameters.
+    /// True if the camera's own pose error is among the parameters.
     pub(crate) fn moves_camera(&self) -> bool {
         self.twists[(0, MAX_JOINTS)] != 0.0
     }

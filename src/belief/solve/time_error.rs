@@ -9,7 +9,7 @@ use nalgebra::{SMatrix, SVector};
 
 use crate::solve::problem::{BundleProblem, N_VIEW_PARAMETERS, ViewData};
 
-/// What the time error takes off the information on a view's own parameters.
+/// Reduction of the information on a view's own parameters by the image's time error.
 #[derive(Clone, Debug)]
 pub(crate) struct TimeError {
     /// `D^-1 j`.
@@ -18,7 +18,7 @@ pub(crate) struct TimeError {
     told: f64,
 }
 
-/// What a view tells of the time error of its image, in sigmas of it.
+/// Estimate of the time error of one view's image, in its sigmas.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct TimeErrorOfView {
     pub sigmas: f64,
@@ -27,7 +27,7 @@ pub(crate) struct TimeErrorOfView {
 }
 
 impl TimeError {
-    /// Of a view in which no joint moves.
+    /// Returns the time error of a view in which no joint moves: none.
     pub(crate) fn none() -> Self {
         Self { by_sigma: SVector::zeros(), told: 0.0 }
     }

@@ -1,4 +1,4 @@
-//! How sure the tool's position and orientation are, by the covariance of the sensors' parameters.
+//! Covariance of the tool's position and orientation, from the covariance of the sensors' parameters.
 //!
 //! `J P J^T + sum_j (dx/dtheta_j) (dx/dtheta_j)^T s_j^2`: P the covariance of the estimated parameters, J the tool's
 //! derivative by them, and s_j^2 what each joint has besides: the datasheet's variance of what was not estimated, and

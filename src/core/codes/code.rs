@@ -187,6 +187,7 @@ codes! {
     SensorScale = "sensor_scale",
     SensorFailed = "sensor_failed",
     SensorWorn = "sensor_worn",
+    SensorUnusual = "sensor_unusual",
     OffsetWalks = "offset_walks",
     Outliers = "outliers",
     // Warnings.

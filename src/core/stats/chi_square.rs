@@ -5,6 +5,11 @@
 /// Numerical Recipes, 6.2). Not a number where `x` is none; 1 without degrees of freedom.
 #[must_use]
 pub fn chi_square_above(x: f64, dof: usize) -> f64 {
+    above(x, dof, ln_gamma_of_half(dof))
+}
+
+/// `ln_gamma`: of half the degrees of freedom, a sum over these.
+fn above(x: f64, dof: usize, ln_gamma: f64) -> f64 {
     let (a, x) = (0.5 * dof as f64, 0.5 * x);
     if dof == 0 || x <= 0.0 {
         return 1.0;
@@ -12,7 +17,7 @@ pub fn chi_square_above(x: f64, dof: usize) -> f64 {
     if x.is_infinite() {
         return 0.0;
     }
-    let scale = (a * x.ln() - x - ln_gamma_of_half(dof)).exp();
+    let scale = (a * x.ln() - x - ln_gamma).exp();
     if x < a + 1.0 { 1.0 - scale * series(a, x) } else { scale * continued_fraction(a, x) }
 }
 
@@ -24,14 +29,15 @@ pub fn chi_square_quantile(p: f64, dof: usize) -> f64 {
     if dof == 0 {
         return 0.0;
     }
+    let ln_gamma = ln_gamma_of_half(dof);
     let mut high = dof as f64 + 1.0;
-    while chi_square_above(high, dof) > 1.0 - p && high < 1e12 {
+    while above(high, dof, ln_gamma) > 1.0 - p && high < 1e12 {
         high *= 2.0;
     }
     let mut low = 0.0;
     for _ in 0..STEPS {
         let middle = 0.5 * (low + high);
-        if chi_square_above(middle, dof) > 1.0 - p { low = middle } else { high = middle }
+        if above(middle, dof, ln_gamma) > 1.0 - p { low = middle } else { high = middle }
     }
     0.5 * (low + high)
 }

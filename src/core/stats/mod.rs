@@ -17,5 +17,5 @@ pub use chi_square::{chi_square_above, chi_square_quantile};
 pub use rate_sequence::RateSequence;
 pub use rng::stream_rng;
 pub use signed_rank::{Location, signed_rank_location};
-pub use student::student_t_above;
+pub use student::StudentT;
 pub use summary::{Summary, quantile};

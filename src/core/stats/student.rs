@@ -2,31 +2,46 @@
 
 use crate::stats::chi_square::ln_gamma_of_half;
 
-/// Probability that a t variable of `dof` degrees of freedom exceeds `t`: half of `I_x(dof/2, 1/2)`, `x = dof / (dof +
-/// t^2)`, for `t > 0`; the regularized incomplete beta function by its continued fraction (Press et al., Numerical
-/// Recipes, 6.4). Not a number without degrees of freedom, or where `t` is none.
-#[must_use]
-pub fn student_t_above(t: f64, dof: usize) -> f64 {
-    if dof == 0 || t.is_nan() {
-        return f64::NAN;
-    }
-    let x = dof as f64 / (dof as f64 + t * t);
-    let side = 0.5 * incomplete_beta_half(x, dof);
-    if t > 0.0 { side } else { 1.0 - side }
+/// The distribution with so many degrees of freedom.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StudentT {
+    dof: usize,
+    /// `ln B(dof / 2, 1/2)`.
+    ln_beta: f64,
 }
 
-/// `I_x(dof/2, 1/2)`.
-fn incomplete_beta_half(x: f64, dof: usize) -> f64 {
-    let (a, b) = (0.5 * dof as f64, 0.5);
-    if x <= 0.0 || x >= 1.0 {
-        return if x <= 0.0 { 0.0 } else { 1.0 };
+impl StudentT {
+    /// A sum over the degrees of freedom: not for each value again.
+    #[must_use]
+    pub fn new(dof: usize) -> Self {
+        Self { dof, ln_beta: ln_gamma_of_half(dof) + ln_gamma_of_half(1) - ln_gamma_of_half(dof + 1) }
     }
-    let ln_beta = ln_gamma_of_half(dof) + ln_gamma_of_half(1) - ln_gamma_of_half(dof + 1);
-    let front = (a * x.ln() + b * (1.0 - x).ln() - ln_beta).exp();
-    if x < (a + 1.0) / (a + b + 2.0) {
-        front * continued_fraction(a, b, x) / a
-    } else {
-        1.0 - front * continued_fraction(b, a, 1.0 - x) / b
+
+    /// Probability that a t variable exceeds `t`: half of `I_x(dof/2, 1/2)`, `x = dof / (dof + t^2)`, for `t > 0`; the
+    /// regularized incomplete beta function by its continued fraction (Press et al., Numerical Recipes, 6.4). Not a
+    /// number without degrees of freedom, or where `t` is none.
+    #[must_use]
+    pub fn above(&self, t: f64) -> f64 {
+        if self.dof == 0 || t.is_nan() {
+            return f64::NAN;
+        }
+        let dof = self.dof as f64;
+        let side = 0.5 * self.incomplete_beta_half(dof / (dof + t * t));
+        if t > 0.0 { side } else { 1.0 - side }
+    }
+
+    /// `I_x(dof/2, 1/2)`.
+    fn incomplete_beta_half(&self, x: f64) -> f64 {
+        let (a, b) = (0.5 * self.dof as f64, 0.5);
+        if x <= 0.0 || x >= 1.0 {
+            return if x <= 0.0 { 0.0 } else { 1.0 };
+        }
+        let front = (a * x.ln() + b * (1.0 - x).ln() - self.ln_beta).exp();
+        if x < (a + 1.0) / (a + b + 2.0) {
+            front * continued_fraction(a, b, x) / a
+        } else {
+            1.0 - front * continued_fraction(b, a, 1.0 - x) / b
+        }
     }
 }
 
@@ -70,12 +85,12 @@ mod tests {
             (6.314, 1, 0.05),
             (2.326_35, 1_000_000, 0.01),
         ] {
-            let found = student_t_above(t, dof);
+            let found = StudentT::new(dof).above(t);
             assert!((found / above - 1.0).abs() < 1e-3, "t {t}, {dof} degrees of freedom: {found}");
-            assert!((student_t_above(-t, dof) + found - 1.0).abs() < 1e-12);
+            assert!((StudentT::new(dof).above(-t) + found - 1.0).abs() < 1e-12);
         }
-        assert_eq!(student_t_above(0.0, 5), 0.5);
-        assert_eq!(student_t_above(f64::INFINITY, 5), 0.0);
-        assert!(student_t_above(1.0, 0).is_nan());
+        assert_eq!(StudentT::new(5).above(0.0), 0.5);
+        assert_eq!(StudentT::new(5).above(f64::INFINITY), 0.0);
+        assert!(StudentT::new(0).above(1.0).is_nan());
     }
 }

@@ -10,9 +10,9 @@ use crate::spec::VehicleMotionSpec;
 pub struct AttitudeAsBuilt {
     /// Rotation vector of the sensor's axes in the vehicle's.
     pub misalignment_rad: [f64; 3],
-    /// At the start.
+    /// Gyro bias at the start, rad/s.
     pub gyro_bias_rad_s: [f64; 3],
-    /// Of the specific force; constant.
+    /// Bias of the specific force, constant, m/s2.
     pub accelerometer_bias_m_s2: [f64; 3],
 }
 
@@ -26,7 +26,7 @@ impl AttitudeAsBuilt {
         }
     }
 
-    /// Whether it is exact, as the standard world's is.
+    /// Returns true if the sensor is exact, as in the standard world.
     pub(super) fn is_exact(&self) -> bool {
         *self == Self::default()
     }

@@ -6,7 +6,8 @@ use rand_distr::{Distribution, StandardNormal};
 use crate::spec::{CameraWorldSpec, PortKind};
 use armcal_core::stats::stream_rng;
 
-/// Centre of a dome, camera frame, m; kept within half of its radius. `None` without a dome or on the pupil.
+/// Draws the centre of a dome, camera frame, m; within half of its radius. `None` without a dome, or if it is centred
+/// on the pupil.
 pub(super) fn draw_dome_center(spec: &CameraWorldSpec, seed: u64) -> Option<[f64; 3]> {
     if spec.port != PortKind::Dome || spec.dome_decentre_std_m <= 0.0 {
         return None;

@@ -8,13 +8,13 @@ use crate::spec::WorldSpec;
 /// Constant errors of thermometers and depth gauge.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GaugesAsBuilt {
-    /// Added to what the oil's thermometer reads.
+    /// Error added to the reading of the oil's thermometer.
     pub oil_bias_k: f64,
-    /// Added to what the water's thermometer reads.
+    /// Error added to the reading of the water's thermometer.
     pub water_bias_k: f64,
-    /// Added to what the depth gauge reads.
+    /// Error added to the reading of the depth gauge.
     pub pressure_bias_pa: f64,
-    /// Relative.
+    /// Relative error of the depth gauge's scale.
     pub pressure_scale_error: f64,
 }
 
@@ -29,7 +29,7 @@ impl GaugesAsBuilt {
         }
     }
 
-    /// Whether they are exact, as the standard world's are.
+    /// Returns true if the gauges are exact, as in the standard world.
     pub(super) fn is_exact(&self) -> bool {
         *self == Self::default()
     }

@@ -1,6 +1,7 @@
 //! The arm's geometry as built: joints in their parent links, tool point, frame of the tag survey.
 //!
-//! The errors are those for which belief states sigmas in `[geometry]` of robot.toml, each per axis and independent.
+//! The errors have the standard deviations of `[geometry]` in robot.toml, the same that the estimator assumes,
+//! independent per axis.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
@@ -17,13 +18,13 @@ use armcal_core::robot::Robot;
 pub struct GeometryAsBuilt {
     /// Shift of the tool point along the axes of its link.
     pub tool_shift_m: [f64; 3],
-    /// Error of the tag survey's frame, along and about the base's axes, at the first joint's origin.
+    /// Error of the tag survey's frame at the first joint's origin, along and about the base's axes.
     pub survey: PlaceError,
-    /// Errors of the joints' places in their parent links, base first.
+    /// Errors of the joints' poses in their parent links, base first.
     pub joints: Vec<PlaceError>,
 }
 
-/// A place's error along and about the axes of the frame in which it is stated.
+/// Error of a pose, along and about the axes of the frame in which it is stated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PlaceError {
     /// Shift of the origin.
@@ -33,7 +34,7 @@ pub struct PlaceError {
 }
 
 impl GeometryAsBuilt {
-    /// `None` in a world whose arm is as in the URDF.
+    /// Draws the errors; `None` in a world whose arm is as in the URDF.
     pub(super) fn draw(robot: &Robot, spec: &GeometrySpec, seed: u64) -> Option<Self> {
         let ratio = spec.error_ratio;
         if ratio <= 0.0 {
@@ -50,7 +51,7 @@ impl GeometryAsBuilt {
         Some(Self { tool_shift_m: tool.into(), survey: place("survey"), joints: joints.collect() })
     }
 
-    /// The nominal arm with these errors.
+    /// Returns the nominal arm with these errors.
     pub(super) fn applied_to(&self, nominal: &Robot) -> Robot {
         let mut corrections = LinkCorrections::default();
         for (place, error) in corrections.places.iter_mut().zip(&self.joints) {
@@ -75,7 +76,7 @@ impl PlaceError {
         Self { shift_m: three(0), turn_rad: three(3) }
     }
 
-    /// Rigid motion of a body with this error, turned about `pivot`.
+    /// Returns the rigid motion of a body with this error, turned about `pivot`.
     fn about(&self, pivot: &Vector3<f64>) -> Isometry3<f64> {
         let turn = UnitQuaternion::from_scaled_axis(Vector3::from(self.turn_rad));
         Translation3::from(pivot + Vector3::from(self.shift_m)) * turn * Translation3::from(-pivot)
@@ -106,7 +107,7 @@ mod tests {
         assert_eq!(arm.tool.mount.link_from_frame, robot.tool.mount.link_from_frame);
     }
 
-    /// Each error is normal with its own sigma of robot.toml, times the ratio.
+    /// Each error is normal with its own standard deviation in robot.toml, times the ratio.
     #[test]
     fn errors_have_the_stated_sigmas() {
         const SEEDS: u64 = 1000;
@@ -133,7 +134,7 @@ mod tests {
         }
     }
 
-    /// The arm has the errors at the places that the estimator corrects, and the tags move as one.
+    /// The arm has the errors at the poses that the estimator corrects, and the tags move as one.
     #[test]
     fn arm_and_tags_have_the_drawn_errors_and_nothing_else_moves() {
         let robot = robot();

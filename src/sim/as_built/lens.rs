@@ -7,19 +7,19 @@ use crate::spec::CameraWorldSpec;
 use armcal_core::optics::CameraModel;
 use armcal_core::stats::stream_rng;
 
-/// A lens as built; its resolution and field of view are the drawing's.
+/// Lens as built; its resolution and field of view are nominal.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LensAsBuilt {
     /// Focal lengths along x and y.
     pub focal_px: [f64; 2],
     /// Principal point, x and y.
     pub center_px: [f64; 2],
-    /// The first four coefficients.
+    /// First four distortion coefficients.
     pub distortion: [f64; 4],
 }
 
 impl LensAsBuilt {
-    /// `None` where nothing differs from the drawing.
+    /// Draws the lens; `None` if it equals the nominal model.
     pub(super) fn draw(nominal: &CameraModel, spec: &CameraWorldSpec, seed: u64) -> Option<Self> {
         if spec.focal_std <= 0.0 && spec.center_std_px <= 0.0 && spec.distortion_std <= 0.0 {
             return None;
@@ -28,7 +28,7 @@ impl LensAsBuilt {
             let mut rng = stream_rng(seed, &format!("as_built/lens/{what}"));
             [0; 4].map(|_| std * Distribution::<f64>::sample(&StandardNormal, &mut rng))
         };
-        // One lens, square pixels: both axes err alike.
+        // One lens with square pixels has the same error on both axes.
         let scale = 1.0 + normals("focal", spec.focal_std)[0];
         let [dx, dy, ..] = normals("center", spec.center_std_px);
         let mut bend = normals("distortion", spec.distortion_std);
@@ -39,7 +39,7 @@ impl LensAsBuilt {
             center_px: [nominal.center_px()[0] + dx, nominal.center_px()[1] + dy],
             distortion,
         };
-        // A lens gives each direction a pixel of its own; a draw that would not is taken back by halves.
+        // A lens gives each direction its own pixel; a draw that would not is reduced by halves.
         for _ in 0..16 {
             built.distortion = std::array::from_fn(|k| distortion[k] + bend[k]);
             if built.applied(nominal).is_monotonic() {

@@ -1,4 +1,4 @@
-//! Normal random numbers, each from the stream that is named after its effect.
+//! Normal random numbers, each from the stream named after its effect.
 
 use nalgebra::Vector3;
 use rand_chacha::ChaCha8Rng;

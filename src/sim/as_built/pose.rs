@@ -21,7 +21,8 @@ impl PlainPose {
         Self { position_m: pose.origin().to_array(), quaternion_wxyz: pose.quaternion_wxyz() }
     }
 
-    /// The caller names the frames, as the file's key does. A quaternion without direction means no rotation.
+    /// Returns the pose. The caller names the frames, as the file's key does. A quaternion without direction means no
+    /// rotation.
     #[must_use]
     pub fn to_pose<A: Frame, B: Frame>(&self) -> Pose<A, B> {
         Pose::from_position_quaternion_wxyz(self.position_m, self.quaternion_wxyz)
@@ -29,7 +30,7 @@ impl PlainPose {
     }
 }
 
-/// A small random motion (translation m, rotation rad), independent per axis.
+/// Draws a small random motion (translation m, rotation rad), independent per axis.
 pub(super) fn normal_twist(seed: u64, stream: &str, std_m: f64, std_rad: f64) -> Vector6<f64> {
     let mut rng = stream_rng(seed, stream);
     let mut draw = |std: f64| Vector3::from_fn(|_, _| std * Distribution::<f64>::sample(&StandardNormal, &mut rng));

@@ -20,7 +20,7 @@ impl JointAsBuilt {
         self.harmonics = draw_harmonics(self, sensors.nonlinearity_peak, &mut effect_rng(seed, "nonlinearity", &name));
         if sensors.wears() {
             let mut rng = effect_rng(seed, "worn_spot", &name);
-            // Not beside the end stops, where no arm works.
+            // Not near the end stops, where no arm works.
             let center_rad = self.center_rad + self.range_rad * rng.random_range(-0.4..=0.4);
             let sign = if rng.random_range(0.0..1.0) < 0.5 { -1.0 } else { 1.0 };
             let peak_rad = sign * sensors.worn_spot_peak_rad;
@@ -29,7 +29,7 @@ impl JointAsBuilt {
     }
 }
 
-/// Two to four harmonics over the range, scaled so that the largest deviation within it is `peak` of the range.
+/// Draws two to four harmonics over the range, scaled so that the largest deviation within it is `peak` of the range.
 fn draw_harmonics(joint: &JointAsBuilt, peak: f64, rng: &mut impl rand::Rng) -> Vec<Harmonic> {
     const SAMPLES: u32 = 2000;
     let n = rng.random_range(2..=4_u32);

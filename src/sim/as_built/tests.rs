@@ -16,7 +16,7 @@ fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt()
 }
 
-/// Mean and spread of normal samples, to 4 sigma.
+/// Asserts mean and standard deviation of normal samples, to 4 sigma.
 pub(super) fn assert_normal(what: &str, samples: &[f64], std: f64) {
     let n = samples.len() as f64;
     let mean = samples.iter().sum::<f64>() / n;
@@ -25,7 +25,7 @@ pub(super) fn assert_normal(what: &str, samples: &[f64], std: f64) {
     assert!((spread / std - 1.0).abs() < 4.0 / (2.0 * n).sqrt(), "{what}: {spread} against {std}");
 }
 
-/// Effects that are off leave no trace in the truth, and truths without them read.
+/// Effects that are off leave no trace in the truth, and truths without them can be read.
 #[test]
 fn the_standard_world_writes_down_what_it_always_did() {
     let built = AsBuilt::draw(&robot(), &WorldSpec::default(), 5);
@@ -68,7 +68,7 @@ fn a_rich_world_reads_back() {
         assert_eq!(of_a_track, [0.0; 4]);
         assert!(other.offset_error_rad != 0.0);
     }
-    // One more effect moves no other.
+    // One more effect changes no other.
     let plain = AsBuilt::draw(&robot, &WorldSpec::default(), 5);
     assert_eq!(plain.joints[0].harmonics, pot.harmonics);
     assert_eq!(plain.joints[0].gain_error, pot.gain_error);
@@ -99,7 +99,7 @@ fn joints_differ_as_the_world_asks() {
     assert!(spots.iter().all(|spot| spot.peak_rad.abs() == 0.01));
 }
 
-/// A joint with a narrow datasheet in a world that does not say how far sensors err, and in one that does.
+/// A joint with a narrow datasheet, in a world that states the sensors' errors and in one that does not.
 #[test]
 fn a_world_that_does_not_say_keeps_to_each_joints_bounds() {
     let mut robot = robot();

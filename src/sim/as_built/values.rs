@@ -17,16 +17,16 @@ use armcal_core::kinematics::Attachment;
 use armcal_core::robot::Robot;
 use armcal_core::spatial::{Camera, Link, Pose, Tag};
 
-/// Everything that was drawn for one seed.
+/// All values that were drawn for one seed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AsBuilt {
     /// Joint sensors, base first.
     pub joints: Vec<JointAsBuilt>,
-    /// `link_from_camera` on the link that carries the camera.
+    /// Pose `link_from_camera` on the link that carries the camera.
     pub camera_mount: PlainPose,
     /// Surveyed tags, in the order of the survey.
     pub tags: Vec<TagAsBuilt>,
-    /// `link_from_tag` of the tag on the gripper.
+    /// Pose `link_from_tag` of the tag on the gripper.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gripper_tag: Option<PlainPose>,
     /// Thermometers and depth gauge.
@@ -35,10 +35,10 @@ pub struct AsBuilt {
     /// The vehicle's attitude sensor.
     #[serde(default, skip_serializing_if = "AttitudeAsBuilt::is_exact")]
     pub attitude: AttitudeAsBuilt,
-    /// Where it differs from the nominal scene.
+    /// Lens, if it differs from the nominal one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lens: Option<LensAsBuilt>,
-    /// Of a dome port that is not about the lens's pupil; camera frame.
+    /// Centre of a dome port that is not centred on the lens's pupil, camera frame, m.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dome_center_m: Option<[f64; 3]>,
     /// Errors of the arm's geometry; absent for an arm as in the URDF. The poses of `tags` include the survey's part.
@@ -47,7 +47,7 @@ pub struct AsBuilt {
 }
 
 impl AsBuilt {
-    /// Draws every value from a stream of its own, so that one more effect does not move the others.
+    /// Draws every value from its own stream, so that one more effect does not change the others.
     #[must_use]
     pub fn draw(robot: &Robot, spec: &WorldSpec, seed: u64) -> Self {
         let geometry = GeometryAsBuilt::draw(robot, &spec.geometry, seed);
@@ -69,19 +69,19 @@ impl AsBuilt {
         }
     }
 
-    /// The arm itself: the nominal one with its geometry errors.
+    /// Returns the arm as built: the nominal one with its geometry errors.
     #[must_use]
     pub fn arm(&self, nominal: &Robot) -> Robot {
         self.geometry.as_ref().map_or_else(|| nominal.clone(), |geometry| geometry.applied_to(nominal))
     }
 
-    /// True pose of the camera on its link.
+    /// Returns the true pose of the camera on its link.
     pub(crate) fn camera_attachment(&self, robot: &Robot) -> Attachment {
         let link_from_camera: Pose<Link, Camera> = self.camera_mount.to_pose();
         Attachment { n_joints: robot.camera.mount.n_joints, link_from_frame: *link_from_camera.isometry() }
     }
 
-    /// True pose of the gripper tag on its link.
+    /// Returns the true pose of the gripper tag on its link.
     pub(crate) fn gripper_tag_attachment(&self, robot: &Robot) -> Option<Attachment> {
         let link_from_tag: Pose<Link, Tag> = self.gripper_tag?.to_pose();
         let n_joints = robot.gripper_tag?.mount.n_joints;

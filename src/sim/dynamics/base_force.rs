@@ -1,4 +1,4 @@
-//! The force that carries the whole arm.
+//! Force that carries the whole arm.
 
 use nalgebra::Isometry3;
 
@@ -7,7 +7,7 @@ use crate::dynamics::spatial::{Force, Motion};
 use armcal_core::streams::JointAngles;
 
 impl Multibody {
-    /// What the base's carrier gives to base and arm, about the base's origin in base axes, where the joints have these
+    /// Returns the force of the base's carrier on base and arm, about the base's origin in base axes, at these joint
     /// accelerations (rad/s2).
     #[must_use]
     pub fn base_force(&self, input: &EquationInput, accelerations: &JointAngles) -> Force {
@@ -32,7 +32,7 @@ impl Multibody {
         total
     }
 
-    /// Puts the first joint elsewhere on the base.
+    /// Moves the first joint to another pose on the base.
     pub fn set_first_place(&mut self, base_from_joint: &Isometry3<f64>) {
         self.chain_mut().set_first_place(base_from_joint);
     }

@@ -15,15 +15,15 @@ pub struct Body {
     pub com_m: Vector3<f64>,
     /// Mass of the displaced water, kg.
     pub displaced_kg: f64,
-    /// Where the weight of the displaced water acts.
+    /// Point at which the weight of the displaced water acts.
     pub center_of_buoyancy_m: Vector3<f64>,
     /// Dry inertia, about the link's origin.
     pub rigid: Inertia,
     /// Added mass of the water, about the link's origin.
     pub added: Inertia,
-    /// One per collision shape of a link; none for other bodies.
+    /// Drag surfaces, one per collision shape of a link; none for other bodies.
     pub surfaces: Vec<Surface>,
-    /// Of a vehicle.
+    /// Drag of a vehicle's hull.
     pub hull: Option<HullDrag>,
 }
 
@@ -32,16 +32,16 @@ pub struct Body {
 pub struct HullDrag {
     /// Pose of the hull's axes in the base frame.
     pub base_from_hull: Isometry3<f64>,
-    /// N s/m and N m s/rad.
+    /// Linear coefficients, N s/m and N m s/rad.
     pub linear: [f64; 6],
-    /// N s2/m2 and N m s2/rad2.
+    /// Quadratic coefficients, N s2/m2 and N m s2/rad2.
     pub quadratic: [f64; 6],
 }
 
 /// Drag surfaces of a body: at three points along its longest axis, per axis of its shape, in the link's frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Surface {
-    /// Points at which a third of the drag acts each.
+    /// Points at each of which a third of the drag acts.
     pub points_m: [Vector3<f64>; 3],
     /// Axes of the shape as columns.
     pub axes: Matrix3<f64>,
@@ -49,7 +49,7 @@ pub struct Surface {
     pub factors: Vector3<f64>,
 }
 
-/// The water about an arm.
+/// Properties of the water about an arm.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct WaterProperties {
     pub density_kg_m3: f64,
@@ -72,7 +72,7 @@ impl WaterProperties {
 }
 
 impl Body {
-    /// A link of the drawing in water.
+    /// Builds a link of the nominal model in water.
     pub(crate) fn link(link: &LinkBody, water: &WaterProperties) -> Self {
         let is_wet = water.density_kg_m3 > 0.0;
         let added =
@@ -89,14 +89,15 @@ impl Body {
         }
     }
 
-    /// A link of the drawing in sea water as the standard world has it, `buoyancy_fraction` of its weight carried.
+    /// Builds a link of the nominal model in the standard world's sea water, which carries `buoyancy_fraction` of its
+    /// weight.
     #[must_use]
     pub fn in_sea_water(link: &LinkBody, buoyancy_fraction: f64) -> Self {
         let spec = crate::spec::WaterSpec { buoyancy_fraction: Some(buoyancy_fraction), ..Default::default() };
         Self::link(link, &WaterProperties::of(&spec))
     }
 
-    /// A body of its own, without water.
+    /// Builds a body without water.
     #[must_use]
     pub fn dry(mass_kg: f64, com_m: Vector3<f64>, about_com_kg_m2: &Matrix3<f64>) -> Self {
         Self {
@@ -111,12 +112,13 @@ impl Body {
         }
     }
 
-    /// Whether the water does nothing to it.
+    /// Returns true if the water exerts no force on the body.
     pub(super) fn is_dry(&self) -> bool {
         self.surfaces.is_empty() && self.hull.is_none() && self.displaced_kg == 0.0 && self.added == Inertia::zero()
     }
 
-    /// Dry inertia in the parent's frame: that about the centre of mass is turned, the rest is the centre's.
+    /// Returns the dry inertia in the parent's frame: the inertia about the centre of mass is turned, the rest follows
+    /// from that centre.
     pub(super) fn placed_dry(&self, parent_from_body: &Isometry3<f64>) -> Inertia {
         let at_origin = |c: &Vector3<f64>| (Matrix3::identity() * c.norm_squared() - c * c.transpose()) * self.mass_kg;
         let about_com = self.rigid.rotational - at_origin(&self.com_m);
@@ -129,14 +131,14 @@ impl Body {
         }
     }
 
-    /// Nothing: what a base carries that moves as prescribed.
+    /// Returns a body without mass, for a base with prescribed motion.
     #[must_use]
     pub fn none() -> Self {
         Self::dry(0.0, Vector3::zeros(), &Matrix3::zeros())
     }
 
-    /// Gravity, and the weight of the displaced water against it at its centre. Water that accelerates pushes what it
-    /// surrounds as it would push itself (Froude and Krylov).
+    /// Returns gravity, and the weight of the displaced water against it at its centre. Accelerating water pushes a
+    /// body as it would push the water in its place (Froude and Krylov).
     pub(crate) fn weight(
         &self,
         place: &Isometry3<f64>,
@@ -152,8 +154,8 @@ impl Body {
         weight + Force::at(&center, &(self.displaced_kg * (water_acceleration - gravity)))
     }
 
-    /// Morison's drag, `-1/2 rho Cd A |v| v` per axis of each shape at points along it; `motion` is that of the body
-    /// against the water.
+    /// Returns Morison's drag, `-1/2 rho Cd A |v| v` per axis of each shape at points along it. `motion` is that of the
+    /// body against the water.
     pub(super) fn drag(&self, place: &Isometry3<f64>, motion: &Motion) -> Force {
         let mut total = Force::zero();
         if let Some(hull) = &self.hull {
@@ -179,7 +181,7 @@ impl Body {
 }
 
 impl HullDrag {
-    /// About the base's origin; `motion` is the base's against the water.
+    /// Returns the drag about the base's origin; `motion` is the base's against the water.
     fn drag(&self, motion: &Motion) -> Force {
         let place = &self.base_from_hull;
         let to_hull = place.rotation.inverse();
@@ -192,7 +194,7 @@ impl HullDrag {
 }
 
 impl Surface {
-    /// Each point takes a third of the areas of the box about the shape.
+    /// Builds the surfaces of a shape: each point has a third of the areas of the box about it.
     pub(super) fn of(placed: &PlacedShape, water: &WaterProperties) -> Self {
         let size = Vector3::from(placed.shape.box_m());
         let areas = Vector3::new(size.y * size.z, size.x * size.z, size.x * size.y);
@@ -211,9 +213,9 @@ impl Surface {
     }
 }
 
-/// Added mass of a shape in its owner's frame. A sphere's is half the displaced mass. Another shape's across each axis
-/// is that of a strip, `rho pi/4 a2 b` for a face of sides a <= b, with Pabst's factor for its finite length (Pabst
-/// 1930; DNV-RP-C205 table A-2); turning, the strips of the longest axis move across the water.
+/// Returns the added mass of a shape in its owner's frame. A sphere's is half the displaced mass. Another shape's,
+/// across each axis, is that of a strip: `rho pi/4 a2 b` for a face of sides a <= b. Pabst's factor corrects its finite
+/// length (Pabst 1930; DNV-RP-C205 table A-2). In rotation, the strips of the longest axis move across the water.
 pub(super) fn added_inertia(placed: &PlacedShape, water: &WaterProperties) -> Inertia {
     let size = Vector3::from(placed.shape.box_m());
     let scale = water.density_kg_m3 * water.added_mass_coefficient;
@@ -236,7 +238,7 @@ pub(super) fn added_inertia(placed: &PlacedShape, water: &WaterProperties) -> In
     own.placed(&placed.owner_from_shape)
 }
 
-/// Volume of water that moves with a face of sides `a`, `b`.
+/// Returns the volume of water that moves with a face of sides `a`, `b`.
 fn face_added_volume_m3(a: f64, b: f64) -> f64 {
     let (short, long) = (a.min(b), a.max(b));
     let slender = long / short;

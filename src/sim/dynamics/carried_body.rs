@@ -1,4 +1,4 @@
-//! A body that another one carries.
+//! Body that another one carries.
 
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 
@@ -6,7 +6,7 @@ use crate::dynamics::body::{Body, Surface, WaterProperties, added_inertia};
 use armcal_core::robot::{PlacedShape, Shape};
 
 impl Body {
-    /// A solid ball in water, about a centre in the frame of what carries it.
+    /// Builds a solid ball in water, about a centre in its carrier's frame.
     pub(crate) fn ball(mass_kg: f64, density_kg_m3: f64, center_m: &Vector3<f64>, water: &WaterProperties) -> Self {
         let volume_m3 = mass_kg / density_kg_m3;
         let radius_m = (0.75 * volume_m3 / std::f64::consts::PI).cbrt();
@@ -21,7 +21,7 @@ impl Body {
         }
     }
 
-    /// Takes up a body that moves with this one, in the same frame.
+    /// Adds a body that moves with this one, in the same frame.
     pub(crate) fn carry(&mut self, other: &Self) {
         let mean = |m: f64, at: &Vector3<f64>, n: f64, by: &Vector3<f64>| {
             if m + n > 0.0 { (at * m + by * n) / (m + n) } else { *at }

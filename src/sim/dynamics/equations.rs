@@ -1,4 +1,4 @@
-//! The equations of motion of one state: `M a = forces - bias`.
+//! Equations of motion of one state: `M a = forces - bias`.
 
 use nalgebra::{Isometry3, Vector3};
 
@@ -8,7 +8,7 @@ use crate::dynamics::system::{Coordinates, Symmetric};
 use armcal_core::kinematics::{Chain, LinkPoses};
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
-/// The arm on its base. Body 0 is the base's own; body `j + 1` is moved by joint `j`.
+/// Arm on its base. Body 0 is the base's own; body `j + 1` is moved by joint `j`.
 #[derive(Clone, Debug)]
 pub struct Multibody {
     chain: Chain,
@@ -18,18 +18,18 @@ pub struct Multibody {
 /// Gravity, base velocity and water about the arm at one instant, in base axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Environment {
-    /// m/s2.
+    /// Gravity, m/s2.
     pub gravity: Vector3<f64>,
-    /// Of the base against the world, at its origin.
+    /// Velocity of the base against the world, at its origin.
     pub base_velocity: Motion,
-    /// Of the water against the world, the same everywhere about the arm, m/s.
+    /// Velocity of the water against the world, the same everywhere about the arm, m/s.
     pub water_velocity: Vector3<f64>,
-    /// m/s2.
+    /// Acceleration of the water, m/s2.
     pub water_acceleration: Vector3<f64>,
 }
 
 impl Environment {
-    /// At rest in still water, z up.
+    /// Returns the surroundings of a base at rest in still water, z up.
     #[must_use]
     pub fn still(gravity_m_s2: f64) -> Self {
         Self {
@@ -49,13 +49,13 @@ impl Environment {
 /// Coupling of the base to the arm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum BaseCoupling {
-    /// It accelerates as prescribed: spatial acceleration about its origin, base axes.
+    /// Prescribed motion of the base: spatial acceleration about its origin, base axes.
     Prescribed(Motion),
-    /// It is free: its six coordinates (angular, then linear, base axes) come before the joints'.
+    /// Free base: its six coordinates (angular, then linear, base axes) come before those of the joints.
     Free,
 }
 
-/// One state of the system, and the forces besides those of gravity and water.
+/// State of the system, and the forces in addition to gravity and water.
 #[derive(Clone, Copy, Debug)]
 pub struct EquationInput<'a> {
     /// Joint angles, rad.
@@ -64,9 +64,9 @@ pub struct EquationInput<'a> {
     pub rates: &'a JointAngles,
     /// Gravity, base velocity and water.
     pub around: &'a Environment,
-    /// Whether the base moves as prescribed.
+    /// Motion of the base: prescribed or free.
     pub base: &'a BaseCoupling,
-    /// On each body about the base's origin in base axes, e.g. of contacts.
+    /// Force on each body about the base's origin in base axes, e.g. of contacts.
     pub extra: &'a [Force; MAX_JOINTS + 1],
 }
 
@@ -82,7 +82,7 @@ pub struct Equations {
 }
 
 impl Multibody {
-    /// `bodies` are those of the links 0..=n, base first.
+    /// Builds the system; `bodies` are those of the links 0..=n, base first.
     #[must_use]
     pub fn new(chain: Chain, bodies: Vec<Body>) -> Self {
         assert_eq!(bodies.len(), chain.n_joints() + 1, "a body for each link");
@@ -94,7 +94,7 @@ impl Multibody {
         self.bodies[0] = body;
     }
 
-    /// The kinematics of the arm.
+    /// Returns the kinematics of the arm.
     #[must_use]
     pub fn chain(&self) -> &Chain {
         &self.chain
@@ -104,13 +104,13 @@ impl Multibody {
         &mut self.chain
     }
 
-    /// Bodies of the links 0..=n, base first.
+    /// Returns the bodies of the links 0..=n, base first.
     #[must_use]
     pub fn bodies(&self) -> &[Body] {
         &self.bodies
     }
 
-    /// Inertia and bias of one state.
+    /// Returns inertia and bias of one state.
     #[must_use]
     pub fn equations(&self, input: &EquationInput) -> Equations {
         let EquationInput { angles, rates, around, base, extra } = *input;
@@ -147,7 +147,7 @@ impl Multibody {
         assemble(n, &axes, &composite, &force, base)
     }
 
-    /// Torques of gravity and buoyancy about each joint at rest, N m.
+    /// Returns the torques of gravity and buoyancy about each joint at rest, N m.
     #[must_use]
     pub fn static_torques(&self, angles: &JointAngles, gravity: &Vector3<f64>) -> JointAngles {
         let still = Environment { gravity: *gravity, ..Environment::still(0.0) };
@@ -162,7 +162,8 @@ impl Multibody {
         JointAngles::from_fn(angles.len(), |j| -equations.bias[j])
     }
 
-    /// Momentum of the whole about the base's origin, that of the moving water included, base axes; still water.
+    /// Returns the momentum of the whole about the base's origin in base axes, including that of the moving water;
+    /// still water.
     #[must_use]
     pub fn momentum(&self, angles: &JointAngles, rates: &JointAngles, base_velocity: &Motion) -> Force {
         let poses = self.chain.link_poses(angles);
@@ -180,7 +181,7 @@ impl Multibody {
 }
 
 impl Body {
-    /// Inertia of the body, and the force that it needs to move so, both about the base's origin.
+    /// Returns the inertia of the body, and the force that this motion needs, both about the base's origin.
     ///
     /// The water's part, with `u` its velocity and `r` the body's velocity against it (Kirchhoff; in the frame that
     /// moves with the water the spatial acceleration has `w x u` more): `Ia (a + w x u - du/dt) + r x* Ia r`.
@@ -223,7 +224,8 @@ pub(super) fn joint_axes(poses: &LinkPoses, n: usize) -> [Motion; MAX_JOINTS] {
     axes
 }
 
-/// Composite rigid bodies: `M[i][j] = s_i . Ic_j s_j` for i <= j, the base's own columns before the joints'.
+/// Assembles the inertia of composite rigid bodies: `M[i][j] = s_i . Ic_j s_j` for i <= j, the base's columns before
+/// the joints'.
 fn assemble(
     n: usize,
     axes: &[Motion; MAX_JOINTS],

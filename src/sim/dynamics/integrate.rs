@@ -23,7 +23,7 @@ pub struct SystemState {
     pub angles: JointAngles,
     /// Joint rates, rad/s.
     pub rates: JointAngles,
-    /// Of a free base; the caller has that of a prescribed base.
+    /// Pose of a free base; the caller has that of a prescribed base.
     pub world_from_base: Isometry3<f64>,
     /// Spatial velocity of a free base about its origin, base axes.
     pub base_velocity: Motion,
@@ -37,9 +37,9 @@ pub struct ContactRow {
     pub direction: Coordinates,
     /// Force along it at the start of the step, at rest.
     pub start_n: f64,
-    /// Of the spring.
+    /// Stiffness of the spring.
     pub stiffness_n_m: f64,
-    /// Of the damper.
+    /// Damping of the damper.
     pub damping_n_s_m: f64,
 }
 
@@ -49,13 +49,13 @@ pub struct StepInput<'a> {
     pub step_s: f64,
     /// Torque about each joint, linear in angle and rate.
     pub loads: &'a [JointLoad; MAX_JOINTS],
-    /// On each body about the base's origin, base axes.
+    /// Force on each body about the base's origin, base axes.
     pub extra: &'a [Force; MAX_JOINTS + 1],
     /// Springs and dampers of the points of contact.
     pub contacts: &'a [ContactRow],
-    /// Whether the base is free.
+    /// True if the base is free.
     pub is_free: bool,
-    /// Surroundings at the start and at the end, of a base placed and moving as given.
+    /// Surroundings at the start and at the end, for a base with this pose and motion.
     pub around: &'a dyn Fn(Stage, &SystemState) -> (Environment, BaseCoupling),
 }
 
@@ -68,7 +68,7 @@ pub enum Stage {
     End,
 }
 
-/// `1 - 1/sqrt 2`.
+/// Coefficient gamma: `1 - 1/sqrt 2`.
 const GAMMA: f64 = 1.0 - std::f64::consts::FRAC_1_SQRT_2;
 
 /// Rates of all coordinates: of positions and of velocities.
@@ -92,7 +92,7 @@ impl Multibody {
         *state = advanced(state, &mean, h, first_joint);
     }
 
-    /// The stage at `at`; `first` is the slope of the stage before it.
+    /// Returns the slope at a stage; `first` is the slope of the stage before it.
     fn slope(&self, input: &StepInput, stage: Stage, at: &SystemState, first: Option<&Slope>) -> Slope {
         let gh = GAMMA * input.step_s;
         let (around, base) = (input.around)(stage, at);
@@ -135,14 +135,14 @@ impl Multibody {
 
 /// State that a contact's force in a stage depends on.
 struct RowState<'a> {
-    /// Coordinates of the system.
+    /// Number of the system's coordinates.
     n: usize,
     /// Step length times gamma, s.
     gh: f64,
     now: &'a Coordinates,
-    /// Since the step's start.
+    /// Travel since the start of the step.
     travel: &'a Coordinates,
-    /// That the implicit part works with.
+    /// Velocity in the implicit part.
     velocity: &'a Coordinates,
     first: Option<&'a Slope>,
 }
@@ -161,7 +161,7 @@ fn add_row(row: &ContactRow, state: &RowState, inertia: &mut Symmetric, forces: 
     inertia.add_outer(gh * (c + gh * k), &row.direction);
 }
 
-/// Velocities as coordinates.
+/// Returns the velocities as coordinates.
 fn coordinates(state: &SystemState, first_joint: usize) -> Coordinates {
     let mut v = [0.0; MAX_DOF];
     if first_joint > 0 {

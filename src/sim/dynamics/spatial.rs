@@ -9,51 +9,51 @@ use armcal_core::spatial::skew;
 /// Velocity or acceleration of a body: its angular part and that of the body's point at the origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
-    /// rad/s or rad/s2.
+    /// Angular part, rad/s or rad/s2.
     pub angular: Vector3<f64>,
-    /// m/s or m/s2.
+    /// Linear part, m/s or m/s2.
     pub linear: Vector3<f64>,
 }
 
 /// Force or momentum: the moment about the origin, and the force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Force {
-    /// N m or N m s.
+    /// Moment about the origin, N m or N m s.
     pub moment: Vector3<f64>,
-    /// N or N s.
+    /// Force or linear momentum, N or N s.
     pub force: Vector3<f64>,
 }
 
 impl Motion {
-    /// From its two parts.
+    /// Builds a motion from its two parts.
     #[must_use]
     #[inline]
     pub fn new(angular: Vector3<f64>, linear: Vector3<f64>) -> Self {
         Self { angular, linear }
     }
 
-    /// No motion.
+    /// Returns no motion.
     #[must_use]
     #[inline]
     pub fn zero() -> Self {
         Self::new(Vector3::zeros(), Vector3::zeros())
     }
 
-    /// Rotation about a unit axis through `origin`.
+    /// Returns the rotation about a unit axis through `origin`.
     #[must_use]
     #[inline]
     pub fn rotation(axis: &Vector3<f64>, origin: &Vector3<f64>) -> Self {
         Self::new(*axis, origin.cross(axis))
     }
 
-    /// Velocity of the body's point at `point`.
+    /// Returns the velocity of the body's point at `point`.
     #[must_use]
     #[inline]
     pub fn at(&self, point: &Vector3<f64>) -> Vector3<f64> {
         self.linear + self.angular.cross(point)
     }
 
-    /// The rate of change of `other`, fixed in a body that moves with `self`.
+    /// Returns the rate of change of `other`, which is fixed in a body that moves with `self`.
     #[must_use]
     #[inline]
     pub fn cross(&self, other: &Self) -> Self {
@@ -63,21 +63,21 @@ impl Motion {
         )
     }
 
-    /// The rate of change of a force fixed in a body that moves with `self`.
+    /// Returns the rate of change of a force that is fixed in a body that moves with `self`.
     #[must_use]
     #[inline]
     pub fn cross_force(&self, f: &Force) -> Force {
         Force::new(self.angular.cross(&f.moment) + self.linear.cross(&f.force), self.angular.cross(&f.force))
     }
 
-    /// Power of a force, or a generalised force.
+    /// Returns the power of a force, or a generalised force.
     #[must_use]
     #[inline]
     pub fn dot(&self, f: &Force) -> f64 {
         self.angular.dot(&f.moment) + self.linear.dot(&f.force)
     }
 
-    /// The six components, angular ones first.
+    /// Returns the six components, angular ones first.
     #[must_use]
     #[inline]
     pub fn to_array(&self) -> [f64; 6] {
@@ -85,7 +85,7 @@ impl Motion {
         [a.x, a.y, a.z, l.x, l.y, l.z]
     }
 
-    /// The inverse of [`Self::to_array`].
+    /// Builds a motion from six components, the inverse of [`Self::to_array`].
     #[must_use]
     #[inline]
     pub fn from_slice(values: &[f64]) -> Self {
@@ -118,21 +118,21 @@ impl std::ops::Mul<f64> for Motion {
 }
 
 impl Force {
-    /// From its two parts.
+    /// Builds a force from its two parts.
     #[must_use]
     #[inline]
     pub fn new(moment: Vector3<f64>, force: Vector3<f64>) -> Self {
         Self { moment, force }
     }
 
-    /// No force.
+    /// Returns no force.
     #[must_use]
     #[inline]
     pub fn zero() -> Self {
         Self::new(Vector3::zeros(), Vector3::zeros())
     }
 
-    /// The six components, those of the moment first.
+    /// Returns the six components, those of the moment first.
     #[must_use]
     #[inline]
     pub fn to_array(&self) -> [f64; 6] {
@@ -140,7 +140,7 @@ impl Force {
         [m.x, m.y, m.z, f.x, f.y, f.z]
     }
 
-    /// A force that acts at `point`.
+    /// Returns the force that acts at `point`.
     #[must_use]
     #[inline]
     pub fn at(point: &Vector3<f64>, force: &Vector3<f64>) -> Self {
@@ -171,27 +171,27 @@ impl std::ops::AddAssign for Force {
     }
 }
 
-/// What maps a motion to momentum, about the origin: `moment = rotational w + coupling v`,
-/// `force = coupling' w + linear v`. Added mass makes `linear` a matrix.
+/// Map from a motion to momentum, about the origin: `moment = rotational w + coupling v`, `force = coupling' w + linear
+/// v`. Added mass makes `linear` a matrix.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Inertia {
-    /// kg m2, symmetric.
+    /// Rotational part, kg m2, symmetric.
     pub rotational: Matrix3<f64>,
-    /// kg m.
+    /// Coupling of rotation and translation, kg m.
     pub coupling: Matrix3<f64>,
-    /// kg, symmetric.
+    /// Linear part, kg, symmetric.
     pub linear: Matrix3<f64>,
 }
 
 impl Inertia {
-    /// No inertia.
+    /// Returns no inertia.
     #[must_use]
     #[inline]
     pub fn zero() -> Self {
         Self { rotational: Matrix3::zeros(), coupling: Matrix3::zeros(), linear: Matrix3::zeros() }
     }
 
-    /// Of a rigid body: its inertia about the centre of mass in the frame's axes.
+    /// Returns the inertia of a rigid body from its inertia about the centre of mass, in the frame's axes.
     #[must_use]
     #[inline]
     pub fn rigid(mass_kg: f64, com_m: &Vector3<f64>, about_com_kg_m2: &Matrix3<f64>) -> Self {
@@ -200,7 +200,7 @@ impl Inertia {
         centered.shifted(com_m)
     }
 
-    /// The same body about a frame in which its own frame's origin lies at `offset`, axes alike.
+    /// Returns the body's inertia in a frame with parallel axes, in which its own frame's origin is at `offset`.
     #[must_use]
     #[inline]
     pub fn shifted(&self, offset: &Vector3<f64>) -> Self {
@@ -214,7 +214,7 @@ impl Inertia {
         }
     }
 
-    /// The same body in the parent's frame.
+    /// Returns the body's inertia in the parent's frame.
     #[must_use]
     #[inline]
     pub fn placed(&self, parent_from_body: &Isometry3<f64>) -> Self {
@@ -225,7 +225,7 @@ impl Inertia {
         turned.shifted(&parent_from_body.translation.vector)
     }
 
-    /// Momentum of a motion.
+    /// Returns the momentum of a motion.
     #[must_use]
     #[inline]
     pub fn momentum(&self, v: &Motion) -> Force {

@@ -1,8 +1,8 @@
-//! A small dense symmetric system: the joint-space inertia and its factor.
+//! Small dense symmetric system: the joint-space inertia and its factor.
 
 use armcal_core::streams::MAX_JOINTS;
 
-/// Six coordinates of a free base, then the joints.
+/// Largest number of coordinates: six of a free base, then the joints.
 pub const MAX_DOF: usize = 6 + MAX_JOINTS;
 
 /// A vector of generalised coordinates; only the first `n` of a system count.
@@ -16,20 +16,20 @@ pub struct Symmetric {
 }
 
 impl Symmetric {
-    /// All zero, `n` rows.
+    /// Returns a matrix of zeros with `n` rows.
     #[must_use]
     pub fn zeros(n: usize) -> Self {
         debug_assert!(n <= MAX_DOF);
         Self { n, lower: [[0.0; MAX_DOF]; MAX_DOF] }
     }
 
-    /// Number of rows.
+    /// Returns the number of rows.
     #[must_use]
     pub fn n(&self) -> usize {
         self.n
     }
 
-    /// An entry, whichever triangle it is in.
+    /// Returns an entry of either triangle.
     #[must_use]
     pub fn get(&self, row: usize, column: usize) -> f64 {
         self.lower[row.max(column)][row.min(column)]
@@ -54,14 +54,14 @@ impl Symmetric {
         }
     }
 
-    /// `v' M v`.
+    /// Returns the quadratic form `v' M v`.
     #[must_use]
     pub fn quadratic(&self, v: &Coordinates) -> f64 {
         (0..self.n).map(|i| v[i] * (0..self.n).map(|j| self.get(i, j) * v[j]).sum::<f64>()).sum()
     }
 
     /// Solves `M x = b` by a factor L L' (Cholesky). A matrix that is not positive definite gives NaN, which the world
-    /// reports as a state that is no longer finite. The factor takes the matrix's place.
+    /// reports as a state that is not finite. The factor overwrites the matrix.
     #[must_use]
     #[allow(clippy::needless_range_loop, reason = "indices name rows and columns of several arrays at once")]
     pub fn solve(&mut self, b: &Coordinates) -> Coordinates {

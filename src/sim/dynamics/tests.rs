@@ -1,4 +1,4 @@
-//! Conservation laws and closed forms; tests/oracle has Pinocchio's and MuJoCo's figures.
+//! Conservation laws and closed forms; tests/oracle compares with Pinocchio and MuJoCo.
 
 use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
 
@@ -43,7 +43,7 @@ impl Float<'_> {
         self.run_seen(system, state, end_s, |_, _| ());
     }
 
-    /// Shows the state after each step, with its time.
+    /// Advances the system, and passes each state with its time to `see`.
     fn run_seen(
         &self,
         system: &Multibody,
@@ -80,14 +80,14 @@ impl Float<'_> {
     }
 }
 
-/// `t` is a multiple of `every`.
+/// Returns true if `t` is a multiple of `every`.
 fn is_multiple(t: f64, every: f64) -> bool {
     (t / every - (t / every).round()).abs() < 1e-6
 }
 
 const SEA_KG_M3: f64 = 1025.0;
 
-/// The Titan on a vehicle of `mass_kg`, without drag, in water or, at density 0, in air.
+/// Returns the Titan on a vehicle of `mass_kg`, without drag, in water or, at density 0, in air.
 fn on_vehicle(robot: &Robot, mass_kg: f64, density_kg_m3: f64) -> Multibody {
     let water = WaterProperties { density_kg_m3, ..SEA };
     let mut bodies: Vec<Body> = robot.bodies.iter().map(|link| Body::link(link, &water)).collect();
@@ -114,7 +114,7 @@ fn equations(
     system.equations(&EquationInput { angles, rates, around, base, extra: &[Force::zero(); MAX_JOINTS + 1] })
 }
 
-/// Momentum about the world's origin in world axes.
+/// Returns the momentum about the world's origin in world axes.
 fn world_momentum(system: &Multibody, state: &SystemState) -> Force {
     let p = system.momentum(&state.angles, &state.rates, &state.base_velocity);
     let to_world = state.world_from_base.rotation;
@@ -126,8 +126,8 @@ fn push_about(t: f64, j: usize) -> f64 {
     [200.0, 300.0, 150.0, 40.0, 30.0, 10.0][j.min(5)] * ((1.0 + 0.3 * j as f64) * t).sin()
 }
 
-/// An arm that swings about on a free vehicle in still water without drag cannot change the momentum of the whole: that
-/// of the water which moves with the bodies is part of it.
+/// An arm that moves on a free vehicle in still water without drag cannot change the total momentum, which includes
+/// that of the water moving with the bodies.
 #[test]
 fn arm_and_free_vehicle_keep_their_momentum() {
     let robot = titan();
@@ -149,7 +149,7 @@ fn arm_and_free_vehicle_keep_their_momentum() {
             );
             let moved = state.angles.max_abs_difference(&robot.stowed);
             assert!(moved > 0.3 && state.world_from_base.rotation.angle() > 0.02, "it moves: {moved}");
-            // Against what the arm has by itself.
+            // Compared with the arm's own momentum.
             let own = system.momentum(&state.angles, &state.rates, &Motion::zero());
             let left = world_momentum(&system, &state);
             (left.force.norm() / own.force.norm()).max(left.moment.norm() / own.moment.norm())
@@ -189,7 +189,8 @@ fn a_light_vehicle_is_rocked_as_predicted() {
     assert!((turned + 8.0 / 38.0 * state.angles[0]).abs() < 1e-6, "{turned} {}", state.angles[0]);
 }
 
-/// No numerical damping to speak of: an undamped fall and swing from the stowed pose on a fixed base keeps its energy.
+/// The numerical damping is negligible: an undamped fall and swing from the stowed pose on a fixed base keeps its
+/// energy.
 #[test]
 fn an_undamped_swing_keeps_its_energy() {
     let robot = titan();
@@ -283,7 +284,7 @@ fn a_neutrally_buoyant_link_hangs_still() {
     assert!(moved(0.9) > 0.1, "a lighter float lets it sink");
 }
 
-/// A ball that floats by itself in water: density, added mass and drag.
+/// Returns a ball that floats alone in water: density, added mass and drag.
 fn ball(mass_kg: f64, radius_m: f64, drag_coefficient: f64) -> Multibody {
     let shape = Shape::Sphere { radius_m };
     let displaced = 1025.0 * 4.0 / 3.0 * std::f64::consts::PI * radius_m.powi(3);
@@ -329,7 +330,7 @@ fn a_ball_sinks_at_its_terminal_velocity() {
     assert!((state.base_velocity.linear.z + terminal).abs() < 1e-9);
 }
 
-/// A ball held by water that accelerates: `(m + md/2) a = (md + md/2) du/dt`, whichever way it is turned.
+/// A ball held by accelerating water obeys `(m + md/2) a = (md + md/2) du/dt`, in any orientation.
 #[test]
 fn accelerating_water_takes_a_ball_along() {
     let system = ball(60.0, 0.2, 0.0);
@@ -346,8 +347,8 @@ fn accelerating_water_takes_a_ball_along() {
     assert!((a - expected).norm() < 1e-12, "{a} {expected}");
 }
 
-/// Seen from water that moves steadily nothing changes: a spinning, sliding hull of uneven added mass accelerates alike
-/// in still water and carried along by a current (Galilei).
+/// Steadily moving water changes nothing in its own frame. A spinning, sliding hull of uneven added mass accelerates
+/// alike in still water and in a current (Galilei).
 #[test]
 fn a_current_carries_everything_along() {
     let robot = titan();
@@ -375,7 +376,7 @@ fn a_current_carries_everything_along() {
     }
 }
 
-/// Turned and moved, what the water does nothing to has the inertia that the general way gives it.
+/// Turned and moved, a body on which the water has no effect has the inertia of the general method.
 #[test]
 fn dry_bodies_are_placed_as_wet_ones_are() {
     for (k, link) in titan().bodies.iter().enumerate() {

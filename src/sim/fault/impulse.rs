@@ -8,7 +8,7 @@ pub(crate) struct Impulse {
 }
 
 impl Impulse {
-    /// Of a force at a point; short against the vehicle's motion, so that only its impulse counts.
+    /// Returns the impulse of a force at a point, too short for the vehicle's motion to matter during it.
     pub(crate) fn new(force_n: [f64; 3], duration_s: f64, at_m: [f64; 3]) -> Self {
         let impulse_n_s = force_n.map(|force| force * duration_s);
         let ([x, y, z], [fx, fy, fz]) = (at_m, impulse_n_s);

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// One fault; it is permanent unless it has a duration.
+/// Fault of the world; it is permanent unless it has a duration.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Fault {
@@ -11,21 +11,21 @@ pub enum Fault {
     SensorJump {
         /// Name of the joint in the URDF.
         joint: String,
-        /// Positive: it reads a larger angle.
+        /// Slip, rad; positive: it reads a larger angle.
         #[schemars(range(min = -3.2, max = 3.2))]
         by_rad: f64,
     },
-    /// The sensor keeps the word that it reads now.
+    /// The sensor keeps its present reading.
     SensorStuck {
         /// Name of the joint in the URDF.
         joint: String,
     },
-    /// The sensor's wire breaks: its word says nothing about the joint any more.
+    /// The sensor's wire breaks: its reading is independent of the joint.
     SensorDead {
         /// Name of the joint in the URDF.
         joint: String,
     },
-    /// The sensor's sense turns round: it reads the other side of the middle of the joint's range.
+    /// The sensor's sense is reversed: readings are mirrored about the middle of the joint's range.
     SensorReversed {
         /// Name of the joint in the URDF.
         joint: String,
@@ -34,21 +34,21 @@ pub enum Fault {
     SensorWorn {
         /// Name of the joint in the URDF.
         joint: String,
-        /// The middle of the spot, an angle of the joint.
+        /// Joint angle at the middle of the spot.
         #[schemars(range(min = -6.3, max = 6.3))]
         at_rad: f64,
         /// Height of the bump; not beyond its width.
         #[schemars(range(min = -1.0, max = 1.0))]
         by_rad: f64,
-        /// Its standard width.
+        /// Standard width of the spot.
         #[schemars(range(min = 1e-3, max = 1.0))]
         width_rad: f64,
     },
-    /// The wiper begins to lose contact, so often in a second.
+    /// The wiper starts to lose contact at random.
     SensorDying {
         /// Name of the joint in the URDF.
         joint: String,
-        /// Drop-outs, each as long as `world.joint_sensors.dropout_mean_s` has it.
+        /// Rate of drop-outs, 1/s; each lasts as `world.joint_sensors.dropout_mean_s` says.
         #[schemars(range(min = 0.0, max = 100.0))]
         dropout_per_s: f64,
     },
@@ -68,12 +68,12 @@ pub enum Fault {
         /// Name of the joint in the URDF.
         joint: String,
     },
-    /// This share of the supply pressure is lost, of one joint's valve (a hose leaks) or of the pump.
+    /// The valve of one joint (a leaking hose) or the pump loses a share of the supply pressure.
     PressureLost {
         /// Name of the joint in the URDF; `None`: the pump.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         joint: Option<String>,
-        /// 0: none is lost, 1: all of it.
+        /// Lost share: 0 is none, 1 is all.
         #[schemars(range(min = 0.0, max = 1.0))]
         ratio: f64,
     },
@@ -95,43 +95,43 @@ pub enum Fault {
         #[schemars(inner(range(min = -3.2, max = 3.2)))]
         by_rad: [f64; 3],
     },
-    /// The detector takes the tag for another one.
+    /// The detector reads a wrong id from the tag.
     TagMisread {
         /// Number of the tag.
         id: u32,
-        /// The number that is read in its place.
+        /// Id that is read instead.
         #[schemars(range(min = 0, max = 2147483647))]
         as_id: u32,
     },
-    /// The camera sees nothing for a while.
+    /// Silt blinds the camera for a time.
     Silt {
-        /// How long the camera sees nothing.
+        /// Duration for which the camera is blind.
         #[schemars(range(min = 0.0, max = 1e6))]
         seconds: f64,
     },
-    /// Something strikes the vehicle: a force in vehicle axes for a moment, at a point of it (its origin, if left out).
+    /// A short force strikes the vehicle, in vehicle axes, at a point of it (its origin, if left out).
     #[serde(rename = "vehicle_knocked")]
     VehicleImpulse {
-        /// In vehicle axes.
+        /// Force in vehicle axes.
         #[schemars(inner(range(min = -1e6, max = 1e6)))]
         force_n: [f64; 3],
-        /// How long the force acts.
+        /// Duration of the force.
         #[schemars(range(min = 0.01, max = 10.0))]
         duration_s: f64,
-        /// In the vehicle's frame.
+        /// Point of the force in the vehicle's frame.
         #[serde(default)]
         #[schemars(inner(range(min = -10.0, max = 10.0)))]
         at_m: [f64; 3],
     },
-    /// Something strikes a link at its centre of mass: a force in base axes for a moment.
+    /// A short force strikes a link at its centre of mass, in base axes.
     #[serde(rename = "arm_bumped")]
     ArmImpulse {
         /// Name of the link in the URDF.
         link: String,
-        /// In base axes.
+        /// Force in base axes.
         #[schemars(inner(range(min = -1e5, max = 1e5)))]
         force_n: [f64; 3],
-        /// How long the force acts.
+        /// Duration of the force.
         #[schemars(range(min = 0.01, max = 10.0))]
         duration_s: f64,
     },
@@ -140,26 +140,26 @@ pub enum Fault {
 /// Latest time of a fault since the start, s.
 pub(crate) const LATEST_FAULT_S: f64 = 1e6;
 
-/// A fault and when it happens.
+/// Fault with its time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ScheduledFault {
-    /// Seconds after the start; `None`: at its step of the script.
+    /// Time since the start, s; `None`: at its step of the script.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub at_s: Option<f64>,
-    /// What breaks.
+    /// Fault that happens.
     #[serde(flatten)]
     pub fault: Fault,
 }
 
 impl From<Fault> for ScheduledFault {
-    /// At a step of the script.
+    /// Schedules the fault at a step of the script.
     fn from(fault: Fault) -> Self {
         Self { at_s: None, fault }
     }
 }
 
 impl Fault {
-    /// As routines name it.
+    /// Returns the kind as routines name it.
     #[must_use]
     pub fn kind(&self) -> &'static str {
         match self {
@@ -181,7 +181,7 @@ impl Fault {
         }
     }
 
-    /// Its values in a routine besides the kind: `by_rad = 0.05, joint = "wrist_yaw"`.
+    /// Returns the values in a routine without the kind: `by_rad = 0.05, joint = "wrist_yaw"`.
     #[must_use]
     pub fn details(&self) -> String {
         let mut table = toml::Table::try_from(self).unwrap_or_default();

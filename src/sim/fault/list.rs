@@ -10,7 +10,7 @@ const KINDS: &str = "sensor_jump (joint, by_rad), sensor_stuck (joint), sensor_d
      pressure_lost (ratio; joint), tag_lost (id), tag_moved (id; by_m, by_rad), tag_misread (id, as_id), \
      silt (seconds), vehicle_knocked (force_n, duration_s; at_m), arm_bumped (link, force_n, duration_s)";
 
-/// The list `[[world.fault]]`, its values not yet held against a robot.
+/// Reads the list `[[world.fault]]`, without checking its values against a robot.
 ///
 /// # Errors
 /// [`FileIssue`] naming the entry, counted from 0 as `--set` does.

@@ -1,4 +1,4 @@
-//! Faults of the simulated arm: their kinds, when they happen, and how a routine states them.
+//! Faults of the simulated arm: their kinds, their times, and their form in a routine.
 //!
 //! `kinds` has the faults, `list` reads their tables, `robot_check` checks them against a robot, `timeline` orders the
 //! timed ones. `world::faults` carries them out.

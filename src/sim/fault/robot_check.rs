@@ -5,7 +5,7 @@ use armcal_core::codes::Code;
 use armcal_core::robot::{FileIssue, Robot, SensorKind};
 use armcal_core::routine::Routine;
 
-/// The routine and the robot that faults are checked against.
+/// Routine and robot against which faults are checked.
 pub(crate) struct RobotCheck<'a> {
     pub routine: &'a Routine,
     pub robot: &'a Robot,
@@ -92,7 +92,7 @@ impl RobotCheck<'_> {
         self.check_name(key, "joint", joint, &self.robot.joint_names())
     }
 
-    /// The base does not move on the vehicle: it is no link that can be bumped or pulled.
+    /// Refuses the base as a link that can be struck or pulled, because it does not move on the vehicle.
     pub(crate) fn check_link(&self, key: &str, link: &str) -> Result<(), FileIssue> {
         let links: Vec<String> = self.robot.bodies[1..].iter().map(|body| body.name.clone()).collect();
         self.check_name(key, "link", link, &links)

@@ -8,13 +8,13 @@ use crate::hydraulics::valve::Valve;
 use crate::spec::HydraulicsSpec;
 use armcal_core::kinematics::JointLimits;
 
-/// The drive of one joint.
+/// Drive of one joint.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Actuator {
     /// Ends of the piston's stroke; a joint with end stops stops there, too.
     limits: Option<JointLimits>,
     pub(super) torque_max_n_m: f64,
-    /// Of a fully open valve without load.
+    /// Rate of a fully open valve without load.
     pub(super) rate_max_rad_s: f64,
     pub(super) stiffness_n_m_rad: f64,
     damping_n_m_s_rad: f64,
@@ -28,16 +28,16 @@ pub(super) struct Actuator {
     /// Position of the joint with incompressible oil.
     pub(super) piston_rad: f64,
     pub(super) piston_rate_rad_s: f64,
-    /// Of the oil's pressure at the start of the last step.
+    /// Torque of the oil's pressure at the start of the last step.
     torque_before_n_m: f64,
-    /// Of the oil's pressure in the step's middle.
+    /// Torque of the oil's pressure in the middle of the step.
     middle_n_m: f64,
     /// Rate that the valve's oil gives the piston.
     pub(super) valve_rate_rad_s: f64,
     /// Share of the supply pressure that the joint's hose holds.
     pub(super) hose_ratio: f64,
     pub(super) is_locked: bool,
-    /// During the coming step.
+    /// Load of the oil column during the coming step; `load` is the sum with friction and end stop.
     pub(super) column: JointLoad,
     pub(super) load: JointLoad,
 }
@@ -73,7 +73,7 @@ impl Actuator {
         }
     }
 
-    /// Rests at `angle_rad` with the column carrying `-torque_n_m`.
+    /// Starts at rest at `angle_rad` with the column carrying `-torque_n_m`.
     pub(super) fn balance(&mut self, angle_rad: f64, torque_n_m: f64) {
         self.piston_rad = angle_rad - torque_n_m / self.stiffness_n_m_rad;
         self.piston_rate_rad_s = 0.0;
@@ -83,22 +83,22 @@ impl Actuator {
         self.load = self.column + self.friction.load();
     }
 
-    /// Of the oil's pressure alone.
+    /// Returns the torque of the oil's pressure only, N m.
     pub(super) fn torque_n_m(&self, angle_rad: f64) -> f64 {
         self.stiffness_n_m_rad * (self.piston_rad - angle_rad)
     }
 
-    /// Of the whole column, N m.
+    /// Returns the torque of the whole column, N m.
     pub(super) fn column_torque_n_m(&self, angle_rad: f64, rate_rad_s: f64) -> f64 {
         if self.column.stiffness_n_m_rad == 0.0 {
-            // It yields.
+            // The column yields.
             return self.column.constant_n_m;
         }
         self.torque_n_m(angle_rad) + self.damping_n_m_s_rad * (self.piston_rate_rad_s - rate_rad_s)
     }
 
-    /// Moves the spool and asks the pump for oil: gives the flow, m3/s. `head_ratio` is the pump's pressure over the
-    /// nominal one. The load is that of the step's middle, as it goes on from the last two starts.
+    /// Moves the spool and returns the flow that it asks of the pump, m3/s. `head_ratio` is the pump's pressure over
+    /// the nominal one. The load at the middle of the step is extrapolated from the last two starts.
     pub(super) fn ask(&mut self, command: f64, head_ratio: f64, angle_rad: f64) -> f64 {
         let opening = self.valve.step(if self.is_locked { 0.0 } else { command });
         let torque_n_m = self.torque_n_m(angle_rad);
@@ -110,20 +110,20 @@ impl Actuator {
         self.displacement_m3_rad * self.valve_rate_rad_s.abs()
     }
 
-    /// Power that warmed the oil in the last step, W: what the pump's oil brought less what the piston did.
+    /// Returns the power that warmed the oil in the last step, W: that of the pump's oil less that of the piston.
     pub(super) fn heat_w(&self, pump_ratio: f64) -> f64 {
         let supply_w = self.torque_max_n_m * pump_ratio * self.valve_rate_rad_s.abs();
         supply_w - self.middle_n_m * self.piston_rate_rad_s
     }
 
-    /// Moves the piston by a step with the `share` of the asked oil that the pump gives, then settles what acts about
-    /// the joint during the step.
+    /// Moves the piston by a step with the `share` of the asked oil that the pump gives. Then sets the loads about the
+    /// joint during the step.
     pub(super) fn advance(&mut self, share: f64, step_s: f64, angle_rad: f64, rate_rad_s: f64) {
         let before_rad = self.piston_rad;
         let leak_rad_s = if self.is_locked { 0.0 } else { self.leakage_rad_s_n_m * self.middle_n_m };
         let free_rad = before_rad + (self.valve_rate_rad_s * share - leak_rad_s) * step_s;
         let mut next_rad = self.limits.map_or(free_rad, |l| {
-            // Balanced beyond its end, a piston stays there.
+            // A piston that was balanced beyond its end stays there.
             free_rad.clamp(l.lower_rad.min(before_rad), l.upper_rad.max(before_rad))
         });
         self.valve_rate_rad_s *= if next_rad == free_rad { share } else { 0.0 };
@@ -132,7 +132,7 @@ impl Actuator {
         self.piston_rate_rad_s = (next_rad - before_rad) / step_s;
         self.piston_rad = next_rad;
         if !is_yielding {
-            // The piston's mean place during the step.
+            // Mean position of the piston during the step.
             let middle_rad = next_rad - 0.5 * step_s * self.piston_rate_rad_s;
             let (stiffness, damping) = (self.stiffness_n_m_rad, self.damping_n_m_s_rad);
             self.column = JointLoad::spring(stiffness, damping, middle_rad, self.piston_rate_rad_s);
@@ -141,9 +141,9 @@ impl Actuator {
         self.load = self.column + self.friction.load() + self.end_stop.load(angle_rad, rate_rad_s);
     }
 
-    /// Lets the piston yield where the relief valve, or a damaged hose, holds no more at the step's end (`angle_rad`).
-    /// While the joint drives it on (`slip_rad_s`, joint against piston), the column gives that torque and nothing
-    /// else.
+    /// Lets the piston yield if the relief valve, or a damaged hose, cannot hold the torque at the step's end
+    /// (`angle_rad`). While the joint drives the piston (`slip_rad_s`, joint against piston), the column gives only the
+    /// torque that can be held.
     fn relieve(&mut self, next_rad: &mut f64, angle_rad: f64, slip_rad_s: f64) -> bool {
         if self.is_locked {
             return false;

@@ -4,17 +4,17 @@ use crate::error::SimError;
 use armcal_core::kinematics::JointLimits;
 use armcal_core::robot::Robot;
 
-/// Data that an actuator is built from.
+/// Data from which an actuator is built.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ActuatorInput {
     pub limits: Option<JointLimits>,
-    /// At the supply pressure, N m; from the URDF's effort.
+    /// Largest torque at the supply pressure, N m; from the URDF's effort.
     pub torque_max_n_m: f64,
-    /// The controller's rate limit.
+    /// Rate limit of the controller.
     pub rate_limit_rad_s: f64,
 }
 
-/// Torque limits from the URDF's effort, rates from the sensors' table.
+/// Returns the actuators' data: torque limits from the URDF's effort, rates from the sensors' table.
 pub(crate) fn actuator_inputs(robot: &Robot) -> Result<Vec<ActuatorInput>, SimError> {
     let file = robot.folder.join("robot.toml");
     let joints = robot.chain.joints().iter().zip(&robot.sensors).zip(&robot.efforts_n_m);

@@ -22,12 +22,12 @@ impl EndStop {
         Self { limits: limits.filter(|_| stiffness_n_m_rad > 0.0), stiffness_n_m_rad }
     }
 
-    /// Whether there is a stop at all.
+    /// Returns true if the joint has stops.
     pub(super) fn is_on(&self) -> bool {
         self.limits.is_some()
     }
 
-    /// For a step that starts with this state.
+    /// Returns the load during a step that starts with this state.
     pub(super) fn load(&self, angle_rad: f64, rate_rad_s: f64) -> JointLoad {
         let Some(limits) = self.limits else { return JointLoad::default() };
         let limit_rad = angle_rad.clamp(limits.lower_rad, limits.upper_rad);
@@ -35,7 +35,7 @@ impl EndStop {
         if depth_rad == 0.0 {
             return JointLoad::default();
         }
-        // A joint that leaves faster than the cushion fills is let go, not held back.
+        // A joint that leaves faster than the cushion fills is released, not held back.
         let is_leaving = depth_rad * rate_rad_s < 0.0;
         let damping_s = if is_leaving { CUSHION_S.min(-depth_rad / rate_rad_s) } else { CUSHION_S };
         JointLoad::spring(self.stiffness_n_m_rad, damping_s * self.stiffness_n_m_rad, limit_rad, 0.0)

@@ -1,23 +1,23 @@
 //! Dry friction of one joint's seals and bearings, with true sticking.
 //!
-//! An elasto-plastic element (Prandtl's; Dupont, Hayward, Armstrong, Altpeter, IEEE Trans. Autom. Control 47, 2002): a
-//! bristle that is a spring about its anchor until it breaks away at the stiction torque, and drags its anchor along at
-//! the sliding torque after that. Below breakaway it is a spring and nothing else, so that nothing can creep: neither
-//! under a steady load nor under one that shakes.
+//! An elasto-plastic element (Prandtl's; Dupont, Hayward, Armstrong, Altpeter, IEEE Trans. Autom. Control 47, 2002). A
+//! bristle is a spring about its anchor until it breaks away at the stiction torque. After that it drags its anchor
+//! along at the sliding torque. Below breakaway it is only a spring, so that nothing can creep, under a steady or a
+//! shaking load.
 
 use crate::dynamics::JointLoad;
 use crate::spec::HydraulicsSpec;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Friction {
-    /// At breakaway.
+    /// Torque at breakaway.
     stiction_n_m: f64,
-    /// In fast sliding.
+    /// Torque in fast sliding.
     coulomb_n_m: f64,
     stribeck_rate_rad_s: f64,
     stiffness_n_m_rad: f64,
     damping_n_m_s_rad: f64,
-    /// In the coming step, while it is stuck.
+    /// Damping in the coming step while the joint sticks.
     stuck_damping_n_m_s_rad: f64,
     /// Anchor of the bristle: its position without torque.
     anchor_rad: f64,
@@ -27,7 +27,7 @@ pub(super) struct Friction {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Slide {
     Stuck,
-    /// In this direction, 1 or -1, against this torque.
+    /// Slides in `direction`, 1 or -1, against `torque_n_m`.
     Sliding {
         direction: f64,
         torque_n_m: f64,
@@ -51,13 +51,13 @@ impl Friction {
         }
     }
 
-    /// Sticks at `angle_rad` without torque.
+    /// Sets the bristle to stick at `angle_rad` without torque.
     pub(super) fn settle(&mut self, angle_rad: f64) {
         self.anchor_rad = angle_rad;
         self.slide = Slide::Stuck;
     }
 
-    /// Decides, from the state at a step's start, what the bristle does during it.
+    /// Sets the bristle's state during a step from the joint's state at its start.
     pub(super) fn step(&mut self, angle_rad: f64, rate_rad_s: f64) {
         if self.stiction_n_m <= 0.0 {
             return;
@@ -76,12 +76,13 @@ impl Friction {
         } else {
             self.slide = Slide::Stuck;
             self.anchor_rad = angle_rad - bend_rad;
-            // No more than the stiction, however fast the joint comes.
+            // Limited to the stiction torque, however fast the joint arrives.
             self.stuck_damping_n_m_s_rad = self.damping_n_m_s_rad.min(self.stiction_n_m / rate_rad_s.abs());
         }
     }
 
-    /// Stribeck's curve in the form of Armstrong-Helouvry, Dupont and Canudas de Wit, Automatica 30, 1994.
+    /// Returns the sliding torque by Stribeck's curve, in the form of Armstrong-Helouvry, Dupont and Canudas de Wit,
+    /// Automatica 30, 1994.
     fn sliding_torque_n_m(&self, rate_rad_s: f64) -> f64 {
         let share = (-(rate_rad_s / self.stribeck_rate_rad_s).powi(2)).exp();
         self.coulomb_n_m + (self.stiction_n_m - self.coulomb_n_m) * share

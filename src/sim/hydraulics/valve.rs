@@ -1,17 +1,17 @@
-//! The spool of one valve: from the controller's command to the share of the full flow.
+//! Spool of one valve: from the controller's command to the share of the full flow.
 
 use crate::spec::HydraulicsSpec;
 
-/// First-order lag behind the command, then play of the spool, then the deadband.
+/// Valve with a first-order lag behind the command, then backlash of the spool, then the deadband.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Valve {
     deadband: f64,
-    /// Half the play between the lagged command and the spool.
+    /// Half of the backlash between the lagged command and the spool.
     half_play: f64,
-    /// Share of the lag that is covered in one step: exact for a command that is held.
+    /// Share of the lag that one step covers: exact for a constant command.
     lag_share: f64,
     lagged: f64,
-    /// Place of the spool, -1..1.
+    /// Position of the spool, -1..1.
     spool: f64,
 }
 
@@ -21,7 +21,7 @@ impl Valve {
         Self { deadband: spec.deadband, half_play: 0.5 * spec.spool_hysteresis, lag_share, lagged: 0.0, spool: 0.0 }
     }
 
-    /// Moves the spool by one step; gives the opening halfway, -1..1.
+    /// Moves the spool by one step; returns the opening halfway, -1..1.
     pub(super) fn step(&mut self, command: f64) -> f64 {
         let before = self.spool;
         self.lagged += (command.clamp(-1.0, 1.0) - self.lagged) * self.lag_share;

@@ -28,6 +28,7 @@ use armcal_core::streams::ReachTask;
 
 const N_VIEWS: usize = 20;
 
+#[derive(Clone)]
 pub(crate) struct Case {
     pub(crate) robot: Robot,
     truth: Truth,

@@ -23,5 +23,6 @@ mod stated_noise;
 mod statistics;
 mod tag_distances;
 mod touches;
+mod unusual_sensors;
 mod walks;
 mod within_sigmas;

@@ -1,4 +1,4 @@
-//! How much later the joint sensors' stamps are than the camera's, s.
+//! Delay of the joint sensors' stamps after the camera's, s.
 
 use crate::model::blocks::{MAX_COLUMNS, Std, Value};
 use crate::model::constants::blocks_clock::CLOCK_STD_S;

@@ -37,7 +37,7 @@ impl<T> PerBlock<T> {
         &self.all[first..first + self.n_tags]
     }
 
-    /// The same, to be changed.
+    /// Entries of the tags, mutable.
     pub(crate) fn tags_mut(&mut self) -> &mut [T] {
         let first = self.place(Block::Tag(0));
         &mut self.all[first..first + self.n_tags]

@@ -1,4 +1,4 @@
-//! What a block's parameters are, and what a step of its columns does to them.
+//! Parameters of a block, and the step of its columns.
 
 pub(crate) use crate::model::constants::blocks_value::MAX_COLUMNS;
 use nalgebra::{Isometry3, Vector6};

@@ -1,4 +1,4 @@
-//! Drive and controller together: where a joint comes to rest.
+//! Drive and controller together: the rest position of a joint.
 
 use std::f64::consts::TAU;
 
