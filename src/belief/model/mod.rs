@@ -2,7 +2,8 @@
 //!
 //! `parameters` are those of a joint's sensor, its link and how the arm bends; `blocks` what else moves together
 //! (mounts, lenses, clock, tags). `estimated` says which have columns, `layout` where these are, `state` holds the
-//! values, `prior` what is known before, `scales` the sizes that the data may tell.
+//! values, `prior` what is known before, `scales` the sizes that the data may tell, `shared_survey_error` what the tags
+//! of a map have in common.
 
 pub(crate) mod blocks;
 pub(crate) mod constants;
@@ -11,6 +12,7 @@ pub(crate) mod layout;
 pub(crate) mod parameters;
 pub(crate) mod prior;
 pub(crate) mod scales;
+pub(crate) mod shared_survey_error;
 pub(crate) mod state;
 pub(crate) mod walk_modes;
 

@@ -66,6 +66,9 @@ pub struct BaseTagStd {
 pub struct TagSurvey {
     /// The tag beside the base; the replay shows it. `None` where there are no tags.
     pub base_tag: Option<u32>,
+    /// The tag whose error all others share, as the tags of a map do; their standard deviations include it. `None`:
+    /// each was surveyed by itself.
+    pub anchor_tag: Option<u32>,
     /// The frame that the poses are in.
     pub frame: Attachment,
     /// What is printed on all of them; `None` where the source of the survey does not say.

@@ -288,7 +288,7 @@ fn group(frame: &str, ids: [u32; 2]) -> WrittenGroup {
 #[test]
 fn maps_that_are_written_read_back_the_same() {
     let groups = [group("base_link", [2, 5]), WrittenGroup { is_static: false, ..group("seafloor", [11, 12]) }];
-    for (name, text) in [("map.toml", own::to_text(&groups)), ("map.yaml", tagslam::to_text(&groups))] {
+    for (name, text) in [("map.toml", own::to_text(&groups, None)), ("map.yaml", tagslam::to_text(&groups))] {
         let file = tags(name, &text);
         assert_eq!(file.frame, "base_link", "{name}");
         let names: Vec<(&str, bool)> = file.bodies.iter().map(|body| (body.name.as_str(), body.is_static)).collect();

@@ -1,5 +1,6 @@
 //! The solver against scenes of known truth.
 
+mod anchored;
 mod bodies;
 mod bound;
 mod checked;
