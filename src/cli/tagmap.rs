@@ -278,6 +278,7 @@ fn warnings(file: &str, map: &TagMap, read: &RecordedViews, tags: &TagFile) -> (
     }
     let is_determined = map.warnings.iter().all(|warning| warning.code != Code::MapUndetermined);
     let is_read = is_whole && read.n_unreadable == 0;
-    let is_sound = is_read && is_determined && !too_many && map.has_converged && map.scale_warnings.is_empty();
+    let is_one = map.has_converged && !map.is_contradicted;
+    let is_sound = is_read && is_determined && !too_many && is_one && map.scale_warnings.is_empty();
     (found, is_sound)
 }

@@ -32,6 +32,28 @@ pub enum MapRefusalCause {
         /// The same with the lens as stated.
         stated_rms_px: f64,
     },
+    /// No tag whose place is known fits the views.
+    AnchorLost {
+        /// The known tags.
+        tags: Vec<u32>,
+        /// Sizes with which they would fit.
+        sizes: Option<WrongSizes>,
+    },
+}
+
+/// Sizes that the views contradict.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WrongSizes {
+    /// The tag of that size; `None` for all tags.
+    pub tag: Option<u32>,
+    /// Sizes over the stated ones.
+    pub factor: f64,
+}
+
+impl WrongSizes {
+    fn of_what(self) -> String {
+        self.tag.map_or_else(|| "all tags".to_owned(), |id| format!("tag {id}"))
+    }
 }
 
 impl MapRefusalCause {
@@ -48,6 +70,10 @@ impl MapRefusalCause {
             Self::OtherLens { .. } => {
                 self.as_wrong_input().map(|wrong| wrong.remedy().into_owned()).unwrap_or_default()
             }
+            Self::AnchorLost { sizes: Some(sizes), .. } => {
+                format!("measure the border square of {} and correct size_m", sizes.of_what())
+            }
+            Self::AnchorLost { sizes: None, .. } => "check their size_m, their ids and the lens".to_owned(),
         }
     }
 }
@@ -56,6 +82,7 @@ impl fmt::Display for MapRefusalCause {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (reading, rms_px, stated_rms_px) = match self {
             Self::OfCalibration(refusal) => return refusal.fmt(f),
+            Self::AnchorLost { tags, sizes } => return anchor_lost(tags, *sizes, f),
             Self::OtherLens { reading, rms_px, stated_rms_px } => (reading, rms_px, stated_rms_px),
         };
         match reading {
@@ -72,10 +99,19 @@ impl fmt::Display for MapRefusalCause {
     }
 }
 
+fn anchor_lost(tags: &[u32], sizes: Option<WrongSizes>, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    let ids: Vec<String> = tags.iter().map(u32::to_string).collect();
+    write!(f, "no tag whose place is known ({}) fits the views with the other tags", ids.join(", "))?;
+    let Some(sizes) = sizes else { return Ok(()) };
+    write!(f, ": size_m of {} times {:.3} would", sizes.of_what(), sizes.factor)
+}
+
 impl Coded for MapRefusal {
     fn code(&self) -> Code {
         match &self.cause {
             MapRefusalCause::OfCalibration(refusal) => refusal.code(),
+            MapRefusalCause::AnchorLost { sizes: Some(_), .. } => Code::InputTagSize,
+            MapRefusalCause::AnchorLost { sizes: None, .. } => Code::MapFailed,
             MapRefusalCause::OtherLens { reading: WrongInputKind::ImageScale(_), .. } => Code::InputImageSize,
             MapRefusalCause::OtherLens { .. } => Code::InputLensModel,
         }

@@ -47,3 +47,16 @@ pub(crate) fn mirrored_corners(n: usize, of: usize) -> String {
          of the input map)"
     )
 }
+
+/// Tags of two groups in the same images; `n`: images that show both groups.
+pub(crate) fn apart_in_common_images([first, second]: [u32; 2], n: usize) -> String {
+    format!(
+        "tags {first} and {second} and their groups are in {n} common images that contradict each other, so that they \
+         are not one map: check the sizes of the tags and the lens"
+    )
+}
+
+/// An id at two places in each of `n` images.
+pub(crate) fn id_on_two_tags(id: u32, n: usize) -> String {
+    format!("id {id} was seen at two places in one image, {n} times: one id on two tags. Replace one of them")
+}

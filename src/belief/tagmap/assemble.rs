@@ -71,6 +71,7 @@ pub(super) fn assemble(
         rejected,
         scale_warnings: Vec::new(),
         warnings,
+        is_contradicted: false,
         has_converged: false,
         n_steps: MAX_STEPS - problem.steps_left,
         factor,

@@ -11,6 +11,7 @@ use crate::tagmap::constants::lens_test::NOISY;
 use crate::tagmap::known_places::{Doubt, wrong_input};
 use crate::tagmap::lens_fit::lens_errors;
 use crate::tagmap::lens_test::{OtherLenses, other_lenses};
+use crate::tagmap::lost_anchor::lost_anchor;
 use crate::tagmap::odd_tags::odd_tag;
 use crate::tagmap::result::{MappedTag, TagMap};
 use crate::tagmap::solve::{Solved, solve};
@@ -33,7 +34,11 @@ pub fn checked_map(input: &MapInput<'_>, settings: &MapSettings) -> Result<TagMa
         let cause = MapRefusalCause::OfCalibration(Refusal::WrongInput(wrong));
         return Err(refused(MapRefusal { cause, lens_file: settings.lens_file.clone() }));
     }
-    of_right_lens(input, settings, map?)
+    let map = of_right_lens(input, settings, map?)?;
+    match lost_anchor(input, settings, &map) {
+        Some(cause) => Err(refused(MapRefusal { cause, lens_file: settings.lens_file.clone() })),
+        None => Ok(map),
+    }
 }
 
 fn refused(refusal: MapRefusal) -> TagMapError {

@@ -67,6 +67,14 @@ pub(crate) mod columns {
     pub(crate) const DETERMINED: f64 = 1e-6;
 }
 
+pub(crate) mod contradictions {
+    /// Images that show tags of two groups from which these must be one map. Assumed: images that fit each other tie
+    /// them by two.
+    pub(crate) const MIN_COMMON_IMAGES: usize = 5;
+    /// Images with an id at two places from which it is on two tags. Assumed: a false detection seldom comes twice.
+    pub(crate) const MIN_TWICE: usize = 2;
+}
+
 pub(crate) mod files_landmark {
     /// Numbers of landmarks that have a name and no number: this plus their place in the file, from 0.
     pub const FIRST_NAMED_ID: u32 = 1_000_000;
@@ -160,6 +168,13 @@ pub(crate) mod localize {
     /// Undamped: a few steps make a start for the adjustment, and one that does not help ends them.
     pub(crate) const UNDAMPED: Damping =
         Damping { first: 0.0, min: 0.0, max: 0.0, down: 0.0, up: 0.0, min_after_rejection: 1.0 };
+}
+
+pub(crate) mod lost_anchor {
+    /// Sizes nearer to right than this lose no tag. Assumed.
+    pub(crate) const LEAST_FACTOR: f64 = 1.02;
+    /// Sightings that tell the size of a tag.
+    pub(crate) const MIN_SIGHTINGS: usize = 3;
 }
 
 pub(crate) mod normal_equations {

@@ -4,8 +4,8 @@
 //! groups of tags; `linearize`, `normal_equations`, `sparse` and `adjust` are the bundle adjustment on corner pixels
 //! (Triggs et al. 2000); `result` is the map with its accuracy; `scale` finds wrong tag sizes. `checked` gives a map
 //! out where its files are not contradicted: `known_places` reads them otherwise, `lens_test` and `lens_fit` look for
-//! another lens, `odd_tags` for sizes and moves, by `columns` of a map without known places (`blind`). `tag_mapping`
-//! maps the tags of a calibration; `files` reads and writes files of tags and cameras, `recording` gets views from
+//! another lens, `odd_tags` for sizes and moves, by `columns` of a map without known places (`blind`), `lost_anchor` and
+//! `contradictions` for what cannot be one map. `tag_mapping` maps the tags of a calibration; `files` reads and writes files of tags and cameras, `recording` gets views from
 //! recordings.
 
 mod adjust;
@@ -16,6 +16,7 @@ mod check;
 mod checked;
 mod columns;
 pub(crate) mod constants;
+mod contradictions;
 mod groups;
 mod incremental_layout;
 mod initial_guess;
@@ -24,6 +25,7 @@ mod lens_fit;
 mod lens_test;
 mod linearize;
 mod localize;
+mod lost_anchor;
 mod normal_equations;
 mod odd_tags;
 mod problem;

@@ -126,6 +126,8 @@ pub struct TagMap {
     pub scale_warnings: Vec<ScaleWarning>,
     /// Sentences for people; empty where nothing is doubtful.
     pub warnings: Vec<Warning>,
+    /// Whether groups that must be one map fell apart, or an id is on two tags.
+    pub is_contradicted: bool,
     /// Whether the last fit found a minimum.
     pub has_converged: bool,
     /// Steps of all fits.

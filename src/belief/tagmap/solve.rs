@@ -7,6 +7,7 @@ use crate::tagmap::assemble::assemble;
 use crate::tagmap::attitude::{self, Wanted};
 use crate::tagmap::check::check;
 use crate::tagmap::constants::solve::{MAX_ROUNDS, MIN_FREEDOM, MUCH_WORSE};
+use crate::tagmap::contradictions::contradictions;
 use crate::tagmap::groups::{Group, build};
 use crate::tagmap::initial_guess::lay_out;
 use crate::tagmap::localize::{localize, place_tag, tag_cost, view_cost};
@@ -41,6 +42,7 @@ pub(super) struct Solved<'a> {
     has_converged: bool,
     scale_warnings: Vec<ScaleWarning>,
     warnings: Vec<Warning>,
+    contradictions: Vec<Warning>,
 }
 
 impl<'a> Solved<'a> {
@@ -71,15 +73,27 @@ impl<'a> Solved<'a> {
             return Err(nothing_left(&screened));
         }
         let warnings = layout.warnings.into_iter().chain(contradiction(&problem)).collect();
+        let contradictions = contradictions(input, settings, &problem);
         let input = *input;
-        Ok(Self { input, problem, groups, noise_scale, screened, has_converged, scale_warnings, warnings })
+        Ok(Self {
+            contradictions,
+            input,
+            problem,
+            groups,
+            noise_scale,
+            screened,
+            has_converged,
+            scale_warnings,
+            warnings,
+        })
     }
 
     pub(super) fn map(&self) -> TagMap {
         let mut map = assemble(&self.input, &self.screened, &self.problem, &self.groups, self.noise_scale);
         map.has_converged = self.has_converged;
         map.scale_warnings.clone_from(&self.scale_warnings);
-        map.warnings.extend(self.warnings.iter().cloned());
+        map.is_contradicted = !self.contradictions.is_empty();
+        map.warnings.extend(self.warnings.iter().chain(&self.contradictions).cloned());
         map
     }
 }

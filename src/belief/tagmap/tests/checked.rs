@@ -53,6 +53,7 @@ fn a_map_of_right_files_is_given_out_without_a_word() {
             let blames = |code: Code| matches!(code, Code::Lens | Code::MapTagSize | Code::MapTagDisagrees);
             let blamed: Vec<_> = map.warnings.iter().filter(|warning| blames(warning.code)).collect();
             assert!(blamed.is_empty() && map.lens_errors.is_none(), "seed {seed}, {mode:?}: {blamed:?}");
+            assert!(!map.is_contradicted, "seed {seed}, {mode:?}");
         }
     }
 }

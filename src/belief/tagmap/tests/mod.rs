@@ -4,6 +4,7 @@ mod anchored;
 mod bodies;
 mod bound;
 mod checked;
+mod contradicted;
 mod corridor;
 mod data;
 mod fixture;
