@@ -208,16 +208,17 @@ pub(super) fn parse(file: &Path, text: &str) -> Result<TagFile, RobotError> {
     Ok(out)
 }
 
-/// Gives the tags standard deviations under which they count as independent, although the error of `anchor_tag` is in
-/// all of them.
+/// Gives the tags of a frame standard deviations under which they count as independent, although the error of
+/// `anchor_tag` is in all of them.
 fn count_shared_error(tags: &mut [TagPrior], anchor_tag: Option<u32>) {
-    let anchor = tags.iter().find(|tag| Some(tag.id) == anchor_tag);
-    let Some((anchor, std)) = anchor.and_then(|tag| tag.pose.zip(tag.std)) else { return };
+    let Some(anchor) = tags.iter().find(|tag| Some(tag.id) == anchor_tag) else { return };
+    let (Some((place, std)), body) = (anchor.pose.zip(anchor.std), anchor.body) else { return };
     let largest = |of: &[f64]| of.iter().copied().fold(0.0, f64::max);
     let (position_std_m, rotation_std_rad) = (largest(&std[..3]), largest(&std[3..]));
-    let shared = SharedSurveyError { anchor, position_std_m, rotation_std_rad };
-    let weights = Weights::of(true, tags.iter().filter(|tag| tag.pose.is_some()).count() - 1);
-    for tag in tags {
+    let shared = SharedSurveyError { anchor: place, position_std_m, rotation_std_rad };
+    let n_known = tags.iter().filter(|tag| tag.body == body && tag.pose.is_some()).count();
+    let weights = Weights::of(true, n_known - 1);
+    for tag in tags.iter_mut().filter(|tag| tag.body == body) {
         if let (Some(pose), Some(std)) = (&tag.pose, &mut tag.std) {
             *std = weights.independent(&shared, (pose, Some(tag.id) == anchor_tag), std);
         }
