@@ -154,17 +154,19 @@ fn a_lens_of_air_in_water_is_named_with_the_focal_length() {
     assert!(held_out_m < 0.003, "{held_out_m}");
 }
 
-/// The map of a grid warns of a camera file with another lens model; with the right one there is no warning.
+/// A camera file with another lens model makes no map of a grid: it is refused, or the lens is estimated.
 #[test]
-fn a_tag_map_by_the_wrong_lens_model_is_warned_of() {
+fn a_tag_map_by_the_wrong_lens_model_is_not_given_out() {
     let case = Case::new("tagmap_wrong_lens_model");
-    for (lens, is_warned) in [("cam-pinhole-equi.yaml", true), ("cam-pinhole-radtan.yaml", false)] {
+    for (lens, is_wrong) in [("cam-pinhole-equi.yaml", true), ("cam-pinhole-radtan.yaml", false)] {
         let mut command = program();
         command.arg("tagmap").arg(case.file("grid.mcap")).arg("--camera").arg(case.file(lens));
         command.arg("--tags").arg(case.file("grid.yaml")).args(["--topic", "/cam0/detections", "--mode", "unknown"]);
         let said = answer(command.arg("--out").arg(case.file(&format!("{lens}.toml"))));
-        said.expect(lens, 0, &[]);
-        assert_eq!(said.stderr.contains("[corners_noisy]"), is_warned, "{lens}: {}", said.stderr);
+        let is_refused = said.stderr.contains("[input_lens_model]");
+        said.expect(lens, if is_refused { 4 } else { 0 }, &[]);
+        assert!(!said.stderr.contains("[corners_noisy]"), "{lens}: {}", said.stderr);
+        assert_eq!(is_refused || said.stderr.contains("[lens]"), is_wrong, "{lens}: {}", said.stderr);
     }
 }
 

@@ -87,14 +87,18 @@ pub(super) fn not_built(command: &str) -> anyhow::Error {
     UsageError::new(Code::BuildFeatureMissing, format!("{command}: {problem}")).into()
 }
 
-/// Exit for an error: 2 for unusable input, and for recordings with nothing to fit; otherwise 1.
+/// Exit for an error: 2 for unusable input, and for recordings with nothing to fit; 4 for a refused map; otherwise 1.
 pub(super) fn of_error(error: &anyhow::Error) -> Exit {
     of_cause(error.as_ref())
 }
 
 /// Exit for an error in the form that the library returns.
 pub(super) fn of_cause(error: &(dyn std::error::Error + 'static)) -> Exit {
-    let invalid = std::iter::successors(Some(error), |error| error.source()).any(|cause| {
+    let causes = || std::iter::successors(Some(error), |error| error.source());
+    if causes().any(|cause| matches!(cause.downcast_ref(), Some(TagMapError::Refused(_)))) {
+        return Exit::Refused;
+    }
+    let invalid = causes().any(|cause| {
         cause.is::<UsageError>()
             || cause.is::<RobotError>()
             || cause.is::<FileIssue>()

@@ -22,7 +22,7 @@ use armcal_belief::calib::surveyed;
 use armcal_belief::tagmap::files::{NamedCamera, TagFile, map_to_text, read_cameras, read_tags};
 use armcal_belief::tagmap::recording::{RecordedViews, read_views};
 use armcal_belief::tagmap::{
-    Body, GroupFrame, MapGroup, MapInput, MapMode, MapSettings, MappedTag, TagMap, TagPrior, solve,
+    Body, GroupFrame, MapGroup, MapInput, MapMode, MapSettings, MappedTag, TagMap, TagPrior, checked_map,
 };
 use armcal_core::log::{Completeness, TopicMap, scan_recording, topics};
 use armcal_core::robot::{self, Robot};
@@ -109,7 +109,7 @@ pub(super) fn tagmap(args: &TagmapArgs) -> Result<Exit> {
     let models: Vec<_> = cameras.iter().map(|camera| camera.model).collect();
     let input = MapInput { cameras: &models, views: &read.views, bodies: &tags.bodies, tags: &tags.tags };
     let file = args.recording.display();
-    let map = solve(&input, &settings).map_err(|error| anyhow::Error::from(error).context(format!("{file}")))?;
+    let map = checked_map(&input, &settings).map_err(|error| anyhow::Error::from(error).context(format!("{file}")))?;
     for out in args.out.iter().filter(|path| !is_page(path)) {
         let text = map_to_text(out, &map, &input).map_err(robot::RobotError::from)?;
         output::write_together(&[(out, text.as_bytes())])?;
@@ -161,6 +161,8 @@ fn of_robot(recording: &Path, robot: &Robot) -> Result<Known> {
         mode: MapMode::Unknown,
         base_tag: robot.base_tag,
         corner_std_px: robot.camera.corner_std_px,
+        tag_family: robot.tag_family,
+        focal_std: robot.camera.lens_priors.focal_std,
         ..MapSettings::default()
     };
     Ok((vec![camera], tags, settings))
@@ -175,6 +177,7 @@ fn of_files(camera: &Path, tags: &Path) -> Result<Known> {
         base_tag: tags.base_tag,
         default_tag: tags.default_tag,
         attitude_body: of_base.filter(|body| !tags.bodies[*body].is_static),
+        lens_file: camera.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned()),
         ..MapSettings::default()
     };
     Ok((cameras, tags, settings))
@@ -273,7 +276,9 @@ fn warnings(file: &str, map: &TagMap, read: &RecordedViews, tags: &TagFile) -> (
         let text = format!("{file}: {faults} of {} detections rejected", map.n_detections);
         found.push(Warning::new(Code::MapDetectionsRejected, text));
     }
-    let is_sound =
-        is_whole && read.n_unreadable == 0 && !too_many && map.has_converged && map.scale_warnings.is_empty();
+    let is_determined = map.warnings.iter().all(|warning| warning.code != Code::MapUndetermined);
+    let is_read = is_whole && read.n_unreadable == 0;
+    let is_one = map.has_converged && !map.is_contradicted;
+    let is_sound = is_read && is_determined && !too_many && is_one && map.scale_warnings.is_empty();
     (found, is_sound)
 }

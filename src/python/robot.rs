@@ -134,7 +134,10 @@ impl TagMap {
         if let Some(pair) = seen.windows(2).find(|pair| pair[0] == pair[1]) {
             return Err(wrong_value(format!("ids has {} twice; give each tag once", pair[0])));
         }
-        Ok(Self { file: PathBuf::from("tag map in memory"), inner: LandmarkFile { frame, base_tag: None, landmarks } })
+        Ok(Self {
+            file: PathBuf::from("tag map in memory"),
+            inner: LandmarkFile { frame, base_tag: None, anchor_tag: None, landmarks },
+        })
     }
 
     /// Frame of the poses.

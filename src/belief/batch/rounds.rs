@@ -28,6 +28,7 @@ use crate::file::map_table::MapResult;
 use crate::file::metrics::HeldOutMetrics;
 use crate::judge::{TargetError, U95Table};
 use crate::model::parameters::JointParameters;
+use crate::model::shared_survey_error::count_as_independent;
 use crate::positions::position_problem::PositionProblem;
 use crate::positions::solution::Solution;
 use crate::positions::unobservable::grouped_names;
@@ -47,6 +48,7 @@ use armcal_core::robot::{Robot, SurveyedTag};
 use armcal_core::routine::Method;
 use armcal_core::stats::Summary;
 use nalgebra::Matrix3;
+use std::collections::BTreeSet;
 
 /// What an estimate is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -142,6 +144,9 @@ impl<'a> BundleCalibration<'a> {
         purpose: EstimatePurpose,
     ) -> Result<Self, CalibError> {
         let surveyed = data.robot.tags.clone();
+        let views = data.data.fit.iter().chain(&data.data.held_out);
+        let seen: BTreeSet<usize> = views.flat_map(|view| view.tags.iter().map(|tag| tag.tag_idx)).collect();
+        count_as_independent(&mut data.robot, |tag| seen.contains(&tag));
         // `bundle` moves the tags itself: the map is where it starts.
         let mapped = map_unknown_tags(&data.name, &mut data.data, &data.robot)?;
         let map = mapped.map(|mapped| {

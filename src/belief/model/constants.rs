@@ -58,6 +58,15 @@ pub(crate) mod scales {
     pub(crate) const POSE_STD: [f64; 2] = [0.005, 0.02];
 }
 
+pub(crate) mod shared_survey_error {
+    /// Weight of a map's anchor in what its tags tell of its place, 1; the others have the rest. Assumed: it alone tells
+    /// all of it, but may be seen seldom.
+    pub(crate) const ANCHOR_WEIGHT: f64 = 0.5;
+    /// Weight of the positions of the other tags, 1; their rotations have the rest. Assumed: positions tell of turns,
+    /// too.
+    pub(crate) const POSITION_WEIGHT: f64 = 0.8;
+}
+
 pub(crate) mod walk_modes {
     /// Number of estimated modes of a walk: they contain 95 % of its variance.
     pub(crate) const N_WALK_MODES: usize = 4;

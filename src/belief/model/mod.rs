@@ -2,7 +2,8 @@
 //!
 //! `parameters` are those of a joint's sensor, its link and the arm's compliance; `blocks` are other groups (mounts,
 //! lenses, clock, tags). `estimated` says which have columns, `layout` where these are, and `state` holds the values.
-//! `prior` has the prior information, `scales` the standard deviations that the data may correct.
+//! `prior` has the prior information, `scales` the standard deviations that the data may correct, and
+//! `shared_survey_error` the error that the tags of a map share.
 
 pub(crate) mod blocks;
 pub(crate) mod constants;
@@ -11,6 +12,7 @@ pub(crate) mod layout;
 pub(crate) mod parameters;
 pub(crate) mod prior;
 pub(crate) mod scales;
+pub(crate) mod shared_survey_error;
 pub(crate) mod state;
 pub(crate) mod walk_modes;
 

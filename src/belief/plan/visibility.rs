@@ -180,7 +180,7 @@ mod tests {
             for tag in &mut tags {
                 tag.base_from_tag = Pose::from_isometry(poses.frame(&robot.tag_frame) * tag.base_from_tag.isometry());
             }
-            let still = TagSurvey { base_tag: robot.base_tag, frame: Attachment::base(), family: None, tags };
+            let still = TagSurvey { tags, frame: Attachment::base(), family: None, ..robot.survey() };
             let still = robot.clone().with_survey(still);
             let of = |robot: &Robot| visibility.in_view(robot, &poses).collect::<Vec<_>>();
             assert_eq!(of(&robot), of(&still));

@@ -9,6 +9,8 @@ pub(crate) mod finding;
 pub(crate) mod finding_words;
 pub(crate) mod geometry_error;
 pub(crate) mod length_unit;
+pub(crate) mod map_refusal;
+pub(crate) mod map_words;
 pub(crate) mod reading_error;
 pub(crate) mod refusal;
 pub(crate) mod repair;

@@ -11,12 +11,13 @@ use crate::solve::constants::covariance::DISTANCE_FLOOR_M;
 use nalgebra::{Const, DMatrix, DVector, Dyn, Matrix3, Matrix6, OMatrix, Vector3, Vector6};
 
 use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
+use crate::model::shared_survey_error::SharedSurveyError;
 use crate::positions::mount_estimate::MountEstimate;
 use crate::positions::position_problem::PositionProblem;
 use crate::solve::details::TargetPrediction;
 use crate::views::view::{TagObservation, TaskRests};
 use armcal_core::kinematics::{IkGoal, IkSettings, JointLimits, solve_position};
-use armcal_core::robot::{FailedJoint, FailedKind, JointSensorSpec, Robot};
+use armcal_core::robot::{FailedJoint, FailedKind, JointSensorSpec, Robot, SurveyedTag};
 use armcal_core::sensor::ConditionChange;
 use armcal_core::stats::Summary;
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
@@ -63,14 +64,13 @@ pub struct CommonErrors {
 }
 
 impl CommonErrors {
-    /// Returns the standard deviations stated in robot.toml and the survey: every axis and every tag independently.
+    /// Returns the standard deviations stated in robot.toml and the survey: every axis independently, and every tag but
+    /// for the error that the tags of a map share.
     #[must_use]
     pub fn priors(robot: &Robot) -> Self {
         let (std_m, std_rad) = (robot.camera.mount_std_m, robot.camera.mount_std_rad);
         let mount = Vector6::from_fn(|row, _| if row < 3 { std_m } else { std_rad }.powi(2));
-        let tags = robot.tags.iter().flat_map(|tag| [tag.position_std_m.powi(2); 3]);
-        let tags_m2 = DMatrix::from_diagonal(&DVector::from_iterator(3 * robot.tags.len(), tags));
-        Self { mount: Matrix6::from_diagonal(&mount), tags_m2 }
+        Self { mount: Matrix6::from_diagonal(&mount), tags_m2: surveyed_m2(robot) }
     }
 
     /// Returns the joint covariance: mount first, then the tags.
@@ -81,6 +81,23 @@ impl CommonErrors {
         matrix.view_mut((6, 6), (n - 6, n - 6)).copy_from(&self.tags_m2);
         matrix
     }
+}
+
+/// Covariance of the tags' positions by their survey, m^2, three rows a tag.
+fn surveyed_m2(robot: &Robot) -> DMatrix<f64> {
+    let shared = SharedSurveyError::of(robot);
+    let own_m2 = |tag: &SurveyedTag| match &shared {
+        Some(shared) if tag.is_known() => shared.own_variance_m2(tag),
+        _ => tag.position_std_m.powi(2),
+    };
+    let own = robot.tags.iter().flat_map(|tag| [own_m2(tag); 3]);
+    let own = DMatrix::from_diagonal(&DVector::from_iterator(3 * robot.tags.len(), own));
+    let Some(shared) = shared else { return own };
+    let mut by_anchor = DMatrix::zeros(own.nrows(), 6);
+    for (idx, tag) in robot.tags.iter().enumerate().filter(|(_, tag)| tag.is_known()) {
+        by_anchor.fixed_view_mut::<3, 6>(3 * idx, 0).copy_from(&shared.motion_m(tag));
+    }
+    own + &by_anchor * by_anchor.transpose()
 }
 
 impl ParameterCovariance {

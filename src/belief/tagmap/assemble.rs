@@ -1,6 +1,7 @@
 //! From the solved problem to the map.
 
-use crate::tagmap::constants::assemble::FAR_FROM_KNOWN;
+use crate::say::map_words::disagreeing_detections;
+use crate::tagmap::constants::assemble::{FAR_FROM_KNOWN, MIN_REJECTED, REJECTED_SHARE};
 use armcal_core::codes::{Code, Warning};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -70,9 +71,11 @@ pub(super) fn assemble(
         rejected,
         scale_warnings: Vec::new(),
         warnings,
+        is_contradicted: false,
         has_converged: false,
         n_steps: MAX_STEPS - problem.steps_left,
         factor,
+        lens_errors: None,
     }
 }
 
@@ -99,12 +102,10 @@ fn doubts(problem: &MapProblem<'_>) -> Vec<Warning> {
                 out.push(Warning::new(Code::MapTagDisagrees, text));
             }
         }
-        if 2 * used < n {
-            let text = format!(
-                "tag {id}: {} of {n} detections disagree with the map; is it where and what it was said to be?",
-                n - used
-            );
-            out.push(Warning::new(Code::MapTagDisagrees, text));
+        let rejected = n - used;
+        let is_often = rejected >= MIN_REJECTED && rejected as f64 > REJECTED_SHARE * n as f64;
+        if is_often || 2 * used < n {
+            out.push(Warning::new(Code::MapTagDisagrees, disagreeing_detections(id, rejected, n)));
         }
     }
     out

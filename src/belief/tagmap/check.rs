@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use crate::views::association::turns_right;
 use armcal_core::robot::MAX_TAGS;
 
 pub(super) use crate::tagmap::constants::check::SIZE_RANGE_M;
@@ -42,7 +43,15 @@ pub(super) fn check(input: &MapInput<'_>, settings: &MapSettings) -> Result<(), 
             }
         }
     }
+    corner_order(input)?;
     anchor(input, settings)
+}
+
+/// Refuses corners most of which run the wrong way round.
+fn corner_order(input: &MapInput<'_>) -> Result<(), TagMapError> {
+    let all = || input.views.iter().flat_map(|view| &view.tags);
+    let (n, of) = (all().filter(|tag| turns_right(&tag.corners_px)).count(), all().count());
+    if 2 * n > of { Err(TagMapError::CornerOrder { n, of }) } else { Ok(()) }
 }
 
 fn size(id: u32, size_m: f64) -> Result<(), TagMapError> {

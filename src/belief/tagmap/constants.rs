@@ -37,11 +37,42 @@ pub(crate) mod adjust {
 pub(crate) mod assemble {
     /// Chi-square of 6 degrees of freedom, 99.99 %.
     pub(crate) const FAR_FROM_KNOWN: f64 = 27.86;
+    /// So many rejected detections of a tag, and this share of them, are no chance: of 5 % outliers three in ten are
+    /// rarer than 2 %. Assumed.
+    pub(crate) const MIN_REJECTED: usize = 3;
+    pub(crate) const REJECTED_SHARE: f64 = 0.25;
+}
+
+pub(crate) mod blind {
+    /// A lens or an odd tag is told from so many detections; more change little but the time. Assumed.
+    pub(crate) const MAX_DETECTIONS: usize = 400;
+    pub(crate) const MIN_VIEWS: usize = 12;
+    /// Residuals with fewer degrees of freedom tell no lens.
+    pub(crate) const MIN_FREEDOM: usize = 60;
 }
 
 pub(crate) mod check {
     /// Sizes of tags, m. Assumed: others are in another unit.
     pub(crate) const SIZE_RANGE_M: std::ops::RangeInclusive<f64> = 1e-3..=10.0;
+}
+
+pub(crate) mod checked {
+    /// Beyond so many of its standard deviations a tag is elsewhere than the map says.
+    pub(crate) const OTHER_SIGMAS: f64 = 3.0;
+}
+
+pub(crate) mod columns {
+    /// An unknown that keeps less of its information when the poses follow is one with them: the size of a tag that is
+    /// seen alone is its distance. Rounding leaves 1e-10.
+    pub(crate) const DETERMINED: f64 = 1e-6;
+}
+
+pub(crate) mod contradictions {
+    /// Images that show tags of two groups from which these must be one map. Assumed: images that fit each other tie
+    /// them by two.
+    pub(crate) const MIN_COMMON_IMAGES: usize = 5;
+    /// Images with an id at two places from which it is on two tags. Assumed: a false detection seldom comes twice.
+    pub(crate) const MIN_TWICE: usize = 2;
 }
 
 pub(crate) mod files_landmark {
@@ -69,6 +100,60 @@ pub(crate) mod incremental_layout {
     pub(crate) const MAX_IMAGES: usize = 24;
 }
 
+pub(crate) mod known_places {
+    /// A place that is less sure than this says nothing about how a file is read, m and rad. Assumed.
+    pub(crate) const MAX_STD_M: f64 = 0.05;
+    pub(crate) const MAX_STD_RAD: f64 = 0.1;
+    /// Fewer tags may stand to one another by chance as another reading has them, where their places are not believed.
+    pub(crate) const MIN_TAGS: usize = 3;
+    /// Views that are looked at.
+    pub(crate) const MAX_VIEWS: usize = 40;
+    /// Share of the detections that may be rejected before the views count as contradicting the map. Assumed.
+    pub(crate) const MAX_REJECTED_SHARE: f64 = 0.2;
+}
+
+pub(crate) mod lens_fit {
+    /// Intrinsics of a camera: focal lengths, centre, four of distortion.
+    pub(crate) const PER_CAMERA: usize = 8;
+    pub(crate) const MAX_LENS_STEPS: usize = 15;
+    /// A step that lowers the sum of squares by less ends the fit.
+    pub(crate) const ENOUGH_GAIN: f64 = 0.01;
+    /// Shares of a step that are tried in turn.
+    pub(crate) const SHORTENED: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
+    /// Relative gain at which the poses of a trial rest.
+    pub(crate) const PRECISE: f64 = 1e-8;
+    /// One sigma of any lens: focal length and centre over the focal length, distortion. Assumed, so wide that only
+    /// what the views do not show follows it.
+    pub(crate) const WIDE_FOCAL: f64 = 0.5;
+    pub(crate) const WIDE_CENTER: f64 = 0.2;
+    pub(crate) const WIDE_DISTORTION: f64 = 0.5;
+}
+
+pub(crate) mod lens_test {
+    /// Corner noise over the stated one from which a lens or a size is doubtful: as `calibrate` warns.
+    pub(crate) const NOISY: f64 = 2.0;
+    /// Log evidence that another lens must bring, beyond what its unknowns cost: as of a calibration's drawing.
+    pub(crate) const MIN_GAIN_NATS: f64 = 6.0;
+    /// Another lens leaves at most this share of the corners' variance: what explains less is within what no lens
+    /// model has, and a map holds it. Assumed.
+    pub(crate) const LEFT_SHARE: f64 = 0.9;
+    /// Another lens keeps this share of the detections.
+    pub(crate) const MIN_USED_SHARE: f64 = 0.95;
+    /// Another reading leaves this share of the variance that the stated lens with other figures leaves. Assumed.
+    pub(crate) const MUCH_BETTER: f64 = 0.5;
+    /// A reading as it is that leaves no more than this, over the variance of fitted lenses, is the cause. Assumed.
+    pub(crate) const AS_GOOD: f64 = 1.2;
+    /// One in so many of the focal lengths of `explain` is a start: 14 % apart.
+    pub(crate) const FOCAL_STRIDE: usize = 7;
+    /// Starts that are fitted.
+    pub(crate) const MAX_STARTS: usize = 3;
+    /// Rounds of lenses and map in turn, and the share of the variance that one must leave for another.
+    pub(crate) const MAX_ROUNDS: usize = 4;
+    pub(crate) const WORTH_A_ROUND: f64 = 0.99;
+    /// Its own standard deviations by which a focal length must be beyond its bound.
+    pub(crate) const SURE_SIGMAS: f64 = 3.0;
+}
+
 pub(crate) mod linearize {
     /// A corner that the lens does not see counts as one that is this many standard deviations off.
     pub(crate) const UNSEEN_SIGMAS: f64 = 1e4;
@@ -85,10 +170,30 @@ pub(crate) mod localize {
         Damping { first: 0.0, min: 0.0, max: 0.0, down: 0.0, up: 0.0, min_after_rejection: 1.0 };
 }
 
+pub(crate) mod lost_anchor {
+    /// Sizes nearer to right than this lose no tag. Assumed.
+    pub(crate) const LEAST_FACTOR: f64 = 1.02;
+    /// Sightings that tell the size of a tag.
+    pub(crate) const MIN_SIGHTINGS: usize = 3;
+}
+
 pub(crate) mod normal_equations {
     /// Keeps a step possible while some camera or tag sees nothing at all: what is determined has 1e4 and more (1/m^2,
     /// 1/rad^2).
     pub(crate) const UNDETERMINED: f64 = 1e-6;
+}
+
+pub(crate) mod odd_tags {
+    /// Log evidence that an odd tag must bring, beyond what its unknowns and the choice among tags cost: as of a
+    /// calibration's drawing.
+    pub(crate) const MIN_GAIN_NATS: f64 = 6.0;
+    /// Sizes and moves below these are those of any print and mount: share, m and rad. Assumed.
+    pub(crate) const LEAST_SIZE: f64 = 0.005;
+    pub(crate) const LEAST_MOVE_M: f64 = 0.001;
+    pub(crate) const LEAST_TURN_RAD: f64 = 0.01;
+    /// A move is looked for after each of so many parts of a tag's detections, with so many on each side.
+    pub(crate) const PARTS: usize = 8;
+    pub(crate) const MIN_SIDE: usize = 3;
 }
 
 pub(crate) mod recording {

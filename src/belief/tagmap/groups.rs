@@ -193,5 +193,5 @@ fn locate(problem: &MapProblem<'_>, range: &std::ops::Range<usize>) -> Option<Is
     let any_used = all.iter().any(|seen| seen.is_used);
     let seen: Vec<_> =
         all.iter().filter(|seen| seen.is_used || !any_used).map(|seen| (seen, problem.tags[seen.tag].pose)).collect();
-    localize(problem.cameras, &seen).map(|(pose, _)| pose)
+    localize(&problem.cameras, &seen).map(|(pose, _)| pose)
 }

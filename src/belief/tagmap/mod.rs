@@ -2,20 +2,32 @@
 //!
 //! `screen` validates detections and solves each square; `vote`, `initial_guess` and `incremental_layout` lay out
 //! groups of tags; `linearize`, `normal_equations`, `sparse` and `adjust` are the bundle adjustment on corner pixels
-//! (Triggs et al. 2000); `result` is the map with its accuracy; `scale` finds wrong tag sizes. `tag_mapping` maps the
-//! tags of a calibration; `files` reads and writes files of tags and cameras, `recording` gets views from recordings.
+//! (Triggs et al. 2000); `result` is the map with its accuracy; `scale` finds wrong tag sizes. `checked` gives a map
+//! out where its files are not contradicted: `known_places` reads them otherwise, `lens_test` and `lens_fit` look for
+//! another lens, `odd_tags` for sizes and moves, by `columns` of a map without known places (`blind`), `lost_anchor` and
+//! `contradictions` for what cannot be one map. `tag_mapping` maps the tags of a calibration; `files` reads and writes files of tags and cameras, `recording` gets views from
+//! recordings.
 
 mod adjust;
 mod assemble;
 mod attitude;
+mod blind;
 mod check;
+mod checked;
+mod columns;
 pub(crate) mod constants;
+mod contradictions;
 mod groups;
 mod incremental_layout;
 mod initial_guess;
+mod known_places;
+mod lens_fit;
+mod lens_test;
 mod linearize;
 mod localize;
+mod lost_anchor;
 mod normal_equations;
+mod odd_tags;
 mod problem;
 mod result;
 mod scale;
@@ -30,6 +42,7 @@ mod vote;
 pub mod files;
 pub mod recording;
 
+pub use checked::checked_map;
 pub use result::{GroupFrame, MapGroup, MappedTag, RelativeBodyPose, TagMap};
 pub use scale::ScaleWarning;
 pub use solve::solve;

@@ -1,5 +1,6 @@
 //! What the bundle adjustment works on.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use nalgebra::{Isometry3, Matrix2, Vector2, Vector3};
@@ -91,7 +92,7 @@ pub(super) struct AttitudeLink {
 
 #[derive(Clone, Debug)]
 pub(super) struct MapProblem<'a> {
-    pub(super) cameras: &'a [CameraModel],
+    pub(super) cameras: Cow<'a, [CameraModel]>,
     /// Sorted by block and tag.
     pub(super) observations: Vec<Observation>,
     pub(super) tags: Vec<TagState>,

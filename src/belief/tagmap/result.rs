@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, Isometry3, Matrix3, Matrix6};
 
+use crate::tagmap::lens_fit::LensErrors;
 use crate::tagmap::scale::ScaleWarning;
 use crate::tagmap::sparse::Factor;
 use crate::tagmap::types::{MapRejection, RejectedDetection};
@@ -125,14 +126,29 @@ pub struct TagMap {
     pub scale_warnings: Vec<ScaleWarning>,
     /// Sentences for people; empty where nothing is doubtful.
     pub warnings: Vec<Warning>,
+    /// Whether groups that must be one map fell apart, or an id is on two tags.
+    pub is_contradicted: bool,
     /// Whether the last fit found a minimum.
     pub has_converged: bool,
     /// Steps of all fits.
     pub n_steps: usize,
     pub(super) factor: Option<Factor>,
+    /// Of lenses that were estimated with the map; without, they count as exact.
+    pub(super) lens_errors: Option<LensErrors>,
 }
 
 impl TagMap {
+    /// The map with what its estimated lenses add to the covariances of its tags.
+    pub(super) fn with_lens_errors(mut self, errors: LensErrors) -> Self {
+        for tag in &mut self.tags {
+            if let Some(node) = tag.node {
+                tag.covariance += errors.common(node, node);
+            }
+        }
+        self.lens_errors = Some(errors);
+        self
+    }
+
     /// The tag of that id; `None` where the map lacks it.
     #[must_use]
     pub fn tag(&self, id: u32) -> Option<&MappedTag> {
@@ -161,7 +177,8 @@ impl TagMap {
             let blocks = factor.inverse_column(*node);
             for (row, other) in nodes.iter().enumerate() {
                 let Some(other) = other else { continue };
-                out.fixed_view_mut::<6, 6>(6 * row, 6 * column).copy_from(&blocks[*other]);
+                let of_lens = self.lens_errors.as_ref().map_or_else(Matrix6::zeros, |by| by.common(*other, *node));
+                out.fixed_view_mut::<6, 6>(6 * row, 6 * column).copy_from(&(blocks[*other] + of_lens));
             }
         }
         Some(out)

@@ -1,16 +1,19 @@
 //! From views to a map, step by step.
 
+use std::borrow::Cow;
+
 use crate::tagmap::adjust::{approach, finish, select};
 use crate::tagmap::assemble::assemble;
 use crate::tagmap::attitude::{self, Wanted};
 use crate::tagmap::check::check;
 use crate::tagmap::constants::solve::{MAX_ROUNDS, MIN_FREEDOM, MUCH_WORSE};
+use crate::tagmap::contradictions::contradictions;
 use crate::tagmap::groups::{Group, build};
 use crate::tagmap::initial_guess::lay_out;
 use crate::tagmap::localize::{localize, place_tag, tag_cost, view_cost};
 use crate::tagmap::problem::{MapProblem, Observation};
 use crate::tagmap::result::TagMap;
-use crate::tagmap::scale;
+use crate::tagmap::scale::{self, ScaleWarning};
 use crate::tagmap::screen::{Screened, screen};
 use crate::tagmap::types::{MapInput, MapSettings, NoiseScale, TagMapError};
 use crate::tagmap::{adjust, linearize};
@@ -25,62 +28,74 @@ use armcal_core::numeric::Loss;
 /// # Errors
 /// [`TagMapError`] when the input cannot be meant, or shows none of the tags that would anchor the map.
 pub fn solve(input: &MapInput<'_>, settings: &MapSettings) -> Result<TagMap, TagMapError> {
-    check(input, settings)?;
-    let mut screened = screen(input, settings);
-    if screened.observations.is_empty() {
-        return Err(nothing_left(&screened));
-    }
-    let scale_warnings = scale::check(input, &screened);
-    let layout = lay_out(input.cameras, &screened.observations, &screened.tags, input.bodies, settings);
-    for (tag, pose) in screened.tags.iter_mut().zip(&layout.pose) {
-        tag.pose = *pose;
-    }
-    let mut problem = MapProblem {
-        cameras: input.cameras,
-        observations: std::mem::take(&mut screened.observations),
-        tags: std::mem::take(&mut screened.tags),
-        blocks: Vec::new(),
-        extras: Vec::new(),
-        links: Vec::new(),
-        n_nodes: 0,
-        steps_left: adjust::MAX_STEPS,
-    };
-    let setting_up = ProblemBuilder { input, settings, screened: &screened, label: &layout.label };
-    let mut groups = setting_up.build(&mut problem);
-    approach(&mut problem);
-    for _ in 0..3 {
-        if problem.steps_left == 0 || !repair(&mut problem) {
-            break;
+    Ok(Solved::of(input, settings)?.map())
+}
+
+/// A problem at its solution.
+pub(super) struct Solved<'a> {
+    pub(super) input: MapInput<'a>,
+    pub(super) problem: MapProblem<'a>,
+    pub(super) groups: Vec<Group>,
+    /// By what the corners' standard deviations were multiplied.
+    pub(super) noise_scale: f64,
+    screened: Screened,
+    has_converged: bool,
+    scale_warnings: Vec<ScaleWarning>,
+    warnings: Vec<Warning>,
+    contradictions: Vec<Warning>,
+}
+
+impl<'a> Solved<'a> {
+    pub(super) fn of(input: &MapInput<'a>, settings: &MapSettings) -> Result<Self, TagMapError> {
+        check(input, settings)?;
+        let mut screened = screen(input, settings);
+        if screened.observations.is_empty() {
+            return Err(nothing_left(&screened));
         }
-        approach(&mut problem);
-    }
-    let mut has_converged = false;
-    for _ in 0..MAX_ROUNDS {
-        let changed = select(&mut problem, settings.reject_beyond_sigmas);
-        if changed {
-            groups = setting_up.build(&mut problem);
+        let scale_warnings = scale::check(input, &screened);
+        let layout = lay_out(input.cameras, &screened.observations, &screened.tags, input.bodies, settings);
+        for (tag, pose) in screened.tags.iter_mut().zip(&layout.pose) {
+            tag.pose = *pose;
         }
-        has_converged = finish(&mut problem);
-        if !changed || problem.steps_left == 0 {
-            break;
+        let mut problem = MapProblem {
+            cameras: Cow::Borrowed(input.cameras),
+            observations: std::mem::take(&mut screened.observations),
+            tags: std::mem::take(&mut screened.tags),
+            blocks: Vec::new(),
+            extras: Vec::new(),
+            links: Vec::new(),
+            n_nodes: 0,
+            steps_left: adjust::MAX_STEPS,
+        };
+        let setting_up = ProblemBuilder { input, settings, screened: &screened, label: &layout.label };
+        let (groups, noise_scale, has_converged) = setting_up.adjust(&mut problem);
+        if !problem.observations.iter().any(|seen| seen.is_used) {
+            return Err(nothing_left(&screened));
         }
+        let warnings = layout.warnings.into_iter().chain(contradiction(&problem)).collect();
+        let contradictions = contradictions(input, settings, &problem);
+        let input = *input;
+        Ok(Self {
+            contradictions,
+            input,
+            problem,
+            groups,
+            noise_scale,
+            screened,
+            has_converged,
+            scale_warnings,
+            warnings,
+        })
     }
-    let noise_scale = match settings.noise {
-        NoiseScale::Given => 1.0,
-        NoiseScale::Estimated => rescale(&mut problem),
-    };
-    if noise_scale != 1.0 {
-        has_converged = finish(&mut problem);
+
+    pub(super) fn map(&self) -> TagMap {
+        let mut map = assemble(&self.input, &self.screened, &self.problem, &self.groups, self.noise_scale);
+        map.has_converged = self.has_converged;
+        map.scale_warnings.clone_from(&self.scale_warnings);
+        map.is_contradicted = !self.contradictions.is_empty();
+        map.warnings.extend(self.warnings.iter().chain(&self.contradictions).cloned());
+        map
     }
-    let mut map = assemble(input, &screened, &problem, &groups, noise_scale);
-    map.has_converged = has_converged;
-    map.scale_warnings = scale_warnings;
-    map.warnings.extend(layout.warnings);
-    map.warnings.extend(contradiction(&problem));
-    if map.n_used == 0 {
-        return Err(nothing_left(&screened));
-    }
-    Ok(map)
 }
 
 /// Why no more steps were made, where that was so.
@@ -107,6 +122,37 @@ struct ProblemBuilder<'a, 'b> {
 }
 
 impl ProblemBuilder<'_, '_> {
+    /// From the layout to the solution: groups, factor of the corners' noise, and whether it came to rest.
+    fn adjust(&self, problem: &mut MapProblem<'_>) -> (Vec<Group>, f64, bool) {
+        let mut groups = self.build(problem);
+        approach(problem);
+        for _ in 0..3 {
+            if problem.steps_left == 0 || !repair(problem) {
+                break;
+            }
+            approach(problem);
+        }
+        let mut has_converged = false;
+        for _ in 0..MAX_ROUNDS {
+            let changed = select(problem, self.settings.reject_beyond_sigmas);
+            if changed {
+                groups = self.build(problem);
+            }
+            has_converged = finish(problem);
+            if !changed || problem.steps_left == 0 {
+                break;
+            }
+        }
+        let noise_scale = match self.settings.noise {
+            NoiseScale::Given => 1.0,
+            NoiseScale::Estimated => rescale(problem),
+        };
+        if noise_scale != 1.0 {
+            has_converged = finish(problem);
+        }
+        (groups, noise_scale, has_converged)
+    }
+
     /// Groups, unknowns and attitude links for the observations in use.
     fn build(&self, problem: &mut MapProblem<'_>) -> Vec<Group> {
         let groups = build(problem, self.label, self.input.bodies, self.settings);
@@ -134,8 +180,8 @@ fn repair(problem: &mut MapProblem<'_>) -> bool {
         let block = &problem.blocks[idx];
         let seen: Vec<(&Observation, _)> =
             problem.observations[block.range.clone()].iter().map(|seen| (seen, problem.tags[seen.tag].pose)).collect();
-        let now = view_cost(problem.cameras, &seen, &block.pose);
-        if let Some((pose, misfit)) = localize(problem.cameras, &seen)
+        let now = view_cost(&problem.cameras, &seen, &block.pose);
+        if let Some((pose, misfit)) = localize(&problem.cameras, &seen)
             && misfit * MUCH_WORSE < now
         {
             problem.blocks[idx].pose = pose;
@@ -150,8 +196,8 @@ fn repair(problem: &mut MapProblem<'_>) -> bool {
     }
     let mut moved = Vec::new();
     for (idx, tag) in problem.tags.iter().enumerate().filter(|(_, tag)| tag.node.is_some()) {
-        let now = tag_cost(problem.cameras, &images[idx], &tag.pose);
-        if let Some((pose, misfit)) = place_tag(problem.cameras, &images[idx])
+        let now = tag_cost(&problem.cameras, &images[idx], &tag.pose);
+        if let Some((pose, misfit)) = place_tag(&problem.cameras, &images[idx])
             && misfit * MUCH_WORSE < now
         {
             moved.push((idx, pose));

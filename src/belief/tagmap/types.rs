@@ -3,10 +3,12 @@
 use armcal_core::codes::{Code, Coded};
 use nalgebra::{Isometry3, Matrix2, UnitQuaternion};
 
+use crate::say::map_refusal::{MapRefusal, ROBOT_FILE};
+use crate::say::map_words::mirrored_corners;
 use crate::tagmap::constants::types::{ATTITUDE_STD_RAD, CORNER_STD_PX, MIN_LINK_VIEWS, REJECT_SIGMAS};
 use crate::views::constants::association::MAX_SQUARE_RMS_PX;
-use armcal_core::optics::CameraModel;
-use armcal_core::robot::MAX_TAGS;
+use armcal_core::optics::{CameraModel, TagFamily};
+use armcal_core::robot::{LensPriors, MAX_TAGS};
 use armcal_core::time::Stamp;
 
 /// One tag in one image.
@@ -106,6 +108,12 @@ pub struct MapSettings {
     pub attitude_body: Option<usize>,
     /// Standard deviation of the attitude, rad.
     pub attitude_std_rad: f64,
+    /// Family of the tags.
+    pub tag_family: TagFamily,
+    /// Standard deviation of the stated focal lengths, relative.
+    pub focal_std: f64,
+    /// Name of the file that states the lenses, for messages.
+    pub lens_file: String,
 }
 
 impl Default for MapSettings {
@@ -121,6 +129,9 @@ impl Default for MapSettings {
             min_link_views: MIN_LINK_VIEWS,
             attitude_body: None,
             attitude_std_rad: ATTITUDE_STD_RAD,
+            tag_family: TagFamily::default(),
+            focal_std: LensPriors::default().focal_std,
+            lens_file: ROBOT_FILE.to_owned(),
         }
     }
 }
@@ -208,6 +219,10 @@ pub enum TagMapError {
     Setting { what: &'static str, value: f64 },
     #[error("every one of {rejected} detections was rejected: {reasons}")]
     NothingLeft { rejected: usize, reasons: String },
+    #[error("{}", mirrored_corners(*n, *of))]
+    CornerOrder { n: usize, of: usize },
+    #[error("{0}")]
+    Refused(Box<MapRefusal>),
 }
 
 impl Coded for TagMapError {
@@ -218,6 +233,8 @@ impl Coded for TagMapError {
             Self::TagTwice { .. } => Code::ValueDuplicate,
             Self::NoSuchBody { .. } | Self::NoSuchCamera { .. } => Code::NameUnknown,
             Self::NothingLeft { .. } => Code::MapFailed,
+            Self::CornerOrder { .. } => Code::InputCornerOrder,
+            Self::Refused(refusal) => refusal.code(),
         }
     }
 }

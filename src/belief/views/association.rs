@@ -319,7 +319,7 @@ pub(crate) fn check_square(
 
 /// Returns true if the corners turn right. Seen from the front, they run counterclockwise with v downwards: each turn
 /// from side to side is to the left.
-fn turns_right(corners_px: &[[f64; 2]; 4]) -> bool {
+pub(crate) fn turns_right(corners_px: &[[f64; 2]; 4]) -> bool {
     let side = |k: usize| [0, 1].map(|axis| corners_px[(k + 1) % 4][axis] - corners_px[k % 4][axis]);
     let turns = [0, 1, 2, 3].map(|k| {
         let ([u, v], [to_u, to_v]) = (side(k), side(k + 1));

@@ -60,7 +60,13 @@ pub(crate) fn no_views(recording: String, robot: &Robot, data: &CaptureData) -> 
     if let Some((most, _)) = most {
         let reasons = data.rejected_by_reason();
         let reasons: Vec<String> = reasons.iter().map(|(why, n)| format!("{n} {}", why.replace('_', " "))).collect();
-        return CalibError::AllRejected { recording, reasons: reasons.join(", "), todo: most.remedy() };
+        let reasons = reasons.join(", ");
+        // No joint moves camera and tags against each other.
+        return if robot.n_seen_joints() == 0 && robot.gripper_tag.is_none() {
+            CalibError::StandingTags { recording, reasons }
+        } else {
+            CalibError::AllRejected { recording, reasons, todo: most.remedy() }
+        };
     }
     let known = robot.tags.iter().map(|tag| tag.id).collect();
     CalibError::NoTags { recording, robot: robot.name.clone(), known, seen: data.ids_seen.clone() }
@@ -132,6 +138,7 @@ mod tests {
     use super::*;
     use crate::fixture::titan;
     use armcal_core::joints::JointAngles;
+    use armcal_core::kinematics::Attachment;
     use armcal_core::stats::stream_rng;
     use armcal_core::time::SIMULATION_EPOCH;
     use rand::RngExt;
@@ -145,6 +152,21 @@ mod tests {
             View::of_reading(number, SIMULATION_EPOCH.plus_s(f64::from(number)), travel_rad)
         };
         (0..20).map(one).collect()
+    }
+
+    /// Tags of the base before a camera on the base, and before one on the arm.
+    #[test]
+    fn tags_that_no_joint_moves_before_the_camera_are_told() {
+        let mut data = CaptureData::default();
+        data.reject(ObservationRejection::InconsistentFrame, 400);
+        let mut robot = titan();
+        robot.gripper_tag = None;
+        let refused = |robot: &Robot| no_views("run".to_owned(), robot, &data);
+        assert!(matches!(refused(&robot), CalibError::AllRejected { .. }));
+        robot.camera.mount = Attachment { n_joints: 0, ..robot.camera.mount };
+        assert!(matches!(refused(&robot), CalibError::StandingTags { .. }));
+        robot.tag_frame = Attachment { n_joints: 3, ..robot.tag_frame };
+        assert!(matches!(refused(&robot), CalibError::AllRejected { .. }));
     }
 
     #[test]

@@ -60,6 +60,11 @@ pub enum CalibError {
     CornerOrder { recording: String, n: usize, of: usize, todo: &'static str },
     #[error("{recording}: no view is left: {reasons}; {todo}")]
     AllRejected { recording: String, reasons: String, todo: &'static str },
+    #[error(
+        "{recording}: no view is left: {reasons}; the camera stands still, and so do the tags: `frame` of the tag map \
+         (tag_link of robot.toml) must name the link that carries the tags"
+    )]
+    StandingTags { recording: String, reasons: String },
     #[error("{recording}: {problem}")]
     Clocks { recording: String, problem: String },
     #[error("{recording}: topic {topic}: {disorder}")]
@@ -85,6 +90,7 @@ impl Coded for CalibError {
             | Self::NoFitViews { .. }
             | Self::TooFewViews { .. }
             | Self::AllRejected { .. }
+            | Self::StandingTags { .. }
             | Self::NoInterimEstimate { .. } => Code::ViewsMissing,
             Self::NoTags { .. } => Code::TagsNotSeen,
             Self::CornerOrder { .. } => Code::InputCornerOrder,

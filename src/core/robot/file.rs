@@ -276,6 +276,7 @@ fn robot_of(folder: &Path, raw: RobotFile, urdf: UrdfModel, meshes: Meshes) -> R
         gripper,
         gripper_tag,
         base_tag: raw.base_tag,
+        anchor_tag: None,
         chain: chain.with_loads(loads(&geometry, &bodies, buoyancy_fraction, tool)),
         bodies,
         self_pairs: None,

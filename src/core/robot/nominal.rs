@@ -77,6 +77,8 @@ pub struct Robot {
     pub links: BTreeMap<String, Attachment>,
     /// Id of the tag next to the base; one of `tags`, `None` if there are none.
     pub base_tag: Option<u32>,
+    /// Id of the tag whose error all others share ([`TagSurvey::anchor_tag`]).
+    pub anchor_tag: Option<u32>,
     /// Stowed configuration, rad. If robot.toml states none, it is the middle of each joint's range: usable as a start
     /// if any angles will do, but not for planning (`planning_issues`).
     pub stowed: JointAngles,
@@ -215,6 +217,7 @@ impl Robot {
         self.planning_issues.retain(|issue| issue.key != BASE_TAG);
         self.tags = survey.tags;
         self.base_tag = survey.base_tag;
+        self.anchor_tag = survey.anchor_tag;
         self.tag_frame = survey.frame;
         self.tag_family = survey.family.unwrap_or(self.tag_family);
         self
@@ -264,6 +267,7 @@ impl Robot {
     pub fn survey(&self) -> TagSurvey {
         TagSurvey {
             base_tag: self.base_tag,
+            anchor_tag: self.anchor_tag,
             frame: self.tag_frame,
             family: Some(self.tag_family),
             tags: self.tags.clone(),

@@ -241,7 +241,7 @@ fn check_survey(
         (Some(base_tag), false) => {
             let base_tag = Some(base_tag);
             let (tags, family) = check_tags(file, &raw.tag, base_tag, &vehicle_from_base.inverse())?;
-            Ok(Some(TagSurvey { base_tag, frame: Attachment::base(), family, tags }))
+            Ok(Some(TagSurvey { base_tag, anchor_tag: None, frame: Attachment::base(), family, tags }))
         }
     }
 }

@@ -48,6 +48,7 @@ impl RecordedSurvey {
         let carrier = self.link.as_ref().and_then(|link| robot.links.get(link)).copied();
         TagSurvey {
             base_tag: Some(self.base_tag),
+            anchor_tag: None,
             frame: carrier.unwrap_or_else(Attachment::base),
             family: None,
             tags: self.tags.iter().filter_map(tag).collect(),

@@ -171,7 +171,13 @@ fn with_landmarks(robot: &Robot, n: usize, rng: &mut ChaCha8Rng) -> Result<Robot
             SurveyedTag { id: id as u32, size_m: 0.15, base_from_tag, position_std_m, rotation_std_rad }
         })
         .collect();
-    Ok(robot.clone().with_survey(TagSurvey { base_tag: Some(0), frame: Attachment::base(), family: None, tags }))
+    Ok(robot.clone().with_survey(TagSurvey {
+        base_tag: Some(0),
+        anchor_tag: None,
+        frame: Attachment::base(),
+        family: None,
+        tags,
+    }))
 }
 
 fn drawn_sensors(robot: &Robot, setting: &Setting, rng: &mut ChaCha8Rng) -> JointParameters {

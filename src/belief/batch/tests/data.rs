@@ -98,7 +98,7 @@ pub fn watched_titan() -> Robot {
         }
     };
     let tags = (0..2 * N_AROUND).map(tag).collect();
-    robot.with_survey(TagSurvey { base_tag: Some(0), frame: hand, family: None, tags })
+    robot.with_survey(TagSurvey { base_tag: Some(0), anchor_tag: None, frame: hand, family: None, tags })
 }
 
 pub fn normal(rng: &mut ChaCha8Rng) -> f64 {

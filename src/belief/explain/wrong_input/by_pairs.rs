@@ -1,17 +1,22 @@
 //! The reading of recording, map or lens with which the tags of each view fit one another.
 
 use super::pairs::{Pairs, distances, mismatch};
-use super::{BETTER, GOOD, SIZE_TOLERANCE, lens, map, recording};
+use super::{BETTER, GOOD, SIZE_TOLERANCE, StatedCamera, lens, map, recording};
 use crate::explain::constants::wrong_input_by_pairs::BAD;
 use crate::say::length_unit::unit_of;
 use crate::say::wrong_input::{MismatchMeasure, WrongInput, WrongInputKind};
 use crate::views::view::{TagMeasurement, TagObservation, View};
-use armcal_core::optics::CameraModel;
-use armcal_core::robot::{Robot, SurveyedTag};
+use armcal_core::optics::{CameraModel, TagFamily};
+use armcal_core::robot::SurveyedTag;
 
 /// The first of these: a reading of poses, map or lens that fits, exchanged ids, another map, a wrong scale.
-pub(crate) fn by_pairs(views: &[&View], tags: &[SurveyedTag], robot: &Robot, as_written: &Pairs) -> Option<WrongInput> {
-    let stated = &robot.camera.lens;
+pub(crate) fn by_pairs(
+    views: &[&View],
+    tags: &[SurveyedTag],
+    camera: StatedCamera<'_>,
+    as_written: &Pairs,
+) -> Option<WrongInput> {
+    let stated = camera.lens;
     let wrong = |input, otherwise| wrong_by(as_written, input, otherwise);
     let maps = map::readings(tags).into_iter().map(|(input, tags)| (input, mismatch(views, &tags, stated)));
     let lenses = lens::readings(stated).into_iter().map(|(input, lens)| (input, mismatch(views, tags, &lens)));
@@ -28,15 +33,15 @@ pub(crate) fn by_pairs(views: &[&View], tags: &[SurveyedTag], robot: &Robot, as_
         return Some(wrong(WrongInputKind::OtherMap, None));
     }
     let is_scaled = (as_written.ratio - 1.0).abs() > SIZE_TOLERANCE && as_written.mismatch < GOOD;
-    is_scaled.then(|| of_scale(views, robot, as_written))
+    is_scaled.then(|| of_scale(views, camera.tag_family, as_written))
 }
 
 /// A scale of recorded positions, by their distances alone: such landmarks have no rotation that could tell more.
-pub(crate) fn by_distances(views: &[&View], tags: &[SurveyedTag], robot: &Robot) -> Option<WrongInput> {
+pub(crate) fn by_distances(views: &[&View], tags: &[SurveyedTag], family: TagFamily) -> Option<WrongInput> {
     let found = distances(views, tags)?;
     let is_scaled = (found.ratio - 1.0).abs() > SIZE_TOLERANCE;
     let is_sure = found.mismatch < GOOD.min(BETTER * found.ratio.ln().abs());
-    (is_scaled && is_sure).then(|| of_scale(views, robot, &found))
+    (is_scaled && is_sure).then(|| of_scale(views, family, &found))
 }
 
 fn wrong_by(as_written: &Pairs, input: WrongInputKind, otherwise: Option<f64>) -> WrongInput {
@@ -59,11 +64,11 @@ fn poses_otherwise(views: &[&View], tags: &[SurveyedTag], lens: &CameraModel) ->
 
 /// Meaning of a scale of all distances: the tags' size where they are seen in pixels; for positions, their unit or the
 /// detector's size.
-fn of_scale(views: &[&View], robot: &Robot, as_written: &Pairs) -> WrongInput {
+fn of_scale(views: &[&View], family: TagFamily, as_written: &Pairs) -> WrongInput {
     let ratio = as_written.ratio;
     let wrong = |input| wrong_by(as_written, input, None);
     let is_in_pixels = views.iter().any(|view| view.tags.iter().any(TagObservation::is_in_pixels));
-    let hint = || map::margin_hint(robot.tag_family, ratio);
+    let hint = || map::margin_hint(family, ratio);
     match (unit_of(ratio), unit_of(1.0 / ratio)) {
         (Some(unit), _) => wrong(WrongInputKind::MapUnit(unit.to_owned())),
         (None, Some(unit)) if !is_in_pixels => wrong(WrongInputKind::RecordedUnit(unit.to_owned())),

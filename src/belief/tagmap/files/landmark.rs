@@ -58,6 +58,8 @@ pub struct LandmarkFile {
     pub frame: String,
     /// `None` where the file names none.
     pub base_tag: Option<u32>,
+    /// The tag whose error all others share ([`TagSurvey::anchor_tag`]).
+    pub anchor_tag: Option<u32>,
     /// In the order of the file; each id once.
     pub landmarks: Vec<Landmark>,
 }
@@ -92,7 +94,8 @@ impl LandmarkFile {
         }
         let named = self.landmarks.iter().filter_map(|landmark| Some((landmark.id, landmark.name.clone()?)));
         let boards = self.landmarks.iter().filter_map(|landmark| Some((landmark.id, landmark.board?))).collect();
-        let survey = TagSurvey { base_tag, frame, family: None, tags };
+        let anchor_tag = self.anchor_tag.filter(|id| ids.contains(id));
+        let survey = TagSurvey { base_tag, anchor_tag, frame, family: None, tags };
         Ok(NamedSurvey { survey, names: named.collect(), boards })
     }
 }

@@ -40,7 +40,7 @@ fn of_tags(tags: &TagFile) -> LandmarkFile {
         }
     };
     let landmarks = tags.tags.iter().filter(|tag| tag.body == 0).map(landmark).collect();
-    LandmarkFile { frame: tags.frame.clone(), base_tag: tags.base_tag, landmarks }
+    LandmarkFile { frame: tags.frame.clone(), base_tag: tags.base_tag, anchor_tag: None, landmarks }
 }
 
 fn check(file: &Path, map: &LandmarkFile) -> Result<(), FileIssue> {

@@ -2,10 +2,10 @@
 //!
 //! `version = 1`, `kind = "tag_map"`, `frame`, and one `[[tag]]` each with `id` (or `name`, for a landmark that is not
 //! an AprilTag), `size_m`, `position_m`, `quaternion_wxyz` and `position_std_m`; all but the first may be absent.
-//! Further optional keys: `base_tag` and `default_size_m` (of tags without an entry) at the top; `rotation_std_rad` and
-//! `frame` of a tag in another frame than the file's, such as a separate group; `squares` and `square_m` of a
-//! chessboard or ChArUco board with a name, whose origin is an outer corner; `[[body]]` with `name` and `moving`, for
-//! frames that move.
+//! Further optional keys: `base_tag`, `anchor_tag` (whose error all others share) and `default_size_m` (of tags without
+//! an entry) at the top; `rotation_std_rad` and `frame` of a tag in another frame than the file's, such as a separate
+//! group; `squares` and `square_m` of a chessboard or ChArUco board with a name, whose origin is an outer corner;
+//! `[[body]]` with `name` and `moving`, for frames that move.
 
 use crate::tagmap::constants::files_own::MAX_SQUARES;
 use armcal_core::codes::Code;
@@ -16,6 +16,7 @@ use nalgebra::Isometry3;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use crate::model::shared_survey_error::{SharedSurveyError, Weights};
 use crate::tagmap::check::SIZE_RANGE_M;
 use crate::tagmap::files::landmark::{FIRST_NAMED_ID, Landmark, LandmarkFile};
 use crate::tagmap::files::tag_file::TagFile;
@@ -39,6 +40,8 @@ struct MapToml {
     frame: String,
     /// Number of the tag that defines the frame.
     base_tag: Option<u32>,
+    /// Number of the tag whose error all others share; their sigmas include it.
+    anchor_tag: Option<u32>,
     /// Edge of tags without an entry.
     #[schemars(range(min = 1e-3, max = 10.0))]
     default_size_m: Option<f64>,
@@ -140,7 +143,7 @@ pub(super) fn parse_landmarks(file: &Path, text: &str) -> Result<LandmarkFile, R
             board: board(file, tag, &key)?,
         });
     }
-    Ok(LandmarkFile { frame: raw.frame, base_tag: raw.base_tag, landmarks })
+    Ok(LandmarkFile { frame: raw.frame, base_tag: raw.base_tag, anchor_tag: raw.anchor_tag, landmarks })
 }
 
 /// `None` where the file says nothing of squares.
@@ -197,11 +200,29 @@ pub(super) fn parse(file: &Path, text: &str) -> Result<TagFile, RobotError> {
         };
         out.tags.push(TagPrior { id, size_m, body, pose, std: std(file, tag, &key)? });
     }
+    count_shared_error(&mut out.tags, raw.anchor_tag);
     if let Some(size_m) = raw.default_size_m {
         FileIssue::check_range(file, "default_size_m", size_m, SIZE_RANGE_M)?;
         out.default_tag = Some((size_m, 0));
     }
     Ok(out)
+}
+
+/// Gives the tags of a frame standard deviations under which they count as independent, although the error of
+/// `anchor_tag` is in all of them.
+fn count_shared_error(tags: &mut [TagPrior], anchor_tag: Option<u32>) {
+    let Some(anchor) = tags.iter().find(|tag| Some(tag.id) == anchor_tag) else { return };
+    let (Some((place, std)), body) = (anchor.pose.zip(anchor.std), anchor.body) else { return };
+    let largest = |of: &[f64]| of.iter().copied().fold(0.0, f64::max);
+    let (position_std_m, rotation_std_rad) = (largest(&std[..3]), largest(&std[3..]));
+    let shared = SharedSurveyError { anchor: place, position_std_m, rotation_std_rad };
+    let n_known = tags.iter().filter(|tag| tag.body == body && tag.pose.is_some()).count();
+    let weights = Weights::of(true, n_known - 1);
+    for tag in tags.iter_mut().filter(|tag| tag.body == body) {
+        if let (Some(pose), Some(std)) = (&tag.pose, &mut tag.std) {
+            *std = weights.independent(&shared, (pose, Some(tag.id) == anchor_tag), std);
+        }
+    }
 }
 
 fn pose(file: &Path, key: &str, position: [f64; 3], wxyz: [f64; 4]) -> Result<Isometry3<f64>, RobotError> {
@@ -234,11 +255,14 @@ fn body_of(out: &mut TagFile, bodies: &[BodyToml], frame: &str) -> usize {
     out.bodies.len() - 1
 }
 
-pub(super) fn to_text(groups: &[WrittenGroup]) -> String {
+pub(super) fn to_text(groups: &[WrittenGroup], anchor_tag: Option<u32>) -> String {
     let main = groups.first().map_or("base_link", |group| group.frame.as_str());
     let kind = Kind::TagMap.name();
     let mut out =
         format!("{}version = {VERSION}\nkind = \"{kind}\"\nframe = {}\n", first_line(Kind::TagMap), quoted(main));
+    if let Some(id) = anchor_tag {
+        let _ = writeln!(out, "anchor_tag = {id}");
+    }
     for group in groups.iter().filter(|group| !group.is_static) {
         let _ = writeln!(out, "\n[[body]]\nname = {}\nmoving = true", quoted(&group.frame));
     }

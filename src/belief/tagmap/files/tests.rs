@@ -288,7 +288,7 @@ fn group(frame: &str, ids: [u32; 2]) -> WrittenGroup {
 #[test]
 fn maps_that_are_written_read_back_the_same() {
     let groups = [group("base_link", [2, 5]), WrittenGroup { is_static: false, ..group("seafloor", [11, 12]) }];
-    for (name, text) in [("map.toml", own::to_text(&groups)), ("map.yaml", tagslam::to_text(&groups))] {
+    for (name, text) in [("map.toml", own::to_text(&groups, None)), ("map.yaml", tagslam::to_text(&groups))] {
         let file = tags(name, &text);
         assert_eq!(file.frame, "base_link", "{name}");
         let names: Vec<(&str, bool)> = file.bodies.iter().map(|body| (body.name.as_str(), body.is_static)).collect();
@@ -306,6 +306,23 @@ fn maps_that_are_written_read_back_the_same() {
             }
         }
     }
+}
+
+/// Of two tags the anchor has half the weight; those of another frame do not share its error.
+#[test]
+fn the_error_of_an_anchor_counts_in_every_tag_of_its_frame() {
+    let groups = [group("base_link", [2, 5]), group("seafloor", [11, 12])];
+    let [alone, anchored] = [None, Some(2)].map(|anchor| tags("map.toml", &own::to_text(&groups, anchor)));
+    let std = |file: &TagFile, id: u32| file.tags.iter().find(|tag| tag.id == id).and_then(|tag| tag.std).unwrap();
+    for id in [11, 12] {
+        assert_eq!(std(&anchored, id), std(&alone, id));
+    }
+    for (now, before) in std(&anchored, 2).iter().zip(std(&alone, 2)) {
+        let shared: f64 = if before > 5e-3 { 0.03 } else { 3e-3 };
+        let expected = (before * before + shared.min(before).powi(2)).sqrt();
+        assert!((now / expected - 1.0).abs() < 1e-9, "{now} {expected}");
+    }
+    assert!((0..6).all(|k| std(&anchored, 5)[k] > 1.5 * std(&alone, 5)[k]));
 }
 
 #[test]

@@ -1,7 +1,10 @@
 //! The solver against scenes of known truth.
 
+mod anchored;
 mod bodies;
 mod bound;
+mod checked;
+mod contradicted;
 mod corridor;
 mod data;
 mod fixture;
