@@ -194,8 +194,7 @@ fn u95_by_data(
 
 /// The links in one line are long enough for a target: with a failed joint the calibration is not to blame then.
 pub(crate) fn is_near(robot: &Robot, target_m: &[f64; 3]) -> bool {
-    let first_m = robot.chain.first_place().translation.vector;
-    (Vector3::from(*target_m) - first_m).norm() <= robot.reach_m()
+    robot.is_long_enough_for(&Vector3::from(*target_m))
 }
 
 /// The decision rule, by the recording alone.

@@ -9,7 +9,8 @@ use crate::follow::event::OnlineEvent;
 use crate::follow::settings::OnlineSettings;
 use crate::follow::view_stream::ViewStream;
 use crate::judge::{ErrorDistribution, MAX_RISK};
-use crate::solve::covariance::{JointAt, ParameterCovariance, task_angles};
+use crate::solve::covariance::{JointAt, ParameterCovariance};
+use crate::solve::task_angles::task_angles;
 use crate::views::view::{TaskRests, View};
 use armcal_core::robot::Robot;
 use armcal_core::sensor::{ArmSensors, Conditions};
@@ -115,7 +116,8 @@ impl Follower {
 
     /// The targets that tool errors are predicted at; where none is within reach, the stowed posture stays.
     pub fn set_task(&mut self, task: &ReachTask) {
-        let targets = task_angles(&self.robot, TaskRests { task, rests: &std::collections::BTreeMap::new() });
+        let rests = std::collections::BTreeMap::new();
+        let targets = task_angles(&self.robot, TaskRests { task, rests: &rests, views: &[] });
         self.tolerance_m = Some(task.tolerance_m);
         if !targets.is_empty() {
             self.targets = targets;

@@ -108,6 +108,15 @@ pub(crate) mod schur {
     pub(crate) const N_BODY_COLUMNS: usize = 7 * MAX_JOINTS + 4;
 }
 
+pub(crate) mod task_angles {
+    /// Targets are reached to this, m.
+    pub(crate) const TOLERANCE_M: f64 = 1e-4;
+    /// Views whose angles the inverse kinematics is started at. Assumed.
+    pub(crate) const N_NEAREST_VIEWS: usize = 8;
+    /// Starts at random where no other leads to the target. Assumed.
+    pub(crate) const N_RANDOM_STARTS: usize = 48;
+}
+
 pub(crate) mod time_error {
     /// Smallest variance of a moving arm's own joint error, rad^2; keeps the differences of inverses finite.
     pub(crate) const LEAST_OWN_VAR: f64 = 1e-14;

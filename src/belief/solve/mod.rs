@@ -21,5 +21,6 @@ pub(crate) mod prior_terms;
 pub(crate) mod problem;
 pub(crate) mod robust_start;
 pub(crate) mod schur;
+pub(crate) mod task_angles;
 pub(crate) mod time_error;
 pub(crate) mod tool_error;

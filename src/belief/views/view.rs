@@ -311,13 +311,15 @@ pub struct TaskRests<'a> {
     pub task: &'a ReachTask,
     /// By the target's number; those that were not reached for are absent.
     pub rests: &'a BTreeMap<u32, JointAngles>,
+    /// Views of the arm, at which it was, too.
+    pub views: &'a [View],
 }
 
 impl CaptureData {
     /// `None` without a task.
     #[must_use]
     pub fn task_rests(&self) -> Option<TaskRests<'_>> {
-        Some(TaskRests { task: self.task.as_ref()?, rests: &self.rests })
+        Some(TaskRests { task: self.task.as_ref()?, rests: &self.rests, views: &self.fit })
     }
 
     /// Widens `smallest_px` and `largest_px`; each corner once.

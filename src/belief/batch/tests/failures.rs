@@ -345,7 +345,7 @@ fn a_dead_sensor_is_refused_where_the_task_needs_it() {
             case.robot.chain.link_poses(&angles).frame(&case.robot.tool.mount).translation.vector.into()
         };
         let targets_m = case.views[..4].iter().map(tool_m).collect();
-        let task = ReachTask { stamp: Default::default(), targets_m, tolerance_m: 0.03 };
+        let task = ReachTask { stamp: Default::default(), targets_m, tolerance_m: 0.03, poses: Vec::new() };
         for (joint, declared, is_needed) in [(last, false, false), (last, true, false), (1, false, true)] {
             let mut broken = Case { robot: case.robot.clone(), truth: case.truth.clone(), views: case.views.clone() };
             random_words(&mut broken, joint, seed);
