@@ -4,7 +4,8 @@
 //! `conditions` the temperatures and the pressure under which it was captured, `dropouts` readings that are none.
 //! `external` does the same for recordings that mark no views, `pooling` for several recordings. `scale_identification`
 //! measures the scale of an unknown sensor; `data_checks` refuses unusable recordings; `error` says what is refused
-//! before any estimate; `marked_spans` reads what views are made of and leaves the rest in the file.
+//! before any estimate; `marked_spans` reads what views are made of and leaves the rest in the file; `motion` is what
+//! the sensors of a moving arm read about a view.
 
 pub(crate) mod association;
 pub(crate) mod calibration_data;
@@ -17,6 +18,7 @@ pub(crate) mod external;
 pub(crate) mod frame_consensus;
 pub(crate) mod marked_spans;
 pub(crate) mod message_index;
+pub(crate) mod motion;
 pub(crate) mod pooling;
 pub(crate) mod scale_identification;
 pub(crate) mod view;
