@@ -6,6 +6,8 @@ pub(crate) mod angles_by_camera {
     /// Candidates of one joint over its range, by how many joints are searched for in one view.
     pub(crate) const CANDIDATES: [usize; 3] = [90, 40, 16];
     pub(crate) const FINEST_STEP_RAD: f64 = 1e-4;
+    /// A camera mount with larger stated sigmas does not place the tags, m and rad.
+    pub(crate) const KNOWN_MOUNT: [f64; 2] = [0.05, 0.2];
 }
 
 pub(crate) mod baseline {
@@ -60,6 +62,10 @@ pub(crate) mod failure_detection {
     pub(crate) const MARGIN: f64 = 30.0;
     /// At most this many failures are looked for beyond those that the readings alone show.
     pub(crate) const MAX_FOUND: usize = 2;
+    /// Pairs of sensors that are estimated as failed: those that place the tags nearest to their survey. Assumed.
+    pub(crate) const MAX_PAIRS: usize = 6;
+    /// Views that choose those pairs, spread over all. Assumed.
+    pub(crate) const RANKED_VIEWS: usize = 12;
 }
 
 pub(crate) mod failure_pattern {
@@ -149,8 +155,6 @@ pub(crate) mod reading_search_hypothesis {
     /// Handicap of the frame of the tag map, which has six numbers: a turn about the first joint's axis is named
     /// behind that joint's zero, and always with it (chi-square of 5 is below this in 99 of 100 cases).
     pub(crate) const FRAME_HANDICAP: f64 = 15.0;
-    /// A camera mount with larger stated sigmas does not place the tags, m and rad.
-    pub(crate) const KNOWN_MOUNT: [f64; 2] = [0.05, 0.2];
     /// Excess over the half range from which a reading is on another turn, rad.
     pub(crate) const NEXT_TURN_RAD: f64 = 0.1;
     pub(crate) const ZERO_STD_RAD: f64 = 0.2;

@@ -17,6 +17,12 @@ pub(crate) mod estimate {
     pub(crate) const CONVERGED_CHANGE: f64 = 0.01;
     /// Rounds after the last new scales, in which outliers may still come and go.
     pub(crate) const LAST_ROUNDS: usize = 5;
+    /// Most rounds under given scales, where outliers alone come and go: good views settle in three (measured).
+    pub(crate) const ROUNDS_AS_GIVEN: usize = 12;
+    /// Most rounds where most observations are left out, under given scales and where scales are fitted: noise that is
+    /// many times the stated lets observations in by and by. Assumed.
+    pub(crate) const LITTLE_AS_GIVEN: usize = 8;
+    pub(crate) const LITTLE_AS_FITTED: usize = 20;
 }
 
 pub(crate) mod evidence {

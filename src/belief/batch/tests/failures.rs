@@ -457,6 +457,22 @@ fn two_failed_sensors_are_told_apart_over_20_arms() {
     assert!(told_apart(80..100) >= 19);
 }
 
+/// The pairs that are worth an estimate are few, and the pair that failed is among them.
+#[test]
+fn the_pair_that_failed_is_among_the_likely_ones() {
+    for seed in 80..90 {
+        let (a, b) = ((seed % 5) as usize, ((seed + 1 + seed / 5 % 4) % 5) as usize);
+        let mut case = case(seed, None);
+        random_words(&mut case, a, seed);
+        random_words(&mut case, b, seed + 1000);
+        let drawing = Drawing::default();
+        let search = FailureSearch { robot: &case.robot, views: &case.views, prior: None, drawing: &drawing };
+        let likely = search.likely_pairs(&[]);
+        assert_eq!(likely.len(), 6, "seed {seed}");
+        assert!(likely.contains(&[a.min(b), a.max(b)]), "seed {seed}: {likely:?} without {a} and {b}");
+    }
+}
+
 /// Counts the arms whose two failed sensors are both named.
 fn told_apart(seeds: std::ops::Range<u64>) -> usize {
     let mut told = 0;
