@@ -2,7 +2,8 @@
 //!
 //! `input` is what a solution takes, `model_for_views` says what has a column, `problem` puts views and priors into
 //! form, `linearize` sums the normal equations (views eliminated: `schur`), `levenberg_marquardt` solves them.
-//! `estimate` is the whole with outliers and the sizes that `evidence` fits; `covariance` what it means for the tool.
+//! `estimate` is the whole with outliers and the sizes that `evidence` fits; `covariance` what it means for the tool
+//! at the task's targets (`task_angles`).
 
 pub(crate) mod body_columns;
 pub(crate) mod body_motion;
