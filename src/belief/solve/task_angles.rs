@@ -190,7 +190,8 @@ mod tests {
     fn a_target_beyond_the_links_in_one_line_has_no_angles() {
         let robot = titan();
         let (_, mut task) = random_task(&robot, 5, 2);
-        task.targets_m[0] = [2.0 * robot.reach_m(), 0.0, 0.0];
+        let stowed = robot.chain.frame(&robot.stowed, &robot.tool.mount);
+        task.targets_m = vec![[2.0 * robot.reach_m(), 0.0, 0.0], stowed.translation.vector.into()];
         let numbered = numbered_task_angles(&robot, TaskRests { task: &task, rests: &BTreeMap::new(), views: &[] });
         assert_eq!(numbered.iter().map(|(idx, _)| *idx).collect::<Vec<_>>(), [1]);
     }
@@ -206,7 +207,8 @@ mod tests {
                 numbered_task_angles(robot, TaskRests { task: &task, rests: &BTreeMap::new(), views: &[] })
             };
             let as_given: Vec<(u32, JointAngles)> = (2..).zip(task.poses.iter().copied()).collect();
-            assert_eq!(angles(&robot)[2..], as_given[..], "seed {seed}");
+            let of_poses = angles(&robot).into_iter().filter(|(target_idx, _)| *target_idx >= 2);
+            assert_eq!(of_poses.collect::<Vec<_>>(), as_given, "seed {seed}");
             let locked = robot.clone().with_failed(&[FailedJoint { joint: 0, kind: FailedKind::Locked }]);
             assert!(angles(&locked).iter().all(|(_, at)| at[0] == locked.stowed[0]), "seed {seed}");
         }
