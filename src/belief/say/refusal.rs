@@ -341,6 +341,13 @@ pub enum Refusal {
         /// Views since the slip.
         views: usize,
     },
+    /// A sensor slipped during the capture, and the method knows no step.
+    SlipNotEstimated {
+        /// Name of the joint in the URDF.
+        joint: String,
+        /// What shows the slip, in words.
+        evidence: String,
+    },
     /// A sensor that reads the other way, or of another scale, and the rest does not fit with its gain estimated.
     SensorLine {
         /// The joint.
@@ -471,6 +478,10 @@ impl Refusal {
             | Self::CornerNoiseUnderstated { .. } => "",
             Self::TooFewViews { .. } | Self::PriorUntested => "capture more views",
             Self::TooFewViewsSinceSlip { .. } => "fasten the sensor on its shaft, then capture more views",
+            Self::SlipNotEstimated { .. } => {
+                "fasten the sensor on its shaft, then calibrate with --method bundle, which estimates the slip, or \
+                 capture anew"
+            }
             Self::NotSolved { .. } => "capture views that move each joint over more of its range",
             Self::TooFewHeldOutViews { .. } | Self::NoHeldOutTag => "hold out more views that show tags",
             Self::NoBetterThanDatasheet { .. } | Self::NoBetterThanBaseline { .. } => {
@@ -585,6 +596,7 @@ impl Coded for Refusal {
             Self::PriorUntested => Code::PriorUntested,
             Self::PriorContradicted { .. } => Code::PriorContradicted,
             Self::TooFewViewsSinceSlip { .. } => Code::TooFewViewsSinceSlip,
+            Self::SlipNotEstimated { .. } => Code::SlipNotEstimated,
             Self::SensorLine { .. } => Code::SensorLine,
             Self::SensorFailed { .. } => Code::SensorNeeded,
         }

@@ -168,6 +168,7 @@ codes! {
     PriorUntested = "prior_untested",
     PriorContradicted = "prior_contradicted",
     TooFewViewsSinceSlip = "too_few_views_since_slip",
+    SlipNotEstimated = "slip_not_estimated",
     SensorLine = "sensor_line",
     SensorNeeded = "sensor_needed",
     // Findings.

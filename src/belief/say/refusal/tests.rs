@@ -208,6 +208,7 @@ fn measured_of_repairs() -> Vec<Refusal> {
     vec![
         Refusal::TagSizeRepair { element: "tag 3".to_owned(), ratio: 0.015, stated_m: 9.9 },
         Refusal::TooFewViewsSinceSlip { joint: joint(), evidence: "it slipped".to_owned(), views: 4 },
+        Refusal::SlipNotEstimated { joint: joint(), evidence: "the sensor slipped by 1.00 deg".to_owned() },
         sensor_failed(),
     ]
 }

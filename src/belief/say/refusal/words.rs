@@ -41,6 +41,7 @@ impl Refusal {
             | Self::Nonlinearity { .. }
             | Self::SensorLine { .. }
             | Self::TooFewViewsSinceSlip { .. }
+            | Self::SlipNotEstimated { .. }
             | Self::Length { .. }
             | Self::Touch { .. } => self.fmt_of_arm(f),
             Self::Innovations { .. }
@@ -274,6 +275,9 @@ impl Refusal {
             }
             Self::TooFewViewsSinceSlip { joint, evidence, views } => {
                 write!(f, "{joint}: {evidence}; {views} views since then cannot calibrate it")
+            }
+            Self::SlipNotEstimated { joint, evidence } => {
+                write!(f, "{joint}: {evidence}; this method takes its offset as the same in all views")
             }
             Self::Length { what, key, measured_m, by_views_m, std_m } => {
                 let sigmas = (measured_m - by_views_m).abs() / std_m;
