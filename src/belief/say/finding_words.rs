@@ -118,6 +118,12 @@ pub(crate) fn lost_reading([n_off, n_since]: [usize; 2], number: u32) -> String 
     format!("the reading is off in {n_off} of the last {n_since} views, since view {number}")
 }
 
+/// A file whose status is `accepted` beside the reasons of a refusal.
+pub(crate) fn accepted_and_refused(refusal: Option<&str>) -> String {
+    let key = refusal.map_or("[[refusals]]", |_| "refusal");
+    format!("is `accepted`, but {key} says why the result was refused: it was edited; calibrate again")
+}
+
 /// A walk of an offset, so large over the views (std), and its effect.
 pub(crate) fn offset_walks(joint: &str, walked: &str) -> String {
     format!(
