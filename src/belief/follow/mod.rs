@@ -4,7 +4,7 @@
 //! starts from the first views by `bundle` and carries its belief on: `filter` is state and information,
 //! `process_noise` how fast sensors change. `diagnosis` races `hypothesis` against hypothesis where a view does not
 //! fit, each with a `branch` of the belief; `hindsight` gathers what looks minutes apart say of one place of a sensor's
-//! track; `event` tells what happened. `follower` is all of it, `belief_log` what it said over time; `oracle` and
+//! track; `event` tells what happened, `doubts` what speaks against all of it. `follower` is all of it, `belief_log` what it said over time; `oracle` and
 //! `batch` are what it is compared with.
 
 pub(crate) mod batch;
@@ -12,6 +12,7 @@ pub(crate) mod belief_log;
 pub(crate) mod branch;
 pub(crate) mod constants;
 pub(crate) mod diagnosis;
+pub(crate) mod doubts;
 pub(crate) mod estimator;
 pub(crate) mod event;
 pub(crate) mod filter;

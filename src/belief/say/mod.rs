@@ -1,10 +1,12 @@
 //! What is said of a calibration, and its words: the same in terminal, report, replay and files.
 //!
 //! `finding` is what was found to be other than stated, `refusal` why a result must not be used (`wrong_input`,
-//! `reading_error`, `geometry_error` are causes), `reservation` its limits. `repair` says what to do about a
-//! finding, `sensor_keys` which lines correct a reading. Their words are in this room and nowhere else.
+//! `reading_error`, `geometry_error` are causes), `reservation` its limits, `doubt` what speaks against an online
+//! belief. `repair` says what to do about a finding, `sensor_keys` which lines correct a reading. Their words are in
+//! this room and nowhere else.
 
 pub(crate) mod constants;
+pub(crate) mod doubt;
 pub(crate) mod finding;
 pub(crate) mod finding_words;
 pub(crate) mod geometry_error;

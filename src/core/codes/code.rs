@@ -233,6 +233,9 @@ codes! {
     ResultKept = "result_kept",
     NotCovered = "not_covered",
     NotIncluded = "not_included",
+    ImagesFrozen = "images_frozen",
+    BaseDoubtful = "base_doubtful",
+    LensChanged = "lens_changed",
 }
 
 /// Types that have a code: errors, refusals, findings.
