@@ -68,7 +68,7 @@ pub(super) fn line(follower: &Follower, row: &BeliefRow) -> String {
     format!("{} views, tool error {now}; in an hour {later}{health}{doubt}", row.views)
 }
 
-/// What speaks against the belief as a whole, with its code.
+/// Reason not to rely on the belief as a whole, with its code.
 fn doubt(follower: &Follower) -> Option<String> {
     follower.doubt().map(|doubt| format!("{doubt} [{}]", doubt.code()))
 }

@@ -1,4 +1,4 @@
-//! What contradicts the belief as a whole: repeated images, a base that moves on, a lens that was changed.
+//! Contradictions to the belief as a whole: repeated images, a base that moves on, a lens that was changed.
 //!
 //! Each explanation of a view is one thing that moved or failed once. Clocks that jump, images that stand still and
 //! another lens are none of these: they come out as large or repeated moves, after which the covariance means nothing.
@@ -13,14 +13,14 @@ use crate::views::conditions::apart_rad;
 use crate::views::view::View;
 use armcal_core::robot::Robot;
 
-/// What was seen so far that may contradict the belief.
+/// Images and events so far that may contradict the belief.
 #[derive(Clone, Default)]
 pub(crate) struct Doubts {
     /// The first view with the latest image.
     image: Option<View>,
     /// Views in a row that repeat it.
     n_frozen: usize,
-    /// Of the last views, each with the number of views at that time.
+    /// Events of the last views, each with the number of views at that time.
     recent: Vec<(usize, Finding)>,
     lasting: Option<Doubt>,
 }
@@ -46,7 +46,7 @@ impl Doubts {
         }
     }
 
-    /// What speaks against the belief now. Images may move again; what else happened is in the belief for good.
+    /// Returns the doubt that holds now. Images may move again; what else happened is in the belief for good.
     pub(crate) fn now(&self) -> Option<Doubt> {
         let frozen = (self.n_frozen >= FROZEN_VIEWS).then_some(Doubt::FrozenImages { views: self.n_frozen });
         frozen.or(self.lasting)

@@ -125,7 +125,7 @@ impl Follower {
         events
     }
 
-    /// What speaks against the belief as a whole, whatever its covariance says.
+    /// Reason not to rely on the belief as a whole, whatever its covariance says.
     #[must_use]
     pub fn doubt(&self) -> Option<Doubt> {
         self.doubts.now()

@@ -1,4 +1,4 @@
-//! What speaks against an online belief as a whole: the words.
+//! Doubts about an online belief as a whole, in words.
 
 use std::fmt;
 

@@ -118,6 +118,16 @@ pub(crate) fn lost_reading([n_off, n_since]: [usize; 2], number: u32) -> String 
     format!("the reading is off in {n_off} of the last {n_since} views, since view {number}")
 }
 
+/// Poses of a capture that the arm did not stand at: why there are few views.
+#[must_use]
+pub fn skipped_poses(skipped: usize, captured: usize) -> String {
+    format!(
+        "{skipped} of {} poses were skipped: the arm did not come to rest there, or did not get there; look for a \
+         locked joint, a dead sensor or weak hydraulics",
+        skipped + captured
+    )
+}
+
 /// A file whose status is `accepted` beside the reasons of a refusal.
 pub(crate) fn accepted_and_refused(refusal: Option<&str>) -> String {
     let key = refusal.map_or("[[refusals]]", |_| "refusal");

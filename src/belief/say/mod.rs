@@ -21,6 +21,7 @@ pub(crate) mod wrong_input;
 pub(crate) mod wrong_input_words;
 
 pub use finding::{Finding, FindingKind, FindingUnit};
+pub use finding_words::skipped_poses;
 pub(crate) use finding_words::{
     accepted_and_refused, drift, event, explanation, lost_reading, offset_walks, reading_in_views, slip,
 };
