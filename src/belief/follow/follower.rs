@@ -140,8 +140,8 @@ impl Follower {
         }
     }
 
-    /// Returns true where the decision rule accepts every target of the task, false under a [`Self::doubt`]; else `None`
-    /// without a task or an estimate.
+    /// Returns true where the decision rule accepts every target of the task, false under a [`Self::doubt`]; without a
+    /// doubt `None` where there is no task or no estimate.
     #[must_use]
     pub fn is_good_enough(&self) -> Option<bool> {
         if self.doubt().is_some() {
