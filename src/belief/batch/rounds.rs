@@ -17,6 +17,7 @@ use crate::explain::drawing::Drawing;
 use crate::explain::failure_detection::FailureSearch;
 use crate::explain::failures::Failure;
 use crate::explain::model_selection::{OptionalTerm, Selection};
+use crate::explain::moved_between::MotionSearch;
 use crate::explain::other_lens::lens_that_fits;
 use crate::explain::reading_search::ReadingSearch;
 use crate::explain::setup::{BundleSetup, Clocks, declared};
@@ -236,9 +237,12 @@ impl<'a> BundleCalibration<'a> {
     ];
 
     fn setup(&self, views: &[View], failures: &[Failure]) -> BundleSetup {
-        let clocks = if self.clock.is_some() { Clocks::Aligned } else { Clocks::AsStamped };
         let setup = BundleSetup::new(&self.data.robot, views, failures, self.prior);
-        setup.with_drawing(&self.drawing).with_clocks(clocks)
+        setup.with_drawing(&self.drawing).with_clocks(self.clocks())
+    }
+
+    fn clocks(&self) -> Clocks {
+        if self.clock.is_some() { Clocks::Aligned } else { Clocks::AsStamped }
     }
 
     fn failures(&self, views: &[View], declared: &[Failure], first: Option<&Estimate<'_>>) -> Vec<Failure> {
@@ -362,6 +366,12 @@ impl<'a> BundleCalibration<'a> {
         let is_of_line = |refusal: &Refusal| matches!(refusal, Refusal::SensorLine { .. } | Refusal::SensorUnit { .. });
         let is_of_scale = |refusal: &Refusal| is_of_line(refusal) || matches!(refusal, Refusal::BeyondDatasheet { .. });
         if calibration.refusals.iter().any(is_of_line) && calibration.refusals.iter().all(is_of_scale) {
+            return;
+        }
+        let (robot, views, drawing, clocks) = (&self.data.robot, &self.as_read[..], &self.drawing, self.clocks());
+        let motion = MotionSearch { robot, views, failures, drawing, clocks }.find(&calibration.refusals);
+        if motion.is_some() {
+            calibration.refuse_first_for(motion);
             return;
         }
         // A repair beyond its bound explains nothing.

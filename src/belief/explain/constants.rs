@@ -142,6 +142,21 @@ pub(crate) mod permutation_test {
     pub(crate) const LEAST_NEW: f64 = 1e-3;
 }
 
+pub(crate) mod moved_between {
+    /// One sigma of how far camera or tags may move between two views, m and rad. Assumed.
+    pub(crate) const MOVED_STD: [f64; 2] = [0.05, 0.1];
+    /// Views on either side of a gap: fewer say nothing of a motion's six numbers beside a slip. Assumed.
+    pub(crate) const MIN_SIDE: usize = 4;
+    /// About so many gaps are tried first. Assumed.
+    pub(crate) const FIRST_GAPS: usize = 8;
+    /// More views do not tell the gap better at first; they would cost time.
+    pub(crate) const MAX_VIEWS: usize = 40;
+    /// Evidence that a motion needs, nats: odds of e^30, as some hundred gaps of several movers are possible.
+    pub(crate) const MIN_GAIN_NATS: f64 = 30.0;
+    /// What the six numbers of a body of tags cost, nats: each is told to a hundredth of its size. Assumed.
+    pub(crate) const BODY_NATS: f64 = 28.0;
+}
+
 pub(crate) mod reading_search_hypothesis {
     /// Added to the score of a camera hypothesis, twice the logarithm of odds (assumed): where it explains the views as
     /// well as a sensor's zero does, the zero is named first.

@@ -1,14 +1,15 @@
 //! What is said of a calibration, and its words: the same in terminal, report, replay and files.
 //!
 //! `finding` is what was found to be other than stated, `refusal` why a result must not be used (`wrong_input`,
-//! `reading_error`, `geometry_error` are causes), `reservation` its limits. `repair` says what to do about a
-//! finding, `sensor_keys` which lines correct a reading. Their words are in this room and nowhere else.
+//! `reading_error`, `geometry_error`, `moved_body` are causes), `reservation` its limits. `repair` says what to do
+//! about a finding, `sensor_keys` which lines correct a reading. Their words are in this room and nowhere else.
 
 pub(crate) mod constants;
 pub(crate) mod finding;
 pub(crate) mod finding_words;
 pub(crate) mod geometry_error;
 pub(crate) mod length_unit;
+pub(crate) mod moved_body;
 pub(crate) mod reading_error;
 pub(crate) mod refusal;
 pub(crate) mod repair;

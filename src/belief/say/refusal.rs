@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::say::finding::FindingUnit;
 use crate::say::geometry_error::GeometryError;
 use crate::say::length_unit::unit_of;
+use crate::say::moved_body::MovedBody;
 use crate::say::reading_error::MisreadReadings;
 use crate::say::sensor_keys::Rescaled;
 use crate::say::wrong_input::WrongInput;
@@ -131,6 +132,20 @@ pub enum Refusal {
     WrongInput(WrongInput),
     /// Joint readings mean something else than the input map and robot.toml say.
     MisreadReadings(MisreadReadings),
+    /// Camera, base or tags moved while the views were captured.
+    MovedBetweenViews {
+        /// What moved.
+        body: MovedBody,
+        /// Name of the camera, where there are several.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        camera: Option<String>,
+        /// Numbers of the last view before it and of the first one after it.
+        views: [u32; 2],
+        /// How far it moved; a base or tags at the origin of the frame of the tag map.
+        shift_m: f64,
+        /// By how much it turned.
+        turn_rad: f64,
+    },
     /// Another link geometry explains the data, and joint sensors do not.
     Geometry(GeometryError),
     /// An element of the geometry departs from its nominal pose by more than a repair may.
@@ -413,8 +428,8 @@ impl Refusal {
     /// Which reason is told first: what makes all others a consequence. Those of one rank stay in their order.
     pub(crate) fn rank(&self) -> u8 {
         match self {
-            // A wrong file explains why few views are left.
-            Self::WrongInput(_) => 0,
+            // A wrong file or a motion explains why few views are left.
+            Self::WrongInput(_) | Self::MovedBetweenViews { .. } => 0,
             Self::TooFewViews { .. } | Self::TooFewViewsSinceSlip { .. } => 1,
             Self::MisreadReadings(_) | Self::Lens { .. } | Self::PriorReused => 2,
             // Under a prior that does not hold, links and sensors seem to be off.
@@ -428,9 +443,12 @@ impl Refusal {
         }
     }
 
-    /// A wrong file or reading, which the further reasons follow from: what they advise is moot.
+    /// A wrong file or reading, or a motion, which the further reasons follow from: what they advise is moot.
     fn explains_others(&self) -> bool {
-        matches!(self, Self::WrongInput(_) | Self::MisreadReadings(_) | Self::Lens { .. })
+        matches!(
+            self,
+            Self::WrongInput(_) | Self::MisreadReadings(_) | Self::MovedBetweenViews { .. } | Self::Lens { .. }
+        )
     }
 
     /// What to do about it.
@@ -469,6 +487,7 @@ impl Refusal {
             | Self::SensorLine { .. }
             | Self::SensorUnit { .. }
             | Self::CornerNoiseUnderstated { .. } => "",
+            Self::MovedBetweenViews { body, .. } => body.remedy(),
             Self::TooFewViews { .. } | Self::PriorUntested => "capture more views",
             Self::TooFewViewsSinceSlip { .. } => "fasten the sensor on its shaft, then capture more views",
             Self::NotSolved { .. } => "capture views that move each joint over more of its range",
@@ -566,6 +585,7 @@ impl Coded for Refusal {
             Self::PriorsBeyondTolerance { .. } => Code::PriorsBeyondTolerance,
             Self::WrongInput(wrong) => wrong.code(),
             Self::MisreadReadings(misread) => misread.code(),
+            Self::MovedBetweenViews { .. } => Code::MovedBetweenViews,
             Self::Geometry(_) => Code::GeometryContradicted,
             Self::RepairTooLarge { .. } | Self::TagSizeRepair { .. } => Code::RepairTooLarge,
             Self::Lens { .. } => Code::LensContradicted,

@@ -151,6 +151,7 @@ codes! {
     InputMapUnit = "input_map_unit",
     InputPoseUnit = "input_pose_unit",
     MapFrame = "map_frame",
+    MovedBetweenViews = "moved_between_views",
     RepairTooLarge = "repair_too_large",
     LensContradicted = "lens_contradicted",
     GeometryContradicted = "geometry_contradicted",

@@ -2,7 +2,8 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use crate::batch::tests::data::{Noise, Truth, reference, rng, titan, titan_with_gripper_tag, views};
+use crate::batch::tests::data::{Noise, Truth, reference, rng, titan, titan_with_gripper_tag, views, watched_titan};
+use crate::batch::tests::statistics;
 use crate::model::parameters::JointParameters;
 use crate::model::scales::Hyperparameters;
 use crate::say::reservation::Reservation;

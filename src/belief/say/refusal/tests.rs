@@ -24,6 +24,7 @@ fn the_words_of_each_reason() {
     all.extend([geometry(), contradicted(), touch(), length(), Refusal::PriorReused, Refusal::PriorSingular]);
     all.push(Refusal::PriorUntested);
     all.extend(of_stated_angles());
+    all.extend(motions());
     let mut words: Vec<String> = all.iter().map(ToString::to_string).collect();
     words.extend(in_words(&all[..2]));
     insta::assert_snapshot!("refusals", words.join("\n"));
@@ -42,6 +43,14 @@ fn the_advice_of_a_wrong_input_is_the_only_one() {
             assert!(words.contains(&reason.cause()) && words.contains(&*reason.remedy()) == (k < n), "{words}");
         }
     }
+}
+
+fn motions() -> [Refusal; 4] {
+    use MovedBody::{BaseOrTags, Camera, CarriedTags, StandingCamera};
+    [(Camera, Some("elbow")), (StandingCamera, None), (BaseOrTags, None), (CarriedTags, None)].map(|(body, name)| {
+        let camera = name.map(str::to_owned);
+        Refusal::MovedBetweenViews { body, camera, views: [20, 21], shift_m: 0.0102, turn_rad: 0.015 }
+    })
 }
 
 fn geometry() -> Refusal {

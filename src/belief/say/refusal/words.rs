@@ -35,6 +35,7 @@ impl Refusal {
             | Self::BeyondDatasheet { .. } => self.fmt_of_size(f),
             Self::WrongInput(_)
             | Self::MisreadReadings(_)
+            | Self::MovedBetweenViews { .. }
             | Self::Geometry(_)
             | Self::SensorUnit { .. }
             | Self::SensorError { .. }
@@ -244,6 +245,9 @@ impl Refusal {
         match self {
             Self::WrongInput(wrong) => write!(f, "{wrong}"),
             Self::MisreadReadings(misread) => write!(f, "{misread}"),
+            Self::MovedBetweenViews { body, camera, views, shift_m, turn_rad } => {
+                body.fmt_motion(f, (camera.as_deref(), *views), [*shift_m, *turn_rad])
+            }
             Self::Geometry(geometry) => write!(f, "{geometry}"),
             Self::SensorUnit { joint, gain, moves, .. } => {
                 let [small, large] = if moves.is_slide() { ["mm", "m"] } else { ["deg", "rad"] };
