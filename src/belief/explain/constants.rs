@@ -29,6 +29,8 @@ pub(crate) mod calibration_prior {
     /// The normal's 0.999 quantile, and that of 0.001 shared by some eight joints' two sides.
     pub(crate) const Z_999: f64 = 3.090;
     pub(crate) const Z_OF_JOINTS: f64 = 3.9;
+    /// One sigma of where a camera may hang that was mounted anew, m and rad. Assumed.
+    pub(crate) const MOUNTED_ANEW_STD: [f64; 2] = [0.05, 0.2];
     /// From this share on, in tenfold steps, no more is added and the matrix has no inverse. Assumed.
     pub(crate) const MAX_ROUNDING: f64 = 0.1;
 }

@@ -346,6 +346,9 @@ pub enum Refusal {
         /// How many joints are off by more than chance.
         #[serde(default)]
         joints_off: usize,
+        /// How far the camera was moved since, where that alone explains it.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        camera_moved: Option<CameraMoved>,
     },
     /// A sensor slipped, and too few views show it as it is now.
     TooFewViewsSinceSlip {
@@ -383,6 +386,15 @@ pub enum Refusal {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         tolerance_m: Option<f64>,
     },
+}
+
+/// A camera that was mounted anew.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct CameraMoved {
+    /// How far it was shifted.
+    pub shift_m: f64,
+    /// By how much it was turned.
+    pub turn_rad: f64,
 }
 
 /// Source of the limit of a held-out error.
@@ -538,6 +550,9 @@ impl Refusal {
             Self::Length { .. } => "measure again, and correct this length or the tags' size_m in robot.toml",
             Self::PriorReused => "give a prior that was made from other views",
             Self::PriorSingular => "make the prior again",
+            Self::PriorContradicted { camera_moved: Some(_), .. } => {
+                "put the camera back, or calibrate without --prior from as many views as the first time"
+            }
             Self::PriorContradicted { .. } => "calibrate without --prior",
         }
     }

@@ -25,6 +25,7 @@ fn the_words_of_each_reason() {
     all.push(Refusal::PriorUntested);
     all.extend(of_stated_angles());
     all.extend(motions());
+    all.push(camera_mounted_anew());
     let mut words: Vec<String> = all.iter().map(ToString::to_string).collect();
     words.extend(in_words(&all[..2]));
     insta::assert_snapshot!("refusals", words.join("\n"));
@@ -76,6 +77,29 @@ fn contradicted() -> Refusal {
         limit: 22.0,
         used_share: 0.4,
         joints_off: 1,
+        camera_moved: None,
+    }
+}
+
+fn camera_mounted_anew() -> Refusal {
+    match contradicted() {
+        Refusal::PriorContradicted { joint, off_rad, off_std_rad, moves, chi2, degrees_of_freedom, limit, .. } => {
+            let camera_moved = Some(CameraMoved { shift_m: 0.0269, turn_rad: 0.1025 });
+            let (used_share, joints_off) = (0.1, 6);
+            Refusal::PriorContradicted {
+                joint,
+                off_rad,
+                off_std_rad,
+                moves,
+                chi2,
+                degrees_of_freedom,
+                limit,
+                used_share,
+                joints_off,
+                camera_moved,
+            }
+        }
+        other => other,
     }
 }
 

@@ -5,7 +5,7 @@ use std::fmt;
 use crate::judge::baseline_comparison::SIGNIFICANCE;
 use crate::say::constants::refusal_words::MORE_DIGITS_BELOW;
 use crate::say::length_unit::unit_of;
-use crate::say::refusal::{HeldOutLimitSource, MIN_USED_SHARE, Refusal, with_advice};
+use crate::say::refusal::{CameraMoved, HeldOutLimitSource, MIN_USED_SHARE, Refusal, with_advice};
 use crate::say::wrong_input_words::medium_of_lens;
 use armcal_core::codes::Coded;
 use armcal_core::robot::FailedKind;
@@ -332,6 +332,11 @@ impl Refusal {
             Self::PriorReused => write!(f, "the prior was made from the same messages, which must not count twice"),
             Self::PriorSingular => write!(f, "the prior's covariance has no inverse"),
             Self::PriorUntested => write!(f, "the views determine too little to be tested against the prior"),
+            Self::PriorContradicted { camera_moved: Some(CameraMoved { shift_m, turn_rad }), .. } => {
+                let (shift_mm, turn_deg) = (1e3 * shift_m, turn_rad.to_degrees());
+                write!(f, "the new views contradict the prior: the camera was mounted anew since, {shift_mm:.1} mm ")?;
+                write!(f, "and {turn_deg:.2} deg from where it was; the sensors are as they were")
+            }
             Self::PriorContradicted { joints_off: 0, used_share, .. } if *used_share < MIN_USED_SHARE => {
                 let percent = 100.0 * used_share;
                 write!(
