@@ -34,6 +34,7 @@ use crate::positions::unobservable::grouped_names;
 use crate::say::refusal::Refusal;
 use crate::say::wrong_input::WrongInput;
 use crate::solve::covariance::{ParameterCovariance, task_angles};
+use crate::solve::details::TargetPrediction;
 use crate::solve::estimate::{Estimate, estimate};
 use crate::solve::input::{BundleInput, HyperparameterMode};
 use crate::tagmap::tag_mapping::map_unknown_tags;
@@ -620,6 +621,13 @@ impl<'a> BundleCalibration<'a> {
         let most = calibration.reservations.first().map(|reservation| reservation.what.clone());
         calibration.refuse_for(refusal_by_priors(&by_data_alone, &calibration.u95, most));
         calibration.restate_risk();
+        calibration.advise_survey(diagnosis.robot.is_watched(), |index| {
+            let target = by_data.targets.iter().find(|target| target.target_idx == index);
+            let keys = |target: &TargetPrediction| {
+                estimated.by_views().keys_that_hold(&target.angles, target.covariance_m2.trace())
+            };
+            target.map_or_else(Vec::new, keys)
+        });
     }
 
     /// Whether the views agree with the prior, and what that refuses for.

@@ -206,7 +206,8 @@ fn refusal_by_risk(u95: &U95Table) -> Option<Refusal> {
     }
     let TargetU95 { index, u95_m, p_beyond_tolerance, .. } = *u95.beyond()?;
     let (u95_m, probability) = u95_m.zip(p_beyond_tolerance)?;
-    Some(Refusal::BeyondTolerance { target: index + 1, probability, u95_m, tolerance_m: u95.tolerance_m? })
+    let (target, tolerance_m, survey, is_watched) = (index + 1, u95.tolerance_m?, Vec::new(), false);
+    Some(Refusal::BeyondTolerance { target, probability, u95_m, tolerance_m, survey, is_watched })
 }
 
 /// The decision rule with stated sigmas included, where the recording alone is within it; `most` is their largest part.

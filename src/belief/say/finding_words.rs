@@ -108,6 +108,11 @@ pub(crate) fn slip(step: &str, [n_before, n]: [usize; 2], number: u32) -> String
     format!("the sensor slipped by {step} after {n_before} of {n} views, before view {number}")
 }
 
+/// `offset_std_rad of wrist_yaw`.
+pub(crate) fn key_of_joint(key: &str, joint: &str) -> String {
+    format!("{key} of {joint}")
+}
+
 /// `the reading is off in 3 of 20 views (2, 9, 15)`; `what`: what is wrong with it there.
 pub(crate) fn reading_in_views(what: &str, [n_there, n]: [usize; 2], numbers: &[String]) -> String {
     format!("the reading {what} in {n_there} of {n} views ({})", numbers.join(", "))

@@ -20,6 +20,8 @@ pub(crate) mod wrong_input;
 pub(crate) mod wrong_input_words;
 
 pub use finding::{Finding, FindingKind, FindingUnit};
-pub(crate) use finding_words::{drift, event, explanation, lost_reading, offset_walks, reading_in_views, slip};
+pub(crate) use finding_words::{
+    drift, event, explanation, key_of_joint, lost_reading, offset_walks, reading_in_views, slip,
+};
 pub use repair::{FailedJoint, Repair, repairs};
 pub use sentence::sentence;

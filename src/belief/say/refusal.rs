@@ -82,6 +82,12 @@ pub enum Refusal {
         u95_m: f64,
         /// The task's tolerance.
         tolerance_m: f64,
+        /// Keys of robot.toml with the sigmas that are most of it: what they state no view tells.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        survey: Vec<String>,
+        /// Whether the camera stands still.
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        is_watched: bool,
     },
     /// Stated sigmas of unobservable parameters make it exceed the tolerance.
     PriorsBeyondTolerance {
@@ -486,6 +492,12 @@ impl Refusal {
                  [{x:.1}, {y:.1}] for [camera] of robot.toml"
             )
             .into(),
+            Self::BeyondTolerance { survey, is_watched, .. } if !survey.is_empty() => {
+                let otherwise = if *is_watched { "" } else { ", or put a tag on the gripper" };
+                let keys = survey.join(", ");
+                format!("measure what no view tells and state its smaller sigma in robot.toml ({keys}){otherwise}")
+                    .into()
+            }
             _ => self.usual_remedy().into(),
         }
     }
@@ -500,7 +512,9 @@ impl Refusal {
             | Self::SensorUnit { .. }
             | Self::CornerNoiseUnderstated { .. } => "",
             Self::MovedBetweenViews { body, .. } => body.remedy(),
-            Self::TooFewViews { .. } | Self::PriorUntested => "capture more views",
+            Self::TooFewViews { .. } | Self::PriorUntested | Self::BeyondTolerance { is_watched: true, .. } => {
+                "capture more views"
+            }
             Self::TooFewViewsSinceSlip { .. } => "fasten the sensor on its shaft, then capture more views",
             Self::NotSolved { .. } => "capture views that move each joint over more of its range",
             Self::TooFewHeldOutViews { .. } | Self::NoHeldOutTag => "hold out more views that show tags",
@@ -511,6 +525,10 @@ impl Refusal {
             Self::PriorsBeyondTolerance { most: Some(most), .. } if most.starts_with("tag survey") => {
                 "measure the frame of the tags in the arm's base and state its sigmas in [geometry] of robot.toml, or \
                  touch three surveyed surfaces (step `touch`)"
+            }
+            Self::PriorsBeyondTolerance { most: Some(most), .. } if most.starts_with("camera mount") => {
+                "measure where the camera is and state its smaller sigmas in [camera] of robot.toml (mount_std_m, \
+                 mount_std_rad), or touch three surveyed surfaces (step `touch`)"
             }
             Self::PriorsBeyondTolerance { .. } => {
                 "put a tag on the gripper, touch three surveyed surfaces (step `touch`), or measure the arm and state \

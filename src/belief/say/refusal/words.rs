@@ -97,7 +97,7 @@ impl Refusal {
     fn fmt_of_decision(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mm = |m: f64| m * 1e3;
         match self {
-            Self::BeyondTolerance { target, probability, u95_m, tolerance_m } => {
+            Self::BeyondTolerance { target, probability, u95_m, tolerance_m, .. } => {
                 let [u95, tolerance] = told_apart_mm([*u95_m, *tolerance_m]);
                 let percent = percent(*probability);
                 write!(
