@@ -8,6 +8,7 @@
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use crate::explain::constants::moved_between::{BODY_NATS, FIRST_GAPS, MAX_VIEWS, MIN_GAIN_NATS, MIN_SIDE, MOVED_STD};
+use crate::explain::constants::tags_freed::FREED_STD;
 use crate::explain::drawing::Drawing;
 use crate::explain::failure_detection::{is_suspicious, score};
 use crate::explain::failures::{Failure, FailureAdjusted};
@@ -58,19 +59,33 @@ impl MotionSearch<'_> {
         if !refusals.iter().any(may_follow_from_motion) {
             return None;
         }
-        // The tag on the gripper belongs to the first camera alone.
-        let views: Vec<View> = self.views.iter().map(|view| View { gripper_tag: None, ..view.clone() }).collect();
-        let motions = self.movers().into_iter().filter_map(|mover| self.likeliest(mover, &views));
-        let best = motions.max_by(|a, b| a.nats.total_cmp(&b.nats))?;
-        let is_likely = best.nats - self.nats_in_one(&views)? > MIN_GAIN_NATS;
-        is_likely.then(|| self.named(&best))
+        let with_gain = |mover: Mover| {
+            let views = self.views_of(mover);
+            let motion = self.likeliest(mover, &views)?;
+            let gain_nats = motion.nats - self.nats_in_one(&views)?;
+            (gain_nats > MIN_GAIN_NATS).then_some((gain_nats, motion))
+        };
+        let motions = self.movers().into_iter().filter_map(with_gain);
+        motions.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, motion)| self.named(&motion))
+    }
+
+    /// The views without what says nothing of `mover`: the tag on the gripper belongs to the first camera alone, and a
+    /// tag that was freed of its survey goes anywhere by itself.
+    fn views_of(&self, mover: Mover) -> Vec<View> {
+        let mut views = self.views.to_vec();
+        for view in &mut views {
+            view.gripper_tag = None;
+            if mover == Mover::Tags {
+                view.tags.retain(|seen| self.robot.tags[seen.tag_idx].position_std_m < FREED_STD);
+            }
+        }
+        views
     }
 
     fn movers(&self) -> Vec<Mover> {
         let n_cameras = 1 + self.robot.further_cameras.len();
         let cameras = (0..n_cameras).filter(|_| n_cameras < MAX_CAMERAS).map(Mover::Camera);
-        let seen = || self.views.iter().flat_map(|view| &view.tags).map(|seen| &self.robot.tags[seen.tag_idx]);
-        cameras.chain(seen().all(SurveyedTag::is_known).then_some(Mover::Tags)).collect()
+        cameras.chain([Mover::Tags]).collect()
     }
 
     /// Indices of the views that tell of `mover`, in the order of time.
