@@ -99,7 +99,7 @@ impl MotionSearch<'_> {
         order
     }
 
-    /// The evidence for views of which nothing moved on, with all that was found of sensors and drawing.
+    /// Evidence for the views if nothing moved, with all that was found of sensors and drawing.
     fn nats_in_one(&self, views: &[View]) -> Option<f64> {
         let setup = BundleSetup::new(self.robot, views, self.failures, None);
         let setup = setup.with_drawing(self.drawing).with_clocks(self.clocks);
@@ -140,7 +140,7 @@ impl MotionSearch<'_> {
         }
     }
 
-    /// Cost of one view of `stride` with a motion at `gap`.
+    /// Score of every `stride`-th view with a motion at `gap`.
     fn score_of_gap(&self, mover: Mover, views: &[View], order: &[usize], (gap, stride): (usize, usize)) -> f64 {
         let (robot, split) = split(self.robot, mover, views, &order[gap..]);
         let some: Vec<View> = order.iter().step_by(stride).map(|&k| split[k].clone()).collect();
