@@ -10,8 +10,8 @@ use armcal_core::log::ros::{
 use armcal_core::log::{RawMessage, RosMessage, decode, is_type};
 use armcal_core::time::Stamp;
 
-/// Messages of a topic that are decoded.
-const MAX_SAMPLES: u64 = 1000;
+use crate::report::inspection::MAX_SAMPLES;
+
 /// Times of one topic that are kept: 16 bytes each.
 const MAX_TIMES: usize = 2_000_000;
 /// Topics, and names or frames of one topic, that are kept.
