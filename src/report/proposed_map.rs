@@ -11,6 +11,7 @@ use armcal_core::schema::first_line;
 use armcal_core::text::printable;
 
 mod contents;
+pub(in crate::report) mod joint_units;
 mod joints;
 mod tags;
 

@@ -22,6 +22,8 @@ const STOOD_RAD: f64 = 0.12;
 const MOVED_RAD: f64 = 0.3;
 /// Angles in radians are smaller.
 const LARGEST_RAD: f64 = 7.0;
+/// A count of a sensor that counts radians is one to this. Assumed: scales are written with seven digits or more.
+const ONE_RAD: f64 = 1e-6;
 /// LeRobot's numbers are single precision.
 const ROUNDED: f64 = 1e-3;
 
@@ -38,7 +40,7 @@ pub(super) fn check_unit(
     if let Some(lerobot) = &map.lerobot {
         check_lerobot(file, map, lerobot, (robot, readings))?;
     }
-    let stated = map.joint_unit;
+    let stated = stated_unit(map, robot);
     let values = Values { stated, lines: &map.joint_lines, sensors: &robot.sensors[..n_needed(robot)], readings };
     if stated != JointUnit::Counts {
         values.check_slides(file, map.joint_lines.slide_unit)?;
@@ -66,6 +68,13 @@ pub(super) fn check_unit(
             stated.name()
         )
     }))
+}
+
+/// The unit of the map; radians, where the robot's sensors count these.
+fn stated_unit(map: &InputMap, robot: &Robot) -> JointUnit {
+    let counts_rad = |spec: &JointSensorSpec| (spec.counts_per_rad - 1.0).abs() < ONE_RAD && spec.offset_counts == 0.0;
+    let are_rad = map.lerobot.is_none() && robot.sensors.iter().all(counts_rad);
+    if map.joint_unit == JointUnit::Counts && are_rad { JointUnit::Rad } else { map.joint_unit }
 }
 
 /// Refuses ticks that no number of LeRobot's stands for.
@@ -242,7 +251,14 @@ mod tests {
 
     /// The arm at six poses; `recorded` has a joint and its angle in rad.
     fn checked(keys: &str, recorded: impl Fn(usize, f64) -> f64) -> Result<Option<String>, InputError> {
-        let robot = titan();
+        checked_of(&titan(), keys, recorded)
+    }
+
+    fn checked_of(
+        robot: &Robot,
+        keys: &str,
+        recorded: impl Fn(usize, f64) -> f64,
+    ) -> Result<Option<String>, InputError> {
         let text = format!(
             "version = 1\nkind = \"input\"\n[joint_sensors]\ntopic = \"/j\"\n{keys}\n[tags]\ntopic = \"/t\"\nuse = \
              \"corners\"\n"
@@ -259,7 +275,7 @@ mod tests {
             digest: [0; 32],
         };
         let readings: Vec<Reading> = (0..6).map(reading).collect();
-        check_unit("run.mcap", &map, &robot, &readings)
+        check_unit("run.mcap", &map, robot, &readings)
     }
 
     /// Its angles in rad times `factor`, read as `unit`.
@@ -283,6 +299,18 @@ mod tests {
             );
             assert!(checked("unit = \"deg\"", recorded).is_ok(), "{wrapped}");
         }
+    }
+
+    /// Without a unit in the map, numbers are what the sensors count.
+    #[test]
+    fn degrees_are_refused_without_a_unit_where_the_sensors_count_radians() {
+        let mut robot = titan();
+        for spec in &mut robot.sensors {
+            (spec.counts_per_rad, spec.offset_counts) = (1.0, 0.0);
+        }
+        assert!(matches!(checked_of(&robot, "", |_, angle_rad| angle_rad), Ok(None)));
+        let found = checked_of(&robot, "", |_, angle_rad| angle_rad.to_degrees());
+        assert!(matches!(found, Err(InputError::Unit { likely: JointUnit::Deg, .. })), "{found:?}");
     }
 
     /// The factors that the error names make the numbers angles.

@@ -6,16 +6,18 @@ use super::pair::{LookedAt, ProposedJoin, TablePair, apart_s, pair};
 use super::roles::{Columns, Roles, unit_of_time};
 use super::text::{cell_of, gaps, missing_joints, missing_seen};
 use super::winding::Windings;
+use crate::report::proposed_map::joint_units::{JointUnits, StatedUnits};
 use crate::report::proposed_map::{ProposalError, comment, quoted};
 use armcal_core::input::{TableColumn, TableContents, TableFormat, parse_input_map};
 use armcal_core::kind::Kind;
-use armcal_core::robot::Robot;
+use armcal_core::robot::{JointSensorSpec, Robot};
 use armcal_core::schema::first_line;
 
-/// No joint of an arm turns more than two turns either way.
-const MAX_RAD: f64 = 4.0 * std::f64::consts::PI;
-/// A robot folder whose readings are radians has one count per radian.
-const RADIANS_WITHIN: f64 = 1e-6;
+/// Units in the names of columns.
+const DEGREES: [&str; 2] = ["deg", "\u{b0}"];
+const MILLIMETRES: [&str; 3] = ["[mm", "(mm", "_mm"];
+/// The line for a unit that the table does not show.
+const AS_SENSORS: &str = "# unit: as the robot's sensors count; or \"rad\", \"deg\"";
 /// No camera of an arm sees a tag farther away, m; larger numbers are millimetres. Assumed.
 const MAX_DISTANCE_M: f64 = 20.0;
 /// Rotation vectors and angles in radians are smaller.
@@ -182,20 +184,28 @@ fn joints(table: &TableContents, roles: &Roles, robot: Option<&Robot>) -> String
     if !renamed.is_empty() {
         text += &format!("names = {{ {} }}   # the robot's joint = its column\n", renamed.join(", "));
     }
-    let largest = largest(table, roles.joints.iter().map(|(_, column)| column));
-    let in_rad =
-        robot.map(|robot| robot.sensors.iter().all(|s| (s.counts_per_rad.abs() - 1.0).abs() <= RADIANS_WITHIN));
-    let says = |words: &[&str]| {
-        let names = roles.joints.iter().map(|(_, column)| column.to_lowercase());
-        !roles.joints.is_empty() && names.into_iter().all(|name| words.iter().any(|word| name.contains(word)))
+    let Some(robot) = robot else {
+        let says_deg = !roles.joints.is_empty() && roles.joints.iter().all(|(_, column)| says(column, &DEGREES));
+        let line = if says_deg { "unit = \"deg\"" } else { AS_SENSORS };
+        let largest = largest(table, roles.joints.iter().map(|(_, column)| column));
+        return text + &format!("{line}   # the largest value is {largest:.4}\n");
     };
-    let unit = match (largest <= MAX_RAD, in_rad) {
-        _ if says(&["deg", "\u{b0}"]) => "unit = \"deg\"",
-        (true, Some(false)) => "unit = \"rad\"",
-        (false, Some(true)) => "unit = \"deg\"",
-        _ => "# unit: as the robot's sensors count; or \"rad\", \"deg\"",
+    let column = |spec: &JointSensorSpec| roles.joints.iter().find(|(joint, _)| *joint == spec.joint).map(|(_, c)| c);
+    let say = |is_slide: bool, words: &[&str]| {
+        let of_kind = robot.sensors.iter().filter(|spec| spec.moves.is_slide() == is_slide);
+        let columns: Vec<&String> = of_kind.filter_map(column).collect();
+        !columns.is_empty() && columns.into_iter().all(|column| says(column, words))
     };
-    text + &format!("{unit}   # the largest value is {largest:.4}\n")
+    let stated = StatedUnits { deg: say(false, &DEGREES), mm: say(true, &MILLIMETRES) };
+    let units = JointUnits::of(robot, stated, |spec| column(spec).map(|column| largest(table, [column])));
+    let line = units.unit.map_or_else(|| AS_SENSORS.to_owned(), |unit| format!("unit = \"{unit}\""));
+    text + &format!("{line}   # the largest value is {:.4}\n", units.largest) + units.slide_line()
+}
+
+/// A column whose name has one of these words.
+fn says(column: &str, words: &[&str]) -> bool {
+    let name = column.to_lowercase();
+    words.iter().any(|word| name.contains(word))
 }
 
 fn list(names: &[String]) -> String {

@@ -3,15 +3,11 @@
 use std::cmp::Reverse;
 
 use armcal_core::log::topics;
-use armcal_core::robot::{Robot, likely_name};
+use armcal_core::robot::{JointSensorSpec, Robot, likely_name};
 
 use super::contents::{Contents, Kind, Topic};
+use super::joint_units::{JointUnits, MAX_RAD, StatedUnits};
 use super::{others, quoted};
-
-/// No joint of an arm turns more than two turns either way.
-const MAX_RAD: f64 = 4.0 * std::f64::consts::PI;
-/// A robot folder whose readings are radians has one count per radian.
-const RADIANS_WITHIN: f64 = 1e-6;
 
 /// The topic and the text of `[joint_sensors]`; the error is that there is no topic (`None`), or what is wrong with
 /// them all.
@@ -49,16 +45,29 @@ pub(super) fn choose_joints(contents: &Contents, robot: Option<&Robot>) -> Resul
     Ok((name.clone(), text))
 }
 
+/// The line of the unit, and that of slides.
 fn unit(topic: &Topic, robot: Option<&Robot>) -> String {
-    let looks_like_rad = topic.largest <= MAX_RAD;
-    let is_in_rad =
-        |robot: &Robot| robot.sensors.iter().all(|spec| (spec.counts_per_rad.abs() - 1.0).abs() <= RADIANS_WITHIN);
-    let values = format!("the largest value is {:.4}", topic.largest);
-    match robot {
-        Some(robot) if looks_like_rad && !is_in_rad(robot) => {
+    let Some(robot) = robot else {
+        let values = format!("the largest value is {:.4}", topic.largest);
+        return match topic.largest <= MAX_RAD {
+            true => format!("# unit: {values}, as radians have it; taken as the robot's sensors count\n"),
+            false => format!("# unit: {values}, as raw counts or degrees have it; for degrees write unit = \"deg\"\n"),
+        };
+    };
+    let largest = |spec: &JointSensorSpec| {
+        likely_name(&spec.joint, &topic.joints).and_then(|name| topic.largest_of.get(name)).copied()
+    };
+    let units = JointUnits::of(robot, StatedUnits::default(), largest);
+    let values = format!("the largest value is {:.4}", units.largest);
+    let line = match units.unit {
+        Some("rad") => {
             format!("unit = \"rad\"   # {values}; robot.toml counts otherwise. Raw readings would be \"counts\"\n")
         }
-        _ if looks_like_rad => format!("# unit: {values}, as radians have it; taken as the robot's sensors count\n"),
-        _ => format!("# unit: {values}, as raw counts or degrees have it; for degrees write unit = \"deg\"\n"),
-    }
+        Some(unit) => format!("unit = \"{unit}\"   # {values}, beyond radians\n"),
+        None if units.largest <= MAX_RAD => {
+            format!("# unit: {values}, as radians have it; taken as the robot's sensors count\n")
+        }
+        None => format!("# unit: {values}, as raw counts or degrees have it; for degrees write unit = \"deg\"\n"),
+    };
+    line + units.slide_line()
 }
