@@ -34,6 +34,8 @@ pub struct ExternalRecording {
     pub clock_doubt: Option<String>,
     /// Sentences on what was read in another way than the messages say.
     pub notes: Vec<String>,
+    /// Times that were earlier than the row before in a table, whose rows were sorted.
+    pub rows_sorted: u64,
     /// Number of messages that hold no data of use, by reason.
     pub skipped: BTreeMap<String, u64>,
     /// Number of unused messages by reason.
