@@ -8,7 +8,7 @@ use super::text::{cell_of, gaps, missing_joints, missing_seen};
 use super::winding::Windings;
 use crate::report::proposed_map::joint_units::{JointUnits, StatedUnits};
 use crate::report::proposed_map::{ProposalError, comment, quoted};
-use armcal_core::input::{TableColumn, TableContents, TableFormat, parse_input_map};
+use armcal_core::input::{MIN_APART_S, TableColumn, TableContents, TableFormat, parse_input_map};
 use armcal_core::kind::Kind;
 use armcal_core::robot::{JointSensorSpec, Robot};
 use armcal_core::schema::first_line;
@@ -166,10 +166,29 @@ fn time(table: &TableContents, roles: &Roles) -> String {
     let largest = found.range.map_or_else(String::new, |[_, high]| cell_of(found.n_dates, high));
     let unit = unit_of_time(found).0;
     let line = format!("time = {{ column = {}, unit = \"{unit}\" }}   # up to {largest}\n", quoted(name));
-    if found.is_rising && found.n_empty + found.n_others == 0 {
+    let is_whole = found.n_empty + found.n_others == 0;
+    if found.is_rising && is_whole {
         return line;
     }
+    if is_whole && are_poses(table, roles, (name, unit_of_time(found).1)) {
+        return format!("{line}# `calibrate` sorts the rows, some of which are out of the order of time\n");
+    }
     format!("# {line}# the column has gaps or goes backwards; rows count as 1 s apart\n")
+}
+
+/// True where rows of one time have the same joints, and others are apart as poses at rest are.
+fn are_poses(table: &TableContents, roles: &Roles, (name, unit_s): (&String, f64)) -> bool {
+    let columns: Vec<Vec<&str>> =
+        roles.joints.iter().map(|(_, column)| table.first_cells(column).collect::<Vec<_>>()).collect();
+    let joints = |row: usize| columns.iter().map(move |cells| cells.get(row).copied()).collect::<Vec<_>>();
+    let times = table.first_cells(name).enumerate();
+    let mut rows: Vec<(f64, usize)> = times.filter_map(|(row, cell)| Some((cell.parse().ok()?, row))).collect();
+    rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let is_pose = |two: &[(f64, usize)]| match unit_s * (two[1].0 - two[0].0) {
+        0.0 => joints(two[0].1) == joints(two[1].1),
+        apart_s => apart_s >= MIN_APART_S,
+    };
+    rows.len() > 1 && rows.windows(2).all(is_pose)
 }
 
 fn joints(table: &TableContents, roles: &Roles, robot: Option<&Robot>) -> String {
@@ -253,6 +272,7 @@ fn tags(table: &TableContents, roles: &Roles) -> String {
         let or = match *form {
             "rotation_vector" => "   # or \"fixed_xyz\", angles about the fixed axes x, y, z",
             "fixed_xyz" => "   # roll, pitch, yaw",
+            "quaternion_xyzw" if columns.names[0].ends_with(".0") => "   # or \"quaternion_wxyz\"",
             _ => "",
         };
         text += &format!("rotation = [{}]\nrotation_form = \"{form}\"{or}\n", list(&columns.names));
