@@ -21,6 +21,12 @@ pub(super) fn choose_joints(contents: &Contents, robot: Option<&Robot>) -> Resul
     let (name, topic) = contents.of_kind(Kind::Joints).max_by_key(rank).ok_or(None)?;
     let missing: Vec<&String> =
         wanted[..n_needed].iter().filter(|joint| likely_name(joint, &topic.joints).is_none()).collect();
+    if topic.joints.is_empty() && topic.without_positions > 0 {
+        return Err(Some(format!(
+            "no topic has joint readings: the messages on {name} have no positions, only velocities or efforts. Record \
+             the topic of the joint state broadcaster with positions"
+        )));
+    }
     if !missing.is_empty() {
         return Err(Some(format!(
             "no topic has the joints {missing:?} of the robot; nearest is {name} with {:?}. Write \
