@@ -66,10 +66,10 @@ fn unit(topic: &Topic, robot: Option<&Robot>) -> String {
     let units = JointUnits::of(robot, StatedUnits::default(), largest);
     let values = format!("the largest value is {:.4}", units.largest);
     let line = match units.unit {
-        Some("rad") => {
+        Some("rad") if !units.are_slides_mm => {
             format!("unit = \"rad\"   # {values}; robot.toml counts otherwise. Raw readings would be \"counts\"\n")
         }
-        Some(unit) => format!("unit = \"{unit}\"   # {values}, beyond radians\n"),
+        Some(unit) => format!("unit = \"{unit}\"   # {values}\n"),
         None if units.largest <= MAX_RAD => {
             format!("# unit: {values}, as radians have it; taken as the robot's sensors count\n")
         }
