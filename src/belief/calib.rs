@@ -46,4 +46,5 @@ pub mod online {
         Batch, BeliefLine, BeliefLog, BeliefRow, DriftModel, Fault, FaultSearch, Follower, OnlineEstimator,
         OnlineEvent, OnlineSettings, Oracle, OracleGain, TagSet, ViewStream,
     };
+    pub use crate::say::doubt::Doubt;
 }

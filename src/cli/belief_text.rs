@@ -3,7 +3,7 @@
 use crate::cli::exit::{Exit, UsageError};
 use crate::cli::stdout::warn;
 use armcal_belief::calib::online::{BeliefRow, Follower};
-use armcal_core::codes::Code;
+use armcal_core::codes::{Code, Coded};
 use armcal_core::stats::Summary;
 
 /// Estimate at the end, with a note on the tags that were not used.
@@ -40,11 +40,12 @@ fn mm(summary: &Summary) -> String {
 
 /// Summary of the estimate at the end.
 pub(super) fn summary(follower: &Follower, row: &BeliefRow) -> String {
-    let health = match follower.is_good_enough() {
+    let doubt = doubt(follower).map(|doubt| format!("not good enough: {doubt}"));
+    let health = doubt.as_deref().unwrap_or(match follower.is_good_enough() {
         Some(true) => "good enough for the task, as far as the sensors go (links and tool point are taken as drawn)",
         Some(false) => "not good enough for the task: views are needed",
         None => "no task is named: no limit to compare with",
-    };
+    });
     format!(
         "views        {}\n\
          tool error   {} over the targets now\n             {} over the targets in an hour without views\n\
@@ -63,7 +64,13 @@ pub(super) fn line(follower: &Follower, row: &BeliefRow) -> String {
         None => "",
     };
     let (now, later) = (mm(&row.tool_error_m), mm(&row.tool_error_in_an_hour_m));
-    format!("{} views, tool error {now}; in an hour {later}{health}", row.views)
+    let doubt = doubt(follower).map(|doubt| format!(": {doubt}")).unwrap_or_default();
+    format!("{} views, tool error {now}; in an hour {later}{health}{doubt}", row.views)
+}
+
+/// Reason not to rely on the belief as a whole, with its code.
+fn doubt(follower: &Follower) -> Option<String> {
+    follower.doubt().map(|doubt| format!("{doubt} [{}]", doubt.code()))
 }
 
 /// Exit by the estimate at the end; `else_by_data` if it is good enough or has no limit.

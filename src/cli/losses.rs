@@ -72,6 +72,13 @@ pub(super) fn warn_of_external(recording: &ExternalRecording, robot: &Robot) -> 
     for (what, n) in &recording.skipped {
         warn(Code::MessagesRejected, format_args!("{file}: {n} {what} skipped"));
     }
+    if recording.rows_sorted > 0 {
+        let n = recording.rows_sorted;
+        warn(
+            Code::StampsDisordered,
+            format_args!("{file}: {n} rows have earlier times than the row before; all were sorted"),
+        );
+    }
     for note in &recording.notes {
         warn(Code::StampsReplaced, format_args!("{file}: {note}"));
     }

@@ -20,6 +20,9 @@ use armcal_core::robot::{
 };
 use armcal_core::text::counted;
 
+/// No arm reaches farther, m. Assumed: Canadarm2 on the space station has 17.6 m.
+const MAX_REACH_M: f64 = 30.0;
+
 #[derive(Debug, Args)]
 pub(super) struct NewRobotArgs {
     /// URDF of the arm; meshes are searched in its folder and in the folders above
@@ -193,6 +196,11 @@ fn write(files: &[NewFile], folder: &Path) -> Result<()> {
     Ok(output::write_together(&files)?)
 }
 
+/// True for a reach that no arm has, m.
+fn is_beyond_arms(reach_m: f64) -> bool {
+    reach_m > MAX_REACH_M
+}
+
 fn described(files: &[NewFile], robot: &Robot, left_out: &[String], out: &Path) -> String {
     let camera = &robot.camera.name;
     let mut text = format!(
@@ -210,6 +218,13 @@ fn described(files: &[NewFile], robot: &Robot, left_out: &[String], out: &Path) 
             "\nassumed: left out as a gripper's or a carriage's joints: {joints}. Name --base and --tip to keep them"
         ));
     }
+    let reach_m = robot.chain.joints().iter().map(|joint| joint.parent_from_joint.translation.vector.norm()).sum();
+    if is_beyond_arms(reach_m) {
+        text.push_str(&format!(
+            "\nwarning: the joints lie {reach_m:.0} m apart in all, and lengths of a URDF are metres; divide them by \
+             1000 where they are millimetres"
+        ));
+    }
     for warning in &robot.urdf_warnings {
         text.push_str(&format!("\nwarning: {warning}"));
     }
@@ -222,4 +237,17 @@ fn described(files: &[NewFile], robot: &Robot, left_out: &[String], out: &Path) 
         out.display()
     ));
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Reaches in metres, and with millimetres taken for metres.
+    #[test]
+    fn lengths_in_millimetres_are_told_from_those_of_the_longest_arms() {
+        for reach_m in [0.3, 0.9, 2.4, 17.6] {
+            assert!(!is_beyond_arms(reach_m) && is_beyond_arms(1e3 * reach_m), "{reach_m}");
+        }
+    }
 }

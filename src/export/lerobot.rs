@@ -13,6 +13,9 @@ use armcal_core::input::InputMap;
 use armcal_core::robot::{FileIssue, Robot};
 use armcal_core::sensor::{ArmSensors, SensorModel};
 
+/// Smallest difference of two zeros, deg: two ticks of 4096 a turn.
+const APART_DEG: f64 = 0.18;
+
 /// A calibration JSON of LeRobot, and the parts of the calibration that it cannot hold.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LerobotHomings {
@@ -43,10 +46,12 @@ pub fn lerobot_homings(
     for (joint, model) in sensors.models.iter().enumerate() {
         let recorded = map.recorded_name(&model.spec.joint);
         let middle = given.middle_tick(recorded)?;
-        let ahead = model.counts(SensorModel::nominal(&robot.sensors[joint]).angle_rad(middle)) - middle;
+        let middle_rad = SensorModel::nominal(&robot.sensors[joint]).angle_rad(middle);
+        let ahead = model.counts(middle_rad) - middle;
         let turn = model.spec.wrap_counts;
         homed.rehome(recorded, middle + ahead - turn * (ahead / turn).round(), middle)?;
         not_held.extend(gain_in_words(robot, joint, model));
+        not_held.extend(zero_in_words(&model.spec.joint, middle_rad.to_degrees()));
     }
     let terms = joints_with_terms(sensors).map(|joint| format!("the terms of {joint}"));
     let links = calibration.link.iter().map(|link| format!("the link correction of {}", link.joint));
@@ -57,4 +62,21 @@ pub fn lerobot_homings(
     let written = homed.serialize(&mut Serializer::with_formatter(&mut text, PrettyFormatter::with_indent(b"    ")));
     let text = written.ok().and_then(|()| String::from_utf8(text).ok()).unwrap_or_default();
     Ok(LerobotHomings { text, left_out: not_held })
+}
+
+/// Names a joint whose zero by robot.toml, `middle_deg` from the middle of its range, is not LeRobot's.
+fn zero_in_words(joint: &str, middle_deg: f64) -> Option<String> {
+    let is_apart = middle_deg.abs() > APART_DEG;
+    is_apart.then(|| format!("the zero of {joint}: LeRobot's 0 deg will be {middle_deg:.2} deg of {joint}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_zero_that_is_not_the_middle_of_the_range_is_named() {
+        assert!([0.0, 0.04, -0.04].into_iter().all(|deg| zero_in_words("elbow_flex", deg).is_none()));
+        assert!([-5.98, 90.0].into_iter().all(|deg| zero_in_words("elbow_flex", deg).is_some()));
+    }
 }

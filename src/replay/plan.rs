@@ -107,7 +107,7 @@ impl PlanMessages<'_> {
         let PlanInput { plan, task, .. } = *self.input;
         let (targets_m, tolerance_m) = (task.targets_m.clone(), task.tolerance_m);
         let stamp = self.stamp();
-        self.push(Message::Task(ReachTask { stamp, targets_m, tolerance_m }));
+        self.push(Message::Task(ReachTask { stamp, targets_m, tolerance_m, poses: Vec::new() }));
         self.joint_state(&JointAngles::from_slice(&plan.start_rad));
         let dwell_s = plan.totals.arm_time_s - plan.pose.last().map_or(0.0, |pose| pose.arm_time_s);
         for (pose, path) in plan.pose.iter().zip(&plan.path) {

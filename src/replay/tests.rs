@@ -184,7 +184,8 @@ fn fabricate(dir: &Path, n_views: u32) -> (PathBuf, PathBuf) {
         error_rad: ERROR_BEFORE_RAD,
     };
     let targets_m = vec![[0.9, 0.4, -0.3], [1.1, 0.0, -0.1], [1.0, 0.7, 0.0], [1.2, 0.3, 0.2]];
-    let task = ReachTask { stamp: SIMULATION_EPOCH, targets_m: targets_m.clone(), tolerance_m: 0.01 };
+    let task =
+        ReachTask { stamp: SIMULATION_EPOCH, targets_m: targets_m.clone(), tolerance_m: 0.01, poses: Vec::new() };
     fabric.record(&Message::Task(task));
     fabric.phase(Phase::Plan);
     fabric.say(LogLevel::Info, "reach task before calibration, 4 targets");

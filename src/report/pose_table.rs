@@ -6,6 +6,8 @@
 mod pair;
 mod proposal;
 mod roles;
+#[cfg(test)]
+mod tests;
 mod text;
 mod winding;
 

@@ -11,6 +11,7 @@ use armcal_core::schema::first_line;
 use armcal_core::text::printable;
 
 mod contents;
+pub(in crate::report) mod joint_units;
 mod joints;
 mod tags;
 
@@ -57,7 +58,7 @@ pub fn propose_input_map(recording: &Path, robot: Option<&Robot>) -> Result<Stri
         None => missing("joint readings (sensor_msgs/msg/JointState)"),
         Some(problem) => ProposalError::Joints { file: file.clone(), problem },
     })?;
-    let (tag_topic, tags) = choose_tags(&contents).ok_or_else(|| missing(TAG_TYPES))?;
+    let (tag_topic, tags) = choose_tags(&contents, robot).ok_or_else(|| missing(TAG_TYPES))?;
     let mut text = format!(
         "{}# Proposed by `armcal inspect --write-input` for {}.\n# Look at each choice; \
          docs/reference/real-arms.md says what the keys mean.\nversion = 1\nkind = \"input\"\n",

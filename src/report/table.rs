@@ -10,8 +10,9 @@ use crate::report::summary::{
 use crate::report::verdict::{attention, beside_refusal, repairs};
 use crate::score::{ReachScore, ScoreSide};
 use armcal_belief::calib::{
-    CameraMount, FailedJointTable, FurtherCamera, MapResult, PriorTable, Status, SurveyCoverage,
+    CameraMount, FailedJointTable, FurtherCamera, MapResult, PriorTable, Refusal, Status, SurveyCoverage,
 };
+use armcal_belief::say::skipped_poses;
 use armcal_core::codes::{Code, Warning};
 use armcal_core::stats::Summary;
 use armcal_core::text::counted;
@@ -258,8 +259,18 @@ fn repaired(summary: &RunSummary) -> String {
 
 /// The first further fault that may be the cause of a refusal.
 fn beside(summary: &RunSummary) -> String {
+    let CaptureSummary { poses, poses_skipped, .. } = summary.capture;
+    if let Some(why) = few_views(&summary.refusals, [poses_skipped, poses]) {
+        return format!("; also: {why}");
+    }
     let first = beside_refusal(summary).into_iter().next();
     first.map_or_else(String::new, |repair| format!("; also: {}; {} [{}]", repair.cause, repair.remedy, repair.code))
+}
+
+/// Returns the cause of a refusal for too few views if poses were skipped.
+fn few_views(refusals: &[Refusal], [skipped, captured]: [usize; 2]) -> Option<String> {
+    let is_for_few = matches!(refusals.first(), Some(Refusal::TooFewViews { .. }));
+    (is_for_few && skipped > 0).then(|| skipped_poses(skipped, captured))
 }
 
 /// Number of views, counts of what was rejected, and the reason that the capture ended.
@@ -495,5 +506,13 @@ mod tests {
         let both: Vec<_> = [(1, 50.0), (3, 6.0), (1, 3.04), (7, 1.96)].iter().map(renewal).collect();
         let lines = [&both[..], &both[..2], &[]].map(|renewals| stop_reason_line("so", renewals));
         insta::assert_snapshot!("stop_reasons", lines.join("\n"));
+    }
+
+    #[test]
+    fn skipped_poses_are_told_beside_too_few_views_alone() {
+        let few = [Refusal::TooFewViews { views: 6, parameters: 10 }];
+        assert!(few_views(&few, [6, 8]).is_some_and(|why| why.contains("6 of 14")));
+        assert_eq!(few_views(&few, [0, 8]), None);
+        assert_eq!(few_views(&[Refusal::NoHeldOutTag], [6, 8]), None);
     }
 }

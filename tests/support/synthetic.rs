@@ -190,6 +190,7 @@ impl<'a> TrueArm<'a> {
             stamp: SIMULATION_EPOCH,
             targets_m: vec![[0.500, 1.620, 0.323], [1.242, -0.887, 0.457], [0.595, -0.966, -0.015]],
             tolerance_m: 0.05,
+            poses: Vec::new(),
         };
         let mut messages = vec![(SIMULATION_EPOCH, Message::Task(task))];
         for (k, shot) in shots.iter().enumerate() {

@@ -8,6 +8,7 @@ use armcal_core::streams::{Mark, MarkKind, Message, PriorSource};
 use armcal_core::time::Stamp;
 
 use crate::batch::rounds::{BundleCalibration, EstimateListener, EstimatePurpose};
+use crate::batch::slips_in_views::refuse_slips;
 use crate::batch::slips_since::slips_since;
 use crate::file::calibration::{Calibration, Status};
 use crate::methods::calibration::calibrate_positions;
@@ -173,7 +174,9 @@ pub fn calibrate_data(
         CalibrationMethod::Positions { method, solve } => {
             data.data.keep_first_camera();
             check_views(&data)?;
-            calibrate_positions(data, (method, solve), prior)
+            let mut calibration = calibrate_positions(data.clone(), (method, solve), prior)?;
+            refuse_slips(&mut calibration, data);
+            Ok(calibration)
         }
     }
 }

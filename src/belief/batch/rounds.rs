@@ -17,6 +17,7 @@ use crate::explain::drawing::Drawing;
 use crate::explain::failure_detection::{FailureSearch, is_suspicious};
 use crate::explain::failures::Failure;
 use crate::explain::model_selection::{OptionalTerm, Selection};
+use crate::explain::moved_between::MotionSearch;
 use crate::explain::other_lens::{lens_that_fits, of_better_model};
 use crate::explain::reading_search::ReadingSearch;
 use crate::explain::setup::{BundleSetup, Clocks, declared};
@@ -35,9 +36,11 @@ use crate::positions::unobservable::grouped_names;
 use crate::say::reading_error::MisreadReadings;
 use crate::say::refusal::Refusal;
 use crate::say::wrong_input::WrongInput;
-use crate::solve::covariance::{ParameterCovariance, task_angles};
+use crate::solve::covariance::ParameterCovariance;
+use crate::solve::details::TargetPrediction;
 use crate::solve::estimate::{Estimate, estimate};
 use crate::solve::input::{BundleInput, HyperparameterMode};
+use crate::solve::task_angles::task_angles;
 use crate::tagmap::tag_mapping::map_unknown_tags;
 use crate::views::calibration_data::CalibrationData;
 use crate::views::error::CalibError;
@@ -243,9 +246,12 @@ impl<'a> BundleCalibration<'a> {
     ];
 
     fn setup(&self, views: &[View], failures: &[Failure]) -> BundleSetup {
-        let clocks = if self.clock.is_some() { Clocks::Aligned } else { Clocks::AsStamped };
         let setup = BundleSetup::new(&self.data.robot, views, failures, self.prior);
-        setup.with_drawing(&self.drawing).with_clocks(clocks)
+        setup.with_drawing(&self.drawing).with_clocks(self.clocks())
+    }
+
+    fn clocks(&self) -> Clocks {
+        if self.clock.is_some() { Clocks::Aligned } else { Clocks::AsStamped }
     }
 
     fn failures(&self, views: &[View], declared: &[Failure], first: Option<&Estimate<'_>>) -> Vec<Failure> {
@@ -372,6 +378,12 @@ impl<'a> BundleCalibration<'a> {
         let is_of_line = |refusal: &Refusal| matches!(refusal, Refusal::SensorLine { .. } | Refusal::SensorUnit { .. });
         let is_of_scale = |refusal: &Refusal| is_of_line(refusal) || matches!(refusal, Refusal::BeyondDatasheet { .. });
         if calibration.refusals.iter().any(is_of_line) && calibration.refusals.iter().all(is_of_scale) {
+            return;
+        }
+        let (robot, views, drawing, clocks) = (&self.data.robot, &self.as_read[..], &self.drawing, self.clocks());
+        let motion = MotionSearch { robot, views, failures, drawing, clocks }.find(&calibration.refusals);
+        if motion.is_some() {
+            calibration.refuse_first_for(motion);
             return;
         }
         // A repair beyond its bound explains nothing.
@@ -632,6 +644,13 @@ impl<'a> BundleCalibration<'a> {
         let most = calibration.reservations.first().map(|reservation| reservation.what.clone());
         calibration.refuse_for(refusal_by_priors(&by_data_alone, &calibration.u95, most));
         calibration.restate_risk();
+        calibration.advise_survey(diagnosis.robot.is_watched(), |index| {
+            let target = by_data.targets.iter().find(|target| target.target_idx == index);
+            let keys = |target: &TargetPrediction| {
+                estimated.by_views().keys_that_hold(&target.angles, target.covariance_m2.trace())
+            };
+            target.map_or_else(Vec::new, keys)
+        });
     }
 
     /// Whether the views agree with the prior, and what that refuses for.

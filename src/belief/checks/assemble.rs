@@ -194,8 +194,7 @@ fn u95_by_data(
 
 /// The links in one line are long enough for a target: with a failed joint the calibration is not to blame then.
 pub(crate) fn is_near(robot: &Robot, target_m: &[f64; 3]) -> bool {
-    let first_m = robot.chain.first_place().translation.vector;
-    (Vector3::from(*target_m) - first_m).norm() <= robot.reach_m()
+    robot.is_long_enough_for(&Vector3::from(*target_m))
 }
 
 /// The decision rule, by the recording alone.
@@ -206,7 +205,8 @@ fn refusal_by_risk(u95: &U95Table) -> Option<Refusal> {
     }
     let TargetU95 { index, u95_m, p_beyond_tolerance, .. } = *u95.beyond()?;
     let (u95_m, probability) = u95_m.zip(p_beyond_tolerance)?;
-    Some(Refusal::BeyondTolerance { target: index + 1, probability, u95_m, tolerance_m: u95.tolerance_m? })
+    let (target, tolerance_m, survey, is_watched) = (index + 1, u95.tolerance_m?, Vec::new(), false);
+    Some(Refusal::BeyondTolerance { target, probability, u95_m, tolerance_m, survey, is_watched })
 }
 
 /// The decision rule with stated sigmas included, where the recording alone is within it; `most` is their largest part.

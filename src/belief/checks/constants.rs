@@ -79,6 +79,11 @@ pub(crate) mod reservations_lens {
     pub(crate) const N: usize = 7;
 }
 
+pub(crate) mod held_by_prior {
+    /// Share of the tool's variance that would be gone with a parameter known exactly, from which on it is most of it.
+    pub(crate) const LEAST_SHARE: f64 = 0.5;
+}
+
 pub(crate) mod reservations {
     /// Share of the prior's variance that the views leave, above which an element counts as unseen.
     pub(crate) const UNSEEN_SHARE: f64 = 0.5;

@@ -10,6 +10,7 @@ pub(crate) mod consistency;
 pub(crate) mod constants;
 pub(crate) mod cross_validation;
 pub(crate) mod drawing_report;
+pub(crate) mod held_by_prior;
 pub(crate) mod innovations;
 pub(crate) mod marginal;
 pub(crate) mod noise_checks;

@@ -1,6 +1,6 @@
 //! The angles of joints whose sensor says nothing, as the tags of a view show them.
 
-use crate::explain::constants::angles_by_camera::{CANDIDATES, FINEST_STEP_RAD, SEARCH_WIDTH_M};
+use crate::explain::constants::angles_by_camera::{CANDIDATES, FINEST_STEP_RAD, KNOWN_MOUNT, SEARCH_WIDTH_M};
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::Robot;
 
@@ -70,4 +70,9 @@ pub(crate) fn distance_cost(robot: &Robot, view: &View, angles: &JointAngles) ->
         (off_m.norm_squared() / SEARCH_WIDTH_M.powi(2)).ln_1p()
     };
     view.tags.iter().map(of_tag).sum()
+}
+
+/// True where the stated sigmas of the camera mount are within [`KNOWN_MOUNT`].
+pub(crate) fn has_known_mount(robot: &Robot) -> bool {
+    robot.camera.mount_std_m <= KNOWN_MOUNT[0] && robot.camera.mount_std_rad <= KNOWN_MOUNT[1]
 }

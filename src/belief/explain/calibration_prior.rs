@@ -10,10 +10,10 @@
 //! as many degrees of freedom as S has eigenvalues above `TOLD_SHARE` in units of P0.
 
 use crate::explain::constants::calibration_prior::{
-    LEAST_SLIP_STD_RAD, MAX_ROUNDING, ROUNDING, USUAL_DRIFT_STD_RAD_PER_SQRT_H, Z_999, Z_OF_JOINTS,
+    LEAST_SLIP_STD_RAD, MAX_ROUNDING, MOUNTED_ANEW_STD, ROUNDING, USUAL_DRIFT_STD_RAD_PER_SQRT_H, Z_999, Z_OF_JOINTS,
 };
 use crate::explain::constants::tags_departure::TOLD_SHARE;
-use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen, Vector6};
+use nalgebra::{Cholesky, DMatrix, DVector, Isometry3, SymmetricEigen, Vector6};
 
 use crate::explain::failures::{Failure, FailureAdjusted};
 use crate::file::calibration::Calibration;
@@ -22,7 +22,7 @@ use crate::model::estimated::Model;
 use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::model::prior::{JointPrior, steps_of};
 use crate::model::scales::Hyperparameters;
-use crate::say::refusal::{MIN_USED_SHARE, Refusal};
+use crate::say::refusal::{CameraMoved, MIN_USED_SHARE, Refusal};
 use crate::solve::estimate::{Estimate, estimate};
 use crate::solve::input::{BundleInput, HyperparameterMode};
 use crate::solve::model_for_views::reference;
@@ -36,6 +36,7 @@ pub const MOUNT_ROWS: [&str; 6] =
     ["camera mount x", "camera mount y", "camera mount z", "camera mount rx", "camera mount ry", "camera mount rz"];
 
 /// An earlier calibration as the estimator takes it.
+#[derive(Clone)]
 pub struct CalibrationPrior {
     /// With the camera where the prior found it, and its lens as the prior has it.
     pub robot: Robot,
@@ -72,6 +73,8 @@ pub struct PriorConsistency {
     pub used_share: f64,
     /// How many joints are off by more than chance.
     pub joints_off: usize,
+    /// Shift, m, and turn, rad, of a camera that was mounted anew, where that and no slip of one sensor explains it.
+    pub camera_moved: Option<[f64; 2]>,
 }
 
 impl PriorConsistency {
@@ -95,6 +98,7 @@ impl PriorConsistency {
             limit: self.limit,
             used_share: self.used_share,
             joints_off: self.joints_off,
+            camera_moved: self.camera_moved.map(|[shift_m, turn_rad]| CameraMoved { shift_m, turn_rad }),
         })
     }
 }
@@ -197,6 +201,50 @@ impl CalibrationPrior {
 
     /// Whether `views` agree with the prior; `None` where they determine nothing.
     pub fn consistency(&self, views: &[View]) -> Option<PriorConsistency> {
+        let (consistency, _) = self.tested(views)?;
+        let is_beyond = consistency.is_beyond_chance();
+        let camera_moved = is_beyond.then(|| self.camera_moved(views, &consistency)).flatten();
+        Some(PriorConsistency { camera_moved, ..consistency })
+    }
+
+    /// Shift and turn of the camera, if `views` agree with the sensors of the prior but for its mount, and not with a
+    /// prior of which the one sensor slipped that is `off` the most.
+    fn camera_moved(&self, views: &[View], off: &PriorConsistency) -> Option<[f64; 2]> {
+        let agrees = |(consistency, _): &(PriorConsistency, _)| !consistency.is_beyond_chance();
+        if self.with_slip_of(off.joint, off.off_rad).tested(views).as_ref().is_some_and(agrees) {
+            return None;
+        }
+        let (_, mount) = self.with_camera_anew().tested(views).filter(agrees)?;
+        let moved = self.robot.camera.mount.link_from_frame.inv_mul(&mount);
+        Some([moved.translation.vector.norm(), moved.rotation.angle()])
+    }
+
+    /// This prior, of which the sensor of `joint` may have slipped since, by `size_rad` or as far as sensors slip.
+    fn with_slip_of(&self, joint: usize, size_rad: f64) -> Self {
+        let mut slipped = self.clone();
+        let offset = Parameter { joint, kind: ParameterKind::Offset };
+        if let Some(k) = self.model.parameters().iter().position(|p| *p == offset) {
+            slipped.covariance[(k, k)] += slip_std_rad(&self.robot.sensors[joint]).max(size_rad.abs()).powi(2);
+        }
+        slipped
+    }
+
+    /// What this prior says of the sensors alone.
+    fn with_camera_anew(&self) -> Self {
+        let n = self.model.parameters().len();
+        let of_sensors = |matrix: &DMatrix<f64>| matrix.view((0, 0), (n, n)).into_owned();
+        let mut anew = self.clone();
+        let camera = &mut anew.robot.camera;
+        camera.mount_std_m = camera.mount_std_m.max(MOUNTED_ANEW_STD[0]);
+        camera.mount_std_rad = camera.mount_std_rad.max(MOUNTED_ANEW_STD[1]);
+        anew.model.blocks.insert(Block::Mount(0));
+        anew.mean = self.mean.rows(0, n).into_owned();
+        (anew.covariance, anew.widened) = (of_sensors(&self.covariance), of_sensors(&self.widened));
+        anew
+    }
+
+    /// The test of agreement, and the mount as `views` have it.
+    fn tested(&self, views: &[View]) -> Option<(PriorConsistency, Isometry3<f64>)> {
         let found = estimate(&self.under(&self.widened, views, HyperparameterMode::Given)?)?;
         let n = self.mean.len();
         let posterior = found.posterior.covariance.view((0, 0), (n, n)).into_owned();
@@ -213,7 +261,18 @@ impl CalibrationPrior {
         let observations = &found.problem.observations;
         let used_share = observations.iter().filter(|s| s.is_used).count() as f64 / observations.len().max(1) as f64;
         let limit = chi_square_999(degrees_of_freedom);
-        Some(PriorConsistency { chi2, degrees_of_freedom, limit, joint, off_rad, off_std_rad, used_share, joints_off })
+        let consistency = PriorConsistency {
+            chi2,
+            degrees_of_freedom,
+            limit,
+            joint,
+            off_rad,
+            off_std_rad,
+            used_share,
+            joints_off,
+            camera_moved: None,
+        };
+        Some((consistency, *found.solved.state.pose(Block::Mount(0))))
     }
 
     fn moved(&self, found: &Estimate<'_>) -> DVector<f64> {
@@ -336,9 +395,14 @@ fn covariances(prior: &Calibration, columns: &PriorColumns<'_>, elapsed_h: f64) 
     }
     let mut widened = covariance.clone();
     for (k, p) in parameters.iter().enumerate().filter(|(_, p)| p.kind == ParameterKind::Offset) {
-        widened[(k, k)] += robot.sensors[p.joint].offset_std_rad.max(LEAST_SLIP_STD_RAD).powi(2);
+        widened[(k, k)] += slip_std_rad(&robot.sensors[p.joint]).powi(2);
     }
     (covariance, widened)
+}
+
+/// One sigma of how far a sensor may have slipped.
+fn slip_std_rad(spec: &JointSensorSpec) -> f64 {
+    spec.offset_std_rad.max(LEAST_SLIP_STD_RAD)
 }
 
 /// By the datasheet, or what is usual.

@@ -6,6 +6,8 @@ pub(crate) mod angles_by_camera {
     /// Candidates of one joint over its range, by how many joints are searched for in one view.
     pub(crate) const CANDIDATES: [usize; 3] = [90, 40, 16];
     pub(crate) const FINEST_STEP_RAD: f64 = 1e-4;
+    /// A camera mount with larger stated sigmas does not place the tags, m and rad.
+    pub(crate) const KNOWN_MOUNT: [f64; 2] = [0.05, 0.2];
 }
 
 pub(crate) mod baseline {
@@ -29,6 +31,8 @@ pub(crate) mod calibration_prior {
     /// The normal's 0.999 quantile, and that of 0.001 shared by some eight joints' two sides.
     pub(crate) const Z_999: f64 = 3.090;
     pub(crate) const Z_OF_JOINTS: f64 = 3.9;
+    /// One sigma of where a camera may hang that was mounted anew, m and rad. Assumed.
+    pub(crate) const MOUNTED_ANEW_STD: [f64; 2] = [0.05, 0.2];
     /// From this share on, in tenfold steps, no more is added and the matrix has no inverse. Assumed.
     pub(crate) const MAX_ROUNDING: f64 = 0.1;
 }
@@ -63,6 +67,10 @@ pub(crate) mod failure_detection {
     /// A joint's error from view to view over its datasheet's linearity: sensors do not have more, after what is smooth
     /// is taken off.
     pub(crate) const MAX_OVER_LINEARITY: f64 = 3.0;
+    /// Pairs of sensors that are estimated as failed: those that place the tags nearest to their survey. Assumed.
+    pub(crate) const MAX_PAIRS: usize = 6;
+    /// Views that choose those pairs, spread over all. Assumed.
+    pub(crate) const RANKED_VIEWS: usize = 12;
 }
 
 pub(crate) mod failure_pattern {
@@ -151,6 +159,21 @@ pub(crate) mod permutation_test {
     pub(crate) const LEAST_NEW: f64 = 1e-3;
 }
 
+pub(crate) mod moved_between {
+    /// One sigma of how far camera or tags may move between two views, m and rad. Assumed.
+    pub(crate) const MOVED_STD: [f64; 2] = [0.05, 0.1];
+    /// Views on either side of a gap: fewer say nothing of a motion's six numbers beside a slip. Assumed.
+    pub(crate) const MIN_SIDE: usize = 4;
+    /// About so many gaps are tried first. Assumed.
+    pub(crate) const FIRST_GAPS: usize = 8;
+    /// More views do not tell the gap better at first; they would cost time.
+    pub(crate) const MAX_VIEWS: usize = 40;
+    /// Evidence that a motion needs, nats: odds of e^30, as some hundred gaps of several movers are possible.
+    pub(crate) const MIN_GAIN_NATS: f64 = 30.0;
+    /// What the six numbers of a body of tags cost, nats: each is told to a hundredth of its size. Assumed.
+    pub(crate) const BODY_NATS: f64 = 28.0;
+}
+
 pub(crate) mod reading_search_hypothesis {
     /// Added to the score of a camera hypothesis, twice the logarithm of odds (assumed): where it explains the views as
     /// well as a sensor's zero does, the zero is named first.
@@ -160,8 +183,6 @@ pub(crate) mod reading_search_hypothesis {
     pub(crate) const FRAME_HANDICAP: f64 = 15.0;
     /// The same of a reading that is a sum of several angles, or of the other sign (assumed).
     pub(crate) const SUM_HANDICAP: f64 = 5.0;
-    /// A camera mount with larger stated sigmas does not place the tags, m and rad.
-    pub(crate) const KNOWN_MOUNT: [f64; 2] = [0.05, 0.2];
     /// Excess over the half range from which a reading is on another turn, rad.
     pub(crate) const NEXT_TURN_RAD: f64 = 0.1;
     pub(crate) const ZERO_STD_RAD: f64 = 0.2;

@@ -6,8 +6,9 @@
 //! parameters' prior, plus `2 ln(prior std / posterior std)` for each reading that is given up (Laplace's approximation
 //! of the evidence, MacKay 1992, with a round figure), must fall by `MARGIN`.
 
+use crate::explain::angles_by_camera::{distance_cost, has_known_mount, seen_angles};
 use crate::explain::constants::failure_detection::{
-    LARGE_STD_RAD, MANY_REJECTED, MARGIN, MAX_FOUND, MAX_OVER_LINEARITY, PER_READING, PER_STEP,
+    LARGE_STD_RAD, MANY_REJECTED, MARGIN, MAX_FOUND, MAX_OVER_LINEARITY, MAX_PAIRS, PER_READING, PER_STEP, RANKED_VIEWS,
 };
 use crate::explain::drawing::Drawing;
 use crate::explain::failure_pattern::{FailurePattern, MIN_STILL_VIEWS, Readings, n_still};
@@ -106,7 +107,8 @@ impl FailureSearch<'_> {
             let without = self.score(&known);
             let candidates = (0..self.robot.n_seen_joints()).filter(|&joint| !is_failed(&known, joint));
             let mut best: Option<(f64, Failure)> = None;
-            for failure in candidates.filter_map(|joint| self.hypothesis(&known, joint, FailureSource::Detected)) {
+            let of_joint = |joint| self.hypothesis_below(&known, joint, FailureSource::Detected, without - MARGIN);
+            for failure in candidates.filter_map(of_joint) {
                 let with: Vec<Failure> = known.iter().cloned().chain([failure.clone()]).collect();
                 let score = self.score(&with);
                 if best.as_ref().is_none_or(|(least, _)| score < *least) {
@@ -124,25 +126,50 @@ impl FailureSearch<'_> {
     /// The two sensors whose failures explain the most together, each by the angles that the camera shows with both
     /// ignored.
     fn two_at_once(&self, known: &[Failure]) -> Option<Vec<Failure>> {
-        let free: Vec<usize> = (0..self.robot.n_seen_joints()).filter(|&joint| !is_failed(known, joint)).collect();
-        let pairs = free.iter().enumerate().flat_map(|(k, &a)| free[k + 1..].iter().map(move |&b| [a, b]));
-        let both = pairs.filter_map(|pair| {
+        let most = self.score(known) - 2.0 * MARGIN;
+        let both = self.likely_pairs(known).into_iter().filter_map(|pair| {
             let mut with = known.to_vec();
-            with.extend(self.hypotheses(known, pair)?);
+            with.extend(self.hypotheses(known, pair, most)?);
             Some((self.score(&with), with))
         });
         let (score, with) = both.min_by(|a, b| a.0.total_cmp(&b.0))?;
-        (self.score(known) - score > 2.0 * MARGIN).then_some(with)
+        (score < most).then_some(with)
     }
 
-    /// Failures of both joints.
-    fn hypotheses(&self, known: &[Failure], pair: [usize; 2]) -> Option<[Failure; 2]> {
+    /// The pairs of joints that, turned to where the camera shows them, place the tags nearest to their survey; all
+    /// where the mount is not known.
+    pub(crate) fn likely_pairs(&self, known: &[Failure]) -> Vec<[usize; 2]> {
+        let n = self.robot.n_seen_joints();
+        let free: Vec<usize> = (0..n).filter(|&joint| !is_failed(known, joint)).collect();
+        let pairs = free.iter().enumerate().flat_map(|(k, &a)| free[k + 1..].iter().map(move |&b| [a, b]));
+        let pairs: Vec<[usize; 2]> = pairs.collect();
+        if pairs.len() <= MAX_PAIRS || !has_known_mount(self.robot) {
+            return pairs;
+        }
+        let FailureAdjusted { robot, views, .. } = self.applied(known);
+        let shown: Vec<&View> = views.iter().filter(|view| !view.tags.is_empty()).collect();
+        let stride = shown.len().div_ceil(RANKED_VIEWS).max(1);
+        let cost = |pair: [usize; 2]| -> f64 {
+            let of_view = |view: &&View| {
+                let joints = (0..n).filter(|&joint| view.is_free[joint] || pair.contains(&joint));
+                let angles = seen_angles(&robot, view, &joints.collect::<Vec<_>>(), &JointParameters::default());
+                distance_cost(&robot, view, &angles)
+            };
+            shown.iter().step_by(stride).map(of_view).sum()
+        };
+        let mut with_costs: Vec<(f64, [usize; 2])> = pairs.into_iter().map(|pair| (cost(pair), pair)).collect();
+        with_costs.sort_by(|a, b| a.0.total_cmp(&b.0));
+        with_costs.into_iter().take(MAX_PAIRS).map(|(_, pair)| pair).collect()
+    }
+
+    /// Failures of both joints; `None` where none scores below `most`.
+    fn hypotheses(&self, known: &[Failure], pair: [usize; 2], most: f64) -> Option<[Failure; 2]> {
         let ignored = pair
             .map(|joint| Failure::without_sensor(joint, FailedKind::Dead, FailureSource::Detected, self.views.len()));
         let mut freed = known.to_vec();
         freed.extend(ignored);
         let applied = self.applied(&freed);
-        let found = self.estimate(&applied)?;
+        let found = self.estimate(&applied).filter(|found| self.may_score(found, pair.len(), most))?;
         let [a, b] = pair.map(|joint| self.failure_of(joint, &found, FailureSource::Detected));
         Some([a?, b?])
     }
@@ -166,12 +193,23 @@ impl FailureSearch<'_> {
         n_still(&travel_rad, &self.robot.sensors[joint]) >= MIN_STILL_VIEWS.min(travel_rad.len())
     }
 
+    /// Returns true where failures of the `n` joints that `found` has free may score below `most`: free joints fit the
+    /// views best, and a failure saves no more than that it gives up fewer readings.
+    fn may_score(&self, found: &Estimate<'_>, n: usize, most: f64) -> bool {
+        score(found) - PER_READING * (n * self.views.len()) as f64 <= most
+    }
+
     /// What is wrong with a joint's sensor under the `known` failures and this sensor ignored.
     fn hypothesis(&self, known: &[Failure], joint: usize, source: FailureSource) -> Option<Failure> {
+        self.hypothesis_below(known, joint, source, f64::INFINITY)
+    }
+
+    /// The same; `None` where no failure of that joint scores below `most`.
+    fn hypothesis_below(&self, known: &[Failure], joint: usize, source: FailureSource, most: f64) -> Option<Failure> {
         let mut freed: Vec<Failure> = known.iter().filter(|failure| failure.joint != joint).cloned().collect();
         freed.push(Failure::without_sensor(joint, FailedKind::Dead, FailureSource::Detected, self.views.len()));
         let applied = self.applied(&freed);
-        let found = self.estimate(&applied)?;
+        let found = self.estimate(&applied).filter(|found| self.may_score(found, 1, most))?;
         self.failure_of(joint, &found, source)
     }
 

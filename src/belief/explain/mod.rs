@@ -1,8 +1,9 @@
 //! What else could be so: other explanations of the same views, compared by their evidence.
 //!
 //! `setup` estimates under one of them. Sensors: `failure_detection`, `slips`, `walk`; readings: `reading_search`,
-//! `unpaired`; tags: `tags`; links, lens, sag: `drawing`, told beforehand by `score_test`; terms of a sensor:
-//! `model_selection`; files that the images contradict: `wrong_input`; an earlier calibration: `calibration_prior`.
+//! `unpaired`; tags: `tags`; links, lens, sag: `drawing`, chosen by `score_test`; terms of a sensor: `model_selection`;
+//! files that the images contradict: `wrong_input`; an earlier calibration: `calibration_prior`; a knocked camera:
+//! `moved_between`.
 
 pub(crate) mod angles_by_camera;
 pub(crate) mod baseline;
@@ -13,6 +14,7 @@ pub(crate) mod failure_detection;
 pub(crate) mod failure_pattern;
 pub(crate) mod failures;
 pub(crate) mod model_selection;
+pub(crate) mod moved_between;
 pub(crate) mod other_lens;
 pub(crate) mod permutation_test;
 pub(crate) mod reading_search;

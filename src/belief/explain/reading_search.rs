@@ -14,12 +14,12 @@ use crate::explain::constants::reading_search::{
 };
 use std::f64::consts::TAU;
 
-use crate::explain::angles_by_camera::distance_cost;
+use crate::explain::angles_by_camera::{distance_cost, has_known_mount};
 use crate::explain::constants::reading_search_hypothesis::NEXT_TURN_RAD;
 use crate::explain::drawing::Drawing;
 use crate::explain::failure_detection::{is_suspicious, score};
 use crate::explain::failures::{Failure, FailureAdjusted};
-use crate::explain::reading_search::hypothesis::{Hypothesis, SCALE_STD, ZERO_STD_RAD, has_known_mount};
+use crate::explain::reading_search::hypothesis::{Hypothesis, SCALE_STD, ZERO_STD_RAD};
 use crate::model::parameters::JointParameters;
 use crate::positions::position_problem::PositionProblem;
 use crate::say::reading_error::{JointZero, MisreadReadings, ReadingError, SignedJoint};

@@ -207,6 +207,16 @@ impl Calibration {
         self.state_refusals();
     }
 
+    /// Says where the sigmas are stated that the decision rule refuses for; `keys`: those at the target of that index.
+    pub(crate) fn advise_survey(&mut self, of_watched: bool, keys: impl Fn(usize) -> Vec<String>) {
+        for refusal in &mut self.refusals {
+            if let Refusal::BeyondTolerance { target, survey, is_watched, .. } = refusal {
+                (*survey, *is_watched) = (keys(*target - 1), of_watched);
+            }
+        }
+        self.state_refusals();
+    }
+
     fn state_refusals(&mut self) {
         self.refusals.sort_by_key(Refusal::rank);
         self.refusal = in_words(&self.refusals);

@@ -5,7 +5,7 @@ use armcal_core::codes::Code;
 use armcal_core::schema::first_line;
 use std::path::Path;
 
-use crate::file::calibration::{Calibration, JointResult};
+use crate::file::calibration::{Calibration, JointResult, Status};
 use crate::file::camera_mount::{CameraMount, FurtherCamera};
 use crate::file::covariance_file::CovarianceTable;
 use crate::file::file_error::CalibrationFileError;
@@ -13,6 +13,7 @@ use crate::file::link_table::LinkResult;
 use crate::file::slide_keys::{SLIDE_HEAD, in_metres, named_as_angles};
 use crate::file::terms_table::TermsTable;
 use crate::model::parameters::{JointParameters, Parameter};
+use crate::say;
 use crate::say::finding::FindingKind;
 use crate::solve::covariance::ParameterCovariance;
 use crate::views::view::View;
@@ -276,6 +277,7 @@ impl Calibration {
     }
 
     fn check(&self, file: &Path) -> Result<(), FileIssue> {
+        self.check_status(file)?;
         for joint in &self.joint {
             let check = |key: &str, value: f64, range| {
                 FileIssue::check_range(file, &format!("joint `{}`: {key}", joint.name), value, range)
@@ -302,6 +304,16 @@ impl Calibration {
                 "covariance.rows",
                 format!("needs {n} rows of {n} numbers"),
             ));
+        }
+        Ok(())
+    }
+
+    /// A result that was refused must not be called accepted.
+    fn check_status(&self, file: &Path) -> Result<(), FileIssue> {
+        let is_contradicted = self.refusal.is_some() || !self.refusals.is_empty();
+        if self.status == Status::Accepted && is_contradicted {
+            let problem = say::accepted_and_refused(self.refusal.as_deref());
+            return Err(FileIssue::new(Code::KeysConflict, file, "status", problem));
         }
         Ok(())
     }

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::follow::event::OnlineEvent;
 use crate::follow::follower::{BeliefRow, Follower};
+use armcal_core::codes::{Code, Coded};
 use armcal_core::time::Stamp;
 
 /// A line of belief.jsonl.
@@ -33,6 +34,8 @@ pub struct BeliefLog {
     pub lines: Vec<BeliefLine>,
     first: Option<Stamp>,
     last: Option<Stamp>,
+    /// Code of the doubt that was told last.
+    doubt: Option<Code>,
 }
 
 impl BeliefLog {
@@ -40,12 +43,14 @@ impl BeliefLog {
     pub fn hear(&mut self, follower: &Follower, events: Vec<OnlineEvent>) -> bool {
         let Some(now) = follower.conditions().stamp else { return false };
         self.first.get_or_insert(now);
-        let is_due = !events.is_empty() || self.last.is_none_or(|last| now.since_s(last) >= EVERY_S);
+        let doubt = follower.doubt().map(|doubt| doubt.code());
+        let is_new = !events.is_empty() || doubt != self.doubt;
+        let is_due = is_new || self.last.is_none_or(|last| now.since_s(last) >= EVERY_S);
         if !is_due {
             return false;
         }
         self.lines.extend(events.into_iter().map(BeliefLine::Event));
-        self.last = Some(now);
+        (self.last, self.doubt) = (Some(now), doubt);
         self.lines.extend(follower.belief().map(BeliefLine::Belief));
         true
     }

@@ -76,6 +76,25 @@ pub(crate) mod estimator {
     pub(crate) const TOLD_LATE_NANOS: i64 = 600_000_000_000;
 }
 
+pub(crate) mod doubts {
+    /// Means of the same corners differ by rounding alone, px.
+    pub(crate) const SAME_PX: f64 = 1e-6;
+    /// A joint that is this far from where it was has moved, rad or m, and the image with it: ten pixels at a focal
+    /// length of 1000 px. Assumed.
+    pub(crate) const MOVED_RAD: f64 = 0.01;
+    /// Views in a row with a repeated image before it is said. Assumed.
+    pub(crate) const FROZEN_VIEWS: usize = 3;
+    /// A base that moved farther than this share of the arm's reach would show no tag where it is looked for. Assumed:
+    /// 0.3 m for an arm of 2 m.
+    pub(crate) const MAX_BASE_SHARE: f64 = 0.15;
+    /// Events this many views ago still belong together. Assumed.
+    pub(crate) const RECENT_VIEWS: usize = 30;
+    /// A base that moves so many times within these views moves on, or something else does. Assumed.
+    pub(crate) const BASE_MOVES: usize = 2;
+    /// So many events of a mount or several tags that had moved before are no accident. Assumed.
+    pub(crate) const MOVED_AGAIN: usize = 2;
+}
+
 pub(crate) mod event {
     /// Lead below which an event also names the next hypothesis, nats (odds of twenty).
     pub(crate) const CLEAR_LEAD_NATS: f64 = 3.0;

@@ -1,6 +1,7 @@
 //! An online estimate that takes in messages, and its reports over time.
 
 use crate::follow::constants::follower::AHEAD_H;
+use crate::follow::doubts::Doubts;
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
@@ -9,8 +10,11 @@ use crate::follow::event::OnlineEvent;
 use crate::follow::settings::OnlineSettings;
 use crate::follow::view_stream::ViewStream;
 use crate::judge::{ErrorDistribution, MAX_RISK};
-use crate::solve::covariance::{JointAt, ParameterCovariance, task_angles};
+use crate::say::doubt::Doubt;
+use crate::solve::covariance::{JointAt, ParameterCovariance};
+use crate::solve::task_angles::task_angles;
 use crate::views::view::{TaskRests, View};
+use armcal_core::codes::{Code, Coded};
 use armcal_core::robot::Robot;
 use armcal_core::sensor::{ArmSensors, Conditions};
 use armcal_core::stats::Summary;
@@ -27,6 +31,7 @@ pub struct Follower {
     robot: Robot,
     views: ViewStream,
     estimator: OnlineEstimator,
+    doubts: Doubts,
     conditions: Conditions,
     targets: Vec<JointAngles>,
     tolerance_m: Option<f64>,
@@ -49,6 +54,9 @@ pub struct BeliefRow {
     pub clock_offset_s: Option<[f64; 2]>,
     /// Lag of the sensors' temperature behind the oil's, s.
     pub temperature_lag_s: f64,
+    /// Code of what speaks against all of it; absent where nothing does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub doubt: Option<Code>,
 }
 
 impl Follower {
@@ -58,6 +66,7 @@ impl Follower {
         Self {
             views: ViewStream::new(robot.clone()),
             estimator: OnlineEstimator::new(robot.clone(), settings.clone()),
+            doubts: Doubts::default(),
             targets: vec![robot.stowed],
             tolerance_m: None,
             robot,
@@ -108,23 +117,38 @@ impl Follower {
                 (*oil_c, *pressure_pa) =
                     (view.conditions.oil_c.or(*oil_c), view.conditions.pressure_pa.or(*pressure_pa));
             }
-            self.estimator.add_view(&view);
+            if !self.doubts.repeats_image(&view, &self.robot) {
+                self.estimator.add_view(&view);
+            }
         }
-        self.estimator.take_events()
+        let events = self.estimator.take_events();
+        self.doubts.hear(&events, self.estimator.n_views(), self.robot.reach_m());
+        events
+    }
+
+    /// Reason not to rely on the belief as a whole, whatever its covariance says.
+    #[must_use]
+    pub fn doubt(&self) -> Option<Doubt> {
+        self.doubts.now()
     }
 
     /// Sets the targets at which tool errors are predicted; if none is within reach, the stowed configuration stays.
     pub fn set_task(&mut self, task: &ReachTask) {
-        let targets = task_angles(&self.robot, TaskRests { task, rests: &std::collections::BTreeMap::new() });
+        let rests = std::collections::BTreeMap::new();
+        let targets = task_angles(&self.robot, TaskRests { task, rests: &rests, views: &[] });
         self.tolerance_m = Some(task.tolerance_m);
         if !targets.is_empty() {
             self.targets = targets;
         }
     }
 
-    /// Returns true if the decision rule accepts every target of the task; `None` without a task or an estimate.
+    /// Returns true if the decision rule accepts every target of the task, and false under a [`Self::doubt`]. Without a
+    /// doubt it is `None` without a task or an estimate.
     #[must_use]
     pub fn is_good_enough(&self) -> Option<bool> {
+        if self.doubt().is_some() {
+            return Some(false);
+        }
         let covariance = self.estimator.covariance(&self.conditions)?;
         let (sensors, tolerance_m) = (self.sensors(), self.tolerance_m?);
         let is_accepted = |angles: &JointAngles| {
@@ -189,6 +213,7 @@ impl Follower {
             tool_error_in_an_hour_m: self.tool_error_m(&later)?,
             clock_offset_s: self.estimator.clock_offset_s(),
             temperature_lag_s: self.estimator.temperature_lag_s(),
+            doubt: self.doubt().map(|doubt| doubt.code()),
             offset_rad: (0..self.robot.n_joints()).map(offset).collect(),
         })
     }

@@ -3,7 +3,8 @@
 //! `view_stream` makes views of messages. `estimator` holds a `member` for each lag of the sensors' temperature. Each
 //! starts from the first views by `bundle` and continues with a filter: `filter` is state and information,
 //! `process_noise` the rate of sensor changes. If a view does not fit, `diagnosis` races each `hypothesis` with its own
-//! `branch` of the belief. `hindsight` adds up scores of views that lie minutes apart. `event` reports the result.
+//! `branch` of the belief. `hindsight` adds up scores of views that lie minutes apart. `event` reports the result, and
+//! `doubts` lists reasons not to rely on any of it.
 //! `follower` combines all of it, and `belief_log` records its reports; `oracle` and `batch` are references for
 //! comparison.
 
@@ -12,6 +13,7 @@ pub(crate) mod belief_log;
 pub(crate) mod branch;
 pub(crate) mod constants;
 pub(crate) mod diagnosis;
+pub(crate) mod doubts;
 pub(crate) mod estimator;
 pub(crate) mod event;
 pub(crate) mod filter;

@@ -4,12 +4,12 @@ use crate::plan::constants::targets::{IK_TOLERANCE_M, RANDOM_SEEDS, SPARE_TRIES}
 use std::collections::BTreeSet;
 
 use nalgebra::Vector3;
-use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use crate::plan::PlanError;
 use crate::plan::bounds::joint_bounds::JointErrorBounds;
 use crate::plan::clearance::{ClearanceModel, ClosestPair};
+use crate::solve::task_angles::random_start;
 use armcal_core::kinematics::{IkError, IkGoal, IkSettings, solve_position};
 use armcal_core::robot::Robot;
 use armcal_core::routine::{ReachSettings, Routine, Step};
@@ -129,7 +129,7 @@ impl TargetSolver<'_> {
         let mut closest: Option<ClosestPair> = None;
         let mut best: Option<(f64, JointAngles)> = None;
         for attempt in 0..=RANDOM_SEEDS {
-            let seed = if attempt == 0 { home } else { random_seed(self.robot, &self.settings, rng) };
+            let seed = if attempt == 0 { home } else { random_start(self.robot, &self.settings, rng) };
             match solve_position(&self.robot.chain, &self.robot.tool.mount, &goal, &seed, &self.settings) {
                 Err(error) => unreached = Some(unreached.map_or(error, |before| nearer(before, error))),
                 Ok(angles) => {
@@ -166,13 +166,6 @@ impl TargetSolver<'_> {
 fn nearer(a: IkError, b: IkError) -> IkError {
     let (IkError::OutOfReach { error_m: a_m }, IkError::OutOfReach { error_m: b_m }) = (a, b);
     if a_m < b_m { a } else { b }
-}
-
-fn random_seed(robot: &Robot, settings: &IkSettings, rng: &mut ChaCha8Rng) -> JointAngles {
-    JointAngles::from_fn(robot.n_joints(), |j| {
-        let limits = settings.limits[j];
-        if settings.locked[j] { robot.stowed[j] } else { rng.random_range(limits.lower_rad..=limits.upper_rad) }
-    })
 }
 
 /// True if the tool point lies on the last joint's axis, so that this joint cannot move it.

@@ -110,6 +110,11 @@ pub(crate) fn slip(step: &str, [n_before, n]: [usize; 2], number: u32) -> String
     format!("the sensor slipped by {step} after {n_before} of {n} views, before view {number}")
 }
 
+/// `offset_std_rad of wrist_yaw`.
+pub(crate) fn key_of_joint(key: &str, joint: &str) -> String {
+    format!("{key} of {joint}")
+}
+
 /// `the reading is off in 3 of 20 views (2, 9, 15)`; `what`: what is wrong with it there.
 pub(crate) fn reading_in_views(what: &str, [n_there, n]: [usize; 2], numbers: &[String]) -> String {
     format!("the reading {what} in {n_there} of {n} views ({})", numbers.join(", "))
@@ -130,6 +135,22 @@ pub(crate) fn other_lens_model(camera: &str, lens: &CameraModel) -> String {
          [{cx:.1}, {cy:.1}], distortion = [{}]; the estimate uses the stated model. Measure the intrinsics again",
         distortion.join(", ")
     )
+}
+
+/// Says how many poses of a capture were skipped, as the cause of few views.
+#[must_use]
+pub fn skipped_poses(skipped: usize, captured: usize) -> String {
+    format!(
+        "{skipped} of {} poses were skipped: the arm did not come to rest there, or did not get there; look for a \
+         locked joint, a dead sensor or weak hydraulics",
+        skipped + captured
+    )
+}
+
+/// Says that a file with the status `accepted` has reasons of a refusal.
+pub(crate) fn accepted_and_refused(refusal: Option<&str>) -> String {
+    let key = refusal.map_or("[[refusals]]", |_| "refusal");
+    format!("is `accepted`, but {key} says why the result was refused: it was edited; calibrate again")
 }
 
 /// A walk of an offset, so large over the views (std), and its effect.

@@ -1,16 +1,19 @@
 //! What is said of a calibration, and its words: the same in terminal, report, replay and files.
 //!
 //! `finding` is what was found to be other than stated, `refusal` why a result must not be used (`wrong_input`,
-//! `reading_error`, `geometry_error` are causes), `reservation` its limits. `repair` says what to do about a
-//! finding, `sensor_keys` which lines correct a reading. Their words are in this room and nowhere else.
+//! `reading_error`, `geometry_error`, `moved_body` are causes), `reservation` its limits, `doubt` reasons not to rely on
+//! an online belief. `repair` says what to do about a finding, `sensor_keys` which lines correct a reading. Their words
+//! are in this room and nowhere else.
 
 pub(crate) mod constants;
+pub(crate) mod doubt;
 pub(crate) mod finding;
 pub(crate) mod finding_words;
 pub(crate) mod geometry_error;
 pub(crate) mod length_unit;
 pub(crate) mod map_refusal;
 pub(crate) mod map_words;
+pub(crate) mod moved_body;
 pub(crate) mod reading_error;
 pub(crate) mod refusal;
 pub(crate) mod repair;
@@ -21,8 +24,10 @@ pub(crate) mod wrong_input;
 pub(crate) mod wrong_input_words;
 
 pub use finding::{Finding, FindingKind, FindingUnit};
+pub use finding_words::skipped_poses;
 pub(crate) use finding_words::{
-    drift, event, explanation, lost_reading, offset_walks, other_lens_model, reading_in_views, slip,
+    accepted_and_refused, drift, event, explanation, key_of_joint, lost_reading, offset_walks, other_lens_model,
+    reading_in_views, slip,
 };
 pub use repair::{FailedJoint, Repair, repairs};
 pub use sentence::sentence;

@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::say::finding::FindingUnit;
 use crate::say::geometry_error::GeometryError;
 use crate::say::length_unit::unit_of;
+use crate::say::moved_body::MovedBody;
 use crate::say::reading_error::MisreadReadings;
 use crate::say::sensor_keys::Rescaled;
 use crate::say::wrong_input::WrongInput;
@@ -81,6 +82,12 @@ pub enum Refusal {
         u95_m: f64,
         /// The task's tolerance.
         tolerance_m: f64,
+        /// Keys of robot.toml with the sigmas that are most of it: what they state no view tells.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        survey: Vec<String>,
+        /// Whether the camera stands still.
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        is_watched: bool,
     },
     /// Stated sigmas of unobservable parameters make it exceed the tolerance.
     PriorsBeyondTolerance {
@@ -131,6 +138,20 @@ pub enum Refusal {
     WrongInput(WrongInput),
     /// Joint readings mean something else than the input map and robot.toml say.
     MisreadReadings(MisreadReadings),
+    /// Camera, base or tags moved while the views were captured.
+    MovedBetweenViews {
+        /// What moved.
+        body: MovedBody,
+        /// Name of the camera, where there are several.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        camera: Option<String>,
+        /// Numbers of the last view before it and of the first one after it.
+        views: [u32; 2],
+        /// How far it moved; a base or tags at the origin of the frame of the tag map.
+        shift_m: f64,
+        /// By how much it turned.
+        turn_rad: f64,
+    },
     /// Another link geometry explains the data, and joint sensors do not.
     Geometry(GeometryError),
     /// An element of the geometry departs from its nominal pose by more than a repair may.
@@ -331,6 +352,9 @@ pub enum Refusal {
         /// How many joints are off by more than chance.
         #[serde(default)]
         joints_off: usize,
+        /// How far the camera was moved since, where that alone explains it.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        camera_moved: Option<CameraMoved>,
     },
     /// A sensor slipped, and too few views show it as it is now.
     TooFewViewsSinceSlip {
@@ -340,6 +364,13 @@ pub enum Refusal {
         evidence: String,
         /// Views since the slip.
         views: usize,
+    },
+    /// A sensor slipped during the capture, and the method knows no step.
+    SlipNotEstimated {
+        /// Name of the joint in the URDF.
+        joint: String,
+        /// What shows the slip, in words.
+        evidence: String,
     },
     /// A sensor that reads the other way, or of another scale, and the rest does not fit with its gain estimated.
     SensorLine {
@@ -368,6 +399,15 @@ pub enum Refusal {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         tolerance_m: Option<f64>,
     },
+}
+
+/// A camera that was mounted anew.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct CameraMoved {
+    /// How far it was shifted.
+    pub shift_m: f64,
+    /// By how much it was turned.
+    pub turn_rad: f64,
 }
 
 /// Source of the limit of a held-out error.
@@ -413,8 +453,8 @@ impl Refusal {
     /// Which reason is told first: what makes all others a consequence. Those of one rank stay in their order.
     pub(crate) fn rank(&self) -> u8 {
         match self {
-            // A wrong file explains why few views are left.
-            Self::WrongInput(_) => 0,
+            // A wrong file or a motion explains why few views are left.
+            Self::WrongInput(_) | Self::MovedBetweenViews { .. } => 0,
             Self::TooFewViews { .. } | Self::TooFewViewsSinceSlip { .. } => 1,
             Self::MisreadReadings(_) | Self::Lens { .. } | Self::PriorReused => 2,
             // Under a prior that does not hold, links and sensors seem to be off.
@@ -428,9 +468,12 @@ impl Refusal {
         }
     }
 
-    /// A wrong file or reading, which the further reasons follow from: what they advise is moot.
+    /// A wrong file or reading, or a motion, which the further reasons follow from: what they advise is moot.
     fn explains_others(&self) -> bool {
-        matches!(self, Self::WrongInput(_) | Self::MisreadReadings(_) | Self::Lens { .. })
+        matches!(
+            self,
+            Self::WrongInput(_) | Self::MisreadReadings(_) | Self::MovedBetweenViews { .. } | Self::Lens { .. }
+        )
     }
 
     /// What to do about it.
@@ -456,6 +499,12 @@ impl Refusal {
                  [{x:.1}, {y:.1}] for [camera] of robot.toml"
             )
             .into(),
+            Self::BeyondTolerance { survey, is_watched, .. } if !survey.is_empty() => {
+                let otherwise = if *is_watched { "" } else { ", or put a tag on the gripper" };
+                let keys = survey.join(", ");
+                format!("measure what no view tells and state its smaller sigma in robot.toml ({keys}){otherwise}")
+                    .into()
+            }
             _ => self.usual_remedy().into(),
         }
     }
@@ -469,8 +518,15 @@ impl Refusal {
             | Self::SensorLine { .. }
             | Self::SensorUnit { .. }
             | Self::CornerNoiseUnderstated { .. } => "",
-            Self::TooFewViews { .. } | Self::PriorUntested => "capture more views",
+            Self::MovedBetweenViews { body, .. } => body.remedy(),
+            Self::TooFewViews { .. } | Self::PriorUntested | Self::BeyondTolerance { is_watched: true, .. } => {
+                "capture more views"
+            }
             Self::TooFewViewsSinceSlip { .. } => "fasten the sensor on its shaft, then capture more views",
+            Self::SlipNotEstimated { .. } => {
+                "fasten the sensor on its shaft, then calibrate with --method bundle, which estimates the slip, or \
+                 capture anew"
+            }
             Self::NotSolved { .. } => "capture views that move each joint over more of its range",
             Self::TooFewHeldOutViews { .. } | Self::NoHeldOutTag => "hold out more views that show tags",
             Self::NoBetterThanDatasheet { .. } | Self::NoBetterThanBaseline { .. } => {
@@ -480,6 +536,10 @@ impl Refusal {
             Self::PriorsBeyondTolerance { most: Some(most), .. } if most.starts_with("tag survey") => {
                 "measure the frame of the tags in the arm's base and state its sigmas in [geometry] of robot.toml, or \
                  touch three surveyed surfaces (step `touch`)"
+            }
+            Self::PriorsBeyondTolerance { most: Some(most), .. } if most.starts_with("camera mount") => {
+                "measure where the camera is and state its smaller sigmas in [camera] of robot.toml (mount_std_m, \
+                 mount_std_rad), or touch three surveyed surfaces (step `touch`)"
             }
             Self::PriorsBeyondTolerance { .. } => {
                 "put a tag on the gripper, touch three surveyed surfaces (step `touch`), or measure the arm and state \
@@ -519,6 +579,9 @@ impl Refusal {
             Self::Length { .. } => "measure again, and correct this length or the tags' size_m in robot.toml",
             Self::PriorReused => "give a prior that was made from other views",
             Self::PriorSingular => "make the prior again",
+            Self::PriorContradicted { camera_moved: Some(_), .. } => {
+                "put the camera back, or calibrate without --prior from as many views as the first time"
+            }
             Self::PriorContradicted { .. } => "calibrate without --prior",
         }
     }
@@ -566,6 +629,7 @@ impl Coded for Refusal {
             Self::PriorsBeyondTolerance { .. } => Code::PriorsBeyondTolerance,
             Self::WrongInput(wrong) => wrong.code(),
             Self::MisreadReadings(misread) => misread.code(),
+            Self::MovedBetweenViews { .. } => Code::MovedBetweenViews,
             Self::Geometry(_) => Code::GeometryContradicted,
             Self::RepairTooLarge { .. } | Self::TagSizeRepair { .. } => Code::RepairTooLarge,
             Self::Lens { .. } => Code::LensContradicted,
@@ -585,6 +649,7 @@ impl Coded for Refusal {
             Self::PriorUntested => Code::PriorUntested,
             Self::PriorContradicted { .. } => Code::PriorContradicted,
             Self::TooFewViewsSinceSlip { .. } => Code::TooFewViewsSinceSlip,
+            Self::SlipNotEstimated { .. } => Code::SlipNotEstimated,
             Self::SensorLine { .. } => Code::SensorLine,
             Self::SensorFailed { .. } => Code::SensorNeeded,
         }

@@ -235,7 +235,7 @@ impl<'b> Driver<'b> {
     pub fn record_task(&mut self, task: &TaskSettings) -> Result<(), SessionError> {
         let stamp = self.arm.now();
         let (targets_m, tolerance_m) = (task.targets_m.clone(), task.tolerance_m);
-        self.record(&Message::Task(ReachTask { stamp, targets_m, tolerance_m }))
+        self.record(&Message::Task(ReachTask { stamp, targets_m, tolerance_m, poses: Vec::new() }))
     }
 
     /// Records the survey if the vehicle has its own: the estimator has only the recording and the robot's file.

@@ -17,6 +17,12 @@ pub(crate) mod estimate {
     pub(crate) const CONVERGED_CHANGE: f64 = 0.01;
     /// Number of rounds after the last new scales, in which outliers may still change.
     pub(crate) const LAST_ROUNDS: usize = 5;
+    /// Most rounds under given scales, where outliers alone come and go: good views settle in three (measured).
+    pub(crate) const ROUNDS_AS_GIVEN: usize = 12;
+    /// Most rounds where most observations are left out, under given scales and where scales are fitted: noise that is
+    /// many times the stated lets observations in by and by. Assumed.
+    pub(crate) const LITTLE_AS_GIVEN: usize = 8;
+    pub(crate) const LITTLE_AS_FITTED: usize = 20;
 }
 
 pub(crate) mod evidence {
@@ -107,6 +113,15 @@ pub(crate) mod schur {
     pub(crate) const N_DIRECTIONS: usize = TIME + 1;
     /// Number of columns of all links that an arm may have, of their compliances, the base's and the tool load.
     pub(crate) const N_BODY_COLUMNS: usize = 7 * MAX_JOINTS + 4;
+}
+
+pub(crate) mod task_angles {
+    /// Targets are reached to this, m.
+    pub(crate) const TOLERANCE_M: f64 = 1e-4;
+    /// Views whose angles the inverse kinematics is started at. Assumed.
+    pub(crate) const N_NEAREST_VIEWS: usize = 8;
+    /// Starts at random where no other leads to the target: nearly one in two of a six-axis arm does (measured).
+    pub(crate) const N_RANDOM_STARTS: usize = 48;
 }
 
 pub(crate) mod time_error {

@@ -8,16 +8,16 @@
 //! more if the residuals show that the sensors are worse than their datasheet.
 
 use crate::solve::constants::covariance::DISTANCE_FLOOR_M;
-use nalgebra::{Const, DMatrix, DVector, Dyn, Matrix3, Matrix6, OMatrix, Vector3, Vector6};
+use nalgebra::{Const, DMatrix, DVector, Dyn, Matrix3, Matrix6, OMatrix, Vector6};
 
 use crate::model::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::model::shared_survey_error::SharedSurveyError;
 use crate::positions::mount_estimate::MountEstimate;
 use crate::positions::position_problem::PositionProblem;
 use crate::solve::details::TargetPrediction;
+use crate::solve::task_angles::numbered_task_angles;
 use crate::views::view::{TagObservation, TaskRests};
-use armcal_core::kinematics::{IkGoal, IkSettings, JointLimits, solve_position};
-use armcal_core::robot::{FailedJoint, FailedKind, JointSensorSpec, Robot, SurveyedTag};
+use armcal_core::robot::{JointSensorSpec, Robot, SurveyedTag};
 use armcal_core::sensor::ConditionChange;
 use armcal_core::stats::Summary;
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
@@ -285,41 +285,6 @@ fn add_columns(matrix: &mut DMatrix<f64>, column: usize, block: &OMatrix<f64, Dy
     view += block;
 }
 
-fn is_locked(robot: &Robot, joint: usize) -> bool {
-    robot.failed.contains(&FailedJoint { joint, kind: FailedKind::Locked })
-}
-
-/// Returns the arm's angles at each target that inverse kinematics reaches. The search starts where the arm rested for
-/// the target, as a `reach` does; otherwise from the stowed pose or the other rests.
-#[must_use]
-pub fn task_angles(robot: &Robot, task: TaskRests<'_>) -> Vec<JointAngles> {
-    numbered_task_angles(robot, task).into_iter().map(|(_, angles)| angles).collect()
-}
-
-/// Returns [`task_angles`] with the number of each target, from 0.
-pub(crate) fn numbered_task_angles(robot: &Robot, TaskRests { task, rests }: TaskRests<'_>) -> Vec<(u32, JointAngles)> {
-    let open = JointLimits { lower_rad: -std::f64::consts::TAU, upper_rad: std::f64::consts::TAU };
-    let settings = IkSettings {
-        limits: robot.chain.joints().iter().map(|joint| joint.limits.unwrap_or(open)).collect(),
-        locked: (0..robot.n_joints()).map(|j| j >= robot.tool.mount.n_joints || is_locked(robot, j)).collect(),
-        tolerance_m: 1e-4,
-        max_iterations: 200,
-    };
-    let reached = (0..).zip(&task.targets_m).filter_map(|(target_idx, target): (u32, _)| {
-        let goal = IkGoal { position_m: Vector3::from(*target) };
-        let from = |start: &JointAngles| solve_position(&robot.chain, &robot.tool.mount, &goal, start, &settings).ok();
-        let rest = |rest: &JointAngles| {
-            JointAngles::from_fn(rest.len(), |j| if settings.locked[j] { robot.stowed[j] } else { rest[j] })
-        };
-        let own = rests.get(&target_idx).map(rest).and_then(|rest| from(&rest));
-        // If a joint is locked elsewhere, the path from the rest may lead past a limit.
-        let angles =
-            own.or_else(|| from(&robot.stowed)).or_else(|| rests.values().find_map(|other| from(&rest(other))));
-        Some((target_idx, angles?))
-    });
-    reached.collect()
-}
-
 /// Predicts the tool's position error at each target of `task`, `sqrt(trace(covariance))`, and its summary.
 #[must_use]
 pub fn predict_tool_error(
@@ -344,39 +309,4 @@ pub fn predict_tool_error(
     let targets: Vec<TargetPrediction> = numbered_task_angles(robot, task?).into_iter().map(predict).collect();
     let errors: Vec<f64> = targets.iter().map(|target| target.error_m).collect();
     Some(ToolErrorPrediction { error_m: Summary::of(&errors)?, targets })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::fixture::titan;
-    use armcal_core::streams::ReachTask;
-    use std::collections::BTreeMap;
-
-    /// The prediction for a target is at the configuration in which the arm rested for it. Without such a rest, or
-    /// without a solution from there, it is the solution from the stowed pose.
-    #[test]
-    fn a_target_is_predicted_where_the_arm_rested_for_it() {
-        let robot = titan();
-        let tool_m = |at: &JointAngles| robot.chain.frame(at, &robot.tool.mount).translation.vector;
-        let mut rested = robot.stowed;
-        for (joint, by_rad) in [(0, -0.6), (1, -0.5), (2, 0.8), (3, -0.9), (4, 0.5)] {
-            rested[joint] += by_rad;
-        }
-        // The sensors are wrong: the arm rested next to the target.
-        let mut at_target = rested;
-        (0..5).for_each(|joint| at_target[joint] += 0.02);
-        let task =
-            ReachTask { stamp: Default::default(), targets_m: vec![tool_m(&at_target).into()], tolerance_m: 0.01 };
-        let angles = |rests: &[(u32, JointAngles)]| {
-            let rests: BTreeMap<u32, JointAngles> = rests.iter().copied().collect();
-            task_angles(&robot, TaskRests { task: &task, rests: &rests })
-        };
-        let [by_rest] = angles(&[(0, rested)])[..] else { panic!("one target") };
-        let by_stowed = angles(&[]);
-        assert!(by_rest.max_abs_difference(&rested) < 0.12, "{by_rest:?}");
-        assert!((tool_m(&by_rest) - tool_m(&at_target)).norm() < 1e-3);
-        assert!(by_stowed[0].max_abs_difference(&rested) > 0.2, "{by_stowed:?}");
-        assert_eq!(angles(&[(1, rested)]), by_stowed);
-    }
 }

@@ -2,7 +2,10 @@
 //! rest.
 
 use crate::measure::BlockMeasurement;
-use crate::solve::constants::estimate::{CONSISTENT_COST, CONVERGED_CHANGE, CORNER_WIDTH, LAST_ROUNDS, MAX_ROUNDS};
+use crate::solve::constants::estimate::{
+    CONSISTENT_COST, CONVERGED_CHANGE, CORNER_WIDTH, LAST_ROUNDS, LITTLE_AS_FITTED, LITTLE_AS_GIVEN, MAX_ROUNDS,
+    ROUNDS_AS_GIVEN,
+};
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Vector6};
 
 use crate::measure::{ObservationTerm, WeightedMeasurement};
@@ -77,7 +80,9 @@ pub(crate) fn estimate_with_lengths<'a>(input: &BundleInput<'a>, lengths: &[Bloc
     let mut posterior;
     let mut round = 0;
     loop {
-        solved = solve(&problem, solved.state, Loss::Square, if round == 0 { LOOSE } else { TIGHT });
+        // What fits little is no explanation; how well it could fit is not worth the steps.
+        let is_loose = round == 0 || input.evidence == HyperparameterMode::Given && fits_little(&problem);
+        solved = solve(&problem, solved.state, Loss::Square, if is_loose { LOOSE } else { TIGHT });
         iterations += solved.iterations;
         posterior = Posterior::of(&problem, &solved.normal)?;
         let mut settled = !reject(&mut problem, &solved);
@@ -92,7 +97,7 @@ pub(crate) fn estimate_with_lengths<'a>(input: &BundleInput<'a>, lengths: &[Bloc
             }
         }
         round += 1;
-        if (settled && round > 1) || round > MAX_ROUNDS + LAST_ROUNDS {
+        if (settled && round > 1) || round > most_rounds(&problem, input.evidence) {
             break;
         }
     }
@@ -113,6 +118,22 @@ pub(crate) fn estimate_with_lengths<'a>(input: &BundleInput<'a>, lengths: &[Bloc
         cost_initial,
         cost_final,
     })
+}
+
+/// Returns true if most observations are left out.
+fn fits_little(problem: &BundleProblem<'_>) -> bool {
+    let n_used = problem.observations.iter().filter(|observation| observation.is_used).count();
+    2 * n_used < problem.observations.len()
+}
+
+/// Returns the number of rounds after which an estimate ends that has not settled.
+fn most_rounds(problem: &BundleProblem<'_>, evidence: HyperparameterMode) -> usize {
+    match (evidence, fits_little(problem)) {
+        (HyperparameterMode::Given, true) => LITTLE_AS_GIVEN,
+        (HyperparameterMode::Given, false) => ROUNDS_AS_GIVEN,
+        (HyperparameterMode::Fitted, true) => LITTLE_AS_FITTED,
+        (HyperparameterMode::Fitted, false) => MAX_ROUNDS + LAST_ROUNDS,
+    }
 }
 
 /// Plain least squares from the guess, with every observation and the given scales, to compare solvers.

@@ -2,7 +2,8 @@
 //!
 //! `input` is the input of a solution, `model_for_views` chooses the columns, and `problem` prepares views and priors.
 //! `linearize` sums the normal equations (views marginalised: `schur`), `levenberg_marquardt` solves them. `estimate`
-//! runs everything, with outliers and the scales that `evidence` fits; `covariance` gives the effect on the tool.
+//! runs everything, with outliers and the scales that `evidence` fits; `covariance` gives the effect on the tool at the
+//! task's targets (`task_angles`).
 
 pub(crate) mod body_columns;
 pub(crate) mod body_motion;
@@ -21,5 +22,6 @@ pub(crate) mod prior_terms;
 pub(crate) mod problem;
 pub(crate) mod robust_start;
 pub(crate) mod schur;
+pub(crate) mod task_angles;
 pub(crate) mod time_error;
 pub(crate) mod tool_error;

@@ -124,7 +124,7 @@ mod tests {
         lost[0] = sensors.counts(&JointAngles::from_fn(robot.n_joints(), |j| robot.stowed[j] + 1.0))[0];
         let at = |seconds: f64| SIMULATION_EPOCH.plus_s(seconds);
         let targets_m = vec![[1.0, 0.0, 0.0]];
-        let task = Message::Task(ReachTask { stamp: at(0.0), targets_m, tolerance_m: 0.01 });
+        let task = Message::Task(ReachTask { stamp: at(0.0), targets_m, tolerance_m: 0.01, poses: Vec::new() });
         let reading = |k: usize| {
             let counts = if k % 6 == 5 { lost } else { sound };
             Message::JointSensors(JointSensorSample { stamp: at(10.0 + 0.01 * k as f64), counts })
@@ -155,7 +155,8 @@ mod tests {
         let at = |seconds: f64| SIMULATION_EPOCH.plus_s(seconds);
         let counts = ArmSensors::nominal(&robot).counts(&robot.stowed);
         let targets_m = vec![[1.0, 0.0, 0.0]];
-        let mut messages = vec![Message::Task(ReachTask { stamp: at(0.0), targets_m, tolerance_m: 0.01 })];
+        let mut messages =
+            vec![Message::Task(ReachTask { stamp: at(0.0), targets_m, tolerance_m: 0.01, poses: Vec::new() })];
         for (start_s, temperature_c) in [(10.0, 20.0), (500.0, 30.0)] {
             let thermometer = Thermometer::Oil;
             let stamp = at(start_s - 5.0);

@@ -53,6 +53,13 @@ pub(crate) mod external_landmarks {
     pub(crate) const NEVER_APART_M: f64 = 2e-3;
 }
 
+pub(crate) mod motion {
+    /// Steps between readings, s: over them a parabola follows the swings of common arms to 0.001 deg. Assumed.
+    pub(crate) const STEP_S: f64 = 0.05;
+    /// Steps before and after a view: four sigmas of the offset between two clocks.
+    pub(crate) const N_STEPS: usize = 4;
+}
+
 pub(crate) mod external_pairing {
     /// Largest time between readings of a continuous stream, s. Assumed.
     pub(crate) const CONTINUOUS_WITHIN_S: f64 = 0.25;

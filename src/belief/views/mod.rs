@@ -4,7 +4,8 @@
 //! `conditions` gives the temperatures and the pressure of the capture, and `dropouts` replaces invalid readings.
 //! `external` does the same for recordings that mark no views, `pooling` for several recordings. `scale_identification`
 //! measures the scale of an unknown sensor. `data_checks` refuses unusable recordings. `error` lists the errors before
-//! any estimate. `marked_spans` reads the messages that views are made of and leaves the rest in the file.
+//! any estimate. `marked_spans` reads the messages that views are made of and leaves the rest in the file. `motion`
+//! keeps the readings of a moving arm around a view.
 
 pub(crate) mod association;
 pub(crate) mod calibration_data;
@@ -17,6 +18,7 @@ pub(crate) mod external;
 pub(crate) mod frame_consensus;
 pub(crate) mod marked_spans;
 pub(crate) mod message_index;
+pub(crate) mod motion;
 pub(crate) mod pooling;
 pub(crate) mod scale_identification;
 pub(crate) mod view;

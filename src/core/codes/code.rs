@@ -151,6 +151,7 @@ codes! {
     InputMapUnit = "input_map_unit",
     InputPoseUnit = "input_pose_unit",
     MapFrame = "map_frame",
+    MovedBetweenViews = "moved_between_views",
     RepairTooLarge = "repair_too_large",
     LensContradicted = "lens_contradicted",
     GeometryContradicted = "geometry_contradicted",
@@ -168,6 +169,7 @@ codes! {
     PriorUntested = "prior_untested",
     PriorContradicted = "prior_contradicted",
     TooFewViewsSinceSlip = "too_few_views_since_slip",
+    SlipNotEstimated = "slip_not_estimated",
     SensorLine = "sensor_line",
     SensorNeeded = "sensor_needed",
     // Findings.
@@ -232,6 +234,9 @@ codes! {
     ResultKept = "result_kept",
     NotCovered = "not_covered",
     NotIncluded = "not_included",
+    ImagesFrozen = "images_frozen",
+    BaseDoubtful = "base_doubtful",
+    LensChanged = "lens_changed",
 }
 
 /// Types that have a code: errors, refusals, findings.

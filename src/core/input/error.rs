@@ -1,6 +1,7 @@
 //! Errors of recordings of a real arm that cannot be used.
 
 use super::map::{JointUnit, SlideUnit};
+use super::two_senders::ONE_SENDER;
 use crate::codes::{Code, Coded};
 use crate::log::{CdrError, LogError, StampRegression};
 
@@ -58,6 +59,12 @@ pub enum InputError {
          messages of the other"
     )]
     JointTwice { file: String, topic: String, joint: String, first: f64, second: f64, message: u64, n: u64, of: u64 },
+    #[error(
+        "{file}: topic {topic} has two senders that differ: `{joint}` by {apart:.3} {} within {:.0} ms; {ONE_SENDER}",
+        if *is_slide { "m" } else { "rad" },
+        1e3 * within_s
+    )]
+    TwoSenders { file: String, topic: String, joint: String, apart: f64, is_slide: bool, within_s: f64 },
     #[error(
         "{file}: {place}: {field} of `{of}` is {value}, not a finite number; set not_finite = \"leave_out\" in the \
          input map to leave such values out"
@@ -150,7 +157,9 @@ impl Coded for InputError {
             Self::Log(error) => error.code(),
             Self::NoTopic { .. } => Code::TopicMissing,
             Self::Type { .. } | Self::Encoding { .. } | Self::Use { .. } => Code::MessageType,
-            Self::Undecodable { .. } | Self::JointTwice { .. } | Self::NotFinite { .. } => Code::MessageInvalid,
+            Self::Undecodable { .. } | Self::JointTwice { .. } | Self::TwoSenders { .. } | Self::NotFinite { .. } => {
+                Code::MessageInvalid
+            }
             Self::NoPositions { .. } => Code::ReadingsMissing,
             Self::Disorder { .. } => Code::StampsDisordered,
             Self::JointNames { .. } => Code::JointsMismatch,

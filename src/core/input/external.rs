@@ -15,6 +15,7 @@ use super::message_type::check_type;
 use super::recording::ExternalRecording;
 use super::table::read_table;
 use super::tags::TagReader;
+use super::two_senders::check_senders;
 use crate::log::ros::{
     AprilTagDetectionArray, CompressedImage, FluidPressure, Image, Imu, IsaacDetectionArray, JointState, Temperature,
     TfMessage,
@@ -86,6 +87,7 @@ fn read_up_to<'a>(
     let mut recording = reader.finish(robot);
     recording.path = path.to_owned();
     recording.unit_doubt = check_unit(&file, map, robot, &recording.readings)?;
+    check_senders((&file, &topics.joints), map, robot, &recording)?;
     (recording.completeness, recording.chunk_order) = (summary.completeness, summary.chunk_order);
     Ok(recording)
 }

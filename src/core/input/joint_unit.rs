@@ -23,6 +23,8 @@ const STOOD_RAD: f64 = 0.12;
 const MOVED_RAD: f64 = 0.3;
 /// Upper limit of angles in radians.
 const LARGEST_RAD: f64 = 7.0;
+/// Tolerance of one count per radian for a sensor that counts radians. Assumed: scales have seven digits or more.
+const ONE_RAD: f64 = 1e-6;
 /// Rounding tolerance of LeRobot's numbers, which are single precision.
 const ROUNDED: f64 = 1e-3;
 
@@ -39,7 +41,7 @@ pub(super) fn check_unit(
     if let Some(lerobot) = &map.lerobot {
         check_lerobot(file, map, lerobot, (robot, readings))?;
     }
-    let stated = map.joint_unit;
+    let stated = stated_unit(map, robot);
     let values = Values { stated, lines: &map.joint_lines, sensors: &robot.sensors[..n_needed(robot)], readings };
     if stated != JointUnit::Counts {
         values.check_slides(file, map.joint_lines.slide_unit)?;
@@ -67,6 +69,13 @@ pub(super) fn check_unit(
             stated.name()
         )
     }))
+}
+
+/// Returns the unit of the map; radians if the robot's sensors count these.
+fn stated_unit(map: &InputMap, robot: &Robot) -> JointUnit {
+    let counts_rad = |spec: &JointSensorSpec| (spec.counts_per_rad - 1.0).abs() < ONE_RAD && spec.offset_counts == 0.0;
+    let are_rad = map.lerobot.is_none() && robot.sensors.iter().all(counts_rad);
+    if map.joint_unit == JointUnit::Counts && are_rad { JointUnit::Rad } else { map.joint_unit }
 }
 
 /// Refuses ticks that match no number of LeRobot's.
@@ -243,7 +252,14 @@ mod tests {
 
     /// Checks the unit of the arm at six poses; `recorded` maps a joint and its angle in rad to the recorded number.
     fn checked(keys: &str, recorded: impl Fn(usize, f64) -> f64) -> Result<Option<String>, InputError> {
-        let robot = titan();
+        checked_of(&titan(), keys, recorded)
+    }
+
+    fn checked_of(
+        robot: &Robot,
+        keys: &str,
+        recorded: impl Fn(usize, f64) -> f64,
+    ) -> Result<Option<String>, InputError> {
         let text = format!(
             "version = 1\nkind = \"input\"\n[joint_sensors]\ntopic = \"/j\"\n{keys}\n[tags]\ntopic = \"/t\"\nuse = \
              \"corners\"\n"
@@ -260,7 +276,7 @@ mod tests {
             digest: [0; 32],
         };
         let readings: Vec<Reading> = (0..6).map(reading).collect();
-        check_unit("run.mcap", &map, &robot, &readings)
+        check_unit("run.mcap", &map, robot, &readings)
     }
 
     /// Result of reading the arm's angles in rad times `factor` as `unit`.
@@ -284,6 +300,18 @@ mod tests {
             );
             assert!(checked("unit = \"deg\"", recorded).is_ok(), "{wrapped}");
         }
+    }
+
+    /// Without a unit in the map, numbers are what the sensors count.
+    #[test]
+    fn degrees_are_refused_without_a_unit_where_the_sensors_count_radians() {
+        let mut robot = titan();
+        for spec in &mut robot.sensors {
+            (spec.counts_per_rad, spec.offset_counts) = (1.0, 0.0);
+        }
+        assert!(matches!(checked_of(&robot, "", |_, angle_rad| angle_rad), Ok(None)));
+        let found = checked_of(&robot, "", |_, angle_rad| angle_rad.to_degrees());
+        assert!(matches!(found, Err(InputError::Unit { likely: JointUnit::Deg, .. })), "{found:?}");
     }
 
     /// The factors that the error names make the numbers angles.

@@ -21,6 +21,7 @@ mod stamp;
 mod table;
 mod tags;
 mod task;
+mod two_senders;
 
 pub use attitude::AttitudeReading;
 pub use clocks::{ClockDoubt, ClockRemedy, StreamTimes, compare_clocks, header_stamp};
@@ -39,6 +40,9 @@ pub use map::{
     WhileMoving, input_schema, parse_input_map, read_input_map,
 };
 pub use recording::ExternalRecording;
-pub use table::{MAX_ROWS, MIN_APART_S, TableColumn, TableContents, plain_key, read_table_contents, tag_number};
+pub use table::{
+    MAX_ROWS, MIN_APART_S, TableColumn, TableContents, plain_key, read_table_contents, tag_number, whole_key,
+};
 pub use tags::{ExternalDetection, RawMeasurement, TagFrame};
 pub use task::{TaskFile, parse_task, read_task, task_schema};
+pub use two_senders::{ONE_SENDER, TwoSenders, two_senders};

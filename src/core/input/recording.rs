@@ -34,6 +34,8 @@ pub struct ExternalRecording {
     pub clock_doubt: Option<String>,
     /// Sentences on data that were not read as the messages state.
     pub notes: Vec<String>,
+    /// Number of rows of a table that were earlier than the row before; the rows were then sorted.
+    pub rows_sorted: u64,
     /// Number of messages without usable data, by reason.
     pub skipped: BTreeMap<String, u64>,
     /// Number of unused messages by reason.

@@ -32,7 +32,7 @@ pub use columns_seen::TableColumn;
 pub use contents::{TableContents, read_table_contents};
 use csv_text::csv_rows;
 pub use one_table::MIN_APART_S;
-pub use rows::{MAX_ROWS, plain_key, tag_number};
+pub use rows::{MAX_ROWS, plain_key, tag_number, whole_key};
 use rows::{Rows, Wanted};
 use yaml::yaml_rows;
 
@@ -158,6 +158,8 @@ fn join_corners(recording: &mut ExternalRecording) {
     }
 }
 
+/// Rows that say nothing new.
+const COPIES: &str = "rows that are exact copies of one before";
 /// Reason for which a row is left out.
 const NOT_A_NUMBER: &str = "rows without a finite number in each column";
 

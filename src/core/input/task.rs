@@ -131,21 +131,23 @@ impl TaskFile {
         Ok(())
     }
 
-    /// Returns the task for `robot`: the targets, and the positions of its tool at the poses by the nominal model.
+    /// Returns the task for `robot`: the targets, then the positions of its tool at the poses by the nominal model.
     ///
     /// # Errors
     /// [`FileIssue`] naming `file` if a pose does not have one angle per joint of the robot.
     pub fn for_robot(&self, file: &Path, robot: &Robot) -> Result<ReachTask, FileIssue> {
-        let mut targets_m = self.targets_m.clone();
+        let (mut targets_m, mut poses) = (self.targets_m.clone(), Vec::new());
         for (k, pose) in self.poses_rad.iter().enumerate() {
             if pose.len() != robot.n_joints() {
                 let problem = format!("has {} angles; the robot has the joints {:?}", pose.len(), robot.joint_names());
                 return Err(FileIssue::new(Code::ValueCount, file, format!("poses_rad[{k}]"), problem));
             }
-            let tool = robot.chain.link_poses(&JointAngles::from_slice(pose)).frame(&robot.tool.mount);
+            let pose = JointAngles::from_slice(pose);
+            let tool = robot.chain.link_poses(&pose).frame(&robot.tool.mount);
             targets_m.push(tool.translation.vector.into());
+            poses.push(pose);
         }
-        Ok(ReachTask { stamp: Stamp::default(), targets_m, tolerance_m: self.tolerance_m })
+        Ok(ReachTask { stamp: Stamp::default(), targets_m, tolerance_m: self.tolerance_m, poses })
     }
 }
 

@@ -82,7 +82,12 @@ pub fn one_of_each() -> Vec<Message> {
         }),
         Message::Gripper(GripperSample { stamp, opening_m: 0.0985 }),
         Message::GripperCommand(GripperCommand { stamp, opening_m: 0.1 }),
-        Message::Task(ReachTask { stamp, targets_m: vec![[1.0, 0.2, -0.3], [0.9, 0.0, 0.1]], tolerance_m: 0.01 }),
+        Message::Task(ReachTask {
+            stamp,
+            targets_m: vec![[1.0, 0.2, -0.3], [0.9, 0.0, 0.1]],
+            tolerance_m: 0.01,
+            poses: Vec::new(),
+        }),
         Message::Touch(ToolTouch {
             stamp,
             duration_s: 0.5,

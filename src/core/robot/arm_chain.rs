@@ -117,6 +117,11 @@ fn single_arm<'a>(urdf: &UrdfModel, candidates: &'a [Candidate], ends: &Ends<'_>
             (None, Some(tip)) => format!("no revolute, continuous or prismatic joint carries `{tip}`"),
             (None, None) => "no chain of revolute, continuous or prismatic joints was found".to_owned(),
         };
+        let other = urdf.robot.joints.iter().find_map(|joint| match &joint.joint_type {
+            JointType::Other(of) => Some(format!("{problem}; joint `{}` is of the type {of:?}", joint.name)),
+            _ => None,
+        });
+        let problem = other.unwrap_or(problem);
         return Err(issue(urdf, "joint", problem));
     };
     let mut arms: Vec<&Candidate> = vec![best];

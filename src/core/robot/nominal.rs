@@ -4,7 +4,7 @@ use crate::codes::{Code, Warning};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use nalgebra::{Isometry3, Matrix6};
+use nalgebra::{Isometry3, Matrix6, Vector3};
 
 use super::allowed_pairs::AllowedPairs;
 use super::body::LinkBody;
@@ -131,6 +131,12 @@ impl Robot {
         let slides = joints.iter().filter(|joint| joint.kind.is_slide());
         let slides_m = slides.filter_map(|joint| joint.limits).map(|l| l.lower_rad.abs().max(l.upper_rad.abs()));
         links_m.chain(slides_m).sum::<f64>() + self.tool.mount.link_from_frame.translation.vector.norm()
+    }
+
+    /// Returns true if the links in one line are long enough for a target in the base's frame.
+    #[must_use]
+    pub fn is_long_enough_for(&self, target_m: &Vector3<f64>) -> bool {
+        (target_m - self.chain.first_place().translation.vector).norm() <= self.reach_m()
     }
 
     /// Returns all cameras, the first one first.

@@ -237,6 +237,17 @@ pub struct ReachTask {
     pub targets_m: Vec<[f64; 3]>,
     /// Largest distance that counts as a hit.
     pub tolerance_m: f64,
+    /// Angles at the last of the targets, which the task gives as poses; a recording does not hold them.
+    pub poses: Vec<JointAngles>,
+}
+
+impl ReachTask {
+    /// Angles at the target of that number, from 0; `None` where the task gives a position.
+    #[must_use]
+    pub fn pose(&self, target_idx: usize) -> Option<&JointAngles> {
+        let first = self.targets_m.len().checked_sub(self.poses.len())?;
+        self.poses.get(target_idx.checked_sub(first)?)
+    }
 }
 
 /// Tags as surveyed before the dive, which the estimator takes as known.

@@ -232,6 +232,9 @@ fn hints(inspection: &Inspection) -> Vec<String> {
         if let Some(what) = topic.may_be.as_deref().filter(|_| topic.known_as.is_none()) {
             hint(&format!("{} may be {what}", topic.topic));
         }
+        if let Some(what) = &topic.two_senders {
+            hint(&format!("{} {what}", topic.topic));
+        }
     }
     hints
 }

@@ -15,5 +15,6 @@ pub use arm::{ArmContents, TagSeen, TaskSeen};
 pub use contents::{Attachment, CompletenessReport, Compression, Inspection, Metadata, State, inspect};
 pub use observable_parameters::ObservableParameters;
 pub use text::to_text;
+pub(in crate::report) use topics::MAX_SAMPLES;
 pub use topics::TopicContents;
 pub use tracking_error::{JointTrackingError, TrackingError};

@@ -4,9 +4,11 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 
+use armcal_core::input::{ONE_SENDER, TwoSenders, two_senders};
 use armcal_core::log::ros::{JointState, TfMessage, decode_detections};
 use armcal_core::log::{RawMessage, decode};
 use armcal_core::log::{Stream, topics};
+use armcal_core::time::Stamp;
 
 /// Counts and type of one topic.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -29,10 +31,15 @@ pub struct TopicContents {
     /// Possible use of a topic that is not armcal's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub may_be: Option<String>,
+    /// Two senders of the same joints that differ.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub two_senders: Option<String>,
 }
 
-/// Number of a topic's messages that are decoded.
-const MAX_SAMPLES: u64 = 200;
+/// Number of a topic's messages that are decoded, here and for an input map.
+pub(in crate::report) const MAX_SAMPLES: u64 = 1000;
+/// Largest angle in rad: no joint of an arm turns more than two turns either way.
+const MAX_RAD: f64 = 4.0 * std::f64::consts::PI;
 /// Number of names that are listed per topic.
 const MAX_NAMES: usize = 12;
 
@@ -57,6 +64,8 @@ struct Seen {
     /// Joint names in the order of the message.
     joints: Vec<String>,
     largest: f64,
+    /// Stamp and positions of messages with these joints.
+    positions: Vec<(Stamp, Vec<f64>)>,
 }
 
 /// Collects counts and samples from every message of a file.
@@ -85,7 +94,7 @@ impl Collector {
         seen.first_nanos = seen.first_nanos.min(raw.log_time_nanos);
         seen.last_nanos = seen.last_nanos.max(raw.log_time_nanos);
         if seen.messages <= MAX_SAMPLES && encoding == "cdr" {
-            seen.look_into(&plain(schema), raw.data);
+            seen.look_into(&plain(schema), raw);
         }
     }
 
@@ -108,14 +117,20 @@ fn plain(schema: &str) -> String {
 }
 
 impl Seen {
-    fn look_into(&mut self, schema: &str, data: &[u8]) {
+    fn look_into(&mut self, schema: &str, raw: &RawMessage<'_>) {
+        let data = raw.data;
         match schema {
             "sensor_msgs/JointState" => {
                 if let Ok(message) = decode::<JointState>(data) {
                     let size = |value: &f64| if value.is_finite() { value.abs() } else { 0.0 };
                     self.largest = message.position.iter().map(size).fold(self.largest, f64::max);
                     if self.joints.is_empty() {
-                        self.joints = message.name;
+                        self.joints = message.name.clone();
+                    }
+                    let is_finite = message.position.iter().all(|value| value.is_finite());
+                    if message.name == self.joints && message.position.len() == message.name.len() && is_finite {
+                        let stamp = Stamp::try_from(message.header.stamp).ok().filter(|stamp| stamp.nanos != 0);
+                        self.positions.push((stamp.unwrap_or(raw.log_time()), message.position));
                     }
                 }
             }
@@ -135,12 +150,32 @@ impl Seen {
         }
     }
 
-    fn finish(self, topic: String) -> TopicContents {
+    /// The joint whose values by two senders differ most, in words; `None` where numbers are no angles in rad.
+    fn two_senders(&mut self) -> Option<String> {
+        if self.largest > MAX_RAD {
+            return None;
+        }
+        self.positions.sort_by_key(|(stamp, _)| *stamp);
+        let stamps: Vec<Stamp> = self.positions.iter().map(|(stamp, _)| *stamp).collect();
+        let of_joint = |(k, joint): (usize, &String)| {
+            let values: Vec<f64> = self.positions.iter().map(|(_, position)| position[k]).collect();
+            Some((joint.clone(), two_senders(&stamps, &values, 0.0, Some(std::f64::consts::TAU))?))
+        };
+        let found = self.joints.iter().enumerate().filter_map(of_joint);
+        let (joint, TwoSenders { apart, within_s }) = found.max_by(|(_, a), (_, b)| a.apart.total_cmp(&b.apart))?;
+        Some(format!(
+            "has two senders that differ: {joint} by {apart:.3} rad within {:.0} ms; {ONE_SENDER}",
+            1e3 * within_s
+        ))
+    }
+
+    fn finish(mut self, topic: String) -> TopicContents {
         let span_s = (self.last_nanos - self.first_nanos) as f64 * 1e-9;
         let rate_hz = (self.messages > 1 && span_s > 0.0).then(|| (self.messages - 1) as f64 / span_s);
         TopicContents {
             known_as: known_as(&topic, &self.schema),
             may_be: self.may_be(&plain(&self.schema)),
+            two_senders: self.two_senders(),
             messages: self.messages,
             bytes: self.bytes,
             time_nanos: [self.first_nanos, self.last_nanos],
@@ -179,8 +214,7 @@ impl Seen {
             n if n > MAX_NAMES => format!("{n} joints, {} ..", self.joints[..MAX_NAMES].join(", ")),
             n => format!("{n} joints, {}", self.joints.join(", ")),
         };
-        // No joint of an arm turns more than two turns either way.
-        let unit = if self.largest > 4.0 * std::f64::consts::PI { "raw counts or degrees" } else { "radians" };
+        let unit = if self.largest > MAX_RAD { "raw counts or degrees" } else { "radians" };
         format!("joint sensors: {joints}; values look like {unit}, largest {:.4}", self.largest)
     }
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::roles::{Roles, unit_of_time};
 use super::text::{missing_joints, missing_seen};
 use crate::report::proposed_map::ProposalError;
-use armcal_core::input::{TableContents, plain_key, read_table_contents};
+use armcal_core::input::{TableContents, plain_key, read_table_contents, whole_key};
 use armcal_core::robot::Robot;
 
 /// An inspected table.
@@ -46,7 +46,12 @@ const MAX_NEIGHBOURS: usize = 20;
 /// Orders two tables and finds the columns that join them.
 pub(super) fn pair<'a>([a, b]: [&'a LookedAt; 2], robot: Option<&Robot>) -> Result<TablePair<'a>, ProposalError> {
     let roles = |of: &LookedAt| Roles::of(&of.contents, robot);
-    let sides = [(a, b, roles(a), roles(b)), (b, a, roles(b), roles(a))];
+    // The tag's position may have the names of a gantry's joints.
+    let of_tags = |of: &LookedAt| {
+        let with_joints = roles(of);
+        if missing_seen(&with_joints).is_none() { with_joints } else { Roles::of(&of.contents, None) }
+    };
+    let sides = [(a, b, roles(a), of_tags(b)), (b, a, roles(b), of_tags(a))];
     let fits = |(_, _, of_joints, of_tags): &(_, _, Roles, Roles)| {
         missing_joints(of_joints).is_none() && missing_seen(of_tags).is_none()
     };
@@ -68,6 +73,9 @@ pub(super) fn pair<'a>([a, b]: [&'a LookedAt; 2], robot: Option<&Robot>) -> Resu
     match join([joints, tags], [&of_joints, &of_tags]) {
         Some(join) => Ok(TablePair { joints, tags, roles: [of_joints, of_tags], join }),
         None => {
+            if let Some(problem) = ambiguous([joints, tags], [&of_joints, &of_tags]) {
+                return Err(ProposalError::Joints { file: joints.path.display().to_string(), problem });
+            }
             let names = |of: &LookedAt| of.contents.columns.iter().take(20).map(|c| c.name.clone()).collect::<Vec<_>>();
             let problem = format!(
                 "no input map can be proposed: no column joins it with {}: give both tables a column with the name of \
@@ -84,7 +92,6 @@ pub(super) fn pair<'a>([a, b]: [&'a LookedAt; 2], robot: Option<&Robot>) -> Resu
 /// Join of two tables: an image's name, else times, else another column with the same texts.
 fn join([joints, tags]: [&LookedAt; 2], [of_joints, of_tags]: [&Roles; 2]) -> Option<ProposedJoin> {
     let keys = keys([joints, tags], [of_joints, of_tags]);
-    let is_image = |name: &String| IMAGES.iter().any(|word| name.to_lowercase().contains(word));
     if let Some(key) = keys.iter().find(|[of_joints, of_tags]| is_image(of_joints) && is_image(of_tags)) {
         return Some(ProposedJoin::Key(key.clone()));
     }
@@ -105,8 +112,19 @@ fn is_rising(joints: &LookedAt, roles: &Roles) -> bool {
     joints.contents.columns.iter().any(|column| Some(&column.name) == roles.time.as_ref() && column.is_rising)
 }
 
-/// Pairs of columns, one per table, whose first cells agree; those with the same name first.
-fn keys([joints, tags]: [&LookedAt; 2], [of_joints, of_tags]: [&Roles; 2]) -> Vec<[String; 2]> {
+/// Pairs of columns, one per table, whose first cells agree; those with the same name first. Whole texts are compared
+/// before images' names without folder and extension.
+fn keys(tables: [&LookedAt; 2], roles: [&Roles; 2]) -> Vec<[String; 2]> {
+    let whole = keys_as(tables, roles, (whole_key, ONCE));
+    if whole.is_empty() { keys_as(tables, roles, (plain_key, ONCE)) } else { whole }
+}
+
+/// Pairs of columns that agree by `key`, if at least `share` of the texts occur in one row of the joints only.
+fn keys_as(
+    [joints, tags]: [&LookedAt; 2],
+    [of_joints, of_tags]: [&Roles; 2],
+    (key, share): (fn(&str) -> String, f64),
+) -> Vec<[String; 2]> {
     let free = |of: &LookedAt, roles: &Roles| {
         let is_free = |name: &String| ["", "time"].contains(&roles.of_column(name)) && !name.is_empty();
         let names = of.contents.columns.iter().map(|column| column.name.clone());
@@ -114,13 +132,13 @@ fn keys([joints, tags]: [&LookedAt; 2], [of_joints, of_tags]: [&Roles; 2]) -> Ve
     };
     let mut found = Vec::new();
     for of_joint in free(joints, of_joints) {
-        let there: Vec<String> = joints.contents.first_cells(&of_joint).map(plain_key).collect();
+        let there: Vec<String> = joints.contents.first_cells(&of_joint).map(key).collect();
         let once: BTreeSet<&String> = there.iter().filter(|key| !key.is_empty()).collect();
-        if once.len() < 2 || (once.len() as f64) < ONCE * there.len() as f64 {
+        if once.len() < 2 || (once.len() as f64) < share * there.len() as f64 {
             continue;
         }
         for of_tag in free(tags, of_tags) {
-            let here: Vec<String> = tags.contents.first_cells(&of_tag).map(plain_key).collect();
+            let here: Vec<String> = tags.contents.first_cells(&of_tag).map(key).collect();
             let n = here.iter().filter(|key| once.contains(key)).count();
             if n as f64 > MOST * here.len() as f64 && is_within(&joints.contents, [&of_joint, &of_tag], &tags.contents)
             {
@@ -130,6 +148,23 @@ fn keys([joints, tags]: [&LookedAt; 2], [of_joints, of_tags]: [&Roles; 2]) -> Ve
     }
     found.sort_by_key(|[a, b]| a != b);
     found
+}
+
+/// Says which image names would join the tables but are ambiguous without folder and extension.
+fn ambiguous(tables: [&LookedAt; 2], roles: [&Roles; 2]) -> Option<String> {
+    let found = keys_as(tables, roles, (plain_key, 0.0));
+    let [of_joint, of_tag] = found.into_iter().find(|names| names.iter().all(is_image))?;
+    let cells: Vec<&str> = tables[0].contents.first_cells(&of_joint).collect();
+    let again = |k: &usize| cells[..*k].iter().find(|cell| plain_key(cell) == plain_key(cells[*k]));
+    let (first, second) = (0..cells.len()).find_map(|k| Some((*again(&k)?, cells[k])))?;
+    Some(format!(
+        "no input map can be proposed: the names in its column `{of_joint}` are ambiguous without folder and ending, \
+         {first:?} and {second:?}; write them with their folders in `{of_tag}` of the other table, too"
+    ))
+}
+
+fn is_image(name: &String) -> bool {
+    IMAGES.iter().any(|word| name.to_lowercase().contains(word))
 }
 
 /// True if the tags' keys stay within the joints' keys. Row numbers agree at first in any two tables, then exceed the

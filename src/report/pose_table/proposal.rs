@@ -6,16 +6,18 @@ use super::pair::{LookedAt, ProposedJoin, TablePair, apart_s, pair};
 use super::roles::{Columns, Roles, unit_of_time};
 use super::text::{cell_of, gaps, missing_joints, missing_seen};
 use super::winding::Windings;
+use crate::report::proposed_map::joint_units::{JointUnits, StatedUnits};
 use crate::report::proposed_map::{ProposalError, comment, quoted};
-use armcal_core::input::{TableColumn, TableContents, TableFormat, parse_input_map};
+use armcal_core::input::{MIN_APART_S, TableColumn, TableContents, TableFormat, parse_input_map};
 use armcal_core::kind::Kind;
-use armcal_core::robot::Robot;
+use armcal_core::robot::{JointSensorSpec, Robot};
 use armcal_core::schema::first_line;
 
-/// Largest angle in rad: no joint of an arm turns more than two turns either way.
-const MAX_RAD: f64 = 4.0 * std::f64::consts::PI;
-/// Tolerance of a scale of one count per radian, as a robot folder with readings in radians has it.
-const RADIANS_WITHIN: f64 = 1e-6;
+/// Units in the names of columns.
+const DEGREES: [&str; 2] = ["deg", "\u{b0}"];
+const MILLIMETRES: [&str; 3] = ["[mm", "(mm", "_mm"];
+/// Line for a unit that the table does not show.
+const AS_SENSORS: &str = "# unit: as the robot's sensors count; or \"rad\", \"deg\"";
 /// Largest distance of a tag from the camera, m; larger numbers are millimetres. Assumed.
 const MAX_DISTANCE_M: f64 = 20.0;
 /// Limit of rotation vectors and angles in radians; larger numbers are degrees.
@@ -164,10 +166,29 @@ fn time(table: &TableContents, roles: &Roles) -> String {
     let largest = found.range.map_or_else(String::new, |[_, high]| cell_of(found.n_dates, high));
     let unit = unit_of_time(found).0;
     let line = format!("time = {{ column = {}, unit = \"{unit}\" }}   # up to {largest}\n", quoted(name));
-    if found.is_rising && found.n_empty + found.n_others == 0 {
+    let is_whole = found.n_empty + found.n_others == 0;
+    if found.is_rising && is_whole {
         return line;
     }
+    if is_whole && are_poses(table, roles, (name, unit_of_time(found).1)) {
+        return format!("{line}# `calibrate` sorts the rows, some of which are out of the order of time\n");
+    }
     format!("# {line}# the column has gaps or goes backwards; rows count as 1 s apart\n")
+}
+
+/// True where rows of one time have the same joints, and others are apart as poses at rest are.
+fn are_poses(table: &TableContents, roles: &Roles, (name, unit_s): (&String, f64)) -> bool {
+    let columns: Vec<Vec<&str>> =
+        roles.joints.iter().map(|(_, column)| table.first_cells(column).collect::<Vec<_>>()).collect();
+    let joints = |row: usize| columns.iter().map(move |cells| cells.get(row).copied()).collect::<Vec<_>>();
+    let times = table.first_cells(name).enumerate();
+    let mut rows: Vec<(f64, usize)> = times.filter_map(|(row, cell)| Some((cell.parse().ok()?, row))).collect();
+    rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let is_pose = |two: &[(f64, usize)]| match unit_s * (two[1].0 - two[0].0) {
+        0.0 => joints(two[0].1) == joints(two[1].1),
+        apart_s => apart_s >= MIN_APART_S,
+    };
+    rows.len() > 1 && rows.windows(2).all(is_pose)
 }
 
 fn joints(table: &TableContents, roles: &Roles, robot: Option<&Robot>) -> String {
@@ -182,20 +203,28 @@ fn joints(table: &TableContents, roles: &Roles, robot: Option<&Robot>) -> String
     if !renamed.is_empty() {
         text += &format!("names = {{ {} }}   # the robot's joint = its column\n", renamed.join(", "));
     }
-    let largest = largest(table, roles.joints.iter().map(|(_, column)| column));
-    let in_rad =
-        robot.map(|robot| robot.sensors.iter().all(|s| (s.counts_per_rad.abs() - 1.0).abs() <= RADIANS_WITHIN));
-    let says = |words: &[&str]| {
-        let names = roles.joints.iter().map(|(_, column)| column.to_lowercase());
-        !roles.joints.is_empty() && names.into_iter().all(|name| words.iter().any(|word| name.contains(word)))
+    let Some(robot) = robot else {
+        let says_deg = !roles.joints.is_empty() && roles.joints.iter().all(|(_, column)| says(column, &DEGREES));
+        let line = if says_deg { "unit = \"deg\"" } else { AS_SENSORS };
+        let largest = largest(table, roles.joints.iter().map(|(_, column)| column));
+        return text + &format!("{line}   # the largest value is {largest:.4}\n");
     };
-    let unit = match (largest <= MAX_RAD, in_rad) {
-        _ if says(&["deg", "\u{b0}"]) => "unit = \"deg\"",
-        (true, Some(false)) => "unit = \"rad\"",
-        (false, Some(true)) => "unit = \"deg\"",
-        _ => "# unit: as the robot's sensors count; or \"rad\", \"deg\"",
+    let column = |spec: &JointSensorSpec| roles.joints.iter().find(|(joint, _)| *joint == spec.joint).map(|(_, c)| c);
+    let say = |is_slide: bool, words: &[&str]| {
+        let of_kind = robot.sensors.iter().filter(|spec| spec.moves.is_slide() == is_slide);
+        let columns: Vec<&String> = of_kind.filter_map(column).collect();
+        !columns.is_empty() && columns.into_iter().all(|column| says(column, words))
     };
-    text + &format!("{unit}   # the largest value is {largest:.4}\n")
+    let stated = StatedUnits { deg: say(false, &DEGREES), mm: say(true, &MILLIMETRES) };
+    let units = JointUnits::of(robot, stated, |spec| column(spec).map(|column| largest(table, [column])));
+    let line = units.unit.map_or_else(|| AS_SENSORS.to_owned(), |unit| format!("unit = \"{unit}\""));
+    text + &format!("{line}   # the largest value is {:.4}\n", units.largest) + units.slide_line()
+}
+
+/// A column whose name has one of these words.
+fn says(column: &str, words: &[&str]) -> bool {
+    let name = column.to_lowercase();
+    words.iter().any(|word| name.contains(word))
 }
 
 fn list(names: &[String]) -> String {
@@ -243,6 +272,7 @@ fn tags(table: &TableContents, roles: &Roles) -> String {
         let or = match *form {
             "rotation_vector" => "   # or \"fixed_xyz\", angles about the fixed axes x, y, z",
             "fixed_xyz" => "   # roll, pitch, yaw",
+            "quaternion_xyzw" if columns.names[0].ends_with(".0") => "   # or \"quaternion_wxyz\"",
             _ => "",
         };
         text += &format!("rotation = [{}]\nrotation_form = \"{form}\"{or}\n", list(&columns.names));

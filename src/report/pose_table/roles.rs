@@ -26,6 +26,8 @@ pub(super) struct Roles {
     pub time: Option<String>,
     pub position: Option<Columns>,
     pub other_positions: Vec<Columns>,
+    /// Several tags have columns of their own in one row.
+    pub are_tags_side_by_side: bool,
     pub rotation: Option<Rotation>,
     pub pixel: Option<[String; 2]>,
     /// Column of a corner's number, where the tag's is in another column.
@@ -47,12 +49,25 @@ const SEEN_WORDS: [&str; 10] =
     ["tag", "board", "marker", "target", "track", "cam", "object", "pattern", "aruco", "landmark"];
 const ARM_WORDS: [&str; 6] = ["robot", "tool", "base", "flange", "tcp", "ee"];
 const ROTATION_STEMS: [&str; 6] = ["r", "rot", "rvec", "rotation", "euler", "rotvec"];
+/// Words before the numbers of columns.
+const PLACE_WORDS: [&str; 5] = ["translation", "position", "pos", "tvec", "xyz"];
+const TURN_WORDS: [&str; 2] = ["rvec", "rotvec"];
+const QUATERNION_WORDS: [&str; 3] = ["quaternion", "quat", "orientation"];
+/// Words before the number of a tag that has columns of its own.
+const TAG_WORDS: [&str; 5] = ["tag", "tag_id", "marker", "aruco", "landmark"];
 
 impl Roles {
     pub fn of(table: &TableContents, robot: Option<&Robot>) -> Self {
         let numbers: Vec<&TableColumn> = table.columns.iter().filter(|column| column.n_numbers > 0).collect();
         let names: Vec<String> = numbers.iter().map(|column| column.name.clone()).collect();
         let mut roles = Self { time: time(&table.columns), ..Self::default() };
+        if let Some(robot) = robot {
+            roles.match_joints(&names, &table.other_names, robot);
+        }
+        // A table of the tags alone may have columns with the names of some joints.
+        let has_joints = roles.missing_joints.is_empty();
+        let is_joint = |name: &String| has_joints && roles.joints.iter().any(|(_, column)| column == name);
+        let names: Vec<String> = names.iter().filter(|name| !is_joint(name)).cloned().collect();
         let called = |words: &[&str]| names.iter().find(|name| words.contains(&last_part(name).as_str())).cloned();
         roles.corner = called(&CORNERS);
         let is_id = |column: &&TableColumn| is_of_tags(column) && IDS.contains(&last_part(&column.name).as_str());
@@ -62,12 +77,17 @@ impl Roles {
         let mut places = triples(&names);
         let rotations: Vec<Columns> = extracted(&mut places, is_rotation);
         places.sort_by_key(|columns| seen_rank(&columns.stem));
+        roles.are_tags_side_by_side = roles.id.is_none() && side_by_side(places.iter());
         let mut places = places.into_iter();
         (roles.position, roles.other_positions) = (places.next(), places.collect());
         let stem = roles.position.as_ref().map_or("", |columns| &columns.stem);
         roles.rotation = rotation(&names, rotations, stem);
         roles.pixel = pixel(&names);
-        roles.match_joints(&names, &table.other_names, robot);
+        match robot {
+            None => roles.unmatched_joints(&names, &table.other_names),
+            Some(robot) if roles.joints.is_empty() => roles.number_joints(&names, robot),
+            Some(_) => {}
+        }
         roles
     }
 
@@ -78,17 +98,8 @@ impl Roles {
         places.chain(rotation).chain(&self.time).chain(&self.id).chain(&self.corner).chain(pixels).collect()
     }
 
-    fn match_joints(&mut self, names: &[String], other_names: &BTreeMap<String, String>, robot: Option<&Robot>) {
-        let Some(robot) = robot else {
-            let used = self.used();
-            let free = names.iter().filter(|name| !used.contains(name) && is_joint_name(name));
-            let found: Vec<(String, String)> = match other_names.is_empty() {
-                true => free.map(|name| (name.clone(), name.clone())).collect(),
-                false => other_names.clone().into_iter().collect(),
-            };
-            self.joints = found;
-            return;
-        };
+    /// Columns with the names of the robot's joints.
+    fn match_joints(&mut self, names: &[String], other_names: &BTreeMap<String, String>, robot: &Robot) {
         let all: BTreeSet<String> = names.iter().chain(other_names.keys()).cloned().collect();
         let n_needed = robot.camera.mount.n_joints;
         for (k, joint) in robot.joint_names().into_iter().enumerate() {
@@ -101,9 +112,17 @@ impl Roles {
                 None => {}
             }
         }
-        if self.joints.is_empty() {
-            self.number_joints(names, robot);
-        }
+    }
+
+    /// Columns without another role that look like joints.
+    fn unmatched_joints(&mut self, names: &[String], other_names: &BTreeMap<String, String>) {
+        let used = self.used();
+        let free = names.iter().filter(|name| !used.contains(name) && is_joint_name(name));
+        let found: Vec<(String, String)> = match other_names.is_empty() {
+            true => free.map(|name| (name.clone(), name.clone())).collect(),
+            false => other_names.clone().into_iter().collect(),
+        };
+        self.joints = found;
     }
 
     /// Assigns columns called `q1`, `q2` .. to the joints in the robot's order, if their number is that of the joints.
@@ -219,7 +238,31 @@ fn triples(names: &[String]) -> Vec<Columns> {
             found.push(Columns { names: columns, stem: lower[..at].to_owned() });
         }
     }
+    found.extend(names.iter().filter_map(|name| numbered(name, names)));
     found
+}
+
+/// Columns such as `target.translation.0` to `.2`, or `target.quaternion.0` to `.3`.
+fn numbered(name: &str, names: &[String]) -> Option<Columns> {
+    let stem = name.strip_suffix(".0")?;
+    let word = last_part(stem);
+    let n = [(&PLACE_WORDS[..], 3), (&TURN_WORDS, 3), (&QUATERNION_WORDS, 4)]
+        .into_iter()
+        .find_map(|(words, n)| words.contains(&word.as_str()).then_some(n))?;
+    let all: Vec<String> = (0..n).map(|k| format!("{stem}.{k}")).collect();
+    let are_all = all.iter().all(|column| names.contains(column)) && !names.contains(&format!("{stem}.{n}"));
+    are_all.then(|| Columns { names: all, stem: format!("{}.", stem.to_lowercase()) })
+}
+
+/// Tags side by side in the columns of one row, by what stands before and behind their numbers: `tag3_x`, `tag5_x`.
+fn side_by_side<'a>(places: impl Iterator<Item = &'a Columns>) -> bool {
+    let number = |columns: &Columns| {
+        let stem = columns.stem.trim_end_matches(['_', '.', '-']);
+        let word = stem.trim_end_matches(|c: char| c.is_ascii_digit());
+        let is_of_tag = TAG_WORDS.iter().any(|tag| word.trim_end_matches(['_', '.', '-']).ends_with(tag));
+        (is_of_tag && word.len() < stem.len()).then(|| stem.to_owned())
+    };
+    places.filter_map(number).collect::<BTreeSet<_>>().len() > 1
 }
 
 fn is_rotation(columns: &Columns) -> bool {

@@ -104,6 +104,9 @@ pub(super) fn missing_joints(roles: &Roles) -> Option<String> {
 
 /// Columns of the camera's measurements that a map would still need.
 pub(super) fn missing_seen(roles: &Roles) -> Option<String> {
+    if roles.are_tags_side_by_side {
+        return Some("one row for each tag with a column of its number: the tags stand side by side".to_owned());
+    }
     let missing = match (&roles.position, &roles.pixel, &roles.corners) {
         (None, None, None) => {
             "columns of what the camera saw: x, y, z of a tag or board, a corner's id and u, v, or a tag's id and u, v \

@@ -10,8 +10,8 @@ use armcal_core::log::ros::{
 use armcal_core::log::{RawMessage, RosMessage, decode, is_type};
 use armcal_core::time::Stamp;
 
-/// Number of a topic's messages that are decoded.
-const MAX_SAMPLES: u64 = 1000;
+use crate::report::inspection::MAX_SAMPLES;
+
 /// Number of one topic's times that are kept: 16 bytes each.
 const MAX_TIMES: usize = 2_000_000;
 /// Number of topics, and of names or frames of one topic, that are kept.
@@ -62,8 +62,11 @@ pub(super) struct Topic {
     pub messages: u64,
     /// Names of joints.
     pub joints: BTreeSet<String>,
-    /// The largest position of a joint.
+    /// The largest position of any joint, and of each by name.
     pub largest: f64,
+    pub largest_of: BTreeMap<String, f64>,
+    /// Messages with names and no positions.
+    pub without_positions: u64,
     /// Parent and child of each transform.
     pub frames: BTreeSet<(String, String)>,
     /// Numbers of detected tags, or of a board's corners.
@@ -155,13 +158,8 @@ impl Topic {
     fn look_into(&mut self, data: &[u8]) {
         match self.kind {
             Kind::Joints => {
-                if let Ok(message) = decode::<JointState>(data)
-                    && message.position.len() == message.name.len()
-                {
-                    let room = MAX_NAMES.saturating_sub(self.joints.len());
-                    self.joints.extend(message.name.into_iter().take(room));
-                    let finite = message.position.into_iter().filter(|value| value.is_finite());
-                    self.largest = finite.map(f64::abs).fold(self.largest, f64::max);
+                if let Ok(message) = decode::<JointState>(data) {
+                    self.look_into_joints(message);
                 }
             }
             Kind::Transforms => {
@@ -194,6 +192,28 @@ impl Topic {
                 }
             }
             _ => {}
+        }
+    }
+
+    fn look_into_joints(&mut self, message: JointState) {
+        if message.position.is_empty() {
+            self.without_positions += 1;
+        }
+        if message.position.len() != message.name.len() {
+            return;
+        }
+        for (name, position) in message.name.into_iter().zip(message.position) {
+            let room = self.joints.len() < MAX_NAMES || self.joints.contains(&name);
+            if position.is_finite() {
+                self.largest = self.largest.max(position.abs());
+            }
+            if room && position.is_finite() {
+                let largest = self.largest_of.entry(name.clone()).or_default();
+                *largest = largest.max(position.abs());
+            }
+            if room {
+                self.joints.insert(name);
+            }
         }
     }
 

@@ -3,15 +3,11 @@
 use std::cmp::Reverse;
 
 use armcal_core::log::topics;
-use armcal_core::robot::{Robot, likely_name};
+use armcal_core::robot::{JointSensorSpec, Robot, likely_name};
 
 use super::contents::{Contents, Kind, Topic};
+use super::joint_units::{JointUnits, MAX_RAD, StatedUnits};
 use super::{others, quoted};
-
-/// Largest angle in rad: no joint of an arm turns more than two turns either way.
-const MAX_RAD: f64 = 4.0 * std::f64::consts::PI;
-/// Tolerance of a scale of one count per radian, as a robot folder with readings in radians has it.
-const RADIANS_WITHIN: f64 = 1e-6;
 
 /// Returns the topic and the text of `[joint_sensors]`. The error is `None` without a topic of joints, else the fault
 /// of all such topics.
@@ -25,6 +21,12 @@ pub(super) fn choose_joints(contents: &Contents, robot: Option<&Robot>) -> Resul
     let (name, topic) = contents.of_kind(Kind::Joints).max_by_key(rank).ok_or(None)?;
     let missing: Vec<&String> =
         wanted[..n_needed].iter().filter(|joint| likely_name(joint, &topic.joints).is_none()).collect();
+    if topic.joints.is_empty() && topic.without_positions > 0 {
+        return Err(Some(format!(
+            "no topic has joint readings: the messages on {name} have no positions, only velocities or efforts. Record \
+             the topic of the joint state broadcaster with positions"
+        )));
+    }
     if !missing.is_empty() {
         return Err(Some(format!(
             "no topic has the joints {missing:?} of the robot; nearest is {name} with {:?}. Write \
@@ -49,16 +51,29 @@ pub(super) fn choose_joints(contents: &Contents, robot: Option<&Robot>) -> Resul
     Ok((name.clone(), text))
 }
 
+/// The line of the unit, and that of slides.
 fn unit(topic: &Topic, robot: Option<&Robot>) -> String {
-    let looks_like_rad = topic.largest <= MAX_RAD;
-    let is_in_rad =
-        |robot: &Robot| robot.sensors.iter().all(|spec| (spec.counts_per_rad.abs() - 1.0).abs() <= RADIANS_WITHIN);
-    let values = format!("the largest value is {:.4}", topic.largest);
-    match robot {
-        Some(robot) if looks_like_rad && !is_in_rad(robot) => {
+    let Some(robot) = robot else {
+        let values = format!("the largest value is {:.4}", topic.largest);
+        return match topic.largest <= MAX_RAD {
+            true => format!("# unit: {values}, as radians have it; taken as the robot's sensors count\n"),
+            false => format!("# unit: {values}, as raw counts or degrees have it; for degrees write unit = \"deg\"\n"),
+        };
+    };
+    let largest = |spec: &JointSensorSpec| {
+        likely_name(&spec.joint, &topic.joints).and_then(|name| topic.largest_of.get(name)).copied()
+    };
+    let units = JointUnits::of(robot, StatedUnits::default(), largest);
+    let values = format!("the largest value is {:.4}", units.largest);
+    let line = match units.unit {
+        Some("rad") if !units.are_slides_mm => {
             format!("unit = \"rad\"   # {values}; robot.toml counts otherwise. Raw readings would be \"counts\"\n")
         }
-        _ if looks_like_rad => format!("# unit: {values}, as radians have it; taken as the robot's sensors count\n"),
-        _ => format!("# unit: {values}, as raw counts or degrees have it; for degrees write unit = \"deg\"\n"),
-    }
+        Some(unit) => format!("unit = \"{unit}\"   # {values}\n"),
+        None if units.largest <= MAX_RAD => {
+            format!("# unit: {values}, as radians have it; taken as the robot's sensors count\n")
+        }
+        None => format!("# unit: {values}, as raw counts or degrees have it; for degrees write unit = \"deg\"\n"),
+    };
+    line + units.slide_line()
 }

@@ -182,3 +182,28 @@ fn names_of_a_topic_are_kept_within_a_limit() {
     for_each_raw(folder.path().join("a.mcap"), |raw| contents.take(raw)).expect("it reads");
     assert_eq!((contents.topics["/j"].joints.len(), contents.topics["/tf"].frames.len()), (2000, 2000));
 }
+
+/// The reason is then that of `calibrate`; with a lens in robot.toml, nobody needs this one.
+#[test]
+fn a_lens_of_no_use_is_named_in_the_map_where_the_robot_needs_one() {
+    let k = [400.0, 0.0, 320.0, 0.0, 400.0, 240.0, 0.0, 0.0, 1.0];
+    let whole =
+        CameraInfo { width: 640, height: 480, k, distortion_model: "plumb_bob".to_owned(), ..Default::default() };
+    let binned = CameraInfo { binning_x: 2, binning_y: 2, ..whole.clone() };
+    let zeros = CameraInfo { k: [0.0; 9], ..whole.clone() };
+    let mut without_lens = titan();
+    without_lens.camera.lens = armcal_core::optics::CameraModel::unknown();
+    for (robot, info, is_named) in [
+        (&without_lens, &binned, true),
+        (&without_lens, &zeros, true),
+        (&without_lens, &whole, true),
+        (&titan(), &binned, false),
+    ] {
+        let mut given = Given::new();
+        given.joints("/arm", &robot.joint_names(), 1.0);
+        given.add("/tags", &AprilTagDetectionArray::default());
+        given.add("/camera_info", info);
+        let text = given.proposed(Some(robot)).1.expect("a map");
+        assert_eq!(topics(&text).1.camera_info.is_some(), is_named, "{text}");
+    }
+}

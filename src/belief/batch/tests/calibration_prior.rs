@@ -1,6 +1,6 @@
 //! Warm starts on the estimator's own model: the prior's chi-square is one, a slip is seen, few views suffice.
 
-use nalgebra::Vector3;
+use nalgebra::{Vector3, Vector6};
 
 use crate::batch::tables::{camera_mount_table, lens_tables};
 use crate::batch::tests::data::{Noise, Truth, normal, rng, titan, views};
@@ -24,6 +24,7 @@ use crate::views::view::View;
 use armcal_core::robot::Robot;
 use armcal_core::routine::Method;
 use armcal_core::sensor::ConditionChange;
+use armcal_core::spatial::exp;
 use armcal_core::stats::quantile;
 
 const FULL_VIEWS: usize = 30;
@@ -42,6 +43,15 @@ struct Case {
 }
 
 fn case(seed: u64, slip: Option<(usize, f64)>, n_later: usize) -> Case {
+    case_with(seed, n_later, |truth| {
+        if let Some((joint, by_rad)) = slip {
+            truth.parameters.offset_rad[joint] += by_rad;
+        }
+    })
+}
+
+/// The arm to which `happens` befell since its calibration.
+fn case_with(seed: u64, n_later: usize, happens: impl Fn(&mut Truth)) -> Case {
     let robot = titan();
     let mut rng = rng(seed, "warm");
     let scales = Hyperparameters::datasheet(&robot);
@@ -57,9 +67,7 @@ fn case(seed: u64, slip: Option<(usize, f64)>, n_later: usize) -> Case {
     for joint in 0..robot.n_seen_joints() {
         truth.parameters.offset_rad[joint] += DRIFT_RAD_PER_SQRT_H * HOURS.sqrt() * normal(&mut rng);
     }
-    if let Some((joint, by_rad)) = slip {
-        truth.parameters.offset_rad[joint] += by_rad;
-    }
+    happens(&mut truth);
     let later = still_readings(later(&robot, &truth, &noise, n_later, &mut rng));
     Case { robot, truth, prior, later }
 }
@@ -183,12 +191,40 @@ fn a_slip_of_one_degree_is_refused_and_named() {
         let case = case(seed, Some((joint, by_rad)), WARM_VIEWS);
         let agreement = agreement(&case);
         assert!(agreement.is_beyond_chance(), "seed {seed}: {agreement:?}");
-        assert_eq!(agreement.joint, joint, "seed {seed}: {agreement:?}");
+        assert_eq!((agreement.joint, agreement.camera_moved), (joint, None), "seed {seed}: {agreement:?}");
         let off = agreement.off_rad - by_rad;
         assert!(off.abs() < 0.4_f64.to_radians(), "seed {seed}: {agreement:?}");
         let refusal = agreement.refusal(&case.robot).expect("beyond chance");
         let Refusal::PriorContradicted { joint: named, off_rad, .. } = &refusal else { panic!("{refusal}") };
         assert_eq!((named, *off_rad), (&case.robot.sensors[joint].joint, agreement.off_rad));
+    }
+}
+
+/// The sensors are as they were: none is blamed.
+#[test]
+fn a_camera_that_was_mounted_anew_is_named_with_its_motion() {
+    for seed in 0..6 {
+        let moved = exp(&Vector6::new(0.02, 0.01, -0.015, 0.05, -0.08, 0.04));
+        let case = case_with(seed, 12, |truth| truth.mount *= moved);
+        let agreement = agreement(&case);
+        let [shift_m, turn_rad] = agreement.camera_moved.expect("the camera");
+        let off = [shift_m - moved.translation.vector.norm(), turn_rad - moved.rotation.angle()];
+        assert!(off[0].abs() < 0.01 && off[1].abs() < 0.02, "seed {seed}: {agreement:?}");
+        let Some(Refusal::PriorContradicted { camera_moved: Some(of_refusal), .. }) = agreement.refusal(&case.robot)
+        else {
+            panic!("seed {seed}: {agreement:?}")
+        };
+        assert_eq!([of_refusal.shift_m, of_refusal.turn_rad], [shift_m, turn_rad]);
+    }
+}
+
+/// Slips of the joint at the camera look like a turn of the mount.
+#[test]
+fn a_large_slip_is_not_blamed_on_the_camera() {
+    for seed in 0..5 {
+        let joint = seed as usize;
+        let agreement = agreement(&case(seed, Some((joint, 6.0_f64.to_radians())), 12));
+        assert!(agreement.is_beyond_chance() && agreement.camera_moved.is_none(), "seed {seed}: {agreement:?}");
     }
 }
 

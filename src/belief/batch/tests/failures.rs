@@ -350,7 +350,7 @@ fn a_dead_sensor_is_refused_where_the_task_needs_it() {
             case.robot.chain.link_poses(&angles).frame(&case.robot.tool.mount).translation.vector.into()
         };
         let targets_m = case.views[..4].iter().map(tool_m).collect();
-        let task = ReachTask { stamp: Default::default(), targets_m, tolerance_m: 0.03 };
+        let task = ReachTask { stamp: Default::default(), targets_m, tolerance_m: 0.03, poses: Vec::new() };
         for (joint, declared, is_needed) in [(last, false, false), (last, true, false), (1, false, true)] {
             let mut broken = Case { robot: case.robot.clone(), truth: case.truth.clone(), views: case.views.clone() };
             random_words(&mut broken, joint, seed);
@@ -460,6 +460,22 @@ fn two_failed_sensors_are_told_apart() {
 #[ignore = "second tier: 20 arms, 9 s"]
 fn two_failed_sensors_are_told_apart_over_20_arms() {
     assert!(told_apart(80..100) >= 19);
+}
+
+/// The pairs that are worth an estimate are few, and the pair that failed is among them.
+#[test]
+fn the_pair_that_failed_is_among_the_likely_ones() {
+    for seed in 80..90 {
+        let (a, b) = ((seed % 5) as usize, ((seed + 1 + seed / 5 % 4) % 5) as usize);
+        let mut case = case(seed, None);
+        random_words(&mut case, a, seed);
+        random_words(&mut case, b, seed + 1000);
+        let drawing = Drawing::default();
+        let search = FailureSearch { robot: &case.robot, views: &case.views, prior: None, drawing: &drawing };
+        let likely = search.likely_pairs(&[]);
+        assert_eq!(likely.len(), 6, "seed {seed}");
+        assert!(likely.contains(&[a.min(b), a.max(b)]), "seed {seed}: {likely:?} without {a} and {b}");
+    }
 }
 
 /// Counts the arms whose two failed sensors are both named.

@@ -11,6 +11,7 @@ mod equations;
 mod failures;
 mod growth;
 mod lenses;
+mod moved_between;
 mod moved_tags;
 mod readings;
 mod recorded_poses;

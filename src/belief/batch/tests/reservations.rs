@@ -2,7 +2,8 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use crate::batch::tests::data::{Noise, Truth, reference, rng, titan, titan_with_gripper_tag, views};
+use crate::batch::tests::data::{Noise, Truth, reference, rng, titan, titan_with_gripper_tag, views, watched_titan};
+use crate::batch::tests::statistics;
 use crate::model::parameters::JointParameters;
 use crate::model::scales::Hyperparameters;
 use crate::say::reservation::Reservation;
@@ -195,4 +196,32 @@ fn views_that_tell_the_lens_have_no_reservation_about_it() {
     let (reservations, _) = all_reservations(&titan());
     let of_lens: Vec<_> = reservations.iter().filter(|r| r.what.starts_with("camera lens")).collect();
     assert!(of_lens.iter().all(|r| r.what.contains(", k")), "{of_lens:?}");
+}
+
+/// A camera that stands anywhere tells nothing of the first joint's zero: both turn the arm about one axis.
+#[test]
+fn the_keys_that_hold_the_tool_are_those_of_the_standing_camera() {
+    for seed in 0..4 {
+        let mut robot = watched_titan();
+        robot.sensors[0].offset_std_rad = 0.02;
+        let zero = format!("offset_std_rad of {}", robot.sensors[0].joint);
+        for (mount_std, is_held) in [([0.1, 0.1], true), ([1e-4, 1e-4], false)] {
+            [robot.camera.mount_std_m, robot.camera.mount_std_rad] = mount_std;
+            let keys = keys_that_hold(&robot, seed);
+            let named = [zero.as_str(), "mount_std_rad"].map(|key| keys.iter().any(|one| one == key));
+            assert_eq!(named, [is_held; 2], "seed {seed}, {mount_std:?}: {keys:?}");
+        }
+    }
+}
+
+fn keys_that_hold(robot: &Robot, seed: u64) -> Vec<String> {
+    let case = statistics::case(robot, seed, N_VIEWS);
+    let input = statistics::input(&case, &case.views, HyperparameterMode::Given);
+    let found = estimate(&input).expect("solved");
+    let at = task(robot)[0];
+    let tool = &found.tool_jacobians(&[at])[0];
+    let covariance = found.joint_covariance();
+    let column = |k: usize| tool.moved_by(&covariance.column(k).into_owned());
+    let tool_m2 = (0..covariance.ncols()).map(|k| column(k).dot(&tool.by_parameters[k])).sum();
+    found.keys_that_hold(&at, tool_m2)
 }

@@ -4,18 +4,22 @@ use std::ops::Range;
 
 use rand::RngExt;
 
+use crate::batch::slips_in_views::refuse_slips;
 use crate::batch::tests::data::{Noise, Truth, reference, rng, titan, views};
 use crate::batch::tests::failures::calibrated;
 use crate::explain::drawing::Drawing;
 use crate::explain::failure_detection::{FailureSearch, is_suspicious};
 use crate::explain::failures::{Failure, FailureAdjusted};
+use crate::fixture::sample;
 use crate::model::parameters::JointParameters;
 use crate::model::scales::Hyperparameters;
 use crate::say::finding::FindingKind;
+use crate::say::refusal::Refusal;
 use crate::solve::estimate::Estimate;
 use crate::solve::input::HyperparameterMode;
 use crate::solve::model_for_views::model_for;
-use crate::views::view::View;
+use crate::views::calibration_data::{CalibrationData, HeldOut};
+use crate::views::view::{CaptureData, View};
 use armcal_core::codes::{Code, Coded};
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::Robot;
@@ -197,6 +201,40 @@ fn a_large_slip_is_no_turn_of_a_link() {
         assert!(found.findings.iter().all(|finding| finding.kind != FindingKind::Link), "seed {seed}");
         let slips = found.findings.iter().filter(|finding| finding.kind == FindingKind::SensorSlip);
         assert_eq!(slips.map(|finding| &finding.name).collect::<Vec<_>>(), [&name], "seed {seed}");
+    }
+}
+
+/// Joints for whose slip an accepted calibration by positions of these views is refused.
+fn refused_for(Case { robot, views, .. }: Case) -> Vec<String> {
+    let data = CalibrationData {
+        name: "synthetic".to_owned(),
+        messages_hash: String::new(),
+        data: CaptureData { n_marks: views.len(), fit: views, ..CaptureData::default() },
+        gripper_tag_data: None,
+        held_out: HeldOut::CrossValidation,
+        robot,
+        identified: Vec::new(),
+    };
+    let mut calibration = sample();
+    refuse_slips(&mut calibration, data);
+    let joint = |refusal: &Refusal| match refusal {
+        Refusal::SlipNotEstimated { joint, .. } => joint.clone(),
+        other => panic!("{other}"),
+    };
+    calibration.refusals.iter().map(joint).collect()
+}
+
+/// Slips of 12 mrad, whose residuals are a centimetre at the tool.
+#[test]
+fn a_calibration_by_positions_is_refused_for_a_slip_and_for_nothing_else() {
+    for seed in 0..4 {
+        let sound = case(4000 + seed, 24);
+        let joint = seed as usize % 4;
+        let mut slipped = sound.clone();
+        slip(&mut slipped, joint, 12, 0.012);
+        let name = sound.robot.sensors[joint].joint.clone();
+        assert_eq!(refused_for(sound), [String::new(); 0], "seed {seed}");
+        assert_eq!(refused_for(slipped), [name], "seed {seed}");
     }
 }
 

@@ -1,8 +1,9 @@
 //! Ways in which the readings of all joints may be meant and the camera be carried, and how a view is read in each.
 
+use crate::explain::angles_by_camera::has_known_mount;
 use crate::explain::constants::reading_search_hypothesis::{
-    CAMERA_HANDICAP, FRAME_HANDICAP, KNOWN_MOUNT, LEAST_SCALE_STEPS, NEXT_TURN_RAD, PARALLEL_RAD, SCALE_STEP,
-    SCALE_STEPS, SUM_HANDICAP,
+    CAMERA_HANDICAP, FRAME_HANDICAP, LEAST_SCALE_STEPS, NEXT_TURN_RAD, PARALLEL_RAD, SCALE_STEP, SCALE_STEPS,
+    SUM_HANDICAP,
 };
 pub(crate) use crate::explain::constants::reading_search_hypothesis::{SCALE_STD, ZERO_STD_RAD};
 use std::borrow::Cow;
@@ -51,11 +52,6 @@ pub(crate) enum Hypothesis {
         n_joints: usize,
         turn: UnitQuaternion<f64>,
     },
-}
-
-/// True where the stated sigmas of the camera mount are within [`KNOWN_MOUNT`].
-pub(crate) fn has_known_mount(robot: &Robot) -> bool {
-    robot.camera.mount_std_m <= KNOWN_MOUNT[0] && robot.camera.mount_std_rad <= KNOWN_MOUNT[1]
 }
 
 impl Hypothesis {

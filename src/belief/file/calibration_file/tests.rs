@@ -155,3 +155,22 @@ fn what_lies_beyond_is_named_and_what_lies_within_is_not() {
     let words = [told.join("; "), calibration.valid_for().join(", ")];
     insta::assert_snapshot!("validity", words.join("\n"));
 }
+
+/// A refused result stays refused when its status alone is edited, and an accepted one with its reasons of none reads.
+#[test]
+fn a_refused_calibration_is_not_accepted_by_an_edited_status() {
+    use crate::say::refusal::Refusal;
+    use armcal_core::codes::Coded;
+    for refusal in [Refusal::PriorUntested, Refusal::TooFewViews { views: 3, parameters: 9 }] {
+        let mut refused = sample();
+        refused.refuse_for([refusal]);
+        parsed(&refused.to_toml()).expect("a refused result reads");
+        let both = Calibration { status: Status::Accepted, ..refused };
+        let sentence_alone = Calibration { refusals: Vec::new(), ..both.clone() };
+        let reasons_alone = Calibration { refusal: None, ..both.clone() };
+        for edited in [both, sentence_alone, reasons_alone] {
+            assert_eq!(parsed(&edited.to_toml()).expect_err("contradictory").code(), Code::KeysConflict);
+        }
+    }
+    parsed(&sample().to_toml()).expect("an accepted result reads");
+}

@@ -1,5 +1,6 @@
 //! The online estimator against the batch and against known truths, on views drawn from the estimator's own model.
 
+mod doubts;
 mod drifting;
 mod failing;
 mod faults;

@@ -24,6 +24,8 @@ fn the_words_of_each_reason() {
     all.extend([geometry(), contradicted(), touch(), length(), Refusal::PriorReused, Refusal::PriorSingular]);
     all.push(Refusal::PriorUntested);
     all.extend(of_stated_angles());
+    all.extend(motions());
+    all.push(camera_mounted_anew());
     let mut words: Vec<String> = all.iter().map(ToString::to_string).collect();
     words.extend(in_words(&all[..2]));
     insta::assert_snapshot!("refusals", words.join("\n"));
@@ -42,6 +44,14 @@ fn the_advice_of_a_wrong_input_is_the_only_one() {
             assert!(words.contains(&reason.cause()) && words.contains(&*reason.remedy()) == (k < n), "{words}");
         }
     }
+}
+
+fn motions() -> [Refusal; 4] {
+    use MovedBody::{BaseOrTags, Camera, CarriedTags, StandingCamera};
+    [(Camera, Some("elbow")), (StandingCamera, None), (BaseOrTags, None), (CarriedTags, None)].map(|(body, name)| {
+        let camera = name.map(str::to_owned);
+        Refusal::MovedBetweenViews { body, camera, views: [20, 21], shift_m: 0.0102, turn_rad: 0.015 }
+    })
 }
 
 fn geometry() -> Refusal {
@@ -67,6 +77,29 @@ fn contradicted() -> Refusal {
         limit: 22.0,
         used_share: 0.4,
         joints_off: 1,
+        camera_moved: None,
+    }
+}
+
+fn camera_mounted_anew() -> Refusal {
+    match contradicted() {
+        Refusal::PriorContradicted { joint, off_rad, off_std_rad, moves, chi2, degrees_of_freedom, limit, .. } => {
+            let camera_moved = Some(CameraMoved { shift_m: 0.0269, turn_rad: 0.1025 });
+            let (used_share, joints_off) = (0.1, 6);
+            Refusal::PriorContradicted {
+                joint,
+                off_rad,
+                off_std_rad,
+                moves,
+                chi2,
+                degrees_of_freedom,
+                limit,
+                used_share,
+                joints_off,
+                camera_moved,
+            }
+        }
+        other => other,
     }
 }
 
@@ -129,6 +162,10 @@ fn measured() -> Vec<Refusal> {
     [measured_of_the_fit(), misread_inputs(), measured_of_repairs()].concat()
 }
 
+fn beyond_tolerance(survey: Vec<String>, is_watched: bool) -> Refusal {
+    Refusal::BeyondTolerance { target: 3, probability: 0.31, u95_m: 0.03, tolerance_m: 0.02, survey, is_watched }
+}
+
 fn measured_of_the_fit() -> Vec<Refusal> {
     let joint = || "wrist_yaw".to_owned();
     vec![
@@ -139,7 +176,8 @@ fn measured_of_the_fit() -> Vec<Refusal> {
         Refusal::NoBetterThanDatasheet { held_out_m: 0.02, datasheet_m: 0.019 },
         Refusal::NoBetterThanBaseline { held_out_m: 0.0201, baseline_m: 0.0203, p_value: 0.4 },
         Refusal::Overfitted { held_out_m: 0.011, fit_m: 0.004 },
-        Refusal::BeyondTolerance { target: 3, probability: 0.31, u95_m: 0.03, tolerance_m: 0.02 },
+        beyond_tolerance(Vec::new(), false),
+        beyond_tolerance(vec!["offset_std_rad of turn".to_owned(), "mount_std_rad".to_owned()], true),
         Refusal::PriorsBeyondTolerance { target: 3, probability: 0.08, u95_m: 0.03, tolerance_m: 0.02, most: None },
         Refusal::TargetsNotJudged { targets: vec![2, 5] },
         Refusal::HeldOutError { held_out_m: 0.3, limit_m: 0.019, source: HeldOutLimitSource::Reach },
@@ -208,6 +246,7 @@ fn measured_of_repairs() -> Vec<Refusal> {
     vec![
         Refusal::TagSizeRepair { element: "tag 3".to_owned(), ratio: 0.015, stated_m: 9.9 },
         Refusal::TooFewViewsSinceSlip { joint: joint(), evidence: "it slipped".to_owned(), views: 4 },
+        Refusal::SlipNotEstimated { joint: joint(), evidence: "the sensor slipped by 1.00 deg".to_owned() },
         sensor_failed(),
     ]
 }

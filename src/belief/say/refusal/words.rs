@@ -5,7 +5,7 @@ use std::fmt;
 use crate::judge::baseline_comparison::SIGNIFICANCE;
 use crate::say::constants::refusal_words::MORE_DIGITS_BELOW;
 use crate::say::length_unit::unit_of;
-use crate::say::refusal::{HeldOutLimitSource, MIN_USED_SHARE, Refusal, with_advice};
+use crate::say::refusal::{CameraMoved, HeldOutLimitSource, MIN_USED_SHARE, Refusal, with_advice};
 use crate::say::wrong_input_words::medium_of_lens;
 use armcal_core::codes::Coded;
 use armcal_core::robot::FailedKind;
@@ -35,12 +35,14 @@ impl Refusal {
             | Self::BeyondDatasheet { .. } => self.fmt_of_size(f),
             Self::WrongInput(_)
             | Self::MisreadReadings(_)
+            | Self::MovedBetweenViews { .. }
             | Self::Geometry(_)
             | Self::SensorUnit { .. }
             | Self::SensorError { .. }
             | Self::Nonlinearity { .. }
             | Self::SensorLine { .. }
             | Self::TooFewViewsSinceSlip { .. }
+            | Self::SlipNotEstimated { .. }
             | Self::Length { .. }
             | Self::Touch { .. } => self.fmt_of_arm(f),
             Self::Innovations { .. }
@@ -96,7 +98,7 @@ impl Refusal {
     fn fmt_of_decision(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mm = |m: f64| m * 1e3;
         match self {
-            Self::BeyondTolerance { target, probability, u95_m, tolerance_m } => {
+            Self::BeyondTolerance { target, probability, u95_m, tolerance_m, .. } => {
                 let [u95, tolerance] = told_apart_mm([*u95_m, *tolerance_m]);
                 let percent = percent(*probability);
                 write!(
@@ -244,6 +246,9 @@ impl Refusal {
         match self {
             Self::WrongInput(wrong) => write!(f, "{wrong}"),
             Self::MisreadReadings(misread) => write!(f, "{misread}"),
+            Self::MovedBetweenViews { body, camera, views, shift_m, turn_rad } => {
+                body.fmt_motion(f, (camera.as_deref(), *views), [*shift_m, *turn_rad])
+            }
             Self::Geometry(geometry) => write!(f, "{geometry}"),
             Self::SensorUnit { joint, gain, moves, .. } => {
                 let [small, large] = if moves.is_slide() { ["mm", "m"] } else { ["deg", "rad"] };
@@ -274,6 +279,9 @@ impl Refusal {
             }
             Self::TooFewViewsSinceSlip { joint, evidence, views } => {
                 write!(f, "{joint}: {evidence}; {views} views since then cannot calibrate it")
+            }
+            Self::SlipNotEstimated { joint, evidence } => {
+                write!(f, "{joint}: {evidence}; this method takes its offset as the same in all views")
             }
             Self::Length { what, key, measured_m, by_views_m, std_m } => {
                 let sigmas = (measured_m - by_views_m).abs() / std_m;
@@ -328,6 +336,11 @@ impl Refusal {
             Self::PriorReused => write!(f, "the prior was made from the same messages, which must not count twice"),
             Self::PriorSingular => write!(f, "the prior's covariance has no inverse"),
             Self::PriorUntested => write!(f, "the views determine too little to be tested against the prior"),
+            Self::PriorContradicted { camera_moved: Some(CameraMoved { shift_m, turn_rad }), .. } => {
+                let (shift_mm, turn_deg) = (1e3 * shift_m, turn_rad.to_degrees());
+                write!(f, "the new views contradict the prior: the camera was mounted anew since, {shift_mm:.1} mm ")?;
+                write!(f, "and {turn_deg:.2} deg from where it was; the sensors are as they were")
+            }
             Self::PriorContradicted { joints_off: 0, used_share, .. } if *used_share < MIN_USED_SHARE => {
                 let percent = 100.0 * used_share;
                 write!(

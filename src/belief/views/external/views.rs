@@ -10,6 +10,7 @@ use nalgebra::Vector3;
 use crate::views::conditions::ConditionHistory;
 use crate::views::external::landmarks::{Averaged, PlainLandmark, average, average_board};
 use crate::views::external::pairing::{RATE_WINDOW_S, TravelSample, TravelSeries};
+use crate::views::motion::Motion;
 use crate::views::view::{FASTEST_RAD_S, ObservationRejection, TagObservation, View};
 use armcal_core::input::{AttitudeReading, ExternalRecording, InputMap, RawMeasurement, TagFrame, WhileMoving};
 use armcal_core::robot::Robot;
@@ -178,6 +179,7 @@ impl Maker<'_> {
             let mean = |j: usize| rates.iter().map(|rate| rate[j]).sum::<f64>() / rates.len() as f64;
             view.rate_rad_s = JointAngles::from_fn(travel_rad.len(), mean);
         }
+        view.motion = self.motion(&frames);
         self.add_tags(&mut view, &frames);
         if view.tags.is_empty() {
             return;
@@ -203,6 +205,20 @@ impl Maker<'_> {
         let (from, to) = (first.paired.readings.0, last.paired.readings.1);
         self.out.digests.extend(self.travels.readings[from..=to].iter().map(|reading| reading.digest));
         self.out.views.push(MadeView { view, first: first.frame.digests[0], readings: (from, to) });
+    }
+
+    /// Returns the readings around the one image of a view of a moving arm.
+    fn motion(&self, frames: &[PairedFrame<'_>]) -> Option<Motion> {
+        let [PairedFrame { frame, paired }] = frames else { return None };
+        if self.while_moving != WhileMoving::Use || !self.is_moving(paired) {
+            return None;
+        }
+        let now_rad = &paired.travel_rad;
+        Motion::new(|s| {
+            let at = self.travels.at(frame.stamp.plus_s(s))?;
+            let unwrapped = |j: usize| now_rad[j] + self.travels.difference(&at.travel_rad, now_rad, j);
+            Some((JointAngles::from_fn(now_rad.len(), unwrapped), at.rate_rad_s?))
+        })
     }
 
     /// Returns the mean direction against gravity over the span, else the nearest in time; `None` without an attitude

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::rows::{Rows, Wanted};
+use super::rows::{Row, Rows, Wanted};
 use crate::input::error::InputError;
 use crate::input::map::{InputMap, SeenColumns, TableJoin, TableLayout, TimeUnit};
 use crate::robot::Robot;
@@ -75,6 +75,20 @@ impl Columns {
 
     pub fn wanted(&self) -> Wanted<'_> {
         Wanted { names: &self.names, time: self.time, id: self.id, key: self.key.as_ref() }
+    }
+
+    /// Sorts rows by their times, and returns the number of rows that were later than the next one. Rows without a time
+    /// stay as they are.
+    pub fn sort_by_time(&self, rows: &mut [Row]) -> u64 {
+        let Some((at, _)) = self.time else { return 0 };
+        if rows.iter().any(|row| row.values[at].is_none_or(f64::is_nan)) {
+            return 0;
+        }
+        let time = |row: &Row| (row.date, row.values[at].unwrap_or_default());
+        let order = |a: &Row, b: &Row| time(a).0.cmp(&time(b).0).then(time(a).1.total_cmp(&time(b).1));
+        let n = rows.windows(2).filter(|two| order(&two[0], &two[1]).is_gt()).count();
+        rows.sort_by(order);
+        n as u64
     }
 
     /// Number of joints, whose columns come first.

@@ -6,7 +6,7 @@ use std::path::Path;
 use super::columns::{Columns, Part};
 use super::row_reader::{MAX_NANOS, RowReader, digest};
 use super::rows::Row;
-use super::{NOT_A_NUMBER, TableFile, read_rows};
+use super::{COPIES, NOT_A_NUMBER, TableFile, read_rows};
 use crate::input::error::InputError;
 use crate::input::joints::{Reading, n_needed};
 use crate::input::map::{InputMap, TableLayout, TimeUnit};
@@ -29,11 +29,12 @@ pub(super) fn read(
 ) -> Result<ExternalRecording, InputError> {
     let file = path.display().to_string();
     let columns = Columns::of(map, layout, robot, Part::Both);
-    let found = read_rows(TableFile { path, format: layout.format, rows_at: &layout.rows }, columns.wanted())?;
+    let mut found = read_rows(TableFile { path, format: layout.format, rows_at: &layout.rows }, columns.wanted())?;
     columns.check_present(&file, &found, n_needed(robot))?;
     let absent_joints = columns.absent_joints(&found);
     let rows = RowReader { file: &file, map, layout, robot, columns: &columns, absent_joints: &absent_joints };
-    let recording = ExternalRecording { path: path.to_owned(), ..ExternalRecording::default() };
+    let rows_sorted = columns.sort_by_time(&mut found.rows);
+    let recording = ExternalRecording { path: path.to_owned(), rows_sorted, ..ExternalRecording::default() };
     let likely_unit = likely_time_unit(rows, &found.rows);
     let mut reader = PoseReader { rows, likely_unit, recording, keys: BTreeSet::new() };
     found.rows.iter().try_for_each(|row| reader.take(row))?;
@@ -75,6 +76,10 @@ impl PoseReader<'_> {
         };
         let counts = self.rows.counts(&values);
         let tag = self.rows.detection(row, &values)?;
+        if self.is_copy(row, &values)? {
+            *self.recording.skipped.entry(COPIES.to_owned()).or_default() += 1;
+            return Ok(());
+        }
         let stamp = self.stamp(row, &values, (&counts, &tag))?;
         let digest = digest(stamp, &values);
         let key = tag.key();
@@ -91,6 +96,13 @@ impl PoseReader<'_> {
         }
         self.keys.insert(key);
         Ok(())
+    }
+
+    /// Returns true if a row with the same time and the same values came before.
+    fn is_copy(&self, row: &Row, values: &[f64]) -> Result<bool, InputError> {
+        let Some(stamp) = self.rows.time(row, values)? else { return Ok(false) };
+        let last = self.recording.frames.last().filter(|frame| frame.stamp == stamp);
+        Ok(last.is_some_and(|frame| frame.digests.contains(&digest(stamp, values))))
     }
 
     /// Returns the stamp of a row's pose. Rows of one time belong to one pose. Without a time, so do rows of different

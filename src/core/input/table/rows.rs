@@ -32,7 +32,7 @@ pub(super) struct Row {
     pub values: Vec<Option<f64>>,
     /// Time to the nanosecond, if it is a date.
     pub date: Option<Stamp>,
-    /// The text in the key's column; empty without one.
+    /// The text in the key's column, as it is compared; empty without one.
     pub key: String,
 }
 
@@ -41,6 +41,19 @@ pub(super) struct Rows {
     pub rows: Vec<Row>,
     /// Names of the columns.
     pub columns: BTreeSet<String>,
+}
+
+impl Rows {
+    /// Number of the other table's rows whose key a row of this one has, as `text` makes it.
+    pub fn n_joined(&self, other: &Self, text: impl Fn(&str) -> String) -> usize {
+        let keys: BTreeSet<String> = self.rows.iter().map(|row| text(&row.key)).filter(|key| !key.is_empty()).collect();
+        other.rows.iter().filter(|row| keys.contains(&text(&row.key))).count()
+    }
+
+    /// Takes folders and endings from the keys.
+    pub fn make_keys_plain(&mut self) {
+        self.rows.iter_mut().for_each(|row| row.key = plain_key(&row.key));
+    }
 }
 
 impl Wanted<'_> {
@@ -68,7 +81,7 @@ impl Wanted<'_> {
             })
         };
         let values = self.names.iter().enumerate().map(value).collect::<Result<_, _>>()?;
-        let key = self.key.and_then(cell).map(plain_key).unwrap_or_default();
+        let key = self.key.and_then(cell).map(whole_key).unwrap_or_default();
         Ok(Row { number, values, date, key })
     }
 
@@ -124,13 +137,20 @@ pub fn tag_number(cell: &str) -> Option<u32> {
 /// Endings of images' names.
 const IMAGES: [&str; 9] = [".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm", ".ppm", ".webp"];
 
-/// Returns the text by which rows of two tables are compared: a number as such, an image without its folder and
-/// extension.
+/// Returns the text by which rows of two tables are compared first; a number as such.
+#[must_use]
+pub fn whole_key(cell: &str) -> String {
+    let cell = cell.trim();
+    let number = cell.parse::<f64>().ok().filter(|number| number.is_finite());
+    number.map_or_else(|| cell.to_owned(), |number| number.to_string())
+}
+
+/// Returns the text by which rows are compared if no whole texts agree: an image without its folder and extension.
 #[must_use]
 pub fn plain_key(cell: &str) -> String {
-    let cell = cell.trim();
-    if let Some(number) = cell.parse::<f64>().ok().filter(|number| number.is_finite()) {
-        return number.to_string();
+    let cell = &whole_key(cell)[..];
+    if cell.parse::<f64>().is_ok() {
+        return cell.to_owned();
     }
     let name = cell.rsplit(['/', '\\']).next().unwrap_or(cell);
     let lower = name.to_ascii_lowercase();

@@ -167,7 +167,7 @@ fn rows_of_several_tags_are_one_pose() {
             assert!((found_s - apart_s).abs() < 1e-9, "{found_s}");
         }
     }
-    let faults = [",20\n", ",5\n", ",10\n", ",-1\n"].map(|to| timed_text.replace(",1020\n", to));
+    let faults = [",1,20\n", ",1,5\n", ",2,10\n", ",1,-1\n"].map(|to| timed_text.replace(",1,1020\n", to));
     let mut told = faults.map(|text| problem(&timed, "tags.csv", &text)).concat();
     told += &problem(&timed, "tags.csv", &timed_text.replace("5,6,3,", "5,9,3,"));
     told += &problem(&map, "tags.csv", &text.replace(",7,0,0", ",7.5,0,0"));
@@ -469,4 +469,58 @@ fn what_is_wrong_with_a_date_is_named() {
     let lenient = map.replace("[table]", "not_finite = \"leave_out\"\n[table]");
     let found = read_with(&lenient, "a.csv", &text.replace(second, "n/a")).expect("one row is left");
     assert_eq!((found.frames.len(), found.left_out.values().sum::<u64>()), (1, 1));
+}
+
+/// Times of rows in any order, some of them twice.
+#[test]
+fn rows_are_sorted_by_their_time_and_copies_are_counted() {
+    let map = PLACES.replace("[table]", "[table]\ntime = { column = \"t\" }");
+    let row = |k: usize| format!("{k}.5,2,3,4,5,6,{},0,0.25,1,{}\n", k % 3, 100 + 2 * (k / 3));
+    let joints = |k: usize| row(k).replacen(&format!("{k}.5"), &format!("{}.5", k / 3), 1);
+    let read = |order: &[usize]| {
+        let rows: String = order.iter().map(|k| joints(*k)).collect();
+        read_with(&map, "a.csv", &format!("{JOINTS},tag,x,y,z,t\n{rows}")).expect("it reads")
+    };
+    let sorted = read(&(0..12).collect::<Vec<_>>());
+    assert_eq!((sorted.readings.len(), sorted.rows_sorted, sorted.skipped.len()), (4, 0, 0));
+    for step in [5, 7, 11] {
+        let mut order: Vec<usize> = (0..12).map(|k| (k * step) % 12).collect();
+        let shuffled = read(&order);
+        assert_eq!((&shuffled.readings.len(), &shuffled.skipped), (&4, &sorted.skipped), "{step}");
+        let tags = |found: &ExternalRecording| found.frames.iter().map(|frame| frame.tags.clone()).collect::<Vec<_>>();
+        assert_eq!(tags(&shuffled), tags(&sorted), "{step}");
+        assert!(shuffled.rows_sorted > 0, "{step}");
+        order.extend([0, 4, 4]);
+        let copied = read(&order);
+        assert_eq!(copied.skipped.values().sum::<u64>(), 3, "{step}");
+        assert_eq!(tags(&copied), tags(&sorted), "{step}");
+    }
+}
+
+/// Images of two days have the same names in two folders.
+#[test]
+fn whole_names_of_images_join_tables_before_names_without_their_folder() {
+    let read = |in_joints: [&str; 2], in_tags: [&str; 2]| {
+        let folder = tempfile::tempdir().expect("a folder");
+        let [a, b] = in_joints;
+        let joints = format!("image,{JOINTS}\n{a},1,2,3,4,5,6\n{b},2,2,3,4,5,6\n");
+        let [a, b] = in_tags;
+        let tags = format!("image,tag,x,y,z\n{b},3,0,0.5,1\n{a},3,0,0.25,1\n");
+        std::fs::write(folder.path().join("joints.csv"), joints).expect("written");
+        std::fs::write(folder.path().join("tags.csv"), tags).expect("written");
+        let map = PLACES.replace("[tags]\n", "[tags]\ntable = { file = \"tags.csv\", key = \"image\" }\n");
+        let map = parse_input_map(&folder.path().join("map.toml"), &map).expect("a map");
+        read_external(&folder.path().join("joints.csv"), &map, &titan())
+    };
+    let days = ["day1/img_0.png", "day2/img_0.png"];
+    for (in_joints, in_tags) in
+        [(days, days), (["a/1.png", "a/2.png"], ["b/1.jpg", "b/2.jpg"]), (["1", "2"], ["1.0", "2.0"])]
+    {
+        let found = read(in_joints, in_tags).expect("they join");
+        let seen: Vec<_> = found.frames.iter().map(|frame| frame.tags[0].seen).collect();
+        let places = [0.25, 0.5].map(|y| RawMeasurement::Position(Vector3::new(0.0, y, 1.0)));
+        assert_eq!(seen, places, "{in_joints:?}");
+    }
+    let ambiguous = read(days, ["img_0.png", "img_1.png"]);
+    assert!(matches!(ambiguous, Err(InputError::Row { .. })), "{ambiguous:?}");
 }

@@ -6,8 +6,8 @@ use std::path::Path;
 use super::columns::{Columns, Part};
 use super::one_table::ROW_S;
 use super::row_reader::{RowReader, digest};
-use super::rows::{Row, Rows};
-use super::{NOT_A_NUMBER, TableFile, read_rows};
+use super::rows::{Row, Rows, plain_key};
+use super::{COPIES, NOT_A_NUMBER, TableFile, read_rows};
 use crate::input::clocks::{StreamTimes, compare_clocks};
 use crate::input::error::InputError;
 use crate::input::joints::{Reading, n_needed};
@@ -31,7 +31,14 @@ pub(super) fn read(
         TableFile { path: &tags.file, format: tags.format, rows_at: &tags.rows },
     ];
     let [of_joints, of_tags] = [0, 1].map(|k| read_rows(tables[k], columns[k].wanted()));
-    let (of_joints, of_tags) = (of_joints?, of_tags?);
+    let (mut of_joints, mut of_tags) = (of_joints?, of_tags?);
+    let n_whole = of_joints.n_joined(&of_tags, str::to_owned);
+    let are_plain = MOST * of_joints.n_joined(&of_tags, plain_key) as f64 >= n_whole as f64;
+    if are_plain {
+        [&mut of_joints, &mut of_tags].into_iter().for_each(Rows::make_keys_plain);
+    }
+    // Stable: rows of the tags that share a time keep their order.
+    let n_late = columns[0].sort_by_time(&mut of_joints.rows);
     columns[0].check_present(&files[0], &of_joints, n_needed(robot))?;
     columns[1].check_present(&files[1], &of_tags, 0)?;
     let absent_joints = columns[0].absent_joints(&of_joints);
@@ -39,15 +46,22 @@ pub(super) fn read(
         let (file, columns) = (files[k].as_str(), &columns[k]);
         RowReader { file, map, layout, robot, columns, absent_joints }
     };
-    let recording = ExternalRecording { path: path.to_owned(), ..ExternalRecording::default() };
-    let mut joined = Joined { recording, stamps: BTreeMap::new(), matched: BTreeSet::new() };
+    let path = path.to_owned();
+    let recording = ExternalRecording { path, rows_sorted: n_late, ..ExternalRecording::default() };
+    let mut joined = Joined { recording, are_plain, stamps: BTreeMap::new(), matched: BTreeSet::new() };
     joined.take_joints(row_reader(0, &absent_joints), &of_joints)?;
     joined.take_tags(row_reader(1, &[]), &of_tags, &tags.join)?;
     joined.finish([&files[0], &files[1]], map, &tags.join).map(|found| ExternalRecording { absent_joints, ..found })
 }
 
+/// Whole texts join where they join more than this share of what images' names without folders join. Assumed: some
+/// rows have no other half, whose name without its folder may be that of another row.
+const MOST: f64 = 0.5;
+
 struct Joined {
     recording: ExternalRecording,
+    /// True if the joining texts are without the images' folders and extensions.
+    are_plain: bool,
     /// Row and stamp of the joints, by the joining text.
     stamps: BTreeMap<String, (u64, Stamp)>,
     /// Texts that both tables have.
@@ -70,15 +84,20 @@ impl Joined {
             };
             let by_number = Stamp::default().plus_s(ROW_S * row.number as f64);
             let stamp = rows.time(row, &values)?.unwrap_or(by_number);
-            if self.recording.readings.last().is_some_and(|last| last.stamp >= stamp) {
-                let problem = "is not later than the row before; sort the rows of the joints' table by time and leave \
-                               one of each time";
+            let digest = digest(stamp, &values);
+            let last = self.recording.readings.last();
+            if last.is_some_and(|last| last.digest == digest) && rows.columns.key.is_none() {
+                *self.recording.skipped.entry(COPIES.to_owned()).or_default() += 1;
+                continue;
+            }
+            if last.is_some_and(|last| last.stamp >= stamp) {
+                let problem = "has the time of a row before; leave one of each time in the joints' table";
                 return rows.problem(row, problem.to_owned());
             }
             if let Some(column) = &rows.columns.key {
                 self.add_key(rows, row, (column, stamp))?;
             }
-            let (counts, digest) = (rows.counts(&values), digest(stamp, &values));
+            let counts = rows.counts(&values);
             self.recording.readings.push(Reading { stamp, counts, digest });
         }
         Ok(())
@@ -90,10 +109,16 @@ impl Joined {
         }
         match self.stamps.insert(row.key.clone(), (row.number, stamp)) {
             None => Ok(()),
-            Some((before, _)) => rows.problem(
-                row,
-                format!("has the `{column}` of row {before}, {:?}; leave one row of the joints for each", row.key),
-            ),
+            Some((before, _)) => {
+                let remedy = match self.are_plain {
+                    true => {
+                        " without folder and ending, as no whole text is in both tables; write folders and endings \
+                         alike in both, or leave one row of the joints for each"
+                    }
+                    false => "; leave one row of the joints for each",
+                };
+                rows.problem(row, format!("has the `{column}` of row {before}, {:?}{remedy}", row.key))
+            }
         }
     }
 

@@ -43,5 +43,6 @@ pub(in crate::log) fn from_ros(m: &ReachTask) -> Result<streams::ReachTask, Deco
     if m.tolerance_m <= 0.0 {
         return Err(DecodeRejection::Tolerance);
     }
-    Ok(streams::ReachTask { stamp: m.header.stamp.try_into()?, targets_m, tolerance_m: m.tolerance_m })
+    let (stamp, poses) = (m.header.stamp.try_into()?, Vec::new());
+    Ok(streams::ReachTask { stamp, targets_m, tolerance_m: m.tolerance_m, poses })
 }
