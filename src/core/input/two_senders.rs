@@ -63,7 +63,7 @@ pub fn two_senders(stamps: &[Stamp], values: &[f64], least: f64, turn: Option<f6
     if n >= MIN_GROUPS && n as f64 >= MIN_SHARE * found.len() as f64 {
         return found.into_iter().flatten().next();
     }
-    leaps(&stamps[..n_steps + 1], step)
+    leaps(&stamps[..stamps.len().min(n_steps + 1)], step)
 }
 
 /// The same of all joints that the robot needs, of the joint where they differ most; for the recording's own topic.
@@ -157,6 +157,12 @@ mod tests {
             last = next;
         }
         found
+    }
+
+    #[test]
+    fn a_stream_without_readings_has_no_senders() {
+        assert_eq!(told(Vec::new()), None);
+        assert_eq!(told(vec![(0.0, 0.3)]), None);
     }
 
     fn told(mut readings: Vec<(f64, f64)>) -> Option<TwoSenders> {
