@@ -4,9 +4,10 @@
 //! is wider by possible changes since: each offset by the datasheet's random walk, `drift^2 hours`. Parameters that the
 //! calibration lacks come from the datasheet.
 //!
-//! The test fits the views once more under P1 = P0 + W, where W lets each offset slip by the datasheet's sigma. With the posterior covariance C and `A = I - C P1^-1`, the estimate moves from the prior by d. If the prior
-//! holds, d has the covariance `S = A P0 A^T + A C` (linear Gaussian model). `d^T S^+ d` is then chi-square with as
-//! many degrees of freedom as S has eigenvalues above `TOLD_SHARE` in units of P0.
+//! The test fits the views once more under P1 = P0 + W, where W lets each offset slip by the datasheet's sigma. With
+//! the posterior covariance C and `A = I - C P1^-1`, the estimate moves from the prior by d. If the prior holds, d has
+//! the covariance `S = A P0 A^T + A C` (linear Gaussian model). `d^T S^+ d` is then chi-square with as many degrees of
+//! freedom as S has eigenvalues above `TOLD_SHARE` in units of P0.
 
 use crate::explain::constants::calibration_prior::{
     LEAST_SLIP_STD_RAD, MAX_ROUNDING, MOUNTED_ANEW_STD, ROUNDING, USUAL_DRIFT_STD_RAD_PER_SQRT_H, Z_999, Z_OF_JOINTS,

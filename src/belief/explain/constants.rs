@@ -180,7 +180,8 @@ pub(crate) mod reading_search_hypothesis {
     /// Handicap of a camera hypothesis in its score, twice the logarithm of odds (assumed). A sensor's zero that
     /// explains the views as well is named first.
     pub(crate) const CAMERA_HANDICAP: f64 = 5.0;
-    /// Handicap of the frame of the tag map, which has six numbers. A turn about the first joint's axis is named after that joint's zero, and always with it. Chi-square of 5 is below this in 99 of 100 cases.
+    /// Handicap of the frame of the tag map, which has six numbers. A turn about the first joint's axis is named after
+    /// that joint's zero, and always with it. Chi-square of 5 is below this in 99 of 100 cases.
     pub(crate) const FRAME_HANDICAP: f64 = 15.0;
     /// Handicap of a reading that is a sum of several angles, or of the other sign (assumed).
     pub(crate) const SUM_HANDICAP: f64 = 5.0;

@@ -2,7 +2,8 @@
 //!
 //! The views after a gap get a camera or tags of their own, near the stated ones within [`MOVED_STD`]. A coarse to fine
 //! search finds the gap of the least [`score`](crate::explain::failure_detection::score). There the evidence for the
-//! views in two parts is compared with that for the views in one. Both include all slips, walks, failures and repairs that were found. Tags of their own are estimated once more as one body, and pay for its six numbers.
+//! views in two parts is compared with that for the views in one. Both include all slips, walks, failures and repairs
+//! that were found. Tags of their own are estimated once more as one body, and pay for its six numbers.
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
