@@ -156,7 +156,8 @@ impl VerdictInput<'_> {
     }
 
     /// Returns a refusal if the views do not confirm the change of the sensors. Held-out views confirm it if they fit
-    /// better than with only mount and map fitted. A change within the predicted error needs no confirmation.
+    /// better than with only mount and map fitted. A change up to `MAX_UNCONFIRMED` times its predicted error needs no
+    /// confirmation.
     fn baseline(
         &self,
         configurations: &[JointAngles],

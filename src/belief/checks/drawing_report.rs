@@ -296,7 +296,7 @@ fn sigmas(covariance: &Matrix3<f64>, stated_std: f64, size: &Vector3<f64>) -> f6
 
 impl Departure {
     /// Returns true for a significant base error. The views cannot distinguish it from a common error of all tags, but
-    /// the tool can.
+    /// the tool error differs.
     fn is_undecided(&self) -> bool {
         let size_m = self.size.norm() * if self.unit == FindingUnit::Radian { REACH_M } else { 1.0 };
         self.kind == FindingKind::Base && self.weight > NAMED_SIGMAS && size_m.max(self.tool_m.unwrap_or(0.0)) > WORTH_M

@@ -159,7 +159,7 @@ fn summarized(information: DMatrix<f64>, names: &[Name], n_views: usize) -> Obse
     }
 }
 
-/// Directions that span the columns of `space`. Elimination with the largest pivots leaves few parameters in each.
+/// Directions that span the column space of `space`. Elimination with the largest pivots leaves few parameters in each.
 fn in_words(space: &mut DMatrix<f64>, names: &[Name]) -> Vec<NullDirection> {
     let n = space.ncols();
     for k in 0..n {

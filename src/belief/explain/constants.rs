@@ -79,7 +79,8 @@ pub(crate) mod failure_pattern {
     /// `LOCKED_RAD`.
     pub(crate) const LOCKED_SIGMAS: f64 = 3.0;
     pub(crate) const LOCKED_RAD: f64 = 0.2 * std::f64::consts::PI / 180.0;
-    /// Distance of a working sensor from the angle, as a share of the angle's spread, with about the datasheet's slope.
+    /// Largest distance of a working sensor from the angle, as a share of the angle's spread, with about the
+    /// datasheet's slope.
     pub(crate) const FOLLOWS: f64 = 0.3;
     /// Distance from a straight line, as a share of the angle's spread; `LEAST_GAIN_STD`: the least uncertainty of a
     /// gain.

@@ -185,7 +185,7 @@ impl FailureAdjusted {
             view.is_free[joint] = false;
         }
         let spec = &mut self.robot.sensors[joint];
-        // Its compliance and backlash stay; only its sensor is gone.
+        // The joint's other errors stay; only its sensor is gone.
         (spec.offset_std_rad, spec.gain_std, spec.noise_std_counts) = (spec.half_range_rad, 0.0, 0.0);
     }
 
