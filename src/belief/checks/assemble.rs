@@ -1,4 +1,4 @@
-//! What every method's calibration.toml holds; each method adds its own tables.
+//! Contents of calibration.toml that all methods share; each method adds its own tables.
 
 use crate::checks::refusal_conditions::{AcceptanceData, HeldOutLimit, refusal};
 use crate::file::calibration::{Calibration, JointResult, Status};
@@ -26,18 +26,18 @@ use armcal_core::routine::Method;
 use armcal_core::sensor::{ConditionChange, SensorModel};
 use nalgebra::{Matrix3, Vector3};
 
-/// What a calibration was made from.
+/// Sources of a calibration.
 pub(crate) struct Provenance<'a> {
     pub messages_hash: &'a str,
     pub robot: &'a Robot,
     pub method: Method,
     pub data: &'a CaptureData,
-    /// What a warm calibration started from.
+    /// Earlier calibration that a warm start uses as its prior.
     pub prior: Option<&'a Calibration>,
     pub identified: &'a [IdentifiedScale],
 }
 
-/// What a method made of it.
+/// Result of a method's fit.
 pub(crate) struct Fit<'a> {
     /// The fitted views.
     pub problem: &'a PositionProblem<'a>,
@@ -46,18 +46,18 @@ pub(crate) struct Fit<'a> {
     pub linearity_scale: f64,
 }
 
-/// What it is accepted or refused by.
+/// Evidence for accepting or refusing a calibration.
 pub(crate) struct Evidence {
     pub held_out: HeldOutMetrics,
-    /// Over the task's targets; `None` without a task.
+    /// Tool error predicted over the task's targets; `None` without a task.
     pub predicted: Option<ToolErrorPrediction>,
-    /// Parameters of sensors that move the camera, determined or not.
+    /// Number of parameters of the sensors that move the camera, determined or not.
     pub n_parameters: usize,
-    /// A joint or its sensor failed.
+    /// True if a joint or its sensor failed.
     pub has_failed_joint: bool,
 }
 
-/// The tables that all methods fill, and the verdict by what all methods have.
+/// Fills the tables that all methods share, and sets the verdict by criteria that they share.
 pub(crate) fn assemble(source: &Provenance<'_>, fit: &Fit<'_>, evidence: Evidence) -> Calibration {
     let at = &fit.solution.parameters;
     let metrics = fit_metrics(source, fit);
@@ -65,7 +65,7 @@ pub(crate) fn assemble(source: &Provenance<'_>, fit: &Fit<'_>, evidence: Evidenc
     let predicted_tool_error_m = predicted.as_ref().map(|predicted| predicted.error_m);
     let u95 = u95_by_data(source, fit, predicted.as_ref(), (n_parameters, has_failed_joint));
     let details = FitDetails::of(fit.problem, at, predicted.map_or_else(Vec::new, |predicted| predicted.targets));
-    // `bundle` knows how sure its parameters are, and judges by that whether they must be better.
+    // `bundle` has the covariance of its parameters, and judges by it whether they must be better.
     let must_improve = source.method != Method::Bundle;
     let tolerance_m = source.data.task.as_ref().map(|task| task.tolerance_m);
     let by_conditions = refusal(&AcceptanceData {
@@ -138,7 +138,7 @@ fn held_out_limit(
     };
     let n = tags().count().max(1) as f64;
     let distance_m2 = tags().map(|tag| tag.center_in_camera_m.norm_squared()).sum::<f64>() / n;
-    // Where the rotation's noise is not stated, the position's is all that a tag is off by.
+    // If the noise of rotations is not stated, only that of positions counts.
     let noise_m2 = 3.0 * position_std_m.powi(2) + 2.0 * distance_m2 * rotation_std_rad.unwrap_or(0.0).powi(2);
     let at = &fit.solution.parameters;
     let sensors = at.sensors(source.robot);
@@ -152,7 +152,7 @@ fn held_out_limit(
 }
 
 /// Degrees of freedom of a noise that is fitted to views together with `n_parameters`, at least 1. The camera's pose
-/// has six coordinates in a view, however many corners show it.
+/// has six coordinates in a view, regardless of the number of corners.
 pub(crate) fn noise_dof(views: &[View], n_parameters: usize) -> f64 {
     let coordinates = |view: &View| {
         let of_tags = view.tags.iter().map(|tag| match tag.measured {
@@ -165,7 +165,7 @@ pub(crate) fn noise_dof(views: &[View], n_parameters: usize) -> f64 {
     all.saturating_sub(n_parameters).max(1) as f64
 }
 
-/// U95 from the recording alone; over the views' own configurations where there is no task.
+/// U95 from the recording only; over the views' own configurations if there is no task.
 fn u95_by_data(
     source: &Provenance<'_>,
     fit: &Fit<'_>,
@@ -192,12 +192,13 @@ fn u95_by_data(
     U95Table::of_configurations(&errors.collect::<Vec<_>>(), dof)
 }
 
-/// The links in one line are long enough for a target: with a failed joint the calibration is not to blame then.
+/// Returns true if the links in one line are long enough for a target. If a joint failed, the calibration is then not
+/// the cause.
 pub(crate) fn is_near(robot: &Robot, target_m: &[f64; 3]) -> bool {
     robot.is_long_enough_for(&Vector3::from(*target_m))
 }
 
-/// The decision rule, by the recording alone.
+/// Refusal by the decision rule, from the recording only.
 fn refusal_by_risk(u95: &U95Table) -> Option<Refusal> {
     let targets = u95.unjudged();
     if !targets.is_empty() {
@@ -209,7 +210,8 @@ fn refusal_by_risk(u95: &U95Table) -> Option<Refusal> {
     Some(Refusal::BeyondTolerance { target, probability, u95_m, tolerance_m, survey, is_watched })
 }
 
-/// The decision rule with stated sigmas included, where the recording alone is within it; `most` is their largest part.
+/// Refusal by the decision rule with stated sigmas included, if U95 from the recording only passes it. `most`: their
+/// largest part.
 pub(crate) fn refusal_by_priors(by_data: &U95Table, with_priors: &U95Table, most: Option<String>) -> Option<Refusal> {
     // A gate whose input is missing has not passed.
     let targets = with_priors.unjudged();
@@ -240,7 +242,7 @@ fn fit_metrics(source: &Provenance<'_>, fit: &Fit<'_>) -> FitMetrics {
     }
 }
 
-/// Of views that the fit never saw.
+/// Held-out metrics of views that the fit did not use.
 pub(crate) fn held_out_metrics(problem: &PositionProblem<'_>, at: &JointParameters) -> HeldOutMetrics {
     HeldOutMetrics {
         cross_validated: false,
@@ -264,7 +266,7 @@ fn joint_result(source: &Provenance<'_>, fit: &Fit<'_>, joint: usize, model: &Se
     let spec = &model.spec;
     let std = |kind| fit.covariance.std(Parameter { joint, kind });
     let (gain_std, offset_std) = (std(ParameterKind::Gain), std(ParameterKind::Offset));
-    // What the new views did not determine is as sure as it was before.
+    // A parameter that the new views do not determine keeps its earlier standard deviation.
     let before = source.prior.map(|prior| &prior.joint[joint]);
     let gain_std_before = before.map_or(spec.gain_std / spec.counts_per_rad.abs(), |j| j.gain_std_rad_per_count);
     JointResult {
@@ -285,7 +287,7 @@ fn joint_result(source: &Provenance<'_>, fit: &Fit<'_>, joint: usize, model: &Se
     }
 }
 
-/// Angles that the views covered; the middle of the range where there are none.
+/// Range of angles that the views cover, rad; the middle of the joint's range twice if no view covers any.
 fn covered_rad(source: &Provenance<'_>, joint: usize, model: &SensorModel) -> [f64; 2] {
     let travel = source.data.fit.iter().filter(|v| !v.tags.is_empty()).map(|view| view.travel_rad[joint]);
     let at_stop = |(_, stop): &&(_, EndStopReading)| source.method == Method::JointLimits && stop.joint == joint;
@@ -296,7 +298,7 @@ fn covered_rad(source: &Provenance<'_>, joint: usize, model: &SensorModel) -> [f
     if low <= high { [angle(low), angle(high)] } else { [model.spec.center_rad; 2] }
 }
 
-/// Counts per radian that the fit was made with, over the datasheet's.
+/// Ratio of the counts per radian used in the fit to the datasheet's.
 fn ratio_of(source: &Provenance<'_>, joint: usize) -> f64 {
     source.identified.iter().find(|scale| scale.joint == joint).map_or(1.0, |scale| scale.ratio)
 }

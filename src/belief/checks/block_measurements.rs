@@ -1,8 +1,8 @@
-//! Measured lengths against what the views say of them.
+//! Checks of measured lengths against their prediction from the views.
 //!
-//! Causes are searched by the views without any length, for a wrong one would hide in the noise that is fitted with it
-//! or look like a tag that moved. With the variance v of what they predict and the length's own s^2, measured less
-//! predicted has the variance `s^2 + v`. Lengths that hold are in the last estimate.
+//! Causes are searched by the views without any length. A wrong length would hide in the noise that is fitted with it,
+//! or look like a moved tag. If a prediction has the variance v and the length its own s^2, their difference has the
+//! variance `s^2 + v`. The last estimate includes the lengths that pass.
 
 use crate::file::verdict_tables::{Check, VerdictTable};
 use crate::judge::constants::FALSE_ALARM;
@@ -14,13 +14,13 @@ use armcal_core::codes::{Code, Warning};
 use armcal_core::stats::chi_square_quantile;
 use nalgebra::DVector;
 
-/// A measured length, and what the views say of it.
+/// Measured length, and its innovation against the views.
 pub(crate) struct LengthInnovation {
     pub(crate) measurement: BlockMeasurement,
     measured_m: f64,
-    /// Measured less predicted.
+    /// Measured less predicted length, m.
     pub(crate) off_m: f64,
-    /// One sigma of it.
+    /// Standard deviation of `off_m`, m.
     pub(crate) std_m: f64,
 }
 
@@ -49,14 +49,14 @@ pub(crate) fn length_innovations(by_views: &Estimate<'_>) -> Vec<LengthInnovatio
     BlockMeasurement::all(by_views.problem.robot).into_iter().flatten().filter_map(innovation).collect()
 }
 
-/// The length that the views contradict most, and how many sigmas chance has at most.
+/// Length that the views contradict most, and the largest number of standard deviations by chance.
 fn worst(all: &[LengthInnovation]) -> Option<(&LengthInnovation, f64)> {
     let worst = all.iter().max_by(|a, b| a.sigmas().total_cmp(&b.sigmas()))?;
     Some((worst, chi_square_quantile(1.0 - FALSE_ALARM / all.len() as f64, 1).sqrt()))
 }
 
 impl<'a> Estimate<'a> {
-    /// The estimate by these lengths, too; this one where the views contradict any.
+    /// Returns the estimate that includes these lengths; `self` if the views contradict any.
     pub(crate) fn with_lengths(self, input: &BundleInput<'a>, all: &[LengthInnovation]) -> Self {
         if worst(all).is_none_or(|(worst, limit)| worst.sigmas() > limit) {
             return self;

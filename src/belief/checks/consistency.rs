@@ -1,5 +1,5 @@
-//! Whether joint sensors explain the data of a calibration by `bundle`: score test of the link geometry, size of the
-//! sensors' errors, outliers, and innovations of held-out views.
+//! Checks whether joint sensors explain the data of a calibration by `bundle`: score test of the link geometry, size of
+//! the sensors' errors, outliers, and innovations of held-out views.
 
 use crate::checks::block_measurements::LengthInnovation;
 use crate::checks::constants::consistency::{
@@ -37,11 +37,11 @@ use armcal_core::robot::{JointSensorSpec, Robot};
 use armcal_core::sensor::ConditionChange;
 use armcal_core::stats::chi_square_quantile;
 
-/// What a verdict on an estimate rests on.
+/// Input of the verdict on an estimate.
 pub(crate) struct VerdictInput<'a> {
     pub input: &'a BundleInput<'a>,
     pub found: &'a Estimate<'a>,
-    /// Of each fold.
+    /// Innovations of each fold.
     pub innovations: &'a [Innovations],
     pub lengths: &'a [LengthInnovation],
     pub task: Option<TaskRests<'a>>,
@@ -49,11 +49,11 @@ pub(crate) struct VerdictInput<'a> {
     pub tag_noise: Option<TagNoise>,
 }
 
-/// A warning that touches answer, and that every arm without a tag on the gripper has.
+/// Warning for every arm without a gripper tag; touches resolve it.
 const UNSEEN_LINKS: &str = "links distal to the camera: errors are unobservable without a gripper tag";
 
 impl VerdictInput<'_> {
-    /// Writes tables and findings into `calibration`, and refuses it where something does not hold.
+    /// Writes tables and findings into `calibration`, and refuses it if a check fails.
     pub(crate) fn judge(&self, calibration: &mut Calibration) {
         let robot = self.input.robot;
         let numbered = self.task.map(|task| numbered_task_angles(robot, task)).unwrap_or_default();
@@ -95,7 +95,7 @@ impl VerdictInput<'_> {
         calibration.refuse_first_for(refusals.into_iter().flatten().take(1));
     }
 
-    /// Whether offsets that walk make the tool error more than the task tolerates.
+    /// Returns a refusal if walking offsets make the tool error exceed the task's tolerance.
     fn walks(&self, calibration: &Calibration) -> Option<Refusal> {
         self.found.model.walk?;
         let (u95_m, tolerance_m) = calibration.refusals.iter().find_map(|refusal| match refusal {
@@ -109,13 +109,13 @@ impl VerdictInput<'_> {
         Some(Refusal::OffsetsWalk { joint, walked_rad: walks[most], moves, u95_m, tolerance_m })
     }
 
-    /// Returns true where the views in a random order would not show this joint's walk.
+    /// Returns true if this joint's walk is significant: the views in a random order would not show it.
     fn walks_surely(&self, joint: usize) -> bool {
         let is_sure = |walk: Walk| walk.gain_nats > NAMED_WALK_NATS && walk.p_value[joint] < WALK_SIGNIFICANCE;
         self.found.model.walk.is_some_and(is_sure)
     }
 
-    /// Whether other links would explain the data better.
+    /// Returns a refusal if other link geometry explains the data better and matters at the tool; else warns of it.
     fn geometry(
         &self,
         configurations: &[JointAngles],
@@ -124,11 +124,11 @@ impl VerdictInput<'_> {
     ) -> Option<Refusal> {
         let mut results = self.found.score_tests(configurations);
         if calibration.map.is_some() {
-            // These views made the map: there is no survey that the base could disagree with.
+            // The map was made from these views, so there is no survey that the base could contradict.
             results.retain(|result| result.element != GeometryElement::Joint(0));
         }
         let false_alarm = FALSE_ALARM / results.len().max(1) as f64;
-        // What the model fails to explain inflates the predicted error: the stated figures bound it.
+        // Unexplained errors inflate the predicted error, so the stated figures bound it.
         let predicted_m = calibration.predicted_tool_error_m.map(|p| {
             self.found
                 .stated_tool_error_m(self.input, configurations)
@@ -155,8 +155,9 @@ impl VerdictInput<'_> {
         refusal
     }
 
-    /// Whether the views confirm what the sensors are changed by: held-out views fit better than with mount and map
-    /// alone, or the change is no larger than the predicted error.
+    /// Returns a refusal if the views do not confirm the change of the sensors. Held-out views confirm it if they fit
+    /// better than with only mount and map fitted. A change up to `MAX_UNCONFIRMED` times its predicted error needs no
+    /// confirmation.
     fn baseline(
         &self,
         configurations: &[JointAngles],
@@ -195,8 +196,8 @@ impl VerdictInput<'_> {
         None
     }
 
-    /// How far the estimated sensors move the tool from where the datasheet has it at the same readings, over the error
-    /// predicted by the stated figures; root mean squares over the configurations.
+    /// Tool displacement between the estimated and the datasheet's sensors at the same readings, over the error
+    /// predicted by the stated figures. Both are root mean squares over the configurations.
     fn change_at_tool(&self, configurations: &[JointAngles]) -> Option<f64> {
         let robot = self.input.robot;
         let covariance = self.found.stated_covariance(self.input)?;
@@ -213,7 +214,7 @@ impl VerdictInput<'_> {
         Some((moved_m2 / predicted_m2).sqrt())
     }
 
-    /// Whether the joints' errors are those of such sensors.
+    /// Returns a refusal if a joint's error between views is too large for its sensor; reports walking offsets.
     fn sensors(&self, calibration: &mut Calibration, table: &mut VerdictTable) -> Option<Refusal> {
         let robot = self.input.robot;
         let stated = Hyperparameters::datasheet(robot);
@@ -229,7 +230,8 @@ impl VerdictInput<'_> {
                 limit_rad,
             );
             if !check.holds && self.found.has_positions() {
-                // Their noise has no datasheet, and one landmark a view cannot part it from the joints' errors.
+                // The noise of positions has no datasheet, and one landmark per view cannot separate it from the
+                // joints' errors.
                 let (found, name) = (spec.unit().shown(std_rad, 2), &spec.joint);
                 table.warnings.push(Warning::new(
                     Code::JointNoise,
@@ -252,7 +254,7 @@ impl VerdictInput<'_> {
         refusal
     }
 
-    /// Whether what is not straight in the sensors is what their datasheets allow; it is estimated, up to a limit.
+    /// Returns a refusal if a sensor's nonlinearity is far beyond its datasheet; up to that limit, it is estimated.
     fn nonlinearity(&self, calibration: &mut Calibration, table: &mut VerdictTable) -> Option<Refusal> {
         let robot = self.input.robot;
         let mut refusal = None;
@@ -295,8 +297,8 @@ impl VerdictInput<'_> {
         refusal
     }
 
-    /// Gains and offsets beyond what a sensor of that datasheet can have: a joint that does not move, or another
-    /// sensor. Those that are not refused, and that few sensors have, are named.
+    /// Returns a refusal if a gain or offset is beyond its sensor's datasheet: the joint does not move, or the sensor
+    /// is another. Reports one that is unusual but not refused.
     fn beyond_datasheet(&self, calibration: &mut Calibration, table: &mut VerdictTable) -> Option<Refusal> {
         let robot = self.input.robot;
         let apart = self.found.from_datasheet();
@@ -344,7 +346,7 @@ impl VerdictInput<'_> {
         refusal
     }
 
-    /// Whether held-out views are predicted as well as they should be: refused far beyond, else a warning.
+    /// Compares the innovations of held-out views with their predicted size; refuses far beyond the limit, else warns.
     fn innovations(&self, table: &mut VerdictTable) -> Option<Refusal> {
         let sum = |f: fn(&Innovations) -> (f64, usize)| {
             self.innovations.iter().map(f).fold((0.0, 0), |(chi2, dof), (c, d)| (chi2 + c, dof + d))
@@ -376,7 +378,7 @@ impl VerdictInput<'_> {
         refusal
     }
 
-    /// Whether what is left of each joint's error has a pattern; a warning.
+    /// Warns if the remaining errors of a joint are correlated, in time or along its travel.
     fn whiteness(&self, table: &mut VerdictTable) {
         let robot = self.input.robot;
         let all: Vec<JointInnovation> = self.innovations.iter().flat_map(|fold| fold.joints.iter().copied()).collect();
@@ -404,7 +406,7 @@ impl VerdictInput<'_> {
         }
     }
 
-    /// Links between camera and tool that no tag shows.
+    /// Returns true if no tag shows the links between camera and tool.
     fn has_unseen_links(&self) -> bool {
         let robot = self.input.robot;
         robot.tool.mount.n_joints > robot.n_seen_joints() && !self.input.model.has(Block::GripperTag)
@@ -491,8 +493,8 @@ fn worn(spec: &JointSensorSpec, std_rad: f64) -> Finding {
     }
 }
 
-/// How many of its own standard deviations von Neumann's ratio lies below 2 (von Neumann 1941): positive where
-/// neighbours are alike. `None` below eight values.
+/// Standard deviations by which von Neumann's ratio lies below 2 (von Neumann 1941): positive if neighbours are alike.
+/// `None` below eight values.
 fn serial_sigmas(values: &[f64]) -> Option<f64> {
     let n = values.len() as f64;
     if values.len() < LEAST {
@@ -500,13 +502,13 @@ fn serial_sigmas(values: &[f64]) -> Option<f64> {
     }
     let squares: f64 = values.iter().map(|v| v * v).sum();
     let steps: f64 = values.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).sum();
-    // About zero, not the mean: the model says that it is zero. E = 2 (n - 1) / n, var = 4 (n - 2) / n^2 for unit
-    // normal values, nearly.
+    // Squares about zero, not the mean, because the model's mean is zero. E = 2 (n - 1) / n, var = 4 (n - 2) / n^2 for
+    // unit normal values, approximately.
     let ratio = steps / squares;
     (squares > 0.0).then(|| (2.0 * (n - 1.0) / n - ratio) / (2.0 * (n - 2.0).sqrt() / n))
 }
 
-/// The standard normal's, by chi-square with one degree of freedom.
+/// Quantile of the standard normal distribution, by chi-square with one degree of freedom.
 fn normal_quantile(p: f64) -> f64 {
     let side = chi_square_quantile((1.0 - 2.0 * p).abs(), 1).sqrt();
     if p < 0.5 { -side } else { side }

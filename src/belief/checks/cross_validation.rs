@@ -16,7 +16,7 @@ use crate::solve::outliers::Outlier;
 use crate::views::view::View;
 use armcal_core::robot::Robot;
 
-/// The views that a fold fits, and those that it holds out.
+/// Returns the views that a fold fits, and those that it holds out.
 pub(crate) fn fold_of(views: &[View], fold: usize) -> (Vec<View>, Vec<View>) {
     let of = |wanted: bool| -> Vec<View> {
         let views = views.iter().enumerate();
@@ -25,8 +25,8 @@ pub(crate) fn fold_of(views: &[View], fold: usize) -> (Vec<View>, Vec<View>) {
     (of(false), of(true))
 }
 
-/// Each view by the parameters that `fit` and the arms that `baselines` estimate from the views of the other folds; a
-/// fold without an estimate does not count.
+/// Computes the held-out metrics of all views, each predicted from the views of the other folds. `fit` estimates the
+/// parameters, `baselines` the arms; a fold without an estimate does not count.
 pub(crate) fn cross_validate(
     robot: &Robot,
     views: &[View],
@@ -47,9 +47,9 @@ pub(crate) fn cross_validate(
     sums.metrics()
 }
 
-/// Held-out views by what was estimated from the other folds, with the hyperparameters of all; and by mount and map
-/// alone about `datasheet`. Observations that the fit of all views rejected are in neither: what a tag of another id
-/// is off by says nothing of the arm.
+/// Computes held-out metrics and innovations. Each fold is predicted from the other folds, with the hyperparameters of
+/// all views; the baselines fit only mount and map about `datasheet`. Neither result counts observations that the fit
+/// of all views rejected: the error of a wrong tag id says nothing about the arm.
 pub(crate) fn cross_validate_with_innovations(
     input: &BundleInput<'_>,
     all: &Estimate<'_>,
@@ -73,7 +73,7 @@ pub(crate) fn cross_validate_with_innovations(
         let mut with_places: Vec<(usize, View)> = places
             .filter_map(|(view_idx, view)| Some((view_idx, without_rejected(view_idx, view, left_out(all))?)))
             .collect();
-        // Where no sensor tells an angle, the view's own tags tell where to linearize, with nothing of other folds.
+        // If no sensor measures an angle, only the view's own tags give the linearization point.
         for (_, view) in &mut with_places {
             all.see_through_found_lens(view, &as_found);
             set_by_camera(&as_found, view, &found.parameters());
@@ -97,14 +97,14 @@ pub(crate) fn cross_validate_with_innovations(
     (HeldOutMetrics { within_95, ..sums.metrics() }, innovations)
 }
 
-/// Observations that the held-out figures leave out: those that were rejected, where they are no more than good
-/// recordings have. Where they are more, it may be the arm that is wrong, and not they.
+/// Returns the observations to leave out of the held-out figures: the rejected ones, if they are no more than in good
+/// recordings. If they are more, the arm may be wrong, not they.
 fn left_out<'b>(all: &'b Estimate<'_>) -> &'b [Outlier] {
     let share = all.outliers.len() as f64 / all.problem.observations.len().max(1) as f64;
     if share <= MAX_OUTLIERS { &all.outliers } else { &[] }
 }
 
-/// A view without the observations that were rejected as a whole; `None` if it shows no other.
+/// Returns a view without its wholly rejected observations; `None` if it shows no other.
 fn without_rejected(view_idx: usize, mut view: View, outliers: &[Outlier]) -> Option<View> {
     let is_rejected =
         |id: u32| outliers.iter().any(|out| out.view_idx == view_idx && out.tag_id == id && out.corner.is_none());
@@ -112,15 +112,15 @@ fn without_rejected(view_idx: usize, mut view: View, outliers: &[Outlier]) -> Op
     (!view.tags.is_empty()).then_some(view)
 }
 
-/// The held-out views of a fold, and what was found without them.
+/// Held-out views of a fold, and the estimate made without them.
 pub(crate) struct Fold<'a> {
     pub views: &'a [View],
-    /// The arm as found, and its parameters.
+    /// Arm as estimated, with its parameters `at`.
     pub as_found: &'a Robot,
     pub at: &'a JointParameters,
-    /// The drawing.
+    /// Nominal model.
     pub nominal: &'a Robot,
-    /// With the joints at the datasheet.
+    /// Arms of the baselines, with the joints at the datasheet.
     pub baselines: &'a [Option<Robot>; N_BASELINES],
 }
 
@@ -128,16 +128,16 @@ pub(crate) struct Fold<'a> {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct FoldSums {
     n_views: usize,
-    /// Landmarks seen, and squares and sizes of their distances.
+    /// Number of landmarks seen; `sum_m2` and `sum_m` sum the squares and sizes of their distances.
     n: usize,
     sum_m2: f64,
     sum_m: f64,
     nominal_m2: f64,
     baselines: [BaselineSums; N_BASELINES],
-    /// Of those, the ones with corners.
+    /// Number of those landmarks with corners.
     n_corners: usize,
     sum_px2: f64,
-    /// And the ones with poses.
+    /// Number of those landmarks with poses.
     n_poses: usize,
     camera_sum_m: f64,
 }
@@ -145,10 +145,10 @@ pub(crate) struct FoldSums {
 /// Sums over the folds of one baseline.
 #[derive(Clone, Debug, Default)]
 struct BaselineSums {
-    /// Landmarks seen, and squares of their distances.
+    /// Number of landmarks seen; `sum_m2` sums the squares of their distances.
     n: usize,
     sum_m2: f64,
-    /// Mean logarithm of each view's distances over the calibration's.
+    /// Mean logarithm of the baseline's distances over the calibration's, one entry per view.
     log_ratios: Vec<f64>,
 }
 
@@ -172,7 +172,7 @@ fn best_comparison(all: &[BaselineSums]) -> Option<BaselineComparison> {
     BaselineComparison::new(best.mean_m2().sqrt(), &best.log_ratios)
 }
 
-/// The views with the angles that their tags show where a sensor says nothing.
+/// Returns the views with each angle that no sensor measures set from their tags.
 fn by_camera(views: &[View], robot: &Robot, at: &JointParameters) -> Vec<View> {
     let mut views = views.to_vec();
     for view in &mut views {
@@ -247,7 +247,7 @@ pub(crate) fn compared(
     best_comparison(&sums.collect::<Vec<_>>())
 }
 
-/// Distances between seen and surveyed landmarks, view by view.
+/// Distances between seen and surveyed landmarks, one entry per view.
 struct ViewDistances {
     n: Vec<usize>,
     sum_ln: Vec<f64>,
@@ -266,7 +266,7 @@ impl ViewDistances {
         self.sum_m2 += distance_m * distance_m;
     }
 
-    /// Mean logarithm of `others` over these, of each view with landmarks.
+    /// Mean logarithm of the distances in `others` over those in `self`, one entry per view with landmarks.
     fn log_ratios(&self, others: &Self) -> Vec<f64> {
         let views = self.n.iter().zip(self.sum_ln.iter().zip(&others.sum_ln)).filter(|(n, _)| **n > 0);
         views.map(|(n, (own, other))| (other - own) / *n as f64).collect()

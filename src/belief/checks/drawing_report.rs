@@ -1,9 +1,9 @@
-//! What an estimate found of the drawing: links, base, camera mount and lens that are not as drawn.
+//! Report of estimated departures from the nominal model: links, base, camera mount and lens.
 //!
-//! An element counts whose estimate z neither its stated size S nor its own covariance C explains: where it is as
-//! large as stated, z has the covariance S + C, and `z^T (S + C)^-1 z` is that of three axes. Were the drawing kept,
-//! the sensors' parameters x would follow the posterior's covariance, `dx = C_xz C_zz^-1 z`, and the tool would be off
-//! by what both move it together.
+//! An element is reported if neither its stated covariance S nor its own posterior covariance C explains its estimate
+//! z. If the departure is as large as stated, z has the covariance S + C, and `z^T (S + C)^-1 z` is that of three axes.
+//! If the nominal model were kept, the sensors' parameters x would follow the posterior's covariance,
+//! `dx = C_xz C_zz^-1 z`. The tool error would be the displacement by z and dx together.
 
 use crate::checks::constants::consistency::WORTH_M;
 use crate::checks::constants::drawing_report::{
@@ -29,28 +29,28 @@ use armcal_core::robot::Robot;
 
 mod sag_report;
 
-/// Three numbers of the drawing that were estimated.
+/// Estimated departure of three numbers from the nominal model.
 struct Departure {
     kind: FindingKind,
     name: String,
     unit: FindingUnit,
     size: Vector3<f64>,
-    /// Along the size, by the posterior.
+    /// Posterior standard deviation along `size`.
     std: f64,
-    /// Over stated size and posterior's covariance together.
+    /// Length of `size` in standard deviations, the stated one and the posterior's combined.
     weight: f64,
-    /// Over the stated size.
+    /// Length of `size` over the stated standard deviation.
     sigmas: f64,
     tool_m: Option<f64>,
     /// Length of the link, m.
     length_m: Option<f64>,
-    /// Largest repair in `sigmas`.
+    /// Largest allowed repair, in the unit of `sigmas`.
     most_sigmas: f64,
 }
 
 impl Estimate<'_> {
-    /// Writes what is not as drawn to `calibration`, the most telling first; `task`: angles at which the tool matters;
-    /// `models`: cameras whose lens is of the other model, and that lens.
+    /// Writes departures from the nominal model to `calibration`, the most significant first. `task`: configurations at
+    /// which the tool matters. `models`: cameras whose lens is of the other model, with that lens.
     pub(crate) fn report_drawing(
         &self,
         drawing: &Drawing,
@@ -62,14 +62,14 @@ impl Estimate<'_> {
         let mut found: Vec<Departure> = all.collect();
         found.sort_by(|a, b| b.weight.total_cmp(&a.weight));
         let n = found.iter().filter(|departure| departure.weight > NAMED_SIGMAS).count();
-        // Several links may share what one of them has: the likeliest is named.
+        // Several links may share the departure of one, so that none is significant: the most likely is named.
         let is_beyond = drawing.links.as_ref().is_some_and(LinkStart::is_beyond_stated);
         found.truncate(n.max(usize::from(is_beyond)));
         let mut findings: Vec<Finding> = found.iter().map(Departure::finding).collect();
         let mut warnings: Vec<Warning> =
             found.iter().map(|departure| Warning::new(departure.kind.code(), departure.words())).collect();
         if let Some(base) = found.iter().find(|departure| departure.is_undecided()) {
-            // Base or tags: the tool follows the one, and not the other.
+            // The views do not distinguish base and tags, but the tool follows only the base.
             calibration.refuse_first_for([Refusal::Geometry(base.geometry_error(self.problem.robot))]);
         }
         calibration.refuse_for(found.iter().find_map(Departure::beyond_bound));
@@ -120,7 +120,7 @@ impl Estimate<'_> {
         })
     }
 
-    /// Distance of a joint from the one before it.
+    /// Distance of a joint from its predecessor, m.
     fn link_length_m(&self, joint: usize) -> f64 {
         self.problem.robot.chain.joints()[joint].parent_from_joint.translation.vector.norm()
     }
@@ -133,7 +133,7 @@ impl Estimate<'_> {
         mounts.flat_map(|(number, at)| self.departures_of_mount(number, at))
     }
 
-    /// Shift and turn of the mount of the camera of that number, whose columns begin at `at`.
+    /// Shift and rotation of the mount of camera `number`, whose columns begin at `at`.
     fn departures_of_mount(&self, number: usize, at: usize) -> [Departure; 2] {
         let camera = self.problem.robot.camera_at(number);
         let name = match number {
@@ -161,13 +161,13 @@ impl Estimate<'_> {
         })
     }
 
-    /// Lenses that have columns: the camera's number and the first column.
+    /// Estimated lenses: the camera's number and the first column.
     fn lenses(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         let blocks = self.problem.layout.blocks();
         blocks.filter_map(|(block, at)| if let Block::Lens(number) = block { Some((number, at)) } else { None })
     }
 
-    /// A focal length that differs from robot.toml's by more than a repair may.
+    /// Refusal of a focal length that differs from robot.toml's by more than a repair may.
     fn lens_beyond_bound(&self, number: usize, at: usize) -> Option<Refusal> {
         let (lens, camera) = (self.lens(number), self.problem.robot.camera_at(number));
         let [found_px, stated_px] = [lens, &camera.lens].map(|lens| lens.focal_px()[0]);
@@ -185,7 +185,7 @@ impl Estimate<'_> {
         })
     }
 
-    /// A lens that has columns.
+    /// Finding and text on an estimated lens.
     fn lens_finding(&self, number: usize, at: usize) -> (Finding, String) {
         let (lens, camera) = (self.lens(number), self.problem.robot.camera_at(number));
         let drawn = &camera.lens;
@@ -206,7 +206,7 @@ impl Estimate<'_> {
         (Finding { kind, name, size, unit, tool_error_m: None, time_s: None, repaired: true }, words)
     }
 
-    /// A lens that has columns, and is of the other model.
+    /// Finding and text on an estimated lens of the other model.
     fn lens_model_finding(&self, number: usize, lens: &CameraModel) -> (Finding, String) {
         let name = if number == 0 { "camera".to_owned() } else { self.problem.robot.camera_at(number).name.clone() };
         let words = say::other_lens_model(&name, lens);
@@ -214,7 +214,7 @@ impl Estimate<'_> {
         (Finding { kind, name, size, unit, tool_error_m: None, time_s: None, repaired: true }, words)
     }
 
-    /// Of tags that were moved, others tell (module `tags::freed`).
+    /// Finding and text on a tag fault; module `tags::freed` reports moved tags.
     fn tag_finding(&self, fault: &TagFault) -> Option<(Finding, String)> {
         let tags = &self.problem.robot.tags;
         let (kind, name, size, words) = match *fault {
@@ -246,7 +246,7 @@ impl Estimate<'_> {
         Some((Finding { kind, name, size, unit, tool_error_m: None, time_s: None, repaired: true }, words))
     }
 
-    /// A size that differs from the tag map's by more than a repair may.
+    /// Refusal of a tag size that differs from the tag map's by more than a repair may.
     fn size_beyond_bound(&self, fault: &TagFault) -> Option<Refusal> {
         let tags = &self.problem.robot.tags;
         let (tag_idx, ratio, element) = match *fault {
@@ -273,7 +273,7 @@ impl Estimate<'_> {
         self.posterior.covariance.fixed_view::<3, 3>(first, first).into_owned()
     }
 
-    /// Root mean square over the task of how far the tool would be elsewhere with the drawing kept, m.
+    /// Tool error with the nominal model kept, root mean square over the task, m.
     fn tool_moved_m(&self, tool: &[ToolJacobian], first: usize, size: &Vector3<f64>) -> f64 {
         let n = self.problem.layout.n_joint();
         let Some(inverse) = self.covariance3(first).try_inverse() else { return 0.0 };
@@ -288,20 +288,21 @@ fn std_along(covariance: &Matrix3<f64>, size: &Vector3<f64>) -> f64 {
     (covariance * along).dot(&along).max(0.0).sqrt()
 }
 
-/// Length of `size` in sigmas, where each axis is stated to be off by `stated_std` and known to `covariance`.
+/// Length of `size` in standard deviations: `stated_std` on each axis and `covariance` combined.
 fn sigmas(covariance: &Matrix3<f64>, stated_std: f64, size: &Vector3<f64>) -> f64 {
     let whole = covariance + Matrix3::identity() * stated_std.powi(2);
     whole.try_inverse().map_or(0.0, |inverse| size.dot(&(inverse * size)).max(0.0).sqrt())
 }
 
 impl Departure {
-    /// A base that is not as drawn and tags that hang elsewhere all together look the same, and differ at the tool.
+    /// Returns true for a significant base error. The views cannot distinguish it from a common error of all tags, but
+    /// the tool error differs.
     fn is_undecided(&self) -> bool {
         let size_m = self.size.norm() * if self.unit == FindingUnit::Radian { REACH_M } else { 1.0 };
         self.kind == FindingKind::Base && self.weight > NAMED_SIGMAS && size_m.max(self.tool_m.unwrap_or(0.0)) > WORTH_M
     }
 
-    /// The refusal of a departure that is too large for a repair.
+    /// Refusal of a departure that is too large for a repair.
     fn beyond_bound(&self) -> Option<Refusal> {
         let is_longer = self.unit == FindingUnit::Metre
             && self.length_m.is_some_and(|length_m| self.size.norm() > length_m.max(LEAST_LENGTH_M));

@@ -1,8 +1,9 @@
-//! What holds the tool where no view tells it: the sigmas of robot.toml that are most of its error.
+//! Keys of robot.toml whose priors cause most of the tool error where no view constrains it.
 //!
-//! With a parameter known exactly, the tool's variance falls by `|cov(tool, parameter)|^2 / var(parameter)`: its share.
-//! One that has a large share and most of its own prior's variance is held by that prior; more views do not tell it.
-//! The camera's mount counts with it where both have large shares, as a known mount would tell that parameter.
+//! If a parameter were known exactly, the tool's variance would fall by `|cov(tool, parameter)|^2 / var(parameter)`:
+//! its share. A parameter with a large share that keeps most of its prior's variance is held by that prior; more views
+//! do not determine it. The camera mount counts with it if both have large shares, because a known mount would
+//! determine that parameter.
 
 use nalgebra::DMatrix;
 
@@ -15,8 +16,8 @@ use crate::solve::estimate::Estimate;
 use armcal_core::joints::JointAngles;
 
 impl Estimate<'_> {
-    /// Keys of robot.toml with the sigmas that hold most of `tool_m2`, the tool's variance at `at`, the first camera's
-    /// last; none where the views tell it.
+    /// Keys of robot.toml whose priors cause most of `tool_m2`, the tool's variance at `at`, m^2; the keys of the first
+    /// camera come last. Empty if the views determine it.
     pub(crate) fn keys_that_hold(&self, at: &JointAngles, tool_m2: f64) -> Vec<String> {
         let layout = &self.problem.layout;
         let Some(tool) = self.tool_jacobians(std::slice::from_ref(at)).into_iter().next() else { return Vec::new() };
@@ -51,7 +52,7 @@ impl Estimate<'_> {
         self.scales().prior_std(spec, parameter.joint, parameter.kind)
     }
 
-    /// `None` of what has no key of its own.
+    /// Key of robot.toml for the parameter's prior; `None` if it has no key of its own.
     fn key_of(&self, parameter: Parameter) -> Option<String> {
         let spec = &self.problem.robot.sensors[parameter.joint];
         let key = match parameter.kind {

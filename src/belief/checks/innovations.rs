@@ -1,11 +1,10 @@
-//! Views that were left out, by what was learnt from the others: the innovations, with the covariance that they should
-//! have.
+//! Innovations of held-out views, predicted from the other views, with their predicted covariance.
 //!
-//! All left-out views of a fold at once: with the fold's normal equations `N` (its priors among them) and those of the
-//! left-out views `N_o y = r_o`, their own parameters eliminated, `chi2 = sum |r|^2 - own - r_o^T (N + N_o)^-1 r_o`:
-//! the innovations' squares under measurement noise, joint errors and the parameters' covariance together. With the
-//! camera of each view free, what is left is the noise within the views; the difference is chi-square with six numbers
-//! a view: how well cameras are foretold.
+//! All held-out views of a fold are used at once. `N` are the fold's normal equations with its priors. `N_o y = r_o`
+//! are those of the held-out views, with the views' own parameters marginalised. Then
+//! `chi2 = sum |r|^2 - own - r_o^T (N + N_o)^-1 r_o` is the innovations' square under measurement noise, joint errors
+//! and the parameters' covariance together. If the camera of each view is free, only the noise within the views
+//! remains. The difference is chi-square with six degrees of freedom per view: it tests the predicted camera poses.
 
 use crate::checks::constants::innovations::{FREE_CAMERA, TOLD};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
@@ -24,39 +23,39 @@ use armcal_core::joints::MAX_JOINTS;
 use armcal_core::numeric::Loss;
 use armcal_core::stats::chi_square_quantile;
 
-/// Innovations of one fold's left-out views.
+/// Innovations of one fold's held-out views.
 #[derive(Clone, Debug)]
 pub struct Innovations {
-    /// Of all coordinates.
+    /// Chi-square of all coordinates.
     pub chi2: f64,
-    /// Number of those coordinates, less one for each joint of a view whose sensor says nothing.
+    /// Number of those coordinates, less one per view for each joint without a sensor reading.
     pub dof: usize,
-    /// Of the cameras' poses alone.
+    /// Chi-square of the camera poses only.
     pub camera_chi2: f64,
-    /// Six per view that shows enough, less one for each joint whose sensor says nothing.
+    /// Six per view that shows enough, less one for each joint without a sensor reading.
     pub camera_dof: usize,
-    /// Each view on its own.
+    /// Number of views, and of those whose own chi-square is within its 95 % quantile.
     pub within_95: ViewContainment,
-    /// Those that the views tell enough of.
+    /// Innovations of joints on which the views have enough information.
     pub joints: Vec<JointInnovation>,
 }
 
-/// What a joint was off in a view that was left out.
+/// Error of a joint in a held-out view.
 #[derive(Clone, Copy, Debug)]
 pub struct JointInnovation {
     /// Index of the joint, base first.
     pub joint: usize,
-    /// Among all views.
+    /// Index among all views.
     pub view_idx: usize,
-    /// Travel from the middle of its range by the datasheet.
+    /// Travel from mid-range by the datasheet, rad.
     pub travel_rad: f64,
-    /// Over the standard deviation that it should have: of unit variance under the model.
+    /// Error over its predicted standard deviation: of unit variance under the model.
     pub normalised: f64,
 }
 
 impl Estimate<'_> {
-    /// Of `left_out`, views with their places among all; `outliers` of all views do not count. `None` if there is no
-    /// factor.
+    /// Innovations of the views in `left_out`, each with its index among all views; `outliers` of all views do not
+    /// count. `None` if the normal equations have no Cholesky factor.
     #[must_use]
     pub fn innovations(
         &self,
@@ -82,7 +81,7 @@ impl Estimate<'_> {
             }
         }
         let state = self.solved.state.with_views(views.len());
-        // A tag at the border may be foretold to lie beyond it.
+        // A tag at the border of an image may be predicted beyond it.
         let mut normal = NormalEquations::new(&problem);
         normal.update(&problem, &state, Loss::Square);
         for (observation, chi2) in problem.observations.iter_mut().zip(&normal.chi2) {
@@ -90,7 +89,7 @@ impl Estimate<'_> {
         }
         let (foretold, chi2) = self.with_data(&problem, &state)?;
         let joints = foretold.joints(&problem, left_out);
-        // A joint without a sensor takes up one number of its view, whatever it is.
+        // A joint without a sensor takes up one degree of freedom of its view.
         let taken = |view_idx: usize| problem.views[view_idx].is_free.iter().filter(|is_free| **is_free).count();
         let told = |view_idx: usize| {
             let used = observations_of(&problem, view_idx).filter(|s| s.is_used);
@@ -116,7 +115,7 @@ impl Estimate<'_> {
         Some(Innovations { chi2, dof, camera_chi2: (chi2 - free_chi2).max(0.0), camera_dof, within_95, joints })
     }
 
-    /// Chi-square of one view's innovations, with its observations as they are used, the gripper's tag last.
+    /// Chi-square of one view's innovations. `observations`: the view's, as they are used, the gripper tag's last.
     fn chi2_of_view(&self, input: &BundleInput<'_>, view: &[View], observations: Vec<ObservationTerm>) -> Option<f64> {
         let mut problem = self.data_only(input, view);
         problem.observations = observations;
@@ -124,7 +123,7 @@ impl Estimate<'_> {
         self.with_data(&problem, &state).map(|(_, chi2)| chi2)
     }
 
-    /// `views` in this estimate's columns, without any prior but the views' own.
+    /// Problem with `views` in this estimate's columns, without any prior except the views' own.
     fn data_only<'a>(&self, input: &BundleInput<'a>, views: &'a [View]) -> BundleProblem<'a> {
         let mut prior = self.problem.prior.clone();
         prior.information.matrix.fill(0.0);
@@ -134,7 +133,8 @@ impl Estimate<'_> {
         BundleProblem::with_layout(&input, self.problem.layout.clone(), prior)
     }
 
-    /// The data of `problem` linearized at `state` and joined to this estimate; and chi-square of their innovations.
+    /// Joins the data of `problem`, linearized at `state`, to this estimate. Also returns the chi-square of their
+    /// innovations.
     fn with_data(&self, problem: &BundleProblem<'_>, state: &State) -> Option<(Joined, f64)> {
         let mut normal = NormalEquations::new(problem);
         normal.update(problem, state, Loss::Square);
@@ -146,11 +146,11 @@ impl Estimate<'_> {
     }
 }
 
-/// Left-out data joined to an estimate.
+/// Held-out data joined to an estimate.
 struct Joined {
     normal: NormalEquations,
     factor: Cholesky<f64, Dyn>,
-    /// Of the common parameters.
+    /// Step of the common parameters.
     step: DVector<f64>,
 }
 
@@ -183,13 +183,13 @@ impl Joined {
     }
 }
 
-/// A view's observations, that of the gripper's tag last.
+/// Observations of a view, the gripper tag's last.
 fn observations_of<'p>(problem: &'p BundleProblem<'_>, view_idx: usize) -> impl Iterator<Item = &'p ObservationTerm> {
     let view = &problem.views[view_idx];
     problem.observations[view.observations.clone()].iter().chain(view.gripper.map(|at| &problem.observations[at]))
 }
 
-/// How many numbers of the camera's pose a view tells.
+/// Number of coordinates of the camera's pose that a view determines.
 fn camera_numbers(problem: &BundleProblem<'_>, view_idx: usize) -> usize {
     let used = problem.observations[problem.views[view_idx].observations.clone()].iter().filter(|s| s.is_used);
     let (mut points, mut poses) = (0, 0);

@@ -1,11 +1,13 @@
-//! The covariance without taking the fitted scales for known.
+//! Covariance that includes the uncertainty of the fitted scales.
 //!
-//! Held-out cameras test it: their innovations' chi-square over its `n` degrees of freedom is one where scales and
-//! model are right. Where it is more, two things are added. A scale's square has, of its `nu` degrees of freedom, an
-//! inverse chi-square distribution: the fit takes `sum / nu`, its mean is `sum / (nu - 2)`, and what it scales is
-//! Student's t with that mean for its variance (Gelman et al. 2013, Bayesian Data Analysis, 2.6 and 3.2); the
-//! covariance is that of scales whose squares are at their means. And all variances are multiplied by the mean of what
-//! is left to explain, `chi2 / (n - 2)` (Birge 1932, with the same mean).
+//! Held-out cameras test the covariance: their innovations' chi-square over its `n` degrees of freedom is one if scales
+//! and model are right. If it is larger, two corrections widen the covariance.
+//!
+//! First, the square of a scale with `nu` degrees of freedom has an inverse chi-square distribution: the fit takes
+//! `sum / nu`, but its mean is `sum / (nu - 2)`. The scaled quantity is Student's t with that mean as its variance
+//! (Gelman et al. 2013, Bayesian Data Analysis, 2.6 and 3.2). So the covariance uses scales whose squares are at their
+//! means. Second, all variances are multiplied by the mean of the remaining ratio, `chi2 / (n - 2)` (Birge 1932, with
+//! the same mean).
 
 use crate::checks::constants::consistency::NAMED_SIGMAS;
 use crate::checks::innovations::Innovations;
@@ -20,18 +22,18 @@ use armcal_core::joints::MAX_JOINTS;
 use armcal_core::numeric::Loss;
 use nalgebra::{DMatrix, DVector};
 
-/// A gain or offset against its datasheet.
+/// Deviation of a gain or offset from its datasheet.
 #[derive(Clone, Copy)]
 pub(crate) struct FromDatasheet {
     pub parameter: Parameter,
     pub sigmas: f64,
-    /// In the parameter's unit.
+    /// Deviation in the parameter's unit.
     pub off: f64,
 }
 
 impl Estimate<'_> {
-    /// Widens the covariance where `innovations` of the folds are larger than they should be; `first` are the scales
-    /// that the fit began with.
+    /// Widens the covariance if the `innovations` of the folds are larger than predicted. `first`: scales at the start
+    /// of the fit.
     pub(crate) fn widen(&mut self, innovations: &[Innovations], first: &Hyperparameters) {
         let chi2: f64 = innovations.iter().map(|fold| fold.camera_chi2).sum();
         let n = innovations.iter().map(|fold| fold.camera_dof).sum::<usize>() as f64;
@@ -55,7 +57,8 @@ impl Estimate<'_> {
         });
     }
 
-    /// Gains and offsets of which the datasheet states a sigma, each as it was before its sensor slipped.
+    /// Deviations of gains and offsets from their datasheets, where these state a standard deviation; each as it was
+    /// before its sensor slipped.
     pub(crate) fn from_datasheet(&self) -> Vec<FromDatasheet> {
         let (robot, sound) = (self.problem.robot, JointParameters::default());
         let linear = |kind| matches!(kind, ParameterKind::Gain | ParameterKind::Offset);
@@ -67,8 +70,8 @@ impl Estimate<'_> {
         apart.collect()
     }
 
-    /// Where a gain (an offset) is so many datasheet's sigmas off that few sensors are, the sigma of all gains (all
-    /// offsets) is taken for as many times larger: those that the views do not tell are then as unsure.
+    /// Widens the priors of all gains (or all offsets) if one is an unusual number of standard deviations from its
+    /// datasheet. That number is the factor: gains or offsets that the views do not determine become as uncertain.
     pub(crate) fn widen_unusual(&mut self) {
         if !self.has_own_priors {
             return;
@@ -87,9 +90,11 @@ impl Estimate<'_> {
         }
     }
 
-    /// `covariance` with the priors of `parameters` wider by `factor`. A variance `p^2` that becomes `f^2 p^2` changes
-    /// the information by `-d e e^T`, `d = (1 - 1 / f^2) / p^2`, and the covariance by `C e d e^T C / (1 - d e^T C e)`
-    /// (Sherman and Morrison 1950); e: the parameter's column, of an offset with its sensor's slips.
+    /// Returns `covariance` with the priors of `parameters` wider by `factor`.
+    ///
+    /// A variance `p^2` that becomes `f^2 p^2` changes the information by `-d e e^T`, `d = (1 - 1 / f^2) / p^2`. The
+    /// covariance changes by `C e d e^T C / (1 - d e^T C e)` (Sherman and Morrison 1950). e: unit vector of the
+    /// parameter's column; for an offset, also of its sensor's slips.
     fn with_wider_priors(&self, parameters: &[Parameter], factor: f64, mut covariance: DMatrix<f64>) -> DMatrix<f64> {
         let layout = self.joint_parameters();
         for parameter in parameters {
@@ -100,7 +105,7 @@ impl Estimate<'_> {
             own.into_iter().chain(steps).for_each(|column| unit[column] = 1.0);
             let prior_var = parameter.prior_std(self.problem.robot).powi(2);
             let column = &covariance * &unit;
-            // Of the prior's variance the views leave at most all.
+            // The views leave at most all of the prior's variance.
             let left = (unit.dot(&column) / prior_var).min(1.0);
             let less = 1.0 - factor.powi(-2);
             covariance += &column * column.transpose() * (less / prior_var / (1.0 - less * left));
@@ -108,8 +113,7 @@ impl Estimate<'_> {
         covariance
     }
 
-    /// Takes the scales whose squares are the means of what the data leave possible, see the module, and linearizes
-    /// under them.
+    /// Takes the scales whose squares are at their means under the data (see the module), and linearizes under them.
     pub(crate) fn take_mean_scales(&mut self, first: &Hyperparameters) {
         let problem = &mut self.problem;
         let target = ScaleTarget::mean(first);
@@ -121,20 +125,21 @@ impl Estimate<'_> {
         self.solved.normal.update(problem, &self.solved.state, Loss::Square);
     }
 
-    /// Covariance of the common parameters as it leaves this estimate.
+    /// Covariance of the common parameters, widened if the estimate was.
     pub(crate) fn wide_covariance(&self) -> &DMatrix<f64> {
         self.marginal.as_ref().map_or(&self.posterior.covariance, |marginal| &marginal.covariance)
     }
 
-    /// What a joint is off at a new pose beyond its sensor's model, one sigma; where offsets walk, as long after the
-    /// last view as the first one was before it.
+    /// Standard deviation of a joint's error at a new configuration beyond its sensor's model, rad. With walking
+    /// offsets, it holds as long after the last view as the first view was before it.
     pub(crate) fn residual_std_rad(&self, joint: usize) -> f64 {
         let fitted = || error_std_rad(&self.model, &self.problem.scales);
         self.marginal.as_ref().map_or_else(fitted, |marginal| marginal.joint_std_rad)[joint]
     }
 }
 
-/// Of each joint at a new pose: what is new in each view, and a walk as long as that during the views.
+/// Standard deviation of each joint's error at a new configuration, rad. It combines the error new in each view and a
+/// walk as long as that during the views.
 fn error_std_rad(model: &Model, scales: &Hyperparameters) -> [f64; MAX_JOINTS] {
     let walked = |joint: usize| if model.walk.is_some() { scales.walk_std_rad[joint] } else { 0.0 };
     std::array::from_fn(|joint| scales.joint_std_rad[joint].hypot(walked(joint)))

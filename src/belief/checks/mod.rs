@@ -1,8 +1,8 @@
-//! Checks of one calibration: do joint sensors explain the views, and what is the result worth?
+//! Checks of one calibration: whether joint sensors explain the views, and how accurate the result is.
 //!
-//! `consistency` is all checks of an estimate, `innovations` and `cross_validation` are about views that the fit did
-//! not use, `observability` and `reservations` about what the views cannot show. `refusal_conditions` and the decision
-//! rule come last, in `assemble`, which fills calibration.toml.
+//! `consistency` holds all checks of an estimate. `innovations` and `cross_validation` test views that the fit did not
+//! use. `observability` and `reservations` cover parameters that the views do not determine. `refusal_conditions` and
+//! the decision rule come last, in `assemble`, which fills calibration.toml.
 
 pub(crate) mod assemble;
 pub(crate) mod block_measurements;

@@ -1,4 +1,4 @@
-//! Checks of the fitted noise of corners, rotations and all other sizes against what is stated for them.
+//! Checks of the fitted noise and scales against their stated values.
 
 use crate::checks::consistency::{MAX_OUTLIERS, MAX_SIGMAS_OFF, VerdictInput};
 use crate::checks::constants::noise_checks::{
@@ -14,7 +14,7 @@ use crate::solve::input::{BundleInput, HyperparameterMode};
 use armcal_core::codes::{Code, Warning};
 
 impl VerdictInput<'_> {
-    /// Returns the refusal of corners with a larger error than robot.toml says: their fitted noise hides other errors.
+    /// Returns a refusal if the corner noise is far above robot.toml's: a large fitted noise hides other errors.
     pub(crate) fn corner_noise(&self, table: &mut VerdictTable) -> Option<Refusal> {
         let stated_px = self.input.robot.camera.corner_std_px;
         let mean_px = self.found.mean_corner_std_px()?;
@@ -38,8 +38,8 @@ impl VerdictInput<'_> {
         refusal
     }
 
-    /// Returns the refusal of a stated corner noise that is far too small: under it most observations seem to fit
-    /// nothing, and under a larger one nearly all fit within what detectors have.
+    /// Returns a refusal if the stated corner noise is far too small: most observations are outliers, but nearly all
+    /// fit under a larger noise that is usual for detectors.
     pub(crate) fn understated_corner_noise(&self, n_observations: usize) -> Option<Refusal> {
         let n_outliers = self.found.outliers.len();
         if 2 * n_outliers <= n_observations || self.found.has_positions() {
@@ -60,7 +60,8 @@ impl VerdictInput<'_> {
         Some(Refusal::CornerNoiseUnderstated { residual_px, stated_px, outliers, observations })
     }
 
-    /// Returns the refusal of poses whose rotations contradict their positions: another form or direction fits so.
+    /// Returns a refusal if rotations contradict positions: rotations in a wrong format or direction fit with a large
+    /// noise.
     pub(crate) fn rotation_noise(&self, table: &mut VerdictTable) -> Option<Refusal> {
         if !self.found.has_poses() {
             return None;
@@ -74,7 +75,7 @@ impl VerdictInput<'_> {
         refusal
     }
 
-    /// Warns of fitted sizes that are at a bound.
+    /// Returns a warning for each fitted scale that is at its bound.
     pub(crate) fn scales_at_bounds(&self) -> Vec<Warning> {
         let (robot, now, first) = (self.input.robot, self.found.scales(), &self.input.scales);
         let mut all = vec![("noise of corners".to_owned(), now.noise, 1.0, NOISE_BOUNDS)];
@@ -85,7 +86,7 @@ impl VerdictInput<'_> {
             let (now, first) = (now.rotation_std_rad, first.rotation_std_rad);
             all.push(("noise of rotations, rad".to_owned(), now, first, POSITION_BOUNDS));
         }
-        // Small sizes are harmless: what is not there needs none.
+        // No lower bound: the scale of an absent effect is near zero.
         let above = [0.0, SCALE_BOUNDS[1]];
         for (joint, spec) in robot.sensors.iter().enumerate().take(robot.n_seen_joints()) {
             let (now_rad, first_rad) = (now.joint_std_rad[joint], first.joint_std_rad[joint]);

@@ -1,9 +1,9 @@
-//! What the data determine, before anything is solved.
+//! Observability of the parameters from the data, before the solve.
 //!
-//! The normal equations at the robust start without the priors of joints, mount, gripper tag and clock; the tags' poses
-//! (about their survey) and the sensors' nonlinearity (a process of its prior's size) are eliminated with what the
-//! views have of their own. Scaled by the prior's sigmas, an eigenvalue below 1 is a direction that the prior tells
-//! more of than the data; the others count for the indices.
+//! The normal equations are those at the robust start, without the priors of joints, mount, gripper tag and clock. The
+//! tags' poses (about their survey), the sensors' nonlinearity (a process of its prior's size) and the views' own
+//! parameters are marginalised. In units of the priors' standard deviations, an eigenvalue below 1 is a direction that
+//! the prior dominates; the others count for the indices.
 //!
 //! Indices of observability, of the singular values s_1 >= .. >= s_L of the scaled, whitened Jacobian (roots of those
 //! eigenvalues) and m views: O1 = (prod s)^(1/L) / sqrt(m) (Borm and Menq 1991), O2 = s_L / s_1 (Driels and Pathre
@@ -24,40 +24,40 @@ use crate::solve::robust_start::robust_start;
 use armcal_core::numeric::Loss;
 use armcal_core::robot::Robot;
 
-/// Before solving.
+/// Observability of the parameters before the solve.
 #[derive(Clone, Debug)]
 pub struct Observability {
-    /// Directions that the data tell more of than the prior, of as many as there are parameters.
+    /// Number of directions, among `n_parameters`, on which the data have more information than the prior.
     pub rank: usize,
     /// Number of tested parameters: joints without nonlinearity, mount, gripper tag, clock and lens, where estimated.
     pub n_parameters: usize,
-    /// Largest over smallest singular value, of the directions that the data tell more of; so are the indices.
+    /// Ratio of the largest to the smallest singular value, among those directions; the indices use the same ones.
     pub condition_number: f64,
-    /// O1 to O5, see the module; all 0 where the rank is 0.
+    /// Indices O1 to O5, see the module; all 0 if the rank is 0.
     pub o: [f64; 5],
-    /// Directions that are held by the prior, in words.
+    /// Directions that the prior dominates, in words.
     pub null_space: Vec<NullDirection>,
 }
 
-/// A direction that the data tell less of than the prior.
+/// Direction on which the data have less information than the prior.
 #[derive(Clone, Debug)]
 pub struct NullDirection {
     pub words: String,
-    /// Whether it is of the sensors' terms alone: temperature, pressure, drift, play.
+    /// True if only the sensors' terms take part: temperature, pressure, drift, backlash.
     pub is_of_terms: bool,
 }
 
-/// A column as it is spoken of.
+/// Column as it is named in texts.
 struct Name {
     text: String,
-    /// The prior's, in the parameter's unit.
+    /// Prior standard deviation, in the parameter's unit.
     sigma: f64,
     is_term: bool,
-    /// An offset or a turn, rad.
+    /// True for an offset or a rotation, rad.
     is_angle: bool,
 }
 
-/// At the robust start of `input`; `None` where nothing has a column.
+/// Computes the observability at the robust start of `input`; `None` if nothing has a column.
 #[must_use]
 pub fn observability(input: &BundleInput<'_>) -> Option<Observability> {
     let start = robust_start(input);
@@ -73,7 +73,7 @@ pub fn observability(input: &BundleInput<'_>) -> Option<Observability> {
         return None;
     }
     let sigma = sigmas(&layout, input, &prior);
-    // A warm start's prior holds the mount, too.
+    // The prior of a warm start also covers the mount.
     let with_mount = layout.n_joint()..prior.n_covered();
     for column in (0..layout.n_joint()).filter(|&column| kept(column)).chain(with_mount) {
         prior.information.matrix.row_mut(column).fill(0.0);
@@ -104,7 +104,7 @@ pub fn observability(input: &BundleInput<'_>) -> Option<Observability> {
     (!names.is_empty()).then(|| summarized(information, &names, input.views.len()))
 }
 
-/// One prior sigma of each column.
+/// Prior standard deviation of each column.
 fn sigmas(layout: &Layout, input: &BundleInput<'_>, prior: &Prior) -> Vec<f64> {
     let mut sigma = vec![1.0; layout.n];
     for (column, p) in layout.parameters.iter().enumerate() {
@@ -120,7 +120,7 @@ fn sigmas(layout: &Layout, input: &BundleInput<'_>, prior: &Prior) -> Vec<f64> {
     sigma
 }
 
-/// Of the wanted columns in units of `sigma`, the others eliminated.
+/// Information on the wanted columns in units of `sigma`, with the others marginalised.
 fn information(
     problem: &BundleProblem<'_>,
     normal: &NormalEquations,
@@ -159,8 +159,7 @@ fn summarized(information: DMatrix<f64>, names: &[Name], n_views: usize) -> Obse
     }
 }
 
-/// Directions of the space that the columns of `space` span, each with as few parameters as elimination with the
-/// largest pivots leaves.
+/// Directions that span the column space of `space`. Elimination with the largest pivots leaves few parameters in each.
 fn in_words(space: &mut DMatrix<f64>, names: &[Name]) -> Vec<NullDirection> {
     let n = space.ncols();
     for k in 0..n {
@@ -181,8 +180,9 @@ fn in_words(space: &mut DMatrix<f64>, names: &[Name]) -> Vec<NullDirection> {
     all
 }
 
-/// What counts in a direction: what is large in units of its prior. An angle among the largest counts angles by
-/// themselves, too: a turn of a mount that is well known and an offset that is not move the camera alike.
+/// Describes a direction by its entries that are large in units of their priors. If the largest entry is an angle,
+/// angles that are large in rad count, too. A rotation of a well-known mount and an uncertain offset move the camera
+/// alike.
 fn spoken(direction: &DVector<f64>, names: &[Name]) -> NullDirection {
     let own = DVector::from_fn(names.len(), |k, _| direction[k] * names[k].sigma);
     let first = direction.iamax();

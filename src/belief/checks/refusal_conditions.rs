@@ -9,20 +9,20 @@ use armcal_core::numeric::Outcome;
 use armcal_core::robot::Robot;
 use armcal_core::stats::chi_square_quantile;
 
-/// What the verdict rests on.
+/// Data for the decision to accept or refuse a calibration.
 #[derive(Clone, Copy, Debug)]
 pub struct AcceptanceData {
     pub outcome: Outcome,
-    /// Steps or evaluations of the solver.
+    /// Number of steps or evaluations of the solver.
     pub evaluations: usize,
     pub held_out_views: usize,
     pub held_out_rms_m: Option<f64>,
-    /// The same views with the datasheet's sensors, and with mount and map fitted besides; `None` where the method
-    /// judges them by its own covariance, or nothing could be fitted.
+    /// Root mean square error of the held-out views with datasheet sensors, m; for `baseline`, mount and map are
+    /// fitted, too. `None` if the method judges them by its own covariance, or nothing could be fitted.
     pub held_out_nominal_rms_m: Option<f64>,
     pub baseline: Option<BaselineComparison>,
     pub fit_rms_m: f64,
-    /// Wanted of the sensors that move the camera, whether these views determine them or not.
+    /// Number of wanted parameters of the sensors that move the camera, determined by these views or not.
     pub n_parameters: usize,
     pub fit_views: usize,
     /// Largest held-out distance of positions and poses; `None` where all tags have corners.
@@ -37,15 +37,15 @@ pub struct HeldOutLimit {
 }
 
 impl HeldOutLimit {
-    /// Without a stated noise.
+    /// Limit without a stated noise: the task's tolerance, else a share of the arm's reach.
     #[must_use]
     pub fn without_noise(robot: &Robot, tolerance_m: Option<f64>) -> Self {
         let by_reach = Self { limit_m: MAX_SHARE_OF_REACH * robot.reach_m(), source: HeldOutLimitSource::Reach };
         tolerance_m.map_or(by_reach, |limit_m| Self { limit_m, source: HeldOutLimitSource::Tolerance })
     }
 
-    /// Limit that `n_views` exceed with the probability of a false alarm, if a tag is off by `expected_m`, root mean
-    /// square, for its noise and the estimate's uncertainty. The tags of a view share most of it.
+    /// Limit that `n_views` exceed with the probability of a false alarm. `expected_m`: root mean square error of a tag
+    /// by its noise and the estimate's uncertainty, m. The tags of a view share most of it.
     #[must_use]
     pub fn by_noise(expected_m: f64, n_views: usize) -> Self {
         let dof = 3 * n_views.max(1);
@@ -54,13 +54,13 @@ impl HeldOutLimit {
     }
 }
 
-/// The fewest fitted views that a calibration of all joints before the camera, from the datasheet, is accepted with.
+/// Least number of fitted views to accept a calibration of all joints proximal to the camera from the datasheet.
 #[must_use]
 pub fn fewest_views(robot: &Robot) -> usize {
     (MIN_VIEWS_PER_PARAMETER * 2.0 * robot.n_seen_joints() as f64).ceil() as usize
 }
 
-/// `None` to accept, else the first reason to refuse.
+/// Returns the first reason to refuse; `None` to accept.
 #[must_use]
 pub fn refusal(e: &AcceptanceData) -> Option<Refusal> {
     if (e.fit_views as f64) < MIN_VIEWS_PER_PARAMETER * e.n_parameters as f64 {

@@ -1,10 +1,10 @@
-//! What rests on priors alone: elements of the geometry that the views do not tell, and what each means at the tool.
+//! Geometry elements that only a prior determines, and the tool error that each may cause.
 //!
-//! Each element z (a joint's place on its parent link, the camera's mount, the tool point) is held at the drawing. By
-//! the score test's quantities, z has the information I from the views, all estimated parameters x eliminated, and the
-//! estimate follows it by `dx/dz`. An error of one sigma s of z's prior moves the tool by
-//! `t = (d tool/dz + d tool/dx dx/dz) s`. Views leave `1 / (1 + I s^2)` of the prior's variance: an element of which
-//! more than half is left is unseen. What is not estimated adds `t t^T` to the tool's covariance.
+//! Each element z (pose of a joint on its parent link, camera mount, tool point) is held at the nominal model. The
+//! score test gives the information I that the views have on z, with all estimated parameters x marginalised. The
+//! estimate follows z by `dx/dz`. A prior error of one standard deviation s moves the tool by
+//! `t = (d tool/dz + d tool/dx dx/dz) s`. The views leave `1 / (1 + I s^2)` of the prior's variance; an element that
+//! keeps more than half of it is unseen. An element that is not estimated adds `t t^T` to the tool's covariance.
 
 mod lens;
 
@@ -25,35 +25,36 @@ use armcal_core::robot::geometry::GeometryPriors;
 
 /// An element of the geometry along one axis, with its prior.
 struct HeldElement {
-    /// What it is, up to its axis.
+    /// Name of the element without its axis.
     stem: String,
     axis: &'static str,
     unit: FindingUnit,
     prior_std: f64,
     /// Share of the prior's variance that the views leave.
     share_left: f64,
-    /// One sigma to which touches tell it; infinite without them.
+    /// Standard deviation from the touches; infinite without touches.
     touched_std: f64,
-    /// Of the tool by one sigma, at each configuration, m.
+    /// Tool displacement by one prior standard deviation at each configuration, m.
     shifts: Vec<Vector3<f64>>,
-    /// Whether the tool's covariance has it already: by the estimate's parameters, or by the lens's.
+    /// True if the tool's covariance already includes the element, through the estimated parameters or the lens.
     is_counted: bool,
-    /// Key of robot.toml that would state `prior_std`, where it does not.
+    /// Key of robot.toml for `prior_std` if the file does not state it.
     unstated: Option<&'static str>,
 }
 
-/// What priors alone say of the tool.
+/// Tool error caused by elements that only a prior determines.
 pub(crate) struct PriorImpact {
-    /// The largest first.
+    /// Reservations, the largest tool error first.
     pub reservations: Vec<Reservation>,
-    /// Added to the tool's covariance at each configuration, m^2; without elements of which no sigma is stated.
+    /// Covariance to add to the tool's at each configuration, m^2. Without touches, it excludes elements with no stated
+    /// standard deviation.
     pub covariances_m2: Vec<Matrix3<f64>>,
-    /// Kinds of elements that are not in it: their keys in robot.toml.
+    /// Keys in robot.toml of the kinds of unseen elements whose standard deviation is not stated.
     pub not_included: Vec<&'static str>,
 }
 
 impl PriorImpact {
-    /// The reservations that are told.
+    /// Returns the reservations to report, at most `MAX_RESERVATIONS`.
     pub(crate) fn told(mut self) -> Vec<Reservation> {
         self.reservations.truncate(MAX_RESERVATIONS);
         self.reservations
@@ -61,13 +62,14 @@ impl PriorImpact {
 }
 
 impl Estimate<'_> {
-    /// What the drawing leaves open at `task`, where the data alone predict `predicted_m`.
+    /// Computes the tool error from priors at `task`. `predicted_m`: tool error predicted from the data only, m.
     #[cfg(test)]
     pub(crate) fn prior_impact(&self, task: &[JointAngles], predicted_m: f64) -> PriorImpact {
         self.prior_impact_with(None, task, predicted_m)
     }
 
-    /// The same where touches tell of it, too; of the estimate by the views alone.
+    /// Computes the tool error from priors at `task`, with the touches if there are any. `self`: the estimate from the
+    /// views only.
     pub(crate) fn prior_impact_with(
         &self,
         touches: Option<&TouchUpdate>,
@@ -78,7 +80,7 @@ impl Estimate<'_> {
         let lenses = self.held_lenses();
         let mut elements = self.held_elements(touches, task, &tool);
         elements.extend(lenses.iter().flat_map(|lens| lens.elements(&tool)));
-        // Without a tag on the gripper and without touches nothing watches over what is beyond the camera.
+        // Without a gripper tag or touches, nothing checks the links distal to the camera.
         let is_watched = touches.is_some() || self.has(Block::GripperTag);
         let worth_m = if is_watched { WORTH_SHARE } else { WORTH_SHARE_UNWATCHED } * predicted_m;
         let covariance = |at: usize| {
@@ -143,7 +145,7 @@ impl Estimate<'_> {
         };
         let unit = [FindingUnit::Metre, FindingUnit::Radian][kind];
         let seen = score.information[(first + axis, first + axis)] * prior_std * prior_std;
-        // The prior of what is estimated takes part in its information.
+        // The information of an estimated element includes its prior.
         let share_left = if is_estimated { 1.0 - seen } else { 1.0 / (1.0 + seen) };
         let size = Vector3::ith(axis, prior_std);
         let shifts = tool.iter().map(|at| at.shift(score, first, &size)).collect();
@@ -153,7 +155,7 @@ impl Estimate<'_> {
         };
         let way = if error == ErrorKind::Shift { "shift along" } else { "rotation about" };
         let stem = format!("{name}, {way} ");
-        // The mount's prior is in the estimate, and is left there.
+        // The estimate includes the prior of an estimated element, which stays in it.
         let own_std = if is_estimated { 0.0 } else { prior_std };
         let touched_std = touches.map_or(f64::INFINITY, |touches| touches.std_of_trial(first, axis, own_std));
         let unstated = match element {
@@ -173,8 +175,8 @@ impl Estimate<'_> {
         }
     }
 
-    /// All tags together against the base: the same views as a base that is off the other way, and the tool that
-    /// follows the estimate alone. Nobody states how well that is known; as well as a link, it is assumed.
+    /// Pose of the whole tag survey relative to the base. The views cannot distinguish it from an opposite error of the
+    /// base, but the tool then only follows the estimate. Nobody states its accuracy, so that of a link is assumed.
     fn survey_frame(
         &self,
         score: &Score,
@@ -193,7 +195,7 @@ impl Estimate<'_> {
         HeldElement {
             stem: format!("tag survey, {way} "),
             prior_std,
-            // A base that is estimated takes up all of it.
+            // An estimated base absorbs the whole error of the survey.
             share_left: if base.is_counted { 1.0 } else { base.share_left },
             touched_std: touches.map_or(f64::INFINITY, |touches| touches.std_of_survey(first, axis)),
             shifts: tool.iter().map(|at| -at.followed(score, first, &size)).collect(),
@@ -202,7 +204,7 @@ impl Estimate<'_> {
         }
     }
 
-    /// No view shows the tool's point.
+    /// Tool point, which no view constrains.
     fn tool_point(&self, axis: usize, task: &[JointAngles], touches: Option<&TouchUpdate>) -> HeldElement {
         let robot = self.problem.robot;
         let prior_std = robot.geometry.tool_position_std_m;
@@ -223,7 +225,7 @@ impl Estimate<'_> {
     }
 }
 
-/// Key of robot.toml that would state how well links are known, where it does not.
+/// Key of robot.toml for the standard deviation of links if the file does not state it.
 fn unstated_link(priors: &GeometryPriors, error: ErrorKind) -> Option<&'static str> {
     match error {
         ErrorKind::Shift => (!priors.stated.link_position).then_some("link_position_std_m"),
@@ -233,7 +235,8 @@ fn unstated_link(priors: &GeometryPriors, error: ErrorKind) -> Option<&'static s
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// What is told of elements that only differ by their axis.
+/// Reservation on elements that differ only by their axis. `None` if no unseen one moves the tool by more than
+/// `worth_m`.
 fn reservations_of(elements: &[HeldElement], worth_m: f64) -> Option<Reservation> {
     let open: Vec<&HeldElement> = elements.iter().filter(|e| e.is_open() && e.tool_error_m() > worth_m).collect();
     let each: Vec<f64> = open.iter().map(|element| element.tool_error_m()).collect();
@@ -255,12 +258,12 @@ fn reservations_of(elements: &[HeldElement], worth_m: f64) -> Option<Reservation
 }
 
 impl HeldElement {
-    /// Neither views nor touches tell it.
+    /// Returns true if neither views nor touches determine the element.
     fn is_open(&self) -> bool {
         self.share_left > UNSEEN_SHARE && self.prior_std > 0.0 && self.touched_std > TOUCHED_SIGMAS * self.prior_std
     }
 
-    /// By one sigma, root mean square.
+    /// Tool error by one prior standard deviation, root mean square over the configurations, m.
     fn tool_error_m(&self) -> f64 {
         let n = self.shifts.len().max(1) as f64;
         (self.shifts.iter().map(Vector3::norm_squared).sum::<f64>() / n).sqrt()

@@ -1,5 +1,5 @@
-//! The tool error that would be predicted if noise and sensors were no worse than stated: a limit made of it does not
-//! grow with what the model fails to explain.
+//! Tool error predicted if noise and sensors are no worse than stated. A limit derived from it does not grow with
+//! errors that the model fails to explain.
 
 use crate::model::scales::Hyperparameters;
 use crate::solve::covariance::ParameterCovariance;
@@ -22,7 +22,7 @@ impl Estimate<'_> {
         quantile(&configurations.iter().map(error_m).collect::<Vec<f64>>(), 0.5)
     }
 
-    /// Of the joints' parameters, with the fitted scales, each at most what robot.toml states.
+    /// Covariance of the joints' parameters with the fitted scales, each at most what robot.toml states.
     pub(crate) fn stated_covariance(&self, input: &BundleInput<'_>) -> Option<ParameterCovariance> {
         let mut problem = self.problem.clone();
         problem.scales = at_most_stated(&problem.scales, input);

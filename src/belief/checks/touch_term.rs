@@ -1,16 +1,19 @@
-//! The tool against surveyed planes: rows about what no view shows, after the views have been fitted.
+//! Touches of surveyed planes by the tool: constraints on unobservable parameters, applied after the fit of the views.
 //!
-//! A touch says `n . (tool - p) = r` within sigma. With the views' estimate x and its covariance C, the drawing's
-//! elements z (joints' places, tool point) under their priors, the sensors w beyond the camera under their datasheets
-//! and each joint's own error e at the touch, the tool is off its prediction by
+//! A touch states `n . (tool - p) = r` within its standard deviation. Its innovation, the tool's deviation from the
+//! prediction, is
 //!
 //! ```text
 //! y = r - n . (tool - p) = n . (J (x - x0) + t z + K w + E e) + noise
 //! ```
 //!
-//! where t has the joints follow z as the views make them (`reservations`). All touches together give the innovation's
-//! covariance S; `y^T S^-1 y` is chi-square if drawing and surfaces hold (Bar-Shalom, Li and Kirubarajan 2001, sec.
-//! 5.4). The update is Kalman's; the drawing is not changed, what it seems to be off stays in the predicted error.
+//! x is the views' estimate with its covariance C; z are elements of the nominal model (poses of joints, tool point)
+//! under their priors. w are the sensors distal to the camera under their datasheets; e are the joints' own errors at
+//! the touch. t includes the estimate's response to z (`reservations`).
+//!
+//! All touches together give the innovations' covariance S. `y^T S^-1 y` is chi-square if nominal model and surfaces
+//! are right (Bar-Shalom, Li and Kirubarajan 2001, sec. 5.4). The update is Kalman's. The nominal model is not changed;
+//! its apparent error stays in the predicted tool error.
 
 pub(crate) use crate::checks::constants::touch_term::MIN_TOUCHES;
 use crate::checks::constants::touch_term::{ALIKE_CHI2, ALIKE_SHARE, TOLD_SHARE, USUAL};
@@ -29,12 +32,12 @@ use armcal_core::codes::Code;
 use armcal_core::robot::Robot;
 use armcal_core::stats::chi_square_quantile;
 
-/// Causes of touches that are not where they should be.
+/// Causes of touch innovations beyond their limit.
 pub(crate) const TOOL_POINT: &str = "tool point or links beyond the camera";
 pub(crate) const MOUNT_TURN: &str = "the camera's turn about the last joint before it";
 pub(crate) const SURVEY_TURN: &str = "a turn of the tag survey against the base";
 
-/// What the touches tell beside the views.
+/// Update of the views' estimate by touches.
 pub(crate) struct TouchUpdate {
     names: Vec<String>,
     tools: Vec<ToolJacobian>,
@@ -42,16 +45,16 @@ pub(crate) struct TouchUpdate {
     score: Score,
     innovations: DVector<f64>,
     factor: Cholesky<f64, Dyn>,
-    /// Of x less the views' estimate, then the elements of the drawing.
+    /// Mean of x less the views' estimate, then of the elements of the nominal model.
     mean: DVector<f64>,
     covariance: DMatrix<f64>,
-    /// Of the estimated parameters in it.
+    /// Number of estimated parameters in `mean`.
     n: usize,
     pub(crate) chi2: f64,
     pub(crate) limit: f64,
 }
 
-/// A cause of touches that are not where they should be.
+/// Possible cause of touch innovations beyond their limit.
 struct Cause {
     words: String,
     chi2_left: f64,
@@ -59,7 +62,7 @@ struct Cause {
 }
 
 impl Estimate<'_> {
-    /// `None` with too few touches, or where their covariance is no covariance.
+    /// Returns the update by `touches`. `None` with too few touches, or if their covariance is not positive definite.
     pub(crate) fn touch_update(&self, touches: &[Touch]) -> Option<TouchUpdate> {
         if touches.len() < MIN_TOUCHES {
             return None;
@@ -108,8 +111,8 @@ impl Estimate<'_> {
         })
     }
 
-    /// Covariance of the rows by all that has no column: noise, the joints' own errors at each touch, and the gains and
-    /// offsets of joints that no view tells of, which all touches share.
+    /// Covariance of the touches from effects without a column: noise, the joints' own errors at each touch, and gains
+    /// and offsets of unobservable joints. All touches share the last.
     fn beyond_columns(&self, touches: &[Touch], tools: &[ToolJacobian]) -> DMatrix<f64> {
         let robot = self.problem.robot;
         let layout = &self.problem.layout;
@@ -137,7 +140,7 @@ impl Estimate<'_> {
         out
     }
 
-    /// The estimate with what the touches add; the views' own parameters stay.
+    /// Returns the estimate updated by the touches; the views' own parameters stay.
     pub(crate) fn with_touches(&self, update: &TouchUpdate) -> Self {
         let mut updated = self.clone();
         let n = update.n;
@@ -151,15 +154,15 @@ fn tool_link(robot: &Robot) -> String {
     robot.bodies[robot.tool.mount.n_joints].name.clone()
 }
 
-/// One sigma of each joint's place: three of shift, three of turn; none of the first `n_estimated`, which the estimate
-/// has as parameters.
+/// Prior standard deviations of each joint's pose: three of shift, m, three of rotation, rad. The first `n_estimated`
+/// are 0, because the estimate has them as parameters.
 fn places(robot: &Robot, n_estimated: usize) -> Vec<f64> {
     let (m, rad) = (robot.geometry.link_position_std_m, robot.geometry.link_rotation_std_rad);
     let all = (0..robot.tool.mount.n_joints).flat_map(|_| [m, m, m, rad, rad, rad]);
     all.enumerate().map(|(k, std)| if k < n_estimated { 0.0 } else { std }).collect()
 }
 
-/// Of the tool along `normal`: by the estimated parameters, the joints' places and the tool point.
+/// Tool displacement along `normal` per unit of the estimated parameters, the joints' poses and the tool point.
 fn sensitivities(robot: &Robot, score: &Score, tool: &ToolJacobian, n: usize, normal: &Vector3<f64>) -> DVector<f64> {
     let n_places = 6 * robot.tool.mount.n_joints;
     let mut along = DVector::zeros(n + n_places + 3);
@@ -177,8 +180,8 @@ fn sensitivities(robot: &Robot, score: &Score, tool: &ToolJacobian, n: usize, no
 }
 
 impl TouchUpdate {
-    /// What the touches leave of the tool's covariance beside that of the estimated parameters, and what the drawing
-    /// seems to be off, at one configuration, m^2.
+    /// Covariance of the tool at one configuration after the touches, without the part of the estimated parameters,
+    /// m^2. It includes the apparent error of the nominal model.
     pub(crate) fn beside_parameters_m2(&self, robot: &Robot, at: &ToolJacobian) -> Matrix3<f64> {
         let rows: Vec<DVector<f64>> =
             (0..3).map(|axis| sensitivities(robot, &self.score, at, self.n, &Vector3::ith(axis, 1.0))).collect();
@@ -192,28 +195,29 @@ impl TouchUpdate {
         })
     }
 
-    /// One sigma to which the touches tell an element that moves the tool by `shift` at each touch for one unit, the
-    /// element's own prior aside; infinite where they do not.
+    /// Standard deviation to which the touches determine an element, without its own prior; infinite if they do not.
+    /// `along`: displacement of the tool along each touch's normal by one unit of the element, m.
     fn std_of(&self, along: &DVector<f64>, own_prior_std: f64) -> f64 {
         let told = along.dot(&self.factor.solve(along));
-        // The factor has the element's prior in it (matrix inversion lemma).
+        // The factor includes the element's prior (matrix inversion lemma).
         let told = told / (1.0 - told * own_prior_std.powi(2)).max(1e-12);
         if told > 0.0 { told.sqrt().recip() } else { f64::INFINITY }
     }
 
-    /// The same of the trial at `first + axis` of the score test.
+    /// Standard deviation from the touches of the score test's trial at `first + axis`.
     pub(crate) fn std_of_trial(&self, first: usize, axis: usize, own_prior_std: f64) -> f64 {
         let shift = |tool: &ToolJacobian| tool.shift(&self.score, first, &Vector3::ith(axis, 1.0));
         self.std_of(&self.along(shift), own_prior_std)
     }
 
-    /// The same of the tag survey's frame, against the joint whose trial is at `first + axis`.
+    /// Standard deviation from the touches of the tag survey's frame, against the joint whose trial is at
+    /// `first + axis`.
     pub(crate) fn std_of_survey(&self, first: usize, axis: usize) -> f64 {
         let shift = |tool: &ToolJacobian| -tool.followed(&self.score, first, &Vector3::ith(axis, 1.0));
         self.std_of(&self.along(shift), 0.0)
     }
 
-    /// The same of the tool point along an axis of its link.
+    /// Standard deviation from the touches of the tool point along an axis of its link, m.
     pub(crate) fn std_of_tool_point(&self, robot: &Robot, axis: usize) -> f64 {
         let shift = |tool: &ToolJacobian| tool.poses.frame(&robot.tool.mount).rotation * Vector3::ith(axis, 1.0);
         self.std_of(&self.along(shift), robot.geometry.tool_position_std_m)
@@ -224,7 +228,7 @@ impl TouchUpdate {
         DVector::from_iterator(self.tools.len(), each)
     }
 
-    /// Writes the check into `calibration`, and refuses it where the tool is not where it should be.
+    /// Writes the check into `calibration`, and refuses it if the touches contradict the tool's position.
     pub(crate) fn judge(&self, robot: &Robot, calibration: &mut Calibration) {
         let check = Check::at_most("touches: chi-square of the tool's place", self.chi2, self.limit);
         let holds = check.holds;
@@ -271,7 +275,7 @@ impl TouchUpdate {
         }
     }
 
-    /// What a wrong tool point alone would be off by, axes of its link.
+    /// Tool point error that explains the touches best without another cause, m, axes of its link.
     pub(crate) fn tool_point_m(&self, robot: &Robot) -> Vector3<f64> {
         self.tool_point(robot).size.fixed_rows::<3>(0).into_owned()
     }
@@ -290,7 +294,7 @@ impl TouchUpdate {
         self.cause(MOUNT_TURN.to_owned(), &columns)
     }
 
-    /// All tags together against the base, about the axes of which no view tells.
+    /// Rotation of the whole tag survey against the base, about the axes that no view determines.
     fn survey_turn(&self, robot: &Robot) -> Option<Cause> {
         let (first, _) = columns(GeometryElement::Joint(0), ErrorKind::Turn);
         let std = robot.geometry.link_rotation_std_rad;
@@ -306,7 +310,7 @@ impl TouchUpdate {
         self.cause(format!("the survey of {}", self.names[k]), &[column])
     }
 
-    /// The chi-square that is left when the columns' parameters are free, and what they then are.
+    /// Estimates the parameters of `columns` from the touches, and the chi-square that then remains.
     fn cause(&self, words: String, columns: &[DVector<f64>]) -> Cause {
         let by = DMatrix::from_columns(columns);
         let weighted = self.factor.solve(&by);

@@ -1,4 +1,4 @@
-//! The angles of joints whose sensor says nothing, as the tags of a view show them.
+//! Angles of joints without a sensor reading, from the tags of a view.
 
 use crate::explain::constants::angles_by_camera::{CANDIDATES, FINEST_STEP_RAD, KNOWN_MOUNT, SEARCH_WIDTH_M};
 use armcal_core::joints::JointAngles;
@@ -7,7 +7,7 @@ use armcal_core::robot::Robot;
 use crate::model::parameters::JointParameters;
 use crate::views::view::{TagObservation, View};
 
-/// Sets the travel of the view's free joints to what its tags show under `at`; leaves it where the view shows none.
+/// Sets the travel of the view's free joints from its tags under `at`; leaves it unchanged if the view shows no tag.
 pub fn set_by_camera(robot: &Robot, view: &mut View, at: &JointParameters) {
     let joints: Vec<usize> = (0..robot.n_seen_joints()).filter(|&joint| view.is_free[joint]).collect();
     if joints.is_empty() {
@@ -20,8 +20,8 @@ pub fn set_by_camera(robot: &Robot, view: &mut View, at: &JointParameters) {
     }
 }
 
-/// All angles of a view, those of `joints` where the tags lie closest to their survey (sum of Cauchy losses): a grid
-/// over the joints' ranges, then smaller and smaller steps.
+/// All angles of a view; those of `joints` are where the tags are closest to their survey (sum of Cauchy losses). The
+/// search uses a grid over the joints' ranges, then smaller and smaller steps.
 pub(crate) fn seen_angles(robot: &Robot, view: &View, joints: &[usize], at: &JointParameters) -> JointAngles {
     let departure = view.conditions.departure_from(&at.reference);
     let mut best = JointAngles::from_fn(robot.n_joints(), |j| {
@@ -72,7 +72,7 @@ pub(crate) fn distance_cost(robot: &Robot, view: &View, angles: &JointAngles) ->
     view.tags.iter().map(of_tag).sum()
 }
 
-/// True where the stated sigmas of the camera mount are within [`KNOWN_MOUNT`].
+/// Returns true if the stated sigmas of the camera mount are within [`KNOWN_MOUNT`].
 pub(crate) fn has_known_mount(robot: &Robot) -> bool {
     robot.camera.mount_std_m <= KNOWN_MOUNT[0] && robot.camera.mount_std_rad <= KNOWN_MOUNT[1]
 }

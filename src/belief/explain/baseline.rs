@@ -1,11 +1,11 @@
-//! Mount and map alone: what a calibration of joints has to beat.
+//! Fit of mount and map only: the baseline that a calibration of joints has to beat.
 //!
-//! The joints stay at the datasheet; camera mount and tags are estimated about their priors from the same views. What
-//! the joints are off is an error of each view, whose size the evidence fits: first about the datasheet's own gain and
-//! offset, then about what the fit before found, until that stays, so that the datasheet does not hold it up.
+//! The joints stay at the datasheet; camera mount and tags are estimated about their priors from the same views. The
+//! joints' errors count as an error of each view, whose scale the evidence fits. The first fit is about the datasheet's
+//! gain and offset, the next ones about the fit before, until the scale settles. So the datasheet does not bias it.
 //!
-//! Plain least squares stands next to it: sensors as good as their datasheets, and an error of each view, or noise of
-//! the positions, that takes up all else, equal in all directions. The datasheet's arm itself is the third.
+//! Plain least squares is the second baseline: sensors as good as their datasheets, and an isotropic error of each view
+//! (or noise of the positions) for the rest. The datasheet's arm itself is the third.
 
 pub(crate) use crate::explain::constants::baseline::N_BASELINES;
 use crate::explain::constants::baseline::{MAX_PASSES, SETTLED};
@@ -20,17 +20,17 @@ use crate::solve::model_for_views::{has_views, reference};
 use crate::views::view::{TagObservation, View};
 use armcal_core::robot::Robot;
 
-/// Mount and map alone, with the sizes of errors that all views tell.
+/// Fit of mount and map only, with the scales of errors from all views.
 pub(crate) struct Baseline {
     model: Model,
-    /// Sizes for which the evidence fits the joints' errors.
+    /// Scales by the evidence, for the joints' errors.
     scales: Hyperparameters,
-    /// Sizes for plain least squares.
+    /// Scales for plain least squares.
     plain: Hyperparameters,
 }
 
 impl Baseline {
-    /// `None` where the views determine nothing.
+    /// Fits the scales of errors to all views; `None` if the views determine nothing.
     pub(crate) fn new(robot: &Robot, views: &[View]) -> Option<Self> {
         let (mut baseline, usual) = (Self::start(robot, views), Hyperparameters::datasheet(robot));
         for _ in 0..MAX_PASSES {
@@ -53,7 +53,7 @@ impl Baseline {
         Some(baseline)
     }
 
-    /// Before any view.
+    /// Baseline before any view.
     fn start(robot: &Robot, views: &[View]) -> Self {
         let shown = Shown { motion: false, gripper_tag: false, by_camera: &|camera| has_views(views, camera) };
         let blocks = Block::all(robot).filter(|block| block.is_told(robot, &shown));
@@ -68,7 +68,7 @@ impl Baseline {
         Self { model, scales, plain }
     }
 
-    /// The arm by `views` under each of the baselines that determine it.
+    /// Estimates the arm from `views` under each of the baselines that determine it.
     pub(crate) fn fit(&self, robot: &Robot, views: &[View]) -> [Option<Robot>; N_BASELINES] {
         let by = |scales| Some(self.estimate(robot, views, scales, HyperparameterMode::Given)?.as_found(robot));
         [Some(robot.clone()), by(&self.plain), by(&self.scales)]

@@ -1,13 +1,13 @@
-//! A warm start: an earlier calibration as prior, and whether the new views agree with it.
+//! Warm start: an earlier calibration as prior, and the test that the new views agree with it.
 //!
-//! The prior's mean and covariance P0 are those of calibration.toml, about its own reference conditions, widened by
-//! what may have happened since: each offset by the datasheet's random walk, `drift^2 hours`. Parameters that it lacks
-//! come from the datasheet.
+//! The prior's mean and covariance P0 are those of calibration.toml, about its own reference conditions. The covariance
+//! is wider by possible changes since: each offset by the datasheet's random walk, `drift^2 hours`. Parameters that the
+//! calibration lacks come from the datasheet.
 //!
-//! Agreement: the views are fitted once more under P1 = P0 + W, where W lets each offset slip as far as the datasheet's
-//! own sigma. With the posterior covariance C and `A = I - C P1^-1`, the estimate moves from the prior by d, which has
-//! the covariance `S = A P0 A^T + A C` if the prior holds (linear Gaussian model); `d^T S^+ d` is then chi-square with
-//! as many degrees of freedom as S has eigenvalues above `TOLD_SHARE` in units of P0.
+//! The test fits the views once more under P1 = P0 + W, where W lets each offset slip by the datasheet's sigma. With
+//! the posterior covariance C and `A = I - C P1^-1`, the estimate moves from the prior by d. If the prior holds, d has
+//! the covariance `S = A P0 A^T + A C` (linear Gaussian model). `d^T S^+ d` is then chi-square with as many degrees of
+//! freedom as S has eigenvalues above `TOLD_SHARE` in units of P0.
 
 use crate::explain::constants::calibration_prior::{
     LEAST_SLIP_STD_RAD, MAX_ROUNDING, MOUNTED_ANEW_STD, ROUNDING, USUAL_DRIFT_STD_RAD_PER_SQRT_H, Z_999, Z_OF_JOINTS,
@@ -35,58 +35,59 @@ use armcal_core::time::Stamp;
 pub const MOUNT_ROWS: [&str; 6] =
     ["camera mount x", "camera mount y", "camera mount z", "camera mount rx", "camera mount ry", "camera mount rz"];
 
-/// An earlier calibration as the estimator takes it.
+/// Earlier calibration in the form that the estimator uses.
 #[derive(Clone)]
 pub struct CalibrationPrior {
-    /// With the camera where the prior found it, and its lens as the prior has it.
+    /// Robot with the camera and the lens as the prior estimated them.
     pub robot: Robot,
-    /// What the new views tell, and all that the prior knows.
+    /// Model of the terms that the new views determine, and all that the prior knows.
     pub model: Model,
-    /// The datasheet's, with the prior's error from view to view.
+    /// Scales of the datasheet, with the prior's error between views.
     pub scales: Hyperparameters,
-    /// The prior's values and reference.
+    /// Parameters and reference of the prior.
     pub guess: JointParameters,
-    /// Hours between the prior's last view and these.
+    /// Time between the prior's last view and these, h.
     pub elapsed_h: f64,
     mean: DVector<f64>,
-    /// Joints' parameters in the model's order, then the camera mount where the prior knows it together with them.
+    /// Covariance of the joints' parameters in the model's order, then of the camera mount if the prior has it, too.
     covariance: DMatrix<f64>,
     widened: DMatrix<f64>,
 }
 
-/// Whether prior and views can both be right.
+/// Result of the test that prior and views agree.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PriorConsistency {
     /// Square of the estimate's move from the prior under its covariance.
     pub chi2: f64,
-    /// Number of directions that the views tell enough of to be tested.
+    /// Number of directions that the views determine well enough to be tested.
     pub degrees_of_freedom: usize,
-    /// The 0.999 quantile.
+    /// Limit of `chi2`: its 0.999 quantile.
     pub limit: f64,
-    /// The joint that is off the most in its own sigma, by how much on average over the views, and that sigma, rad.
+    /// Index of the joint with the largest change in its own standard deviations.
     pub joint: usize,
-    /// See `joint`; positive where the new views put the angle above the prior's.
+    /// Mean change of the joint's angle over the views, rad; positive if the new views put it above the prior's.
     pub off_rad: f64,
-    /// See `joint`.
+    /// Standard deviation of `off_rad`, rad.
     pub off_std_rad: f64,
     /// Share of the observations that a fit under the widened prior uses.
     pub used_share: f64,
-    /// How many joints are off by more than chance.
+    /// Number of joints that changed by more than chance.
     pub joints_off: usize,
-    /// Shift, m, and turn, rad, of a camera that was mounted anew, where that and no slip of one sensor explains it.
+    /// Shift, m, and rotation, rad, of a camera that was mounted again, if that and no slip of one sensor explains the
+    /// views.
     pub camera_moved: Option<[f64; 2]>,
 }
 
 impl PriorConsistency {
-    /// Whether move, joint or share of used observations is beyond what happens by chance.
+    /// Returns true if `chi2`, the joint's change or the share of used observations is beyond chance.
     pub fn is_beyond_chance(&self) -> bool {
-        // Not a number is no agreement.
+        // NaN counts as disagreement.
         !(self.chi2 <= self.limit
             && self.off_rad.abs() <= Z_OF_JOINTS * self.off_std_rad
             && self.used_share >= MIN_USED_SHARE)
     }
 
-    /// Why prior and views do not go together, if that is no chance.
+    /// Refusal of a prior that the views contradict; `None` if the difference may be chance.
     pub fn refusal(&self, robot: &Robot) -> Option<Refusal> {
         self.is_beyond_chance().then(|| Refusal::PriorContradicted {
             joint: robot.sensors[self.joint].joint.clone(),
@@ -104,7 +105,7 @@ impl PriorConsistency {
 }
 
 impl CalibrationPrior {
-    /// `None` where the prior's covariance is no covariance.
+    /// Prepares `prior` for the estimator; `None` if its covariance is not positive definite.
     pub fn new(prior: &Calibration, applied: &FailureAdjusted) -> Option<Self> {
         let views = &applied.views;
         let mut robot = prior.with_lenses(&applied.robot);
@@ -112,7 +113,7 @@ impl CalibrationPrior {
         if guess.reference == Conditions::default() {
             guess.reference = reference(views);
         }
-        // What the prior knows of a sensor is nothing about where a locked joint stands.
+        // The prior knows the sensor of a locked joint, not where the joint stands.
         let is_locked = |failure: &&Failure| failure.kind.stands_still() && failure.leaves_no_sensor();
         let locked: Vec<usize> = applied.failures.iter().filter(is_locked).map(|failure| failure.joint).collect();
         for &joint in &locked {
@@ -158,7 +159,7 @@ impl CalibrationPrior {
         Some(Self { robot, model, scales, guess, elapsed_h, mean, covariance, widened })
     }
 
-    /// What to estimate under the prior.
+    /// Input of an estimate under the prior.
     pub fn input<'a>(&'a self, views: &'a [View], evidence: HyperparameterMode) -> Option<BundleInput<'a>> {
         self.under(&self.covariance, views, evidence)
     }
@@ -180,7 +181,7 @@ impl CalibrationPrior {
         })
     }
 
-    /// With this information on the parameters, and on the mount if the prior has it.
+    /// Prior with this information on the parameters, and on the mount if the prior has it.
     fn known(&self, information: DMatrix<f64>) -> JointPrior {
         let n = self.model.parameters().len();
         let mean = self.mean.rows(0, n).into_owned();
@@ -189,7 +190,7 @@ impl CalibrationPrior {
         of(mean, information)
     }
 
-    /// Gains and offsets that the prior knows no better than half as well as the datasheet.
+    /// Number of gains and offsets with more than half of the datasheet's standard deviation in the prior.
     pub fn n_unknown(&self, datasheet: &Robot) -> usize {
         let parameters = self.model.parameters().into_iter();
         let is_unknown = |(k, p): &(usize, Parameter)| {
@@ -199,7 +200,7 @@ impl CalibrationPrior {
         parameters.enumerate().filter(is_unknown).count()
     }
 
-    /// Whether `views` agree with the prior; `None` where they determine nothing.
+    /// Tests whether `views` agree with the prior; `None` if they determine nothing.
     pub fn consistency(&self, views: &[View]) -> Option<PriorConsistency> {
         let (consistency, _) = self.tested(views)?;
         let is_beyond = consistency.is_beyond_chance();
@@ -207,8 +208,8 @@ impl CalibrationPrior {
         Some(PriorConsistency { camera_moved, ..consistency })
     }
 
-    /// Shift and turn of the camera, if `views` agree with the sensors of the prior but for its mount, and not with a
-    /// prior of which the one sensor slipped that is `off` the most.
+    /// Shift and rotation of the camera, m and rad, if only a new mount explains `views`. The views must agree with the
+    /// prior of the sensors only, and not with a slip of the sensor in `off`.
     fn camera_moved(&self, views: &[View], off: &PriorConsistency) -> Option<[f64; 2]> {
         let agrees = |(consistency, _): &(PriorConsistency, _)| !consistency.is_beyond_chance();
         if self.with_slip_of(off.joint, off.off_rad).tested(views).as_ref().is_some_and(agrees) {
@@ -219,7 +220,7 @@ impl CalibrationPrior {
         Some([moved.translation.vector.norm(), moved.rotation.angle()])
     }
 
-    /// This prior, of which the sensor of `joint` may have slipped since, by `size_rad` or as far as sensors slip.
+    /// Returns this prior with a possible slip of the sensor of `joint`, by `size_rad` or the usual size of slips.
     fn with_slip_of(&self, joint: usize, size_rad: f64) -> Self {
         let mut slipped = self.clone();
         let offset = Parameter { joint, kind: ParameterKind::Offset };
@@ -229,7 +230,7 @@ impl CalibrationPrior {
         slipped
     }
 
-    /// What this prior says of the sensors alone.
+    /// Returns this prior of the sensors only, with the camera mounted again.
     fn with_camera_anew(&self) -> Self {
         let n = self.model.parameters().len();
         let of_sensors = |matrix: &DMatrix<f64>| matrix.view((0, 0), (n, n)).into_owned();
@@ -243,7 +244,7 @@ impl CalibrationPrior {
         anew
     }
 
-    /// The test of agreement, and the mount as `views` have it.
+    /// Test of agreement, and the mount as `views` determine it.
     fn tested(&self, views: &[View]) -> Option<(PriorConsistency, Isometry3<f64>)> {
         let found = estimate(&self.under(&self.widened, views, HyperparameterMode::Given)?)?;
         let n = self.mean.len();
@@ -309,7 +310,8 @@ impl CalibrationPrior {
     }
 }
 
-/// (joint, mean change of its angle over the views, one sigma of that), rad.
+/// Change of each joint: its index, the mean change of its angle over the views and the standard deviation of that,
+/// rad.
 fn joints_moved(found: &Estimate<'_>, moved: &DVector<f64>, moved_by: &DMatrix<f64>) -> Vec<(usize, f64, f64)> {
     let problem = &found.problem;
     let seen = problem.views.iter().filter(|view| !view.observations.is_empty()).count().max(1) as f64;
@@ -326,10 +328,10 @@ fn joints_moved(found: &Estimate<'_>, moved: &DVector<f64>, moved_by: &DMatrix<f
     joints.map(of_joint).collect()
 }
 
-/// What the views can tell, and all that the prior knows.
+/// Model of the terms that the views determine, and all that the prior knows.
 fn model(applied: &FailureAdjusted, reference: &Conditions, known: &[Parameter]) -> Model {
     let mut views = applied.views.clone();
-    // Terms act from the prior's reference on: oil as warm in all views, yet warmer than then, has columns.
+    // Terms act from the prior's reference on: oil as warm in all views, but warmer than then, has columns.
     if let Some(first) = applied.views.first() {
         views.push(View { conditions: *reference, tags: Vec::new(), gripper_tag: None, ..first.clone() });
     }
@@ -354,18 +356,18 @@ fn elapsed_h(prior: &Calibration, views: &[View]) -> f64 {
     hours.iter().sum::<f64>() / hours.len().max(1) as f64
 }
 
-/// What the prior's covariance is to have rows of.
+/// Rows that the prior's covariance should have.
 struct PriorColumns<'a> {
     robot: &'a Robot,
     scales: &'a Hyperparameters,
     parameters: &'a [Parameter],
     /// The mount's rows in the prior's covariance.
     mount: Option<[usize; 6]>,
-    /// Joints of which the prior says nothing.
+    /// Joints that the prior does not constrain.
     locked: &'a [usize],
 }
 
-/// P0 and P1, see the module.
+/// Covariances P0 and P1, see the module.
 fn covariances(prior: &Calibration, columns: &PriorColumns<'_>, elapsed_h: f64) -> (DMatrix<f64>, DMatrix<f64>) {
     let PriorColumns { robot, scales, parameters, mount, locked } = columns;
     let row = |p: &Parameter| prior.covariance.row(&p.name(robot)).filter(|_| !locked.contains(&p.joint));
@@ -384,7 +386,7 @@ fn covariances(prior: &Calibration, columns: &PriorColumns<'_>, elapsed_h: f64) 
             covariance[(k, k)] += drift_std_rad_per_sqrt_h(spec).powi(2) * elapsed_h;
         }
     }
-    // The prior tells of an offset before the sensor slipped among the new views.
+    // The prior constrains an offset before the sensor slipped among the new views.
     for (k, p) in parameters.iter().enumerate().filter(|(_, p)| p.kind == ParameterKind::Offset) {
         for step in steps_of(parameters, p.joint) {
             let step_rad2 = covariance[(step, step)];
@@ -400,18 +402,18 @@ fn covariances(prior: &Calibration, columns: &PriorColumns<'_>, elapsed_h: f64) 
     (covariance, widened)
 }
 
-/// One sigma of how far a sensor may have slipped.
+/// Standard deviation of a possible slip of a sensor, rad.
 fn slip_std_rad(spec: &JointSensorSpec) -> f64 {
     spec.offset_std_rad.max(LEAST_SLIP_STD_RAD)
 }
 
-/// By the datasheet, or what is usual.
+/// Drift by the datasheet, or the usual one if it states none, rad per root of an hour.
 pub(crate) fn drift_std_rad_per_sqrt_h(spec: &JointSensorSpec) -> f64 {
     let stated = spec.drift_std_rad_per_sqrt_h;
     if stated == 0.0 { USUAL_DRIFT_STD_RAD_PER_SQRT_H } else { stated }
 }
 
-/// Symmetric, and with an inverse in spite of the file's rounding.
+/// Makes `matrix` symmetric, and invertible in spite of the file's rounding.
 fn regular(matrix: DMatrix<f64>) -> Option<DMatrix<f64>> {
     let symmetric = 0.5 * (&matrix + matrix.transpose());
     let mut share = ROUNDING;
@@ -435,7 +437,7 @@ fn chi_square_999(degrees_of_freedom: usize) -> f64 {
     k * (1.0 - by + Z_999 * by.sqrt()).powi(3)
 }
 
-/// Rows of the camera mount: its covariance with the joints' parameters and itself, for calibration.toml.
+/// Covariance of the joints' parameters and the camera mount, whose rows come last, for calibration.toml.
 pub fn with_mount_rows(found: &Estimate<'_>) -> Option<DMatrix<f64>> {
     let at = found.problem.layout.at(Block::Mount(0))?;
     let n = found.problem.layout.n_joint();

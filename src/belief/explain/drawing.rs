@@ -1,19 +1,17 @@
-//! Is the drawing right? Other explanations of the same views, compared by their evidence.
+//! Errors of the nominal model: other explanations of the same views, compared by their evidence.
 //!
-//! Where the score test says that links, base or a mount would explain the data better than joint sensors do, where
-//! tags are not where they should be or do not fit at all, the views are estimated again under each alternative: link
-//! geometry with columns of its own, an arm that bends under its weight (`sag_start`), a lens with columns, tags of
-//! another size, two tags exchanged, tags that were moved together. The one of most evidence stays if it brings
-//! [`MIN_GAIN_NATS`] or more, and more than freeing a tag that was moved (module `tags::freed`) would. Then all begins
-//! again, until nothing explains more.
+//! Alternatives are tried if the score test prefers links, base or a mount to joint sensors, or if tags do not fit
+//! their survey. The views are estimated again under each: link geometry with columns of its own, sag of the arm
+//! (`sag_start`), a lens with columns, tags of another size. Further alternatives are two exchanged tags, and tags that
+//! were moved together. The one of most evidence stays if it brings [`MIN_GAIN_NATS`] or more, and more than freeing a
+//! moved tag (module `tags::freed`). The search then starts again, until nothing explains more.
 //!
-//! The score test says beforehand what links may bring: with the pull s and the information I of trial columns z under
-//! a prior of variance a^2, Laplace's approximation is
-//! `ln Z(a) - ln Z(0) = s^T (I + a^-2)^-1 s / 2 - ln det(1 + a^2 I) / 2`. The element and size of the largest gain are
-//! where the sizes of the links' errors start from.
+//! The score test predicts the gain of links: with the pull s and the information I of trial columns z under a prior of
+//! variance a^2, Laplace's approximation is `ln Z(a) - ln Z(0) = s^T (I + a^-2)^-1 s / 2 - ln det(1 + a^2 I) / 2`. The
+//! element and scale of the largest gain are the start for the scales of the links' errors.
 //!
-//! Alternatives reject other observations. For the comparison, a rejected one costs what it is rejected at (a truncated
-//! square), so that explaining it counts.
+//! Alternatives reject different observations. In the comparison, a rejected one costs its rejection threshold (a
+//! truncated square), so that explaining it counts.
 
 pub(crate) use crate::explain::constants::drawing::MULTIPLES;
 use crate::explain::constants::drawing::{GOLDEN_STEPS, LENS_SCALE, LOG_RATIO_RANGE, MIN_GAIN_NATS};
@@ -36,7 +34,7 @@ use armcal_core::robot::Robot;
 
 mod sag_start;
 
-/// What of the drawing is taken otherwise, or estimated beside the joint sensors.
+/// Departures from the nominal model that are assumed, or estimated together with the joint sensors.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Drawing {
     pub links: Option<LinkStart>,
@@ -46,26 +44,26 @@ pub(crate) struct Drawing {
     pub tags: Vec<TagFault>,
 }
 
-/// Where the sizes of the links' errors start from, and how many joints have columns.
+/// Start of the scales of the links' errors, and the number of joints with columns.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct LinkStart {
     n_links: usize,
-    /// Over robot.toml's: shift, turn.
+    /// Ratio to robot.toml's standard deviations: shift, rotation.
     multiples: [[f64; 2]; MAX_JOINTS],
     mount_scale: [[f64; 2]; MAX_CAMERAS],
-    /// Gain of these sizes over that of all links at their stated sigmas, nats.
+    /// Evidence gain of these scales over all links at their stated sigmas, nats.
     beyond_stated_nats: f64,
 }
 
 impl LinkStart {
-    /// Returns true where the stated sigmas do not explain the links' departures.
+    /// Returns true if the stated sigmas do not explain the links' departures.
     pub(crate) fn is_beyond_stated(&self) -> bool {
         self.beyond_stated_nats > MIN_GAIN_NATS
     }
 }
 
 impl Drawing {
-    /// Gives `input` the columns of this drawing.
+    /// Adds the columns of these departures to `input`.
     pub(crate) fn apply(&self, input: &mut BundleInput<'_>) {
         if !self.lenses.is_empty() {
             input.model.blocks.extend(self.lenses.iter().copied().map(Block::Lens));
@@ -84,11 +82,11 @@ impl Drawing {
         input.scales.mount_scale = start.mount_scale;
     }
 
-    /// The drawing of most evidence, if another than this explains the views much better, and by more than
-    /// `least_nats`; `input` has this one's columns and tags, `found` is its estimate.
+    /// Alternative of most evidence, if it explains the views much better than this one, and by more than `least_nats`.
+    /// `input` has the columns and tags of this one; `found` is its estimate.
     pub(crate) fn better(&self, input: &BundleInput<'_>, found: &Estimate<'_>, least_nats: f64) -> Option<Self> {
         if input.joint_prior.is_some() {
-            // A warm start knows the links from before, and its own test of agreement.
+            // A warm start has a prior of the links, and its own test of agreement.
             return None;
         }
         let before = log_evidence_of_all(found);
@@ -121,8 +119,8 @@ impl Drawing {
         if is_scaled { None } else { common_size_ratio(input.views, input.robot) }
     }
 
-    /// Tags that were moved together, if none were found so far: each by as much as it likes, if several are doubtful,
-    /// or all by one motion.
+    /// Alternatives with tags that were moved together, if none were found so far. Each tag moves freely (if several
+    /// are doubtful), or all by one motion.
     fn moved_groups(&self, input: &BundleInput<'_>, found: &Estimate<'_>) -> Vec<Self> {
         if self.tags.iter().any(|fault| fault.moved_tag().is_some()) {
             return Vec::new();
@@ -132,7 +130,7 @@ impl Drawing {
         groups.map(|group| self.with_faults(group)).collect()
     }
 
-    /// What else may explain the views, none where nothing is suspicious.
+    /// Alternatives that may explain the views; none if nothing is suspicious.
     fn alternatives(&self, input: &BundleInput<'_>, found: &Estimate<'_>) -> Vec<Self> {
         let (links, gain) = found.link_start();
         let (sag, sag_gain) = found.sag_start();
@@ -156,13 +154,13 @@ impl Drawing {
         all
     }
 
-    /// Where `next` takes tags otherwise than this, `robot` does, too.
+    /// Applies to `robot` the tag faults that `next` has beyond this one.
     pub(crate) fn apply_new_faults(&self, next: &Self, robot: &mut Robot) {
         next.tags[self.tags.len()..].iter().for_each(|fault| fault.apply(robot));
     }
 }
 
-/// Where `gain` is largest near `ratio`, by golden sections of the logarithm.
+/// Ratio near `ratio` at which `gain` is largest, by golden sections of the logarithm.
 fn best_ratio(ratio: f64, gain: impl Fn(f64) -> f64) -> f64 {
     let golden = 0.5 * (5f64.sqrt() - 1.0);
     let gain = |log: f64| gain(log.exp());
@@ -184,7 +182,7 @@ fn best_ratio(ratio: f64, gain: impl Fn(f64) -> f64) -> f64 {
 }
 
 impl Estimate<'_> {
-    /// Where to start links from, and what that may bring, nats.
+    /// Start of the links' scales, and its predicted evidence gain, nats.
     pub(crate) fn link_start(&self) -> (LinkStart, f64) {
         let robot = self.problem.robot;
         let score = self.score();
@@ -233,22 +231,22 @@ impl Estimate<'_> {
     }
 }
 
-/// What has wider priors than the drawing's at the start.
+/// Elements with wider priors than the nominal model's at the start.
 #[derive(Clone, Copy)]
 enum Loosened {
-    /// Shift (0) or turn (1) of a joint's place.
+    /// Shift (0) or rotation (1) of a joint's pose.
     Joint(usize, usize),
-    /// Shift (0) or turn (1) of a camera's mount, by the camera's number.
+    /// Shift (0) or rotation (1) of a camera's mount, by the camera's number.
     Mount(usize, usize),
     AllLinks,
 }
 
-/// Twists of the camera of that number by its mount; of another none.
+/// Twists of camera `camera` by its mount; zero for another camera.
 fn by_mount_of(group: &Group<'_>, camera: usize) -> Matrix6<f64> {
     if group.camera == camera { group.by_mount } else { Matrix6::zeros() }
 }
 
-/// What trial columns would bring under priors of `multiple` times their (column, std).
+/// Evidence gain of trial columns under priors of `multiple` times their (column, std), nats.
 pub(crate) fn gain_nats(
     score: &DVector<f64>,
     information: &DMatrix<f64>,
@@ -267,5 +265,5 @@ pub(crate) fn gain_nats(
     0.5 * pull.dot(&factor.solve(&pull)) - half_log_det
 }
 
-/// Largest multiple of robot.toml's sigmas that the evidence may fit.
+/// The evidence may fit no larger multiple of robot.toml's sigmas.
 const _: () = assert!(MULTIPLES[4] <= SCALE_BOUNDS[1]);

@@ -1,10 +1,11 @@
-//! Which joint failed, and how: one joint at a time is freed in all views, and the angles that the camera then shows
-//! are held against its readings.
+//! Detection of the joint that failed, and of the failure. One joint at a time is free in all views; the angles that
+//! the camera then shows are compared with its readings.
 //!
-//! A hypothesis must explain the data better than a sound arm by far: with the datasheet's scales, the sum of the
-//! observations' chi-squares (each cut where a observation would be rejected), plus the joints' own and their
-//! parameters' prior, plus `2 ln(prior std / posterior std)` for each reading that is given up (Laplace's approximation
-//! of the evidence, MacKay 1992, with a round figure), must fall by `MARGIN`.
+//! A hypothesis must explain the data far better than a sound arm: its score must be lower by `MARGIN`. The score, with
+//! the datasheet's scales, is the sum of the observations' chi-squares, each cut at the rejection threshold, and of
+//! three more terms. These are the joints' own prior, the prior of their parameters, and
+//! `2 ln(prior std / posterior std)` for each reading that is given up. The last is Laplace's approximation of the
+//! evidence (MacKay 1992), with a rounded value.
 
 use crate::explain::angles_by_camera::{distance_cost, has_known_mount, seen_angles};
 use crate::explain::constants::failure_detection::{
@@ -29,19 +30,19 @@ use crate::views::view::View;
 use armcal_core::robot::{FailedKind, Robot};
 use armcal_core::stats::quantile;
 
-/// An arm and its views, in which failures are looked for.
+/// Arm and views in which failures are searched for.
 pub(crate) struct FailureSearch<'a> {
     pub robot: &'a Robot,
     pub views: &'a [View],
-    /// What the estimates rest on beside the datasheet.
+    /// Prior of the estimates, in addition to the datasheet.
     pub prior: Option<&'a Calibration>,
-    /// What of the drawing is estimated, too.
+    /// Departures from the nominal model that are estimated, too.
     pub drawing: &'a Drawing,
 }
 
 impl FailureSearch<'_> {
-    /// The failures that the views show beside the `declared` ones, which come first and with what was found of them;
-    /// `found` is the estimate under the declared ones alone.
+    /// Failures that the views show in addition to the `declared` ones, which come first and include new evidence.
+    /// `found` is the estimate under the declared ones only.
     pub(crate) fn failures(&self, declared: &[Failure], found: Option<&Estimate<'_>>) -> Vec<Failure> {
         let mut known = declared.to_vec();
         let shown = self.views.iter().filter(|view| !view.tags.is_empty()).count();
@@ -61,8 +62,8 @@ impl FailureSearch<'_> {
         self.failures_beside(known.clone(), self.setup(&known).estimate().as_ref().map(|(found, _)| found))
     }
 
-    /// `known` and what the estimate under them shows beside: slips, then sensors that say nothing, one at a time, then
-    /// two at once.
+    /// Adds to `known` the failures that the estimate under them shows: slips, then sensors without a reading, one at a
+    /// time, then two at once.
     fn failures_beside(&self, known: Vec<Failure>, found: Option<&Estimate<'_>>) -> Vec<Failure> {
         let is_sound = found.is_some_and(|found| !is_suspicious(found));
         let slips = found.map_or_else(|| known.clone(), |found| self.with_slips(known.clone(), found));
@@ -123,7 +124,7 @@ impl FailureSearch<'_> {
         known
     }
 
-    /// The two sensors whose failures explain the most together, each by the angles that the camera shows with both
+    /// Two sensors whose failures together explain the most, each by the angles that the camera shows with both
     /// ignored.
     fn two_at_once(&self, known: &[Failure]) -> Option<Vec<Failure>> {
         let most = self.score(known) - 2.0 * MARGIN;
@@ -136,8 +137,8 @@ impl FailureSearch<'_> {
         (score < most).then_some(with)
     }
 
-    /// The pairs of joints that, turned to where the camera shows them, place the tags nearest to their survey; all
-    /// where the mount is not known.
+    /// Pairs of joints that place the tags nearest to their survey when turned to the angles that the camera shows. All
+    /// pairs if the mount is not known.
     pub(crate) fn likely_pairs(&self, known: &[Failure]) -> Vec<[usize; 2]> {
         let n = self.robot.n_seen_joints();
         let free: Vec<usize> = (0..n).filter(|&joint| !is_failed(known, joint)).collect();
@@ -162,7 +163,7 @@ impl FailureSearch<'_> {
         with_costs.into_iter().take(MAX_PAIRS).map(|(_, pair)| pair).collect()
     }
 
-    /// Failures of both joints; `None` where none scores below `most`.
+    /// Failures of both joints; `None` if none scores below `most`.
     fn hypotheses(&self, known: &[Failure], pair: [usize; 2], most: f64) -> Option<[Failure; 2]> {
         let ignored = pair
             .map(|joint| Failure::without_sensor(joint, FailedKind::Dead, FailureSource::Detected, self.views.len()));
@@ -178,14 +179,14 @@ impl FailureSearch<'_> {
         FailureAdjusted::new(self.robot, self.views, failures, &JointParameters::default())
     }
 
-    /// Under the datasheet's scales.
+    /// Estimates under the datasheet's scales.
     fn estimate<'b>(&self, applied: &'b FailureAdjusted) -> Option<Estimate<'b>> {
         let mut input = applied.input(HyperparameterMode::Given);
         self.drawing.apply(&mut input);
         estimate(&input)
     }
 
-    /// Whether the reading stands still over all views, or since one of them.
+    /// Returns true if the reading stands still over all views, or since one of them.
     fn is_still(&self, joint: usize) -> bool {
         let mut shown: Vec<&View> = self.views.iter().filter(|view| !view.tags.is_empty()).collect();
         shown.sort_by_key(|view| view.end);
@@ -193,18 +194,18 @@ impl FailureSearch<'_> {
         n_still(&travel_rad, &self.robot.sensors[joint]) >= MIN_STILL_VIEWS.min(travel_rad.len())
     }
 
-    /// Returns true where failures of the `n` joints that `found` has free may score below `most`: free joints fit the
-    /// views best, and a failure saves no more than that it gives up fewer readings.
+    /// Returns true if failures of the `n` joints that `found` has free may score below `most`. Free joints fit the
+    /// views best, and a failure only saves the cost of readings that it does not give up.
     fn may_score(&self, found: &Estimate<'_>, n: usize, most: f64) -> bool {
         score(found) - PER_READING * (n * self.views.len()) as f64 <= most
     }
 
-    /// What is wrong with a joint's sensor under the `known` failures and this sensor ignored.
+    /// Failure of a joint's sensor under the `known` failures, with this sensor ignored.
     fn hypothesis(&self, known: &[Failure], joint: usize, source: FailureSource) -> Option<Failure> {
         self.hypothesis_below(known, joint, source, f64::INFINITY)
     }
 
-    /// The same; `None` where no failure of that joint scores below `most`.
+    /// Failure as by `hypothesis`; `None` if no failure of that joint scores below `most`.
     fn hypothesis_below(&self, known: &[Failure], joint: usize, source: FailureSource, most: f64) -> Option<Failure> {
         let mut freed: Vec<Failure> = known.iter().filter(|failure| failure.joint != joint).cloned().collect();
         freed.push(Failure::without_sensor(joint, FailedKind::Dead, FailureSource::Detected, self.views.len()));
@@ -213,7 +214,7 @@ impl FailureSearch<'_> {
         self.failure_of(joint, &found, source)
     }
 
-    /// The same, by an estimate in which the joint is free.
+    /// Failure of a joint's sensor by an estimate in which the joint is free.
     fn failure_of(&self, joint: usize, found: &Estimate<'_>, source: FailureSource) -> Option<Failure> {
         let readings = Readings::new(self.robot, self.views, joint, found);
         if readings.len() < MIN_VIEWS {
@@ -253,7 +254,7 @@ impl FailureSearch<'_> {
         }
     }
 
-    /// Declared jumps: when they were, where the views show it.
+    /// Finds the views of declared jumps, if the views show them.
     fn look_into_jumps(&self, known: &mut [Failure], joints: &[usize]) {
         for &joint in joints {
             let found = self.hypothesis(known, joint, FailureSource::Declared);
@@ -265,7 +266,8 @@ impl FailureSearch<'_> {
         }
     }
 
-    /// Joints whose readings stand still: all sensors ignored first, then each by what the camera shows.
+    /// Classifies joints whose readings stand still: ignores all these sensors first, then judges each by what the
+    /// camera shows.
     fn classify_still(&self, known: &mut Vec<Failure>, joints: &[usize]) {
         let ignored = |&joint: &usize| {
             Failure::without_sensor(joint, FailedKind::Dead, FailureSource::Detected, self.views.len())
@@ -289,12 +291,12 @@ fn is_failed(known: &[Failure], joint: usize) -> bool {
     known.iter().any(|failure| failure.joint == joint)
 }
 
-/// Whether `better` is likelier than `without` by more than other links, mounts or tags would be.
+/// Returns true if `better` is likelier than `without` by more than other links, mounts or tags would be.
 fn explains_most(without: &Estimate<'_>, better: &Estimate<'_>) -> bool {
     2.0 * (log_evidence_of_all(better) - log_evidence_of_all(without)) > MARGIN.max(without.largest_other_chi2())
 }
 
-/// What the data cost under an estimate, see the module.
+/// Score of the data under an estimate, see the module.
 pub(crate) fn score(found: &Estimate<'_>) -> f64 {
     let problem = &found.problem;
     let observations = problem.observations.iter().zip(&found.solved.normal.chi2);
@@ -316,20 +318,21 @@ pub(crate) fn score(found: &Estimate<'_>) -> f64 {
     sum
 }
 
-/// A gain or offset that no sensor of the datasheet has: a locked joint looks like one of gain zero.
+/// Returns true if a gain or offset is beyond any sensor of the datasheet: a locked joint looks like one of gain zero.
 fn is_beyond_datasheet(robot: &Robot, found: &Estimate<'_>) -> bool {
     let sound = JointParameters::default();
     found.joint_parameters().iter().enumerate().any(|(column, p)| {
         let is_known = matches!(p.kind, ParameterKind::Gain | ParameterKind::Offset) && p.prior_std(robot) > 0.0;
         let limit = FAR_SIGMAS * p.prior_std(robot);
-        // What the gain does not take up may have gone to the nonlinearity.
+        // The nonlinearity may have taken up what the gain did not.
         let slope_off = if p.kind == ParameterKind::Gain { (found.slope(*p, column) - 1.0).abs() } else { 0.0 };
         is_known && ((found.before_slips(*p) - sound.get(*p)).abs() > limit || slope_off > limit)
     })
 }
 
 impl Estimate<'_> {
-    /// Slope of the joint's estimated angles by its readings, its sensor's slips taken off; one where they do not move.
+    /// Slope of the joint's estimated angles by its readings, without its sensor's slips; one if the readings do not
+    /// move.
     fn slope(&self, gain: Parameter, column: usize) -> f64 {
         let problem = &self.problem;
         let views = (0..problem.views.len()).filter(|&view_idx| self.uses(view_idx));
@@ -348,15 +351,16 @@ impl Estimate<'_> {
     }
 }
 
-/// Error from view to view above which a joint's sensor is none of its datasheet's, rad; `stated`: the datasheet's.
+/// Error between views above which a joint's sensor does not match its datasheet, rad; `stated`: the datasheet's
+/// scales.
 pub(crate) fn most_unsteady_rad(robot: &Robot, joint: usize, stated: &Hyperparameters) -> f64 {
     let spec = &robot.sensors[joint];
-    // Its noise is no error of its own: where linearity is stated as none, that is what differs.
+    // Reading noise is not a sensor error. It is the least limit, for a datasheet that states zero linearity.
     let noise_rad = (spec.noise_std_counts / spec.counts_per_rad).abs();
     MAX_OVER_LINEARITY * spec.linearity_std_rad.max(noise_rad).max(stated.joint_std_rad[joint])
 }
 
-/// Returns true where the sensor of a joint would be refused for its errors from view to view.
+/// Returns true if the sensor of a joint would be refused for its errors between views.
 pub(crate) fn has_unsteady_sensor(found: &Estimate<'_>) -> bool {
     let robot = found.problem.robot;
     let stated = Hyperparameters::datasheet(robot);
@@ -364,7 +368,7 @@ pub(crate) fn has_unsteady_sensor(found: &Estimate<'_>) -> bool {
     (0..found.problem.n_seen_joints).any(is_unsteady)
 }
 
-/// Whether an estimate looks as if some sensor did not belong.
+/// Returns true if an estimate looks as if some sensor failed.
 pub(crate) fn is_suspicious(found: &Estimate<'_>) -> bool {
     let (problem, robot) = (&found.problem, found.problem.robot);
     let used = |observations: &std::ops::Range<usize>| {

@@ -1,4 +1,4 @@
-//! A joint's readings against the angles that the camera shows.
+//! Comparison of a joint's readings with the angles that the camera shows.
 
 pub(crate) use crate::explain::constants::failure_pattern::MIN_STILL_VIEWS;
 use crate::explain::constants::failure_pattern::{
@@ -19,38 +19,38 @@ use armcal_core::robot::{FailedKind, JointSensorSpec, Robot};
 use armcal_core::sensor::wrap_symmetric;
 use armcal_core::stats::quantile;
 
-/// One joint over the views that show tags, in the order of time.
+/// Readings and angles of one joint over the views that show tags, in the order of time.
 pub(crate) struct Readings {
     joint: usize,
     view_idx: Vec<usize>,
     travel_rad: Vec<f64>,
-    /// By the camera, with one sigma.
+    /// Angle by the camera, with its standard deviation in `std_rad`.
     angle_rad: Vec<f64>,
     std_rad: Vec<f64>,
 }
 
-/// How the readings go with the angles.
+/// Relation of a joint's readings to its angles.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum FailurePattern {
-    /// The angle is always the same: the joint is locked where its reading moves, and was not moved otherwise.
+    /// The angle is always the same: the joint is locked if its reading moves, else it was not moved.
     Still(FailedKind, SensorUse),
-    /// The reading is the same in so many views up to the last, the angle is not.
+    /// The reading is the same in this number of views up to the last; the angle is not.
     Stuck(usize),
-    /// They have nothing to do with each other.
+    /// Readings and angles are unrelated.
     Dead,
-    /// They go the other way, along a line.
+    /// The readings go the other way, along a line.
     Reversed(SensorLine),
-    /// They go along a line of a slope that no sensor of the datasheet has.
+    /// The readings follow a line of a slope that no sensor of the datasheet has.
     Scaled(SensorLine),
-    /// The readings of these views are off.
+    /// The readings of these views are wrong.
     Single(Vec<usize>),
-    /// The readings are off in so many views since one of them, nearly all, and up to the end.
+    /// Nearly all readings from one view up to the end are wrong, `n_off` in number.
     Lost { since: usize, n_off: usize },
-    /// The readings are off against each other before and since a view, by so much, rad.
+    /// The readings from one view on differ by a constant step from those before it, rad.
     Lasting { since: usize, step_rad: f64 },
 }
 
-/// How many of the last readings are the same but for noise.
+/// Number of the last readings that are the same except for noise.
 pub(crate) fn n_still(travel_rad: &[f64], spec: &JointSensorSpec) -> usize {
     let span_rad = STILL_SIGMAS * spec.noise_std_counts / spec.counts_per_rad.abs();
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -62,7 +62,7 @@ pub(crate) fn n_still(travel_rad: &[f64], spec: &JointSensorSpec) -> usize {
 }
 
 impl Readings {
-    /// Of an estimate in which the joint is free in all views.
+    /// Readings and angles by an estimate in which the joint is free in all views.
     pub(crate) fn new(robot: &Robot, views: &[View], joint: usize, found: &Estimate<'_>) -> Self {
         let mut seen: Vec<usize> = (0..views.len()).filter(|&k| found.uses(k)).collect();
         seen.sort_by_key(|&k| (views[k].end, k));
@@ -81,7 +81,7 @@ impl Readings {
         self.view_idx.len()
     }
 
-    /// `None` where the readings follow the angles as they should.
+    /// Pattern of the readings; `None` if they follow the angles as they should.
     pub(crate) fn pattern(&self, robot: &Robot) -> Option<FailurePattern> {
         let spec = &robot.sensors[self.joint];
         let noise_rad = FAR_SIGMAS * spec.noise_std_counts / spec.counts_per_rad.abs();
@@ -102,7 +102,7 @@ impl Readings {
             let counts = (spec.offset_counts
                 + spec.counts_per_rad * (spec.center_rad + quantile(&self.travel_rad, 0.5)?))
             .rem_euclid(spec.wrap_counts);
-            // A broken wire reads nothing but noise about zero.
+            // A broken wire reads only noise about zero.
             let near_zero = counts.min(spec.wrap_counts - counts) < FAR_SIGMAS * spec.noise_std_counts.max(1.0);
             return Some(if near_zero { FailurePattern::Dead } else { FailurePattern::Stuck(self.len()) });
         }
@@ -123,14 +123,14 @@ impl Readings {
         self.single(&self.are_far(&off_rad, &all), spec.center_rad)
     }
 
-    /// Which distances stand out from those of the `usual` views.
+    /// Returns true for each distance that is large against those of the `usual` views.
     fn are_far(&self, off_rad: &[f64], usual: &[usize]) -> Vec<bool> {
         let sizes: Vec<f64> = usual.iter().map(|&k| off_rad[k].abs()).collect();
         let sigma_rad = (SIGMA_OF_MEDIAN * quantile(&sizes, 0.5).unwrap_or(0.0)).max(rms(&self.std_rad));
         off_rad.iter().map(|off| off.abs() > FAR_RAD.max(FAR_SIGMAS * sigma_rad)).collect()
     }
 
-    /// Which readings are far from the line of those that are not: many wrong ones pull at the line of all.
+    /// Returns true for each reading far from the line of those that are not: many wrong ones pull at the line of all.
     fn far_from_others(&self, is_far: &[bool], center_rad: f64) -> Vec<bool> {
         let mut is_far = is_far.to_vec();
         for _ in 0..REFITS {
@@ -140,7 +140,7 @@ impl Readings {
         is_far
     }
 
-    /// Single views whose readings are far off, or nearly all since one of them.
+    /// Pattern of single views whose readings are far off, or of nearly all since one of them.
     fn single(&self, is_far: &[bool], center_rad: f64) -> Option<FailurePattern> {
         let is_off = self.far_from_others(is_far, center_rad);
         if let Some(from) = lost_from(&is_off) {
@@ -154,14 +154,14 @@ impl Readings {
         (is_exception && !single.is_empty()).then_some(FailurePattern::Single(single))
     }
 
-    /// Returns true where the readings of these views are the same but for noise.
+    /// Returns true if the readings of these views are the same except for noise.
     fn is_still_in(&self, views: &[usize], spec: &JointSensorSpec) -> bool {
         let at = self.view_idx.iter().zip(&self.travel_rad).filter(|(k, _)| views.contains(k));
         let travel_rad: Vec<f64> = at.map(|(_, travel_rad)| *travel_rad).collect();
         travel_rad.len() >= MIN_STILL_VIEWS && n_still(&travel_rad, spec) == travel_rad.len()
     }
 
-    /// Returns true where the sensor of a joint that stands still reads an angle that its datasheet allows.
+    /// Returns true if the sensor of a joint that stands still reads an angle that its datasheet allows.
     fn is_as_stated(&self, robot: &Robot) -> bool {
         let spec = &robot.sensors[self.joint];
         let travel_rad = quantile(&self.travel_rad, 0.5).unwrap_or(0.0);
@@ -170,7 +170,7 @@ impl Readings {
         off_rad.abs() < allowed_rad
     }
 
-    /// The slip that explains the most, if it explains nearly all (least squares of 1, reading and a step).
+    /// Slip that explains the most, if it explains nearly all (least squares of 1, reading and a step).
     fn step(&self) -> Option<FailurePattern> {
         let n = self.len();
         let squares_of = |off_rad: &[f64]| off_rad.iter().map(|off| off * off).sum::<f64>();
@@ -201,7 +201,7 @@ impl Readings {
             right += row(k) * self.angle_rad[k];
         }
         let x = matrix.cholesky()?.solve(&right);
-        // Which way the reading went off: against the angle.
+        // The step of the reading is opposite to that of the angle.
         Some(((0..self.len()).map(|k| self.angle_rad[k] - row(k).dot(&x)).collect(), -x[2]))
     }
 
@@ -228,7 +228,7 @@ impl Readings {
         (off(offset, slope), SensorLine { slope, offset_rad: offset - center_rad })
     }
 
-    /// What shows the pattern.
+    /// Evidence of the pattern, in words.
     pub(crate) fn in_words(&self, spec: &JointSensorSpec, pattern: &FailurePattern, views: &[View]) -> String {
         let unit = spec.unit();
         let range = |values: &[f64], digits: usize| {
@@ -284,7 +284,7 @@ impl Readings {
     }
 }
 
-/// From which view on nearly all are off, several and up to the end, if any is so; the views are in the order of time.
+/// First view from which nearly all are off, several and up to the end; the views are in the order of time.
 fn lost_from(is_off: &[bool]) -> Option<usize> {
     let n_back = is_off.iter().rev().take_while(|off| !**off).count();
     let is_lost_from = |from: &usize| {
@@ -298,7 +298,8 @@ fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }
 
-/// The camera shows an angle but for whole turns, and a reading that stands still does not tell which: the first one's.
+/// Puts the angles on the turn of the first one: the camera leaves whole turns open, and so does a reading that stands
+/// still.
 fn on_one_turn(angles_rad: &mut [f64]) {
     let Some(first_rad) = angles_rad.first().copied() else { return };
     for angle_rad in angles_rad {
@@ -330,7 +331,8 @@ mod tests {
         Readings { joint: JOINT, view_idx: (0..40).collect(), travel_rad, angle_rad, std_rad: vec![1e-4; 40] }
     }
 
-    /// Another line, or another joint's angle, since a view. The first ones may read right by chance.
+    /// The sensor reads another line, or another joint's angle, since a view. The first readings may be right by
+    /// chance.
     #[test]
     fn a_sensor_that_reads_something_else_up_to_the_end_is_lost() {
         const FROM: usize = 32;
@@ -350,7 +352,7 @@ mod tests {
         }
     }
 
-    /// A block that ends, and scattered views.
+    /// The readings are wrong in a block that ends, and in scattered views.
     #[test]
     fn a_sensor_that_reads_right_again_jumped_in_single_views() {
         let robot = titan();

@@ -1,8 +1,8 @@
-//! Joints whose sensor says nothing, in all views or in some: how they look to the estimator.
+//! Joints without a sensor reading, in all views or in some, as the estimator handles them.
 //!
-//! A reading that says nothing is replaced by the angle that the tags show (found by search, so that the solver starts
-//! near), and the joint's error in that view gets a standard deviation that leaves it open ([`View::is_free`]). A
-//! locked joint is a sensor that always reads the same and whose offset nobody knows: one column for all views.
+//! An invalid reading is replaced by the angle that the tags show, found by search so that the solver starts near. The
+//! joint's error in that view gets a standard deviation that leaves it open ([`View::is_free`]). A locked joint is a
+//! sensor that always reads the same, with an unknown offset: one column for all views.
 
 use crate::explain::angles_by_camera::set_by_camera;
 pub(crate) use crate::explain::constants::failures::{FAR_RAD, FAR_SIGMAS, MIN_VIEWS};
@@ -19,60 +19,60 @@ use armcal_core::robot::{FailedJoint, FailedKind, Robot};
 use armcal_core::stats::quantile;
 use armcal_core::units::Unit;
 
-/// Who says that a joint failed.
+/// Source of the report that a joint failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FailureSource {
-    /// An operator, by a mark of the recording or in the routine.
+    /// An operator, by a mark in the recording or in the routine.
     Declared,
-    /// The estimator, by what the tags show.
+    /// The estimator, from the tags.
     Detected,
 }
 
-/// What the sensor of a locked joint is worth.
+/// Use of a failed joint's sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SensorUse {
-    /// It reads where the joint stands, or it is used in the views that are not named.
+    /// The readings are used, except in the failure's `views`.
     Used,
-    /// It is not looked at.
+    /// No reading is used.
     Ignored,
 }
 
-/// How a joint's angle goes with its reading where that is not as its datasheet has it.
+/// Straight line from a joint's reading to its angle, if the line differs from the datasheet's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SensorLine {
-    /// Of the angle by the datasheet's travel; below zero the sensor is reversed.
+    /// Slope of the angle over the datasheet's travel; below zero the sensor is reversed.
     pub slope: f64,
-    /// Angle at no travel, from the middle of the range.
+    /// Angle at no travel, from mid-range, rad.
     pub offset_rad: f64,
 }
 
-/// One failed joint, and what is not used of it.
+/// One failed joint, and the data of it that are not used.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Failure {
     /// Index of the joint, base first.
     pub joint: usize,
-    /// What is wrong with it.
+    /// Kind of failure.
     pub kind: FailedKind,
-    /// Who says so.
+    /// Source of the report.
     pub found: FailureSource,
-    /// Whether any of the sensor's readings are used.
+    /// Use of the sensor's readings.
     pub reading: SensorUse,
-    /// Views whose reading says nothing, ascending.
+    /// Views whose reading is not used, ascending.
     pub views: Vec<usize>,
-    /// Of a slip that lasts: the first view after it in the order of time; before it the sensor had another offset.
+    /// First view after a lasting slip, in the order of time; before it the sensor had another offset.
     pub since: Option<usize>,
-    /// By how much more it reads since, rad.
+    /// Increase of the reading since the slip, rad.
     pub step_rad: Option<f64>,
-    /// First view in which a sensor reads something else up to the end.
+    /// First view from which the sensor reads something else up to the end.
     pub lost_since: Option<usize>,
-    /// Of a reversed sensor, whose reading is not used, and of one of another scale, whose gain is estimated.
+    /// Line of a reversed sensor, whose reading is not used, or of one of another scale, whose gain is estimated.
     pub line: Option<SensorLine>,
-    /// What shows it, in words.
+    /// Evidence of the failure, in words.
     pub evidence: String,
 }
 
 impl Failure {
-    /// Nothing that the sensor says in any of `n_views` is used.
+    /// Failure of a sensor that is ignored in all of `n_views`.
     pub fn without_sensor(joint: usize, kind: FailedKind, found: FailureSource, n_views: usize) -> Self {
         let views = (0..n_views).collect();
         Self {
@@ -89,7 +89,7 @@ impl Failure {
         }
     }
 
-    /// What somebody declared; when a sensor jumped is still to be found.
+    /// Failure as declared; the view of a jump is still to be found.
     pub fn declared(declared: FailedJoint, n_views: usize) -> Self {
         let FailedJoint { joint, kind } = declared;
         let all = Self::without_sensor(joint, kind, FailureSource::Declared, n_views);
@@ -99,7 +99,7 @@ impl Failure {
         }
     }
 
-    /// A sensor that slipped by `step_rad`, shown in `unit`, before the view `since`.
+    /// Slip of a sensor by `step_rad`, shown in `unit`, before the view `since`.
     pub fn slip((joint, unit): (usize, Unit), step_rad: f64, views: &[View], since: usize) -> Self {
         Self {
             reading: SensorUse::Used,
@@ -110,47 +110,47 @@ impl Failure {
         }
     }
 
-    /// Whether the sensor slipped once for good.
+    /// Returns true if the sensor slipped once for good.
     pub fn is_step(&self) -> bool {
         self.since.is_some()
     }
 
-    /// How many of `views` show the sensor as it is since it slipped.
+    /// Number of `views` with tags from the slip on.
     pub fn n_views_since(&self, views: &[View]) -> Option<usize> {
         let since = views[self.since?].end;
         Some(views.iter().filter(|view| view.end >= since && !view.tags.is_empty()).count())
     }
 
-    /// Returns true where nothing determines the joint's angle any more, now that the views are over.
+    /// Returns true if nothing determines the joint's angle any more, after the last view.
     pub fn has_no_sensor_now(&self) -> bool {
         self.leaves_no_sensor() || self.lost_since.is_some()
     }
 
-    /// Whether the joint's parameters have no data at all.
+    /// Returns true if the joint's parameters have no data at all.
     pub fn leaves_no_sensor(&self) -> bool {
         self.reading == SensorUse::Ignored
     }
 }
 
-/// `the sensor slipped by 1.00 deg after 9 of 20 views, before view 10`.
+/// Text of a slip: `the sensor slipped by 1.00 deg after 9 of 20 views, before view 10`.
 pub(crate) fn slip_in_words(step: String, views: &[View], since: usize) -> String {
     let n_before = views.iter().filter(|view| view.end < views[since].end).count();
     let (n, number) = (views.len(), views[since].pose_idx + 1);
     say::slip(&step, [n_before, n], number)
 }
 
-/// An arm and its views with the failed joints taken care of.
+/// Arm and views, adjusted for the failed joints.
 pub struct FailureAdjusted {
-    /// A locked joint has a sensor of unknown offset.
+    /// Robot in which a locked joint has a sensor of unknown offset.
     pub robot: Robot,
-    /// Unused readings replaced by what the camera shows.
+    /// Views with unused readings replaced by the angles from the camera.
     pub views: Vec<View>,
     /// The failed joints.
     pub failures: Vec<Failure>,
 }
 
 impl FailureAdjusted {
-    /// `at`: what is believed of the other joints' sensors.
+    /// Adjusts arm and views for `failures`. `at`: the estimate of the other joints' sensors.
     pub fn new(robot: &Robot, views: &[View], failures: &[Failure], at: &JointParameters) -> Self {
         let mut applied = Self { robot: robot.clone(), views: views.to_vec(), failures: failures.to_vec() };
         for failure in failures {
@@ -175,7 +175,7 @@ impl FailureAdjusted {
         applied
     }
 
-    /// One angle in all views, which starts at the middle one of those that the camera showed.
+    /// Sets one angle in all views, which starts at the median of those that the camera showed.
     fn lock(&mut self, joint: usize) {
         let seen: Vec<f64> =
             self.views.iter().filter(|view| !view.tags.is_empty()).map(|view| view.travel_rad[joint]).collect();
@@ -185,18 +185,18 @@ impl FailureAdjusted {
             view.is_free[joint] = false;
         }
         let spec = &mut self.robot.sensors[joint];
-        // It gives and swings as it did; only its sensor is gone.
+        // The joint's other errors stay; only its sensor is gone.
         (spec.offset_std_rad, spec.gain_std, spec.noise_std_counts) = (spec.half_range_rad, 0.0, 0.0);
     }
 
-    /// What these views tell, without columns for sensors that say nothing.
+    /// Model of the terms that these views determine, without columns for failed sensors.
     pub fn model(&self) -> Model {
         let mut model = model_for(&self.robot, &self.views);
         self.restrict(&mut model);
         model
     }
 
-    /// Takes the columns of sensors that say nothing from `model`.
+    /// Removes the columns of failed sensors from `model`.
     pub fn restrict(&self, model: &mut Model) {
         for failure in self.failures.iter().filter(|failure| failure.leaves_no_sensor()) {
             let is_locked = failure.kind.stands_still();
@@ -204,14 +204,14 @@ impl FailureAdjusted {
         }
         for (failure, since) in self.failures.iter().filter_map(|failure| Some((failure, failure.since?))) {
             let kinds = &mut model.joints[failure.joint];
-            // Without a column of its own the sensor is exact.
+            // A sensor without a column of its own is exact, so it needs no step.
             if !kinds.is_empty() {
                 kinds.push(ParameterKind::StepBefore(self.views[since].end));
             }
         }
     }
 
-    /// From the datasheet.
+    /// Input of an estimate from the datasheet.
     pub fn input(&self, evidence: HyperparameterMode) -> BundleInput<'_> {
         BundleInput {
             robot: &self.robot,
@@ -224,7 +224,7 @@ impl FailureAdjusted {
         }
     }
 
-    /// The estimate from the datasheet; `None` where the views determine nothing.
+    /// Initial guess from the datasheet, with the lines of failed sensors.
     fn guess(&self) -> JointParameters {
         let mut guess = JointParameters { reference: reference(&self.views), ..JointParameters::default() };
         for (joint, line) in self.failures.iter().filter_map(|failure| Some((failure.joint, failure.line?))) {
@@ -235,7 +235,7 @@ impl FailureAdjusted {
         guess
     }
 
-    /// The estimate from the datasheet.
+    /// Estimates from the datasheet; `None` if the views determine nothing.
     pub fn estimate(&self, evidence: HyperparameterMode) -> Option<Estimate<'_>> {
         estimate(&self.input(evidence))
     }

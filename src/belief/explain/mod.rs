@@ -1,8 +1,8 @@
-//! What else could be so: other explanations of the same views, compared by their evidence.
+//! Other explanations of the same views, compared by their evidence.
 //!
-//! `setup` estimates under one of them. Sensors: `failure_detection`, `slips`, `walk`; readings: `reading_search`,
-//! `unpaired`; tags: `tags`; links, lens, sag: `drawing`, chosen by `score_test`; terms of a sensor: `model_selection`;
-//! files that the images contradict: `wrong_input`; an earlier calibration: `calibration_prior`; a knocked camera:
+//! `setup` estimates under one explanation. Sensors: `failure_detection`, `slips`, `walk`; readings: `reading_search`,
+//! `unpaired`; tags: `tags`. Links, lens, sag: `drawing`, chosen by `score_test`; terms of a sensor: `model_selection`.
+//! Files that the images contradict: `wrong_input`; an earlier calibration: `calibration_prior`; a knocked camera:
 //! `moved_between`.
 
 pub(crate) mod angles_by_camera;

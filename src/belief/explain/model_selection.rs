@@ -1,10 +1,10 @@
-//! Which of the doubtful terms the data ask for, by Laplace's approximation of the evidence.
+//! Selection of the optional terms that the data need, by Laplace's approximation of the evidence.
 //!
 //! `ln Z = -cost/2 + (ln|P| - ln|N|)/2 + sum over views (ln|L| - ln|S^T G S + L|)/2 - n ln(noise)` at the fitted
-//! scales: N the reduced normal matrix, P the common parameters' prior, L the views' own (MacKay 1992, eq. 4.4). A term
-//! comes in when it brings three nats or more (Kass and Raftery 1995: strong evidence). What a sensor of its kind is
-//! known to have (nonlinearity, temperature, play) is in from the start: its prior size is fitted, so that it costs
-//! nothing where there is none.
+//! scales. N is the reduced normal matrix, P the common parameters' prior, L the views' own (MacKay 1992, eq. 4.4). A
+//! term is added if it brings three nats or more (Kass and Raftery 1995: strong evidence). Known terms of such a sensor
+//! (nonlinearity, temperature, backlash) are in from the start. Their prior scale is fitted, so that an absent one
+//! costs nothing.
 
 pub(crate) use crate::explain::constants::model_selection::CAMERA_ERROR_STD;
 use crate::explain::constants::model_selection::{MIN_GAIN_NATS, MIN_RATE_RAD_S, MIN_SESSION_H};
@@ -24,31 +24,31 @@ use crate::solve::linearize::NormalEquations;
 use crate::solve::outliers::{Rejected, rejected};
 use crate::solve::problem::BundleProblem;
 
-/// A term that not every recording has.
+/// Term that not every recording has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OptionalTerm {
     /// An error of the camera's pose that all tags of a view share.
     CameraError,
-    /// Between the clocks of joint sensors and camera; only where joints move.
+    /// An offset between the clocks of joint sensors and camera; only if joints move.
     TimeOffset,
-    /// Of every joint's offset; only in long sessions without a prior.
+    /// A drift of every joint's offset; only in long sessions without a prior.
     Drift,
-    /// A random walk of every joint's offset; only without a prior, and after failures and drawing.
+    /// A random walk of every joint's offset; only without a prior, and after failures and geometry.
     Walk,
 }
 
-/// Whether a doubtful term came in, and what it brought.
+/// Result of the trial of an optional term.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Selection {
     /// The term that was tried.
     pub term: OptionalTerm,
-    /// Whether it stayed.
+    /// True if the term stayed.
     pub is_in: bool,
-    /// Natural logarithm of the evidence with it over that without.
+    /// Natural logarithm of the evidence with the term over that without it.
     pub gain_nats: f64,
 }
 
-/// Estimates, and again with each doubtful term that the data may ask for; the best model stays.
+/// Estimates without and with each optional term that the data may need; returns the best estimate and the trials.
 #[must_use]
 pub fn select_model<'a>(input: &BundleInput<'a>) -> Option<(Estimate<'a>, Vec<Selection>)> {
     let mut best = estimate(input)?;
@@ -89,7 +89,7 @@ fn candidates(input: &BundleInput<'_>) -> Vec<OptionalTerm> {
     out
 }
 
-/// With the offset between the clocks goes what an image's stamp is off beside it.
+/// Adds the offset between the clocks to `input`, together with the jitter of an image's stamp.
 pub(crate) fn estimate_clock(input: &mut BundleInput<'_>) {
     input.model.blocks.insert(Block::Clock);
     input.scales.time_jitter_std_s = TIME_JITTER_STD_S;
@@ -107,14 +107,14 @@ fn with<'a>(input: &BundleInput<'a>, term: OptionalTerm) -> BundleInput<'a> {
                 }
             }
         }
-        // It is tried when all else is known (`walk`).
+        // The walk is tried when all other terms are known (`walk`).
         OptionalTerm::Walk => {}
     }
     wider
 }
 
-/// Natural logarithm of the evidence of `wider` over that of `other`, two models of the same views, on the observations
-/// that both use: one that rejects more has less to explain.
+/// Natural logarithm of the evidence of `wider` over that of `other`, two models of the same views. It counts the
+/// observations that both use, because a model that rejects more has less to explain.
 pub(crate) fn evidence_gain_nats(wider: &Estimate<'_>, other: &Estimate<'_>) -> f64 {
     let observations = wider.problem.observations.iter().zip(&other.problem.observations);
     let both = |a: [bool; 4], b: [bool; 4]| [0, 1, 2, 3].map(|corner| a[corner] && b[corner]);
@@ -122,7 +122,7 @@ pub(crate) fn evidence_gain_nats(wider: &Estimate<'_>, other: &Estimate<'_>) -> 
     log_evidence_on(wider, &shared) - log_evidence_on(other, &shared)
 }
 
-/// With the scales of `found` and the corners that are `used`.
+/// Logarithm of the evidence with the scales of `found` and only the corners that are `used`.
 fn log_evidence_on(found: &Estimate<'_>, used: &[[bool; 4]]) -> f64 {
     if found.problem.observations.iter().zip(used).all(|(observation, used)| observation.used() == *used) {
         return log_evidence(&found.problem, &found.solved.normal);
@@ -133,7 +133,7 @@ fn log_evidence_on(found: &Estimate<'_>, used: &[[bool; 4]]) -> f64 {
     log_evidence(&problem, &solved.normal)
 }
 
-/// Up to what all models of the same data share.
+/// Logarithm of the evidence, up to terms that all models of the same data share.
 pub(crate) fn log_evidence(problem: &BundleProblem<'_>, normal: &NormalEquations) -> f64 {
     let log_det = |matrix: &nalgebra::DMatrix<f64>| {
         Cholesky::new(matrix.clone()).map(|f| 2.0 * f.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>())
@@ -163,7 +163,8 @@ fn log_sum(std: &[f64]) -> f64 {
     std.iter().map(|std| at_least(*std).ln()).sum()
 }
 
-/// With what is rejected at the cost that it is rejected at, so that estimates that reject others compare.
+/// Logarithm of the evidence with each rejected observation at its rejection cost, to compare estimates that reject
+/// different ones.
 pub(crate) fn log_evidence_of_all(found: &Estimate<'_>) -> f64 {
     let log_noise = found.problem.scales.noise.ln();
     let cost = |rejected: Rejected| 0.5 * rejected.chi2 + rejected.n_coordinates as f64 * log_noise;

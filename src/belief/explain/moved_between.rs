@@ -1,9 +1,9 @@
-//! Did camera, base or tags move between two views?
+//! Search for a motion of camera, base or tags between two views.
 //!
-//! The views after a gap get a camera of their own, or tags of their own, near the stated ones within [`MOVED_STD`].
-//! The gap of the least [`score`](crate::explain::failure_detection::score) is looked for from coarse to fine. There
-//! the evidence for the views in two parts is held against that for the views in one, with all slips, walks, failures
-//! and repairs that were found. Tags of their own are estimated once more as one body, and pay for its six numbers.
+//! The views after a gap get a camera or tags of their own, near the stated ones within [`MOVED_STD`]. A coarse to fine
+//! search finds the gap of the least [`score`](crate::explain::failure_detection::score). There the evidence for the
+//! views in two parts is compared with that for the views in one. Both include all slips, walks, failures and repairs
+//! that were found. Tags of their own are estimated once more as one body, and pay for its six numbers.
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
@@ -26,7 +26,7 @@ use crate::views::view::View;
 use armcal_core::robot::{CameraSpec, Robot, SurveyedTag};
 use armcal_core::spatial::Pose;
 
-/// Views that no calibration explains, and what was made of them.
+/// Views that no calibration explains, and the findings on them.
 pub(crate) struct MotionSearch<'a> {
     pub robot: &'a Robot,
     pub views: &'a [View],
@@ -35,7 +35,7 @@ pub(crate) struct MotionSearch<'a> {
     pub clocks: Clocks,
 }
 
-/// What has one place before a gap and another one after it.
+/// Element with one pose before a gap and another one after it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Mover {
     /// The camera of that number on its mount.
@@ -44,17 +44,18 @@ enum Mover {
     Tags,
 }
 
-/// A motion that explains the views.
+/// Motion that explains the views.
 struct Motion {
     mover: Mover,
-    /// The last view before it and the first one after it.
+    /// Last view before the motion and first view after it.
     views: [usize; 2],
     nats: f64,
     moved: Isometry3<f64>,
 }
 
 impl MotionSearch<'_> {
-    /// The motion, if the views in two parts are much likelier than in one; `refusals`: what they are refused for.
+    /// Refusal that names the motion, if the views in two parts are much likelier than in one. `refusals`: those of the
+    /// views so far.
     pub(crate) fn find(&self, refusals: &[Refusal]) -> Option<Refusal> {
         if !refusals.iter().any(may_follow_from_motion) {
             return None;
@@ -69,8 +70,8 @@ impl MotionSearch<'_> {
         motions.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, motion)| self.named(&motion))
     }
 
-    /// The views without what says nothing of `mover`: the tag on the gripper belongs to the first camera alone, and a
-    /// tag that was freed of its survey goes anywhere by itself.
+    /// Views without the data that do not constrain `mover`. The gripper tag belongs to the first camera only, and a
+    /// freed tag may go anywhere on its own.
     fn views_of(&self, mover: Mover) -> Vec<View> {
         let mut views = self.views.to_vec();
         for view in &mut views {
@@ -88,7 +89,7 @@ impl MotionSearch<'_> {
         cameras.chain([Mover::Tags]).collect()
     }
 
-    /// Indices of the views that tell of `mover`, in the order of time.
+    /// Indices of the views that constrain `mover`, in the order of time.
     fn order(mover: Mover, views: &[View]) -> Vec<usize> {
         let tells = |k: &usize| {
             let is_seen = mover == Mover::Tags || mover == Mover::Camera(views[*k].camera);
@@ -99,7 +100,7 @@ impl MotionSearch<'_> {
         order
     }
 
-    /// Evidence for the views if nothing moved, with all that was found of sensors and drawing.
+    /// Evidence for the views if nothing moved, with all findings on sensors and geometry, nats.
     fn nats_in_one(&self, views: &[View]) -> Option<f64> {
         let setup = BundleSetup::new(self.robot, views, self.failures, None);
         let setup = setup.with_drawing(self.drawing).with_clocks(self.clocks);
@@ -119,7 +120,7 @@ impl MotionSearch<'_> {
         Some(Motion { mover, views: [order[gap - 1], order[gap]], nats, moved })
     }
 
-    /// Place in `order` of the first view after the likeliest motion.
+    /// Index in `order` of the first view after the likeliest motion.
     fn likeliest_gap(&self, mover: Mover, views: &[View], order: &[usize]) -> Option<usize> {
         let last = order.len().checked_sub(MIN_SIDE)?;
         let mut step = order.len().div_ceil(FIRST_GAPS);
@@ -130,7 +131,7 @@ impl MotionSearch<'_> {
             let scores = candidates.iter().map(|gap| (score(gap), *gap));
             let (least, gap) = scores.min_by(|a, b| a.0.total_cmp(&b.0))?;
             if step == 1 {
-                // Behind the last view nothing moves.
+                // No motion is possible after the last view: its score is that without a motion.
                 let saved = score(&order.len()) - least;
                 return (saved > 2.0 * MIN_GAIN_NATS).then_some(gap);
             }
@@ -148,7 +149,7 @@ impl MotionSearch<'_> {
         estimate(&adjusted.input(HyperparameterMode::Given)).map_or(f64::INFINITY, |found| score(&found))
     }
 
-    /// Evidence for the views in two parts, and the motion between them; `None` where they still do not fit.
+    /// Evidence for the views in two parts, nats, and the motion between them; `None` if they still do not fit.
     fn fitted(&self, mover: Mover, robot: &Robot, views: &[View], drawing: &Drawing) -> Option<(f64, Isometry3<f64>)> {
         let fit = |robot: &Robot, read: &dyn Fn(&Estimate<'_>) -> Option<(f64, Isometry3<f64>)>| {
             let setup = BundleSetup::new(robot, views, &declared(robot, views), None);
@@ -194,7 +195,7 @@ impl MotionSearch<'_> {
     }
 }
 
-/// Returns true for a refusal that views may have because something moved between them.
+/// Returns true for a refusal that a motion between the views may cause.
 fn may_follow_from_motion(refusal: &Refusal) -> bool {
     matches!(
         refusal,
@@ -220,7 +221,7 @@ fn may_follow_from_motion(refusal: &Refusal) -> bool {
     )
 }
 
-/// The arm and its views with another camera, or with other tags, in the views `after`.
+/// Returns the arm and its views with another camera, or with other tags, in the views `after`.
 fn split(robot: &Robot, mover: Mover, views: &[View], after: &[usize]) -> (Robot, Vec<View>) {
     let mut views = views.to_vec();
     let robot = match mover {
@@ -249,7 +250,7 @@ fn split(robot: &Robot, mover: Mover, views: &[View], after: &[usize]) -> (Robot
     (robot, views)
 }
 
-/// The arm with one more camera, where that of `number` is; neither mount is known well.
+/// Returns the arm with one more camera at the pose of camera `number`, both mounts with wide priors.
 fn with_other_camera(robot: &Robot, number: usize) -> Robot {
     let mut robot = robot.clone();
     let loosen = |camera: &mut CameraSpec| {
@@ -266,7 +267,7 @@ fn with_other_camera(robot: &Robot, number: usize) -> Robot {
     robot
 }
 
-/// The arm with each of its tags once more, moved together.
+/// Returns the arm with a copy of each of its tags, moved by `moved`.
 fn with_tags_moved(robot: &Robot, moved: &Isometry3<f64>) -> Robot {
     let mut robot = robot.clone();
     let elsewhere = |tag: &SurveyedTag| SurveyedTag {
@@ -278,7 +279,7 @@ fn with_tags_moved(robot: &Robot, moved: &Isometry3<f64>) -> Robot {
     robot
 }
 
-/// The motion of the first `n` tags to the next `n`, the surest tags counting most; `None` where none has moved.
+/// Motion of the first `n` tags to the next `n`, weighted by their information; `None` if none has moved.
 fn motion_of_tags(found: &Estimate<'_>, n: usize) -> Option<Isometry3<f64>> {
     let pairs: Vec<(Isometry3<f64>, Isometry3<f64>, [f64; 2])> = (0..n)
         .filter_map(|tag| {
@@ -302,8 +303,8 @@ fn motion_of_tags(found: &Estimate<'_>, n: usize) -> Option<Isometry3<f64>> {
     Some(Isometry3::from_parts(shift.into(), turn))
 }
 
-/// What the priors of tags that have a column in both parts add to the evidence: it leaves out those of all tags, as
-/// models of the same tags have them in common.
+/// Evidence from the priors of tags that have a column in both parts, nats. The evidence leaves out the priors of all
+/// tags, because models of the same tags share them.
 fn nats_of_tag_priors(found: &Estimate<'_>, n: usize) -> f64 {
     let is_in_both = |tag: usize| tag >= n && found.has(Block::Tag(tag - n));
     let tags = found.problem.layout.tags().filter(|(tag, _)| is_in_both(*tag));

@@ -1,5 +1,5 @@
-//! A lens that is not robot.toml's, before any sensor is blamed: a centre some ten pixels off looks like readings that
-//! are off here and there.
+//! Search for a lens that is not robot.toml's, before any sensor is blamed: a centre error of about ten pixels looks
+//! like occasional wrong readings.
 
 use crate::explain::constants::drawing::{LENS_SCALE, MIN_GAIN_NATS};
 use crate::explain::constants::other_lens::MODEL_NATS;
@@ -12,9 +12,9 @@ use crate::solve::input::BundleInput;
 use armcal_core::optics::CameraModel;
 use armcal_core::robot::Robot;
 
-/// `drawing` with the lens of a camera estimated, where `found` looks as if a sensor did not belong, the same with that
-/// lens does not, and nothing else of the drawing explains more. A focal length far from the stated one is no lens that
-/// is a little off: another image size, another unit or water come first.
+/// Returns `drawing` with the lens of one camera estimated, if that explains an apparent sensor failure. `found` must
+/// look like such a failure, the estimate with the lens must not, and no other alternative explains more. A focal
+/// length far from the stated one does not count: another image size, another unit or water come first.
 pub(crate) fn lens_that_fits(drawing: &Drawing, input: &BundleInput<'_>, found: &Estimate<'_>) -> Option<Drawing> {
     if input.joint_prior.is_some() || found.has_positions() || !seems_of_sensors(found) {
         return None;
@@ -32,8 +32,8 @@ pub(crate) fn lens_that_fits(drawing: &Drawing, input: &BundleInput<'_>, found: 
     (gain > MIN_GAIN_NATS && drawing.better(input, found, gain).is_none()).then_some(other)
 }
 
-/// The lens of the other model as estimated, where it explains the views much better than the lens that is stated and
-/// estimated, as `input` has it; with the stated distortion, or from none.
+/// Estimated lens of the other model, if it explains the views much better than the estimated lens of the stated model
+/// in `input`. It starts with the stated distortion, or without any.
 pub(crate) fn of_better_model(input: &BundleInput<'_>, camera: usize) -> Option<CameraModel> {
     let stated = input.robot.camera_at(camera).lens;
     let before = log_evidence_of_all(&estimate(input)?);
@@ -59,7 +59,7 @@ fn with_lens(robot: &Robot, camera: usize, lens: CameraModel) -> Robot {
     robot
 }
 
-/// Returns true where a sensor would be blamed, be it for some views or for its errors in all.
+/// Returns true if a sensor would be blamed, for some views or for its errors in all.
 fn seems_of_sensors(found: &Estimate<'_>) -> bool {
     is_suspicious(found) || has_unsteady_sensor(found)
 }

@@ -1,10 +1,10 @@
-//! Does a joint's error follow time, or the arm's configurations, or neither? Permutation tests over the views.
+//! Permutation tests over the views: whether a joint's error depends on time, beyond the arm's configurations.
 //!
-//! Series are often captured in an order that goes through the configurations, so that every effect of the
-//! configuration that the model lacks looks like one of time. The errors y are regressed on smooth functions X of the
-//! angles; a statistic of the residual's order in time is compared with that of its permutations, each regressed
-//! again (Freedman and Lane 1983). Residuals are scaled to one variance by their leverages, statistics by the sum of
-//! squares. Where nothing depends on time, the p-value is uniform.
+//! Series are often captured in an order that goes through the configurations. Every effect of the configuration that
+//! the model lacks then looks like one of time. So the errors y are regressed on smooth functions X of the angles. A
+//! statistic of the residual's order in time is compared with that of its permutations, each regressed again (Freedman
+//! and Lane 1983). Residuals are scaled to one variance by their leverages, statistics by the sum of squares. If
+//! nothing depends on time, the p-value is uniform.
 
 use crate::explain::constants::permutation_test::{
     ENOUGH_ABOVE, LEAST_LEFT, LEAST_NEW, MAX_FUNCTIONS, N_PERMUTATIONS, VIEWS_PER_FUNCTION,
@@ -19,17 +19,17 @@ use armcal_core::stats::stream_rng;
 use nalgebra::{DMatrix, DVector};
 use rand::seq::SliceRandom;
 
-/// The errors of one joint in the order of time, and what its configurations explain.
+/// Errors of one joint in the order of time, and the part that its configurations explain.
 pub(crate) struct TimeOrder {
-    /// Orthonormal columns.
+    /// Functions of the configuration in orthonormal columns.
     by_configuration: DMatrix<f64>,
-    /// Errors of unit variance, less what the columns explain.
+    /// Errors of unit variance, less the part that the columns explain.
     residual: DVector<f64>,
 }
 
 impl TimeOrder {
-    /// `errors`: in the order of time, each with the arm's angles. The errors are regressed on `stated`, effects that
-    /// the model has at their stated size, then on functions of the angles, the joint's own first.
+    /// Regresses `errors`, in the order of time, each with the arm's angles. The regressors are `stated`, effects that
+    /// the model has at their stated size, then functions of the angles, the joint's own first.
     pub(crate) fn new(errors: &[f64], angles: &[JointAngles], joint: usize, stated: Vec<DVector<f64>>) -> Self {
         let by_configuration = smooth_functions(angles, joint, stated);
         let residual = without(&by_configuration, &DVector::from_column_slice(errors));
@@ -53,13 +53,13 @@ impl TimeOrder {
         (above + 1) as f64 / (N_PERMUTATIONS + 1) as f64
     }
 
-    /// The residuals with the variance that the regression took from each given back.
+    /// Residuals scaled by the variance that the regression took from each.
     fn exchangeable(&self) -> DVector<f64> {
         let left = |row: usize| (1.0 - self.by_configuration.row(row).norm_squared()).max(LEAST_LEFT);
         DVector::from_fn(self.residual.len(), |row, _| self.residual[row] / left(row).sqrt())
     }
 
-    /// Returns the p-value of the weighted squares of the scores along `patterns`, one row a view.
+    /// Returns the p-value of the weighted squares of the scores along `patterns`, one row per view.
     pub(crate) fn p_of_patterns(&self, patterns: &DMatrix<f64>, weights: &[f64]) -> f64 {
         self.p_value("permutations/patterns", |y| {
             patterns.column_iter().zip(weights).map(|(pattern, weight)| weight * pattern.dot(y).powi(2)).sum()
@@ -109,8 +109,8 @@ pub(crate) fn p_of_order(name: &str, n: usize, statistic: impl Fn(&[usize]) -> f
 }
 
 impl Estimate<'_> {
-    /// The errors of a joint as a test of their order takes them. What the model has as smooth in time is given back,
-    /// and regressed on where it is no larger than stated: warmth is no walk, but takes up one.
+    /// Errors of a joint as input of a test of their order. Terms of the model that are smooth in time are added back.
+    /// They become regressors if they are no larger than stated: warmth is not a walk, but absorbs one.
     pub(crate) fn time_order(&self, joint: usize, errors: &[JointError]) -> TimeOrder {
         let is_of_time = |kind: ParameterKind| {
             matches!(kind, ParameterKind::OffsetPerK | ParameterKind::OffsetPerMpa | ParameterKind::DriftPerH)
@@ -139,8 +139,8 @@ fn without(columns: &DMatrix<f64>, y: &DVector<f64>) -> DVector<f64> {
     y - columns * columns.tr_mul(y)
 }
 
-/// Orthonormal columns: a constant, `stated`, sines and cosines of each joint's angle and of twice it, then their
-/// products, as many as the views allow.
+/// Orthonormal columns, as many as the views allow. They are a constant, `stated`, sines and cosines of each joint's
+/// angle and of twice it, then their products.
 fn smooth_functions(angles: &[JointAngles], joint: usize, stated: Vec<DVector<f64>>) -> DMatrix<f64> {
     let n_joints = angles.first().map_or(0, |at| at.len());
     let order = || std::iter::once(joint).chain((0..n_joints).filter(move |&other| other != joint));
@@ -187,8 +187,8 @@ mod tests {
     const N_VIEWS: usize = 90;
     const N_JOINTS: usize = 6;
 
-    /// Views along a way through the configurations, and errors: white noise, an effect of the configuration as large,
-    /// and a walk of `walk` times the noise over all views.
+    /// Views along a way through the configurations, and errors: white noise, an equal effect of the configuration, and
+    /// a walk of `walk` times the noise over all views.
     fn series(seed: u64, walk: f64) -> (Vec<f64>, Vec<JointAngles>) {
         let mut rng = rng(seed, "permutation test");
         let (mut at, mut walked) = ([0.0; N_JOINTS], 0.0);
@@ -220,7 +220,7 @@ mod tests {
         values.iter().enumerate().map(off).fold(0.0, f64::max)
     }
 
-    /// Kolmogorov and Smirnov's limit at 1 % is 0.115 for 200 series; that without the regression on configurations is
+    /// Kolmogorov and Smirnov's limit at 1 % is 0.115 for 200 series. Without the regression on configurations, it is
     /// exceeded many times over.
     #[test]
     fn p_values_are_uniform_where_only_the_configurations_matter() {

@@ -30,7 +30,7 @@ use armcal_core::joints::JointAngles;
 use armcal_core::robot::{JointSensorSpec, Robot, SurveyedTag};
 use armcal_core::sensor::wrap_symmetric;
 
-/// A hypothesis and what it explains.
+/// Hypothesis and its score.
 struct Tried {
     hypothesis: Hypothesis,
     score: f64,
@@ -50,9 +50,9 @@ impl Tried {
         }
     }
 
-    /// Returns true where it explains the views nearly as well as the best one. A frame that is turned as a joint turns
-    /// looks like that joint's zero: its handicap decides the order alone, and what it explains better is a part of the
-    /// base that the zero does not have.
+    /// Returns true if it explains the views nearly as well as the best one. A frame that is turned about a joint's
+    /// axis looks like that joint's zero. The handicap of the frame only decides the order; what the frame explains
+    /// better is a part of the base's error that the zero lacks.
     fn is_near(&self, best: &Self) -> bool {
         if best.hypothesis.is_of_map() && matches!(self.hypothesis, Hypothesis::Zeros(_)) {
             return true;
@@ -62,22 +62,22 @@ impl Tried {
     }
 }
 
-/// An arm whose views no calibration explains.
+/// Arm whose views no calibration explains.
 #[derive(Clone, Copy)]
 pub(crate) struct ReadingSearch<'a> {
     pub robot: &'a Robot,
-    /// As they were read.
+    /// Views as they were read.
     pub views: &'a [View],
     /// Failed sensors as detected: the alternative that a reading error must beat.
     pub failures: &'a [Failure],
     /// Repaired geometry, another alternative.
     pub drawing: &'a Drawing,
-    /// The tags as they were given; `None` where the views made the map, which then is in the base's frame.
+    /// Tags as they were given; `None` if the views made the map, which then is in the base's frame.
     pub map: Option<&'a [SurveyedTag]>,
 }
 
 impl ReadingSearch<'_> {
-    /// The reading error, if one explains the views and the readings as they are do not.
+    /// Reading error that explains the views, if the readings as they are do not.
     pub(crate) fn find(&self) -> Option<MisreadReadings> {
         let stride = self.stride();
         let views: Vec<View> = self.views.iter().step_by(stride).cloned().collect();
@@ -89,7 +89,7 @@ impl ReadingSearch<'_> {
         }
         let is_good = |tried: &Tried| tried.fits && as_read - tried.score > MARGIN && self.is_large(tried);
         let frame = self.attempt_map_frame(&views).filter(is_good);
-        // In the wrong frame tags seem to have moved or to have other sizes: what was made of that says nothing.
+        // In the wrong frame tags seem to have moved or to have other sizes: findings on them are invalid.
         let given = frame.as_ref().and(self.map).map(|map| map_frame::as_given(self.robot, map, self.views));
         let search = given.as_ref().map_or(*self, |(robot, views)| ReadingSearch { robot, views, ..*self });
         let tried = search.likely().into_iter().filter_map(|hypothesis| search.attempt(hypothesis));
@@ -101,7 +101,7 @@ impl ReadingSearch<'_> {
         Some(MisreadReadings { found, alternatives, tag_error_m: before_m, corrected_m: best.tag_error_m })
     }
 
-    /// Those that explain the views nearly as well as the best one, the frame of the map first.
+    /// Alternatives that explain the views nearly as well as the best one, the frame of the map first.
     fn alternatives(&self, best: &Tried, others: &[Tried]) -> Vec<ReadingError> {
         let mut near: Vec<&Tried> = others.iter().filter(|other| other.is_near(best)).collect();
         near.sort_by_key(|other| !other.hypothesis.is_of_map());
@@ -116,7 +116,7 @@ impl ReadingSearch<'_> {
         alternatives
     }
 
-    /// Joints that are beyond their limits in most views, and on a turn within them fit as well.
+    /// Joints that are beyond their limits in most views, and fit as well on a turn within them.
     pub(crate) fn find_other_turns(&self) -> Option<MisreadReadings> {
         let hypothesis = Hypothesis::other_turns_in_most(self.robot, self.views)?;
         let before_m = PositionProblem::new(self.robot, self.views).rms_m(&JointParameters::default())?;
@@ -129,12 +129,12 @@ impl ReadingSearch<'_> {
         MisreadReadings { found, alternatives, tag_error_m, corrected_m: turned.tag_error_m }
     }
 
-    /// One view of so many is looked at.
+    /// Step between the views that are used.
     fn stride(&self) -> usize {
         self.views.len().div_ceil(MAX_VIEWS).max(1)
     }
 
-    /// Some of the views, read that way.
+    /// Every `stride`-th view, read by `hypothesis`.
     fn views_by(&self, hypothesis: &Hypothesis) -> Vec<View> {
         // Only readings of another view need all of them.
         if matches!(hypothesis, Hypothesis::Shifted(_)) {
@@ -144,7 +144,7 @@ impl ReadingSearch<'_> {
         hypothesis.applied(self.robot, &views)
     }
 
-    /// The least that the readings as they are cost, failed sensors and repaired geometry included.
+    /// Least score of the readings as they are, with failed sensors and repaired geometry.
     fn score_as_read(&self, views: &[View], stride: usize) -> f64 {
         let of_views = |failure: &Failure| {
             let views = failure.views.iter().filter(|view| view.is_multiple_of(stride)).map(|view| view / stride);
@@ -160,7 +160,7 @@ impl ReadingSearch<'_> {
         with(&[]).min(with(&failures))
     }
 
-    /// The hypotheses that are worth an estimate.
+    /// Hypotheses that are worth an estimate.
     fn likely(&self) -> Vec<Hypothesis> {
         let all = Hypothesis::all(self.robot);
         if !has_known_mount(self.robot) {
@@ -208,7 +208,7 @@ impl ReadingSearch<'_> {
         Some(Tried::of(hypothesis, &found, &views))
     }
 
-    /// All tags moved as one, where somebody measured them beside the arm.
+    /// Estimates with all tags moved as one, if the map was measured without the arm.
     fn attempt_map_frame(&self, views: &[View]) -> Option<Tried> {
         let map = self.map.filter(|_| !self.robot.is_watched())?;
         let (robot, views) = map_frame::as_given(self.robot, map, views);
@@ -222,8 +222,8 @@ impl ReadingSearch<'_> {
         Some(Tried::of(Hypothesis::MapFrame(base_from_map), &found, &views))
     }
 
-    /// Zeros as they were found, beyond what the sensors are stated to be off, and a frame beyond what a base is; other
-    /// errors have no size.
+    /// Returns true if an estimated zero exceeds the sensor's stated error, or a frame exceeds a base's. Other errors
+    /// have no size.
     fn is_large(&self, tried: &Tried) -> bool {
         let zeros = match &tried.hypothesis {
             Hypothesis::Zeros(zeros) => zeros,
@@ -298,8 +298,8 @@ impl ReadingSearch<'_> {
     }
 }
 
-/// Of zero errors that differ by whole turns the one that puts most angles within the joint's limits; of equals the
-/// smallest.
+/// Zero error, among those that differ by whole turns, that puts most angles within the joint's limits; the smallest of
+/// equals.
 fn on_turn_within_limits(spec: &JointSensorSpec, travel_rad: impl Iterator<Item = f64> + Clone, off_rad: f64) -> f64 {
     let nearest_rad = wrap_symmetric(off_rad, TAU);
     if !spec.is_limited() || spec.moves.is_slide() {
@@ -321,7 +321,7 @@ fn tag_error_m(found: &Estimate<'_>, views: &[View]) -> Option<f64> {
     PositionProblem::new(&robot, views).rms_m(&found.parameters())
 }
 
-/// Two names for the same joints.
+/// Returns true if both errors name the same joints.
 fn concerns_same(a: &ReadingError, b: &ReadingError) -> bool {
     let joints = |error: &ReadingError| match error {
         ReadingError::Exchanged { joints } => joints.to_vec(),

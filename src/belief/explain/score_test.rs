@@ -1,10 +1,10 @@
-//! Would another geometry explain the data better than joint sensors can?
+//! Score test: whether other geometry explains the data better than joint sensors can.
 //!
-//! The score test (Rao 1948; the Lagrange multiplier test): each link's place and turn is a trial parameter z, zero in
-//! the model. With everything else at its optimum, `s = d(-cost/2)/dz` and z's information `I`, all other parameters
-//! eliminated under their priors, follow from the normal equations without another fit: `z = I^-1 s` is what the data
-//! ask for, `s^T I^-1 s` is chi-square under the model. Directions that the data tell less of than [`SIZE_M`] or
-//! [`SIZE_RAD`] do not count.
+//! In the score test (Rao 1948; the Lagrange multiplier test), each link's shift and rotation is a trial parameter z,
+//! zero in the model. With everything else at its optimum, the normal equations give `s = d(-cost/2)/dz` and z's
+//! information `I` without another fit. All other parameters are marginalised under their priors. `z = I^-1 s` is the
+//! estimate from the data; `s^T I^-1 s` is chi-square under the model. Directions that the data determine less well
+//! than [`SIZE_M`] or [`SIZE_RAD`] do not count.
 
 use crate::explain::constants::score_test::{ALIKE_CHI2, MOUNT, SIZE_M, SIZE_RAD, SURER};
 use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, Vector3, Vector6};
@@ -22,49 +22,49 @@ use armcal_core::robot::Robot;
 use armcal_core::sensor::{ArmSensors, ConditionChange};
 use armcal_core::stats::chi_square_above;
 
-/// An element of the geometry that is tested.
+/// Element of the geometry that is tested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GeometryElement {
-    /// Where the joint sits on its parent link.
+    /// Pose of the joint on its parent link.
     Joint(usize),
-    /// Where the camera hangs, beyond its prior.
+    /// Pose of the camera mount, beyond its prior.
     Mount,
 }
 
-/// What one change of the geometry would explain.
+/// Result of the test of one change of the geometry.
 #[derive(Clone, Debug)]
 pub struct ScoreTestResult {
-    /// The element that would be elsewhere.
+    /// Element that the test changes.
     pub element: GeometryElement,
-    /// Shifted or turned.
+    /// Kind of change: shift or rotation.
     pub error: ErrorKind,
-    /// What the data ask for, in the parent link's frame (the camera's for the mount): m or rad.
+    /// Estimated change, in the parent link's frame (the camera's for the mount): m or rad.
     pub size: Vector3<f64>,
-    /// Chi-square of the score, where the model holds.
+    /// Chi-square of the score under the model.
     pub chi2: f64,
-    /// Number of directions that the data tell enough of, 1 to 3.
+    /// Number of directions that the data determine well enough, 1 to 3.
     pub dof: usize,
-    /// That chance alone makes chi2 as large.
+    /// Probability that chance alone makes `chi2` as large.
     pub probability: f64,
-    /// Root mean square over the task of how far the tool would be elsewhere, m.
+    /// Tool displacement by the change, root mean square over the task, m.
     pub tool_m: f64,
 }
 
-/// Trial columns: of each joint's place in its parent link three of translation, then three of rotation; then the
+/// Trial columns: for each joint's pose in its parent link, three of translation, then three of rotation; then the
 /// mount's six.
 type Trials = SMatrix<f64, 6, { MOUNT + 6 }>;
 
-/// Score and information of all trials, and how the common parameters follow them.
+/// Score and information of all trials, and the response of the common parameters to them.
 pub(crate) struct Score {
     pub(crate) score: DVector<f64>,
     pub(crate) information: DMatrix<f64>,
-    /// d(common)/d(trial).
+    /// Derivative of the common parameters by the trials.
     sensitivity: DMatrix<f64>,
 }
 
 impl Estimate<'_> {
-    /// All that can be tested, the least likely by chance first; `task`: the arm's angles at the task's targets. A
-    /// mount that explains as much as a link, and has a much larger stated sigma, comes before it.
+    /// Results of all tests, the least likely by chance first; `task`: the arm's angles at the task's targets. A mount
+    /// that explains as much as a link, and has a much larger stated sigma, comes before it.
     #[must_use]
     pub fn score_tests(&self, task: &[JointAngles]) -> Vec<ScoreTestResult> {
         let score = self.score();
@@ -81,8 +81,8 @@ impl Estimate<'_> {
         out
     }
 
-    /// The mount among `results`, where it explains as much as the link that comes first: behind the last joint that
-    /// the views move only the stated sigmas distinguish them.
+    /// Index in `results` of the mount, if it explains as much as the first link. Beyond the last joint that the views
+    /// move, only the stated sigmas distinguish them.
     fn likelier_mount(&self, results: &[ScoreTestResult]) -> Option<usize> {
         let first = results.first().filter(|first| matches!(first.element, GeometryElement::Joint(1..)))?;
         let (links, camera) = (&self.problem.robot.geometry, &self.problem.robot.camera);
@@ -97,7 +97,7 @@ impl Estimate<'_> {
         results.iter().position(is_likelier)
     }
 
-    /// Joints, base first, that some view sees move.
+    /// Number of joints, from the base, whose motion some view shows.
     pub(crate) fn n_seen_joints(&self) -> usize {
         match &self.problem.robot.gripper_tag {
             Some(tag) if self.has(Block::GripperTag) => tag.mount.n_joints,
@@ -177,7 +177,7 @@ impl Estimate<'_> {
         Score { score, information, sensitivity: followed }
     }
 
-    /// Curvature and pull of a group's observations on the camera's twist.
+    /// Information and gradient of a group's observations on the camera's twist.
     fn gradient(&self, group: &Group<'_>) -> (Matrix6<f64>, Vector6<f64>) {
         let (problem, state) = (&self.problem, &self.solved.state);
         let (mut h, mut g) = (Matrix6::zeros(), Vector6::zeros());
@@ -212,12 +212,12 @@ fn trials(group: &Group<'_>) -> Trials {
     trials
 }
 
-/// The tool at one configuration, and how it moves.
+/// Tool position at one configuration, and its derivatives.
 pub(crate) struct ToolJacobian {
     pub(crate) poses: LinkPoses,
-    /// Base frame.
+    /// Tool position in the base frame, m.
     pub(crate) tool_m: Vector3<f64>,
-    /// By the estimated joints' parameters, m per unit.
+    /// Derivatives by the estimated joints' parameters, m per unit.
     pub(crate) by_parameters: Vec<Vector3<f64>>,
     n_joints: usize,
 }
@@ -244,7 +244,7 @@ impl ToolJacobian {
         Self { by_parameters, tool_m, n_joints: tool.n_joints, poses }
     }
 
-    /// By the readings of an arm at rest, under their conditions.
+    /// Tool and derivatives by the readings of an arm at rest, under their conditions.
     pub(crate) fn of_view(robot: &Robot, estimated: &[Parameter], at: &JointParameters, view: &View) -> Self {
         let departure = view.conditions.departure_from(&at.reference);
         let angles = JointAngles::from_fn(robot.n_joints(), |joint| {
@@ -270,13 +270,12 @@ impl ToolJacobian {
         Self { by_parameters, tool_m, n_joints: tool.n_joints, poses }
     }
 
-    /// How the tool moves by changes of the estimated joints' parameters, base frame, m.
+    /// Tool displacement by changes of the estimated joints' parameters, base frame, m.
     pub(crate) fn moved_by(&self, changes: &DVector<f64>) -> Vector3<f64> {
         self.by_parameters.iter().zip(changes.iter()).map(|(by, change)| by * *change).sum()
     }
 
-    /// Where the tool is with the trial at `first` of `size`, the joints' parameters following: beyond where it
-    /// is without, base frame, m.
+    /// Tool displacement by the trial at `first` of `size`, with the joints' parameters following it, base frame, m.
     pub(crate) fn shift(&self, score: &Score, first: usize, size: &Vector3<f64>) -> Vector3<f64> {
         let mut moved = Vector3::zeros();
         let joint = first / 6;
@@ -288,19 +287,19 @@ impl ToolJacobian {
         moved + self.followed(score, first, size)
     }
 
-    /// What of that the joints' parameters alone do, which follow the trial.
+    /// Part of `shift` caused by the joints' parameters that follow the trial, base frame, m.
     pub(crate) fn followed(&self, score: &Score, first: usize, size: &Vector3<f64>) -> Vector3<f64> {
         self.moved_by(&(score.sensitivity.columns(first, 3) * size))
     }
 }
 
-/// The tool's motion by a parameter of the arm's body, m per unit.
+/// Tool displacement by a parameter of the arm's body, m per unit.
 fn by_body(robot: &Robot, poses: &LinkPoses, tool_m: &Vector3<f64>, parameter: Parameter) -> Vector3<f64> {
     let motion = parameter.body_motion(&robot.chain, poses, 0..robot.tool.mount.n_joints, tool_m);
     motion.map_or_else(Vector3::zeros, |[moved, _]| moved)
 }
 
-/// First trial column, and the size in whose units it is looked at.
+/// First trial column, and the size that defines its unit.
 pub(crate) fn columns(element: GeometryElement, error: ErrorKind) -> (usize, f64) {
     let first = match element {
         GeometryElement::Joint(joint) => 6 * joint,

@@ -1,4 +1,4 @@
-//! What `bundle` is started from: failed joints taken care of, a prior taken up.
+//! Setup of `bundle`: adjusts for failed joints, and applies a prior.
 
 use crate::explain::calibration_prior::CalibrationPrior;
 use crate::explain::drawing::Drawing;
@@ -14,7 +14,7 @@ use crate::solve::input::{BundleInput, HyperparameterMode};
 use crate::views::view::View;
 use armcal_core::robot::{FailedKind, Robot};
 
-/// The views under one hypothesis of failed joints.
+/// Views under one hypothesis of failed joints.
 pub(crate) struct BundleSetup {
     pub applied: FailureAdjusted,
     prior: Option<Result<CalibrationPrior, Refusal>>,
@@ -22,16 +22,16 @@ pub(crate) struct BundleSetup {
     clocks: Clocks,
 }
 
-/// Which times the readings of a view are of.
+/// Times of a view's joint readings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Clocks {
-    /// The images' stamps, as they are.
+    /// Stamps of the images, as they are.
     AsStamped,
-    /// The images' own times, by the offset between the clocks that was found: what is left of it is a column.
+    /// Images' own times, by the estimated offset between the clocks; its remainder is a column.
     Aligned,
 }
 
-/// The declared failures of `robot`.
+/// Declared failures of `robot`.
 pub(crate) fn declared(robot: &Robot, views: &[View]) -> Vec<Failure> {
     let before_camera = robot.failed.iter().filter(|failed| failed.joint < robot.n_seen_joints());
     before_camera.map(|&failed| Failure::declared(failed, views.len())).collect()
@@ -49,17 +49,17 @@ impl BundleSetup {
         Self { applied, prior, drawing: Drawing::default(), clocks: Clocks::AsStamped }
     }
 
-    /// The same with what of the drawing is estimated, too.
+    /// Returns this setup with the departures in `drawing` estimated, too.
     pub(crate) fn with_drawing(self, drawing: &Drawing) -> Self {
         Self { drawing: drawing.clone(), ..self }
     }
 
-    /// The same for views with these clocks.
+    /// Returns this setup for views with these clocks.
     pub(crate) fn with_clocks(self, clocks: Clocks) -> Self {
         Self { clocks, ..self }
     }
 
-    /// The prior, or why it is of no use.
+    /// Prior, or the reason that it cannot be used.
     pub(crate) fn prior(&self) -> Option<&Result<CalibrationPrior, Refusal>> {
         self.prior.as_ref()
     }
@@ -83,7 +83,7 @@ impl BundleSetup {
         select_model(&self.input())
     }
 
-    /// Gains and offsets that the views alone must tell.
+    /// Number of gains and offsets that only the views can determine.
     pub(crate) fn n_wanted(&self, robot: &Robot) -> usize {
         let per_joint = 2 * robot.n_seen_joints();
         let lost = self
@@ -96,13 +96,13 @@ impl BundleSetup {
         self.usable_prior().map_or(cold, |prior| prior.n_unknown(robot).min(cold))
     }
 
-    /// Between the prior's last view and these, h.
+    /// Time between the prior's last view and these, h.
     pub(crate) fn elapsed_h(&self) -> f64 {
         self.usable_prior().map_or(0.0, |prior| prior.elapsed_h)
     }
 
-    /// The views with the angles that were found where no sensor tells them; `parameters` without those of joints that
-    /// have none.
+    /// Returns the views with the estimated angle of each joint that has no sensor reading; `parameters` lack joints
+    /// without a sensor.
     pub(crate) fn with_estimated_angles(&self, found: &Estimate<'_>, parameters: &JointParameters) -> Vec<View> {
         let sensors = parameters.sensors(&self.applied.robot);
         let mut views = self.applied.views.clone();
@@ -122,7 +122,7 @@ impl BundleSetup {
         self.applied.failures.iter().any(|failure| failure.joint == joint && failure.leaves_no_sensor())
     }
 
-    /// `parameters` with the datasheet's for joints without a sensor.
+    /// Returns `parameters` with the datasheet's for joints without a sensor.
     pub(crate) fn without_failed(&self, parameters: &JointParameters) -> JointParameters {
         let mut sound = *parameters;
         for joint in (0..self.applied.robot.n_joints()).filter(|&joint| self.has_no_sensor(joint)) {
@@ -139,7 +139,7 @@ impl BundleSetup {
         joints.fold(covariance.clone(), |covariance, joint| covariance.without_joint(joint))
     }
 
-    /// What failed joints leave undetermined.
+    /// Parameters that failed joints leave undetermined.
     pub(crate) fn unobservable(&self) -> Vec<Unobservable> {
         let of = |failure: &Failure| {
             let reason = match failure.kind {
@@ -155,7 +155,7 @@ impl BundleSetup {
         self.applied.failures.iter().filter(|failure| failure.reading == SensorUse::Ignored).flat_map(of).collect()
     }
 
-    /// What was never estimated, or only before the sensor failed, is the datasheet's.
+    /// Resets to the datasheet parameters that were never estimated, or only before the sensor failed.
     pub(crate) fn forget_failed(&self, calibration: &mut Calibration, datasheet: &Robot) {
         let pairs = calibration.joint.iter_mut().zip(&datasheet.sensors).enumerate();
         for (_, (joint, spec)) in pairs.filter(|(joint, _)| self.has_no_sensor(*joint)) {

@@ -1,10 +1,10 @@
-//! Sensors that slipped on their shafts during a capture: found, and fitted as steps.
+//! Detection of sensors that slipped on their shafts during a capture; the slips are fitted as steps.
 //!
-//! The score test of steps proposes a joint and a change point; all is then estimated anew with that step as a column,
-//! and the change point is moved where the test of further steps asks for it. A step stays where twice the logarithm of
-//! the evidences' ratio, less what the step's wide prior costs (`2 ln(prior std / posterior std)`, so that it is a
-//! ratio of likelihoods), and the square of the step in its standard deviations both exceed [`MIN_LIKELIHOOD_RATIO`],
-//! and what other links, mounts or tags would explain.
+//! The score test of steps proposes a joint and a change point. The fit is repeated with that step as a column, and the
+//! change point moves if the test of further steps requires it. A step stays if two figures exceed
+//! [`MIN_LIKELIHOOD_RATIO`] and what other links, mounts or tags would explain. The first is twice the logarithm of the
+//! evidences' ratio, plus `2 ln(prior std / posterior std)` for the cost of the step's wide prior: a ratio of
+//! likelihoods. The second is the square of the step in its standard deviations.
 
 use crate::explain::constants::slips::{
     MAX_MOVES, MAX_P, MAX_STEPS, MIN_LIKELIHOOD_RATIO, MIN_STEP_RAD, MISPLACED, WORTH_A_FIT,
@@ -22,16 +22,16 @@ use crate::views::view::View;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::time::Stamp;
 
-/// What a step is measured by.
+/// Reference that a step is compared with.
 struct Baseline {
-    /// Logarithm of the evidence without it.
+    /// Logarithm of the evidence without the step.
     log_evidence: f64,
-    /// What one other link, mount or tag would take off the cost.
+    /// Largest reduction of the cost by one other link, mount or tag.
     by_others: f64,
 }
 
 impl FailureSearch<'_> {
-    /// `known` and the slips that the views show beside them; `found` is the estimate under `known`.
+    /// Adds to `known` the slips that the views show; `found` is the estimate under `known`.
     pub(crate) fn with_slips(&self, known: Vec<Failure>, found: &Estimate<'_>) -> Vec<Failure> {
         if known.iter().filter(|failure| failure.is_step()).count() >= MAX_STEPS {
             return known;
@@ -47,8 +47,8 @@ impl FailureSearch<'_> {
         self.with_step(&known, &step, &baseline, (f64::NEG_INFINITY, MAX_MOVES)).unwrap_or(known)
     }
 
-    /// `known` and this step, or one of the same joint at a better change point, and further ones; `None` where it is
-    /// none, or not above `least`.
+    /// Adds to `known` this step, or one of the same joint at a better change point, and further ones. `None` if the
+    /// step is not significant, or not above `least`.
     fn with_step(
         &self,
         known: &[Failure],
@@ -63,7 +63,7 @@ impl FailureSearch<'_> {
         let (size_rad, std_rad) = better.step(step.joint, self.views[step.since].end)?;
         let likelihood_ratio =
             2.0 * (log_evidence_of_all(&better) - baseline.log_evidence) + 2.0 * (STEP_STD_RAD / std_rad).ln();
-        // An estimate that is better for another reason says nothing of the step.
+        // An estimate that is better for another reason does not support the step.
         let likelihood_ratio = likelihood_ratio.min((size_rad / std_rad).powi(2));
         if likelihood_ratio <= least {
             return None;
@@ -103,14 +103,14 @@ impl FailureSearch<'_> {
 }
 
 impl Estimate<'_> {
-    /// A step that has a column, and one sigma, rad.
+    /// Estimate of a step that has a column, and its standard deviation, rad.
     pub(crate) fn step(&self, joint: usize, since: Stamp) -> Option<(f64, f64)> {
         let step = Parameter { joint, kind: ParameterKind::StepBefore(since) };
         let column = self.problem.layout.parameters.iter().position(|p| *p == step)?;
         Some((self.solved.state.joint[column], self.posterior.covariance[(column, column)].max(0.0).sqrt()))
     }
 
-    /// `parameter` before the sensor slipped: the datasheet states that.
+    /// Value of `parameter` before the sensor slipped, which the datasheet states.
     pub(crate) fn before_slips(&self, parameter: Parameter) -> f64 {
         let now = self.parameters().get(parameter);
         if parameter.kind != ParameterKind::Offset {
@@ -120,8 +120,8 @@ impl Estimate<'_> {
         now + steps.into_iter().map(|column| self.solved.state.joint[column]).sum::<f64>()
     }
 
-    /// `views` with the readings that the sensors as they are at the last view would have had before they slipped or
-    /// walked.
+    /// Returns `views` with the readings before slips and walks changed to those of the sensors as they are at the last
+    /// view.
     pub(crate) fn as_read_now(&self, views: &[View]) -> Vec<View> {
         let mut views = views.to_vec();
         let parameters = self.parameters();
@@ -145,7 +145,7 @@ impl Estimate<'_> {
         views
     }
 
-    /// The most that a change of one link, of the mount or of one tag would take off the cost.
+    /// Largest reduction of the cost by a change of one link, of the mount or of one tag.
     pub(crate) fn largest_other_chi2(&self) -> f64 {
         let by_links = self.score_tests(&self.view_angles()).into_iter().map(|result| result.chi2);
         let tags = 0..self.problem.robot.tags.len();

@@ -1,17 +1,17 @@
-//! Did a joint's sensor slip while the views were captured?
+//! Test for a slip of a joint's sensor while the views were captured.
 //!
 //! A step d of one sensor at a change point c is a trial parameter, zero in the model: the joint's angle at the same
-//! reading is larger by d in all views before c. With the joint's error in view v, e_v, counted from there, d acts
-//! through the errors' prior alone. So its score and its information, everything else eliminated, are
+//! reading is larger by d in all views before c. The joint's error e_v in view v is counted from there, so d acts only
+//! through the errors' prior. The score z and information I of d, with everything else marginalised, are
 //!
 //! ```text
 //! z = sum w_v e_v        I = sum w_v - sum w_u w_v cov(e_u, e_v)        over views before c, w = 1 / var(e)
 //! ```
 //!
-//! with the posterior covariance of the errors (Rao 1948). `z^2 / I` is chi-square of one degree of freedom. A step
-//! that is not in the model inflates the joint's own fitted variance, and chi-square stays small. What it takes off
-//! the sum of the errors' squares, r of `S = sum w e^2`, counts `-N ln(1 - r / N)` with the variance fitted anew to
-//! N = `sum (1 - var / prior var)` errors and the prior's few.
+//! with the posterior covariance of the errors (Rao 1948). `z^2 / I` is chi-square with one degree of freedom. A step
+//! that is not in the model inflates the joint's own fitted variance, and chi-square stays small. A step takes r off
+//! the errors' sum of squares `S = sum w e^2`. It counts `-N ln(1 - r / N)`, with the variance fitted again to N =
+//! `sum (1 - var / prior var)` errors and the prior's few.
 
 pub(crate) use crate::explain::constants::step_test::MIN_SIDE;
 use crate::explain::constants::step_test::{LEAST_TOLD, SATURATED};
@@ -20,35 +20,35 @@ use nalgebra::DVector;
 use crate::solve::estimate::Estimate;
 use crate::solve::evidence::NU_JOINT;
 
-/// A step of one joint's sensor.
+/// Possible step of one joint's sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct StepCandidate {
     pub joint: usize,
-    /// The first view after it, in the order of time.
+    /// First view after the step, in the order of time.
     pub since: usize,
-    /// By how much the angle was more at the same reading before.
+    /// Excess of the joint's angle at the same reading before the step, rad.
     pub size_rad: f64,
     /// Twice the logarithm of the likelihoods' ratio.
     pub likelihood_ratio: f64,
 }
 
-/// What is known of the offsets before the first view.
+/// Prior of the offsets before the first view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum OffsetPrior {
     Datasheet,
-    /// They may have changed since an earlier calibration, in all views alike.
+    /// An earlier calibration: the offsets may have changed since, in all views alike.
     Calibrated,
 }
 
-/// A joint's error in one view.
+/// Error of a joint in one view.
 pub(crate) struct JointError {
     pub view_idx: usize,
     pub error_rad: f64,
     /// Inverse of the prior's variance.
     pub weight: f64,
-    /// Posterior variance where the common parameters are known.
+    /// Posterior variance if the common parameters were known.
     pub own_var: f64,
-    /// Derivative by the common parameters.
+    /// Derivative of the error by the common parameters.
     pub by_common: DVector<f64>,
     /// Share of the prior's variance that the view takes away.
     pub told: f64,
@@ -91,7 +91,7 @@ impl Estimate<'_> {
         best.filter(|(most, _)| *most > of_all).map(|(_, candidate)| candidate)
     }
 
-    /// Of each joint before the camera, in the views that tell of it.
+    /// Errors of each joint proximal to the camera, in the views that determine them enough.
     pub(crate) fn joint_errors(&self, views: &[usize]) -> Vec<Vec<JointError>> {
         let problem = &self.problem;
         let mut first_group = Vec::with_capacity(problem.views.len());

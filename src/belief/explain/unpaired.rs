@@ -1,11 +1,11 @@
-//! Are readings and tags of the same instants? A permutation test over the views.
+//! Permutation test over the views: whether readings and tags are of the same instants.
 //!
-//! Where the camera is in each view is known from the tags alone. Whatever is wrong with sensors, zeros or columns,
-//! most joints still move the camera: near readings go with near places. Readings of other instants do not.
+//! The tags alone give the camera's position in each view. Most joints still move the camera, even with wrong sensors,
+//! zeros or columns: similar readings give similar positions. Readings of other instants do not.
 //!
-//! The statistic is the largest distance correlation of a joint's readings and the camera's place (Szekely, Rizzo and
-//! Bakirov 2007), against that of readings in a random order. The same of the places where the nominal arm has the
-//! camera by these readings tells whether so many views could show it at all.
+//! The statistic is the largest distance correlation of a joint's readings and the camera's position (Szekely, Rizzo
+//! and Bakirov 2007). It is compared with that of readings in a random order. The same statistic of the nominal arm's
+//! camera positions by these readings shows whether this number of views is enough.
 
 use nalgebra::{DMatrix, Vector3};
 
@@ -20,8 +20,8 @@ use crate::views::view::View;
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::Robot;
 
-/// That the views have the joint readings of other instants, where the tags of each view agree with the map; of views
-/// that no sensor, column or mount explains. `None` where they are too few to tell.
+/// Refers to readings of other instants if the tags of each view agree with the map, for views that no sensor, column
+/// or mount explains. `None` if the readings belong to the views, or if these are too few to decide.
 pub(crate) fn unpaired(robot: &Robot, views: &[View]) -> Option<MisreadReadings> {
     let stride = views.len().div_ceil(MAX_VIEWS).max(1);
     let of_first = views.iter().step_by(stride).filter(|view| view.camera == 0);
@@ -46,7 +46,7 @@ pub(crate) fn unpaired(robot: &Robot, views: &[View]) -> Option<MisreadReadings>
     Some(MisreadReadings { found, alternatives: Vec::new(), tag_error_m, corrected_m: None })
 }
 
-/// Returns true where the tags of a view stand to one another as the map says, or there is one tag in all.
+/// Returns true if the tags of a view agree with the map's relative poses, or if there is one tag in all.
 fn agree_with_map(robot: &Robot, views: &[&View]) -> bool {
     let pairs = mismatch(views, &robot.tags, &robot.camera.lens);
     let first = views.iter().flat_map(|view| &view.tags).next().map(|seen| seen.tag_idx);
@@ -54,7 +54,7 @@ fn agree_with_map(robot: &Robot, views: &[&View]) -> bool {
     pairs.map_or_else(is_one, |pairs| pairs.mismatch < GOOD)
 }
 
-/// The camera in the tags' frame: of the places by each tag and each of its poses the one nearest to all others.
+/// Camera position in the tags' frame, m: of those by each tag and each of its poses, the one nearest to all others.
 fn camera_place_m(robot: &Robot, view: &View) -> Option<Vector3<f64>> {
     let posed = posed_tags(view, &robot.tags, &robot.camera.lens);
     let places: Vec<Vector3<f64>> = posed.iter().flat_map(|tag| tag.camera_places_m()).collect();
@@ -67,7 +67,7 @@ fn nominal_place_m(robot: &Robot, view: &View) -> Vector3<f64> {
     robot.tags_from_camera(&JointAngles::from_fn(view.travel_rad.len(), angle_rad)).translation.vector
 }
 
-/// Readings of the joints that move, one vector a joint.
+/// Readings of the joints that move, one vector per joint.
 fn readings(robot: &Robot, views: &[&View]) -> Vec<Vec<f64>> {
     let of_joint = |joint: usize| views.iter().map(|view| view.travel_rad[joint]).collect::<Vec<f64>>();
     let moves = |read: &Vec<f64>| {
@@ -77,7 +77,7 @@ fn readings(robot: &Robot, views: &[&View]) -> Vec<Vec<f64>> {
     (0..robot.n_seen_joints()).map(of_joint).filter(moves).collect()
 }
 
-/// Probability that readings in a random order go with the places as well.
+/// Probability that readings in a random order match the positions as well.
 fn p_of_chance(joints: &[Vec<f64>], places_m: &[Vector3<f64>]) -> f64 {
     let n = places_m.len();
     let of_places = centred(n, |i, k| (places_m[i] - places_m[k]).norm());
@@ -108,7 +108,7 @@ mod tests {
     use rand::RngExt;
     use rand::seq::SliceRandom;
 
-    /// Places of a camera that two of three joints carry, and the joints' readings.
+    /// Positions of a camera that two of three joints carry, and the joints' readings.
     fn drawn(seed: u64, n: usize) -> (Vec<Vec<f64>>, Vec<Vector3<f64>>) {
         let mut rng = stream_rng(seed, "unpaired");
         let joints: Vec<Vec<f64>> =
@@ -121,7 +121,7 @@ mod tests {
         (joints, places)
     }
 
-    /// Reversed, scaled and exchanged columns are no chance; a random order is, in nearly all cases.
+    /// Reversed, scaled and exchanged columns are not chance; a random order is, in nearly all cases.
     #[test]
     fn readings_of_other_instants_are_told_from_readings_that_are_misread() {
         let mut n_chance = 0;

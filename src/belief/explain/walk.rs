@@ -1,16 +1,16 @@
-//! Offsets that walk at random while the views are captured: found, and estimated as they are at the last view.
+//! Offsets with a random walk during the capture: detection, and estimates as of the last view.
 //!
-//! Columns for the modes of a walk (`walk_modes`) cost time, so two figures of the estimate without them ask first: how
-//! much more than stated the offsets change with temperature, for that takes up what walks one way; and a score test of
-//! the walk's variance (Lin 1997). With `z` and `I` of the joint's errors, all else eliminated (`step_test`), and the
-//! modes' variances l, where nothing walks
+//! Columns for the modes of a walk (`walk_modes`) cost time, so two figures of the estimate without them decide first.
+//! One is the excess of the offsets' change with temperature over the stated one, because it absorbs a walk in one
+//! direction. The other is a score test of the walk's variance (Lin 1997). `z` and `I` are those of the joint's errors,
+//! all else marginalised (`step_test`); l are the modes' variances. If nothing walks
 //!
 //! ```text
 //! T = sum_k l_k (phi_k^T z)^2,   A = phi^T I phi,   mean sum_k l_k A_kk,   variance 2 sum_kl l_k l_l A_kl^2
 //! ```
 //!
-//! Then the evidence and a permutation test decide: a walk is no walk where the views in another order have as much of
-//! it (`permutation_test`). No view constrains the offsets afterwards: as much again as during the views is added
+//! Then the evidence and a permutation test decide: there is no walk if the views in another order have as much of it
+//! (`permutation_test`). No view constrains the offsets afterwards, so a walk as long as that during the views is added
 //! to each joint's error.
 
 pub(crate) use crate::explain::constants::walk::WARMTH_WORTH_A_FIT;
@@ -26,7 +26,7 @@ use armcal_core::joints::MAX_JOINTS;
 use armcal_core::time::Stamp;
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
-/// When the first and the last of `views` end; `None` for views that all end together.
+/// Ends of the first and the last of `views`; `None` for views that all end together.
 pub(crate) fn span(views: &[View]) -> Option<[Stamp; 2]> {
     let ends = || views.iter().map(|view| view.end);
     let (first, last) = (ends().min()?, ends().max()?);
@@ -34,8 +34,8 @@ pub(crate) fn span(views: &[View]) -> Option<[Stamp; 2]> {
 }
 
 impl<'a> Estimate<'a> {
-    /// This estimate, or one with walks of the offsets where the views ask for them; and what that brought, where it
-    /// was tried. `input` is what this estimate was made from, but for the terms that were chosen.
+    /// Returns the estimate with walks of the offsets if the views need them, else `self`; and the result of a trial.
+    /// `input`: that of this estimate, except for the terms that were chosen.
     pub(crate) fn with_walks(
         self,
         input: &BundleInput<'a>,
@@ -61,7 +61,7 @@ impl<'a> Estimate<'a> {
         }
         let Some(mut found) = estimate(&wider) else { return (self, None) };
         let gain_nats = evidence_gain_nats(&found, &self);
-        // One that rejects more explains less.
+        // A model that rejects more explains less.
         let least_p = p_value.iter().copied().fold(1.0, f64::min) * self.problem.n_seen_joints as f64;
         let is_in = gain_nats > MIN_WALK_NATS && found.outliers.len() <= self.outliers.len() && least_p < MAX_WALK_P;
         if let Some(walk) = &mut found.model.walk {
@@ -71,8 +71,8 @@ impl<'a> Estimate<'a> {
         (if is_in { found } else { self }, Some(selection))
     }
 
-    /// What a walk is tried with, rad: twice what each joint is off in each view, or what warmth was credited with.
-    /// From much smaller sizes the fit ends where all of it is new in each view.
+    /// Initial standard deviation of a walk, rad: twice each joint's error per view, or the change attributed to
+    /// warmth. From much smaller ones the fit attributes all of it to errors new in each view.
     fn first_walk_std_rad(&self, views: &[View]) -> [f64; MAX_JOINTS] {
         let oil_c = || views.iter().filter_map(|view| view.conditions.oil_c);
         let warmed_k = oil_c().fold(f64::NEG_INFINITY, f64::max) - oil_c().fold(f64::INFINITY, f64::min);
@@ -119,7 +119,7 @@ impl<'a> Estimate<'a> {
     }
 }
 
-/// How many of its standard deviations the statistic of a walk lies above its mean.
+/// Excess of a walk's statistic over its mean, in its standard deviations.
 fn sigmas(score: &SVector<f64, N_WALK_MODES>, information: &SMatrix<f64, N_WALK_MODES, N_WALK_MODES>) -> f64 {
     let by_mode = SVector::<f64, N_WALK_MODES>::from_fn(|k, _| mode_std(k as u8).powi(2));
     let statistic: f64 = (0..N_WALK_MODES).map(|k| by_mode[k] * score[k].powi(2)).sum();

@@ -1,4 +1,4 @@
-//! What an estimate found of how the arm bends.
+//! Report of the estimated sag of the arm.
 
 use crate::checks::constants::drawing_report_sag_report::NAMED_SIGMAS;
 use nalgebra::{Cholesky, DVector};
@@ -8,18 +8,18 @@ use crate::say::finding::{Finding, FindingKind, FindingUnit};
 use crate::solve::estimate::Estimate;
 use armcal_core::joints::JointAngles;
 
-/// A parameter of sag that was estimated.
+/// Estimated parameter of sag.
 struct SagFigure {
     parameter: Parameter,
     size: f64,
     std: f64,
-    /// How far the tool hangs by it, root mean square over the task, m.
+    /// Tool displacement by this parameter, root mean square over the task, m.
     tool_m: f64,
 }
 
 impl Estimate<'_> {
-    /// How the arm bends, with the words: what it would cost not to know it, then what gives, the most at the tool
-    /// first. Nothing where it was not estimated. `task`: angles at which the tool matters.
+    /// Findings on the arm's sag with their texts: first the tool error without sag in the model, then each parameter,
+    /// the largest at the tool first. Empty if sag was not estimated. `task`: configurations at which the tool matters.
     pub(crate) fn sag_findings(&self, task: &[JointAngles]) -> Vec<(Finding, String)> {
         let columns = self.problem.layout.sag.clone();
         if columns.is_empty() {
@@ -78,11 +78,11 @@ impl Estimate<'_> {
         (finding(name, Some((*size, unit)), *tool_m), words)
     }
 
-    /// The joints' parameters and sag's beyond what they would be with a stiff arm: `C_xz C_zz^-1 z`.
+    /// Change of the joints' and sag's parameters relative to a stiff arm: `C_xz C_zz^-1 z`.
     fn unknown_sag(&self, first: usize) -> Option<DVector<f64>> {
         let n = self.problem.layout.n_joint();
         let covariance = self.posterior.covariance.view((0, 0), (n, n));
-        // In units of the standard deviations, which differ by orders of magnitude.
+        // Scaled by the standard deviations, which differ by orders of magnitude.
         let std = covariance.diagonal().map(|variance| variance.max(f64::MIN_POSITIVE).sqrt());
         let scaled = covariance.component_div(&(&std * std.transpose()));
         let size = self.solved.state.joint.rows(first, n - first).component_div(&std.rows(first, n - first));

@@ -1,9 +1,9 @@
-//! What the lens's priors say of the tool where the lens is taken as robot.toml has it.
+//! Tool error from the priors of a lens that is kept as in robot.toml.
 //!
-//! One more linearization, with columns y of the lens in units of their priors, gives their score s, their information
-//! I (all estimated parameters x eliminated) and dx/dy. Most of it the views tell: y has the covariance
-//! `P = (1 + I)^-1` about `m = P s`. The tool of an estimate that keeps the lens is off by `T y`,
-//! `T = d tool/dx dx/dy`: its covariance gets `T (P + m m^T) T^T`.
+//! One more linearization adds columns y of the lens in units of their priors. It gives their score s, their
+//! information I (all estimated parameters x marginalised) and dx/dy. The views determine most of y: it has the
+//! covariance `P = (1 + I)^-1` about the mean `m = P s`. An estimate that keeps the lens has the tool error `T y`,
+//! `T = d tool/dx dx/dy`, so the tool's covariance gets `T (P + m m^T) T^T`.
 
 use crate::checks::constants::reservations_lens::N;
 use nalgebra::{Const, DMatrix, Dyn, Matrix3, OMatrix, SMatrix, SVector};
@@ -17,27 +17,28 @@ use crate::solve::linearize::NormalEquations;
 use armcal_core::numeric::Loss;
 use armcal_core::robot::{CameraSpec, LensPriors};
 
-/// The lens at its priors.
+/// Lens that is not estimated, with its priors.
 pub(crate) struct HeldLens {
-    /// Which lens, in words.
+    /// Name of the lens for messages.
     stem: String,
     priors: LensPriors,
     focal_px: f64,
-    /// Of each number in its own prior's units.
+    /// Information on the lens parameters, in units of their priors' standard deviations.
     information: SMatrix<f64, N, N>,
-    /// `P + m m^T`.
+    /// Second moment of the lens parameters in the same units, `P + m m^T`.
     left: SMatrix<f64, N, N>,
-    /// dx/dy.
+    /// Response of the estimate to the lens parameters, dx/dy.
     response: OMatrix<f64, Dyn, Const<N>>,
 }
 
 impl Estimate<'_> {
-    /// Lenses of the cameras with views.
+    /// Lenses kept as in robot.toml, of the cameras with views.
     pub(crate) fn held_lenses(&self) -> Vec<HeldLens> {
         self.cameras().filter_map(|number| self.held_lens(number)).collect()
     }
 
-    /// `None` where the lens is estimated, or where nobody says what it is: then no view holds corners.
+    /// Returns the lens of camera `number`; `None` if it is estimated or unknown. With an unknown lens, no view holds
+    /// corners.
     fn held_lens(&self, number: usize) -> Option<HeldLens> {
         let (mut problem, block) = (self.problem.clone(), Block::Lens(number));
         let camera = problem.robot.camera_at(number);
@@ -50,7 +51,7 @@ impl Estimate<'_> {
         let mut normal = NormalEquations::new(&problem);
         normal.update(&problem, &self.solved.state, Loss::Square);
         let units = units(camera);
-        // Only the lower triangle is there.
+        // The normal equations fill only the lower triangle.
         let cross = DMatrix::from_fn(self.problem.layout.n, 8, |row, k| {
             if row < at { normal.matrix[(at + k, row)] } else { normal.matrix[(row + 8, at + k)] }
         });
@@ -73,7 +74,7 @@ impl Estimate<'_> {
     }
 }
 
-/// One sigma of each number, in the lens's columns.
+/// Prior standard deviation of each lens parameter (columns), in the lens's columns (rows).
 fn units(camera: &CameraSpec) -> SMatrix<f64, 8, N> {
     let LensPriors { focal_std, center_std_px, distortion_std } = camera.lens_priors;
     let mut units = SMatrix::zeros();
@@ -86,21 +87,21 @@ fn units(camera: &CameraSpec) -> SMatrix<f64, 8, N> {
 }
 
 impl HeldLens {
-    /// Added to the tool's covariance, m^2.
+    /// Covariance that the lens adds to the tool's, m^2.
     pub(crate) fn covariance_m2(&self, tool: &ToolJacobian) -> Matrix3<f64> {
         let by = SMatrix::<f64, 3, N>::from_columns(&self.shifts(tool));
         by * self.left * by.transpose()
     }
 
-    /// Of the tool by one sigma of each number, m.
+    /// Tool displacement by one prior standard deviation of each lens parameter, m.
     fn shifts(&self, tool: &ToolJacobian) -> [nalgebra::Vector3<f64>; N] {
         std::array::from_fn(|k| tool.moved_by(&self.response.column(k).into_owned()))
     }
 
-    /// Each number by itself.
+    /// Elements of the lens, one per parameter.
     pub(super) fn elements(&self, tool: &[ToolJacobian]) -> impl Iterator<Item = HeldElement> {
         let LensPriors { focal_std, center_std_px, distortion_std } = self.priors;
-        // The centre as an angle about the optical centre.
+        // Image centre as an angle at the optical centre.
         let center_rad = center_std_px / self.focal_px;
         let shifts: Vec<_> = tool.iter().map(|at| self.shifts(at)).collect();
         let rest = ["k1", "k2", "k3", "k4"].map(|k| (k, FindingUnit::One, distortion_std));

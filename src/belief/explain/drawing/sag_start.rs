@@ -1,7 +1,7 @@
-//! Would an arm that bends under its weight explain the views better, and how much does it give?
+//! Test whether sag of the arm explains the views better, and initial scales of its compliances.
 //!
-//! The same foretold gain of evidence as for links, with a trial column for each joint's compliance and for each of the
-//! base's three. A load at the tool bends nothing as long as nothing gives: its column comes with the others.
+//! The gain of evidence is predicted as for links, with a trial column for each joint's compliance and for each of the
+//! base's three. A load at the tool bends nothing while nothing is compliant: its column comes with the others.
 
 use nalgebra::SMatrix;
 
@@ -15,14 +15,14 @@ use crate::solve::schur::Group;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::kinematics::Sag;
 
-/// Columns: the joints' compliances, then the base's three.
+/// Trial columns: the joints' compliances, then the base's three.
 type Trials = SMatrix<f64, 6, { MAX_JOINTS + 3 }>;
 
-/// Where the sizes of compliances start from.
+/// Initial scales of compliances.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct SagStart {
     n_joints: usize,
-    /// Over robot.toml's: of the joints, of the base.
+    /// Ratio to robot.toml's: of the joints, of the base.
     multiples: [f64; 2],
 }
 
@@ -38,12 +38,12 @@ impl SagStart {
 }
 
 impl Estimate<'_> {
-    /// Where to start compliances from, and what they may bring, nats.
+    /// Initial scales of compliances, and their predicted evidence gain, nats.
     pub(crate) fn sag_start(&self) -> (SagStart, f64) {
         let robot = self.problem.robot;
         let n_joints = self.n_seen_joints();
         let mut best = (0.0, SagStart { n_joints, multiples: [1.0; 2] });
-        // Before a camera that stands still, poses are in the frame of the tags, where gravity turns.
+        // If the camera is fixed, poses are in the frame of the tags, in which gravity turns.
         if !robot.chain.loads().are_known() || robot.is_watched() {
             return (best.1, 0.0);
         }

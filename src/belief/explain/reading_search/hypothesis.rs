@@ -1,4 +1,4 @@
-//! Ways in which the readings of all joints may be meant and the camera be carried, and how a view is read in each.
+//! Possible meanings of the joint readings, the camera mount and the map's frame, and the views under each.
 
 use crate::explain::angles_by_camera::has_known_mount;
 use crate::explain::constants::reading_search_hypothesis::{
@@ -16,9 +16,9 @@ use crate::views::view::View;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::wrap_symmetric;
 
-/// Zeros are tried at these steps; one sigma of what is left, rad.
+/// Step of the zeros to try, and standard deviation of the rest, rad.
 const ZERO_STEP_RAD: f64 = FRAC_PI_6;
-/// One way to read the joints, or to carry the camera.
+/// One way to read the joints, to carry the camera, or to place the tag map.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Hypothesis {
     /// Joint `k` has the reading of `order[k]`.
@@ -34,20 +34,20 @@ pub(crate) enum Hypothesis {
         own: f64,
         with: Vec<(usize, f64)>,
     },
-    /// A turn less or more, where that is within the limits.
+    /// The readings of these joints are a turn less or more, within their limits.
     OtherTurns(Vec<usize>),
-    /// Added to the angles.
+    /// A constant is added to the angle of each of these joints, rad.
     Zeros(Vec<(usize, f64)>),
-    /// The angle over the reading.
+    /// The angle is `factor` times the reading.
     Scaled {
         joint: usize,
         factor: f64,
     },
-    /// Each view has its own readings at the view so many later.
+    /// The readings of each view are recorded at the view this number of places later.
     Shifted(isize),
-    /// The tag map has its frame there in the base's.
+    /// The tag map's frame has this pose in the base frame.
     MapFrame(Isometry3<f64>),
-    /// The camera is behind so many joints, and its frame is turned.
+    /// The camera is mounted after `n_joints` joints, and its frame is turned.
     Camera {
         n_joints: usize,
         turn: UnitQuaternion<f64>,
@@ -55,8 +55,8 @@ pub(crate) enum Hypothesis {
 }
 
 impl Hypothesis {
-    /// Joints with readings of 0 to 360 deg, where their range is one about zero: some beyond their limits, all within
-    /// them but for a turn.
+    /// Joints whose readings go from 0 to 360 deg although their range is one about zero. Some readings are beyond the
+    /// limits; all are within them except for a turn.
     pub(crate) fn other_turns(robot: &Robot, views: &[View]) -> Option<Self> {
         let is_turned = |&joint: &usize| {
             let spec = &robot.sensors[joint];
@@ -71,7 +71,7 @@ impl Hypothesis {
         (!joints.is_empty()).then_some(Self::OtherTurns(joints))
     }
 
-    /// The same, where one of the joints is beyond its limits in most views.
+    /// Hypothesis of `other_turns`, if one of the joints is beyond its limits in most views.
     pub(crate) fn other_turns_in_most(robot: &Robot, views: &[View]) -> Option<Self> {
         let hypothesis = Self::other_turns(robot, views)?;
         let Self::OtherTurns(joints) = &hypothesis else { return None };
@@ -82,7 +82,7 @@ impl Hypothesis {
         joints.iter().any(in_most).then_some(hypothesis)
     }
 
-    /// All but readings of 0 to 360 deg.
+    /// All single hypotheses except readings of 0 to 360 deg.
     pub(crate) fn all(robot: &Robot) -> Vec<Self> {
         let n = robot.n_seen_joints();
         let order: Vec<usize> = (0..robot.n_joints()).collect();
@@ -109,8 +109,8 @@ impl Hypothesis {
         of_joints.chain(shifted).chain(Self::of_camera(robot)).collect()
     }
 
-    /// Three columns in a circle, and sums that take more than one neighbour or a sign: so many that only those are
-    /// worth an estimate that the nominal arm places well.
+    /// Three columns in a circle, and sums of more than one neighbour or with a sign. They are so many that only those
+    /// are estimated under which the nominal arm fits well.
     pub(crate) fn composite(robot: &Robot) -> Vec<Self> {
         let n = robot.n_seen_joints();
         let order: Vec<usize> = (0..robot.n_joints()).collect();
@@ -126,8 +126,8 @@ impl Hypothesis {
         circles.chain(turning.iter().flat_map(|&joint| Self::sums(joint, &turning))).collect()
     }
 
-    /// Readings of `joint` that contain the angle of any other joint, or of two before it, as one against the base
-    /// does; without those of a single neighbour that are not reversed.
+    /// Readings of `joint` that contain the angle of any other joint, or of two before it, as an angle against the base
+    /// does. Those of a single neighbour that are not reversed are left to `all`.
     fn sums(joint: usize, turning: &[usize]) -> Vec<Self> {
         let others = || turning.iter().copied().filter(move |&other| other != joint);
         let before = || turning.iter().copied().filter(move |&other| other < joint);
@@ -145,7 +145,7 @@ impl Hypothesis {
         all.map(|(own, with)| Self::Sum { joint, own, with }).collect()
     }
 
-    /// On each link, at the stated pose with its frame turned by quarters; where the stated pose is known.
+    /// Camera on each link, at the stated pose with its frame turned by quarters; only if the stated pose is known.
     fn of_camera(robot: &Robot) -> Vec<Self> {
         let camera = &robot.camera;
         if !has_known_mount(robot) || !robot.further_cameras.is_empty() || robot.camera.mount.n_joints == 0 {
@@ -158,7 +158,7 @@ impl Hypothesis {
         all.filter(|one| *one != as_stated).collect()
     }
 
-    /// Handicap in its score: it has more numbers to fit the views with, or is less usual.
+    /// Handicap in the score: for more numbers to fit the views with, or for being less usual.
     pub(crate) fn handicap(&self) -> f64 {
         match self {
             Self::Camera { .. } => CAMERA_HANDICAP,
@@ -176,7 +176,7 @@ impl Hypothesis {
         matches!(self, Self::Camera { .. })
     }
 
-    /// The arm with its camera carried that way.
+    /// Returns the arm with its camera carried by this hypothesis.
     pub(crate) fn robot<'a>(&self, robot: &'a Robot) -> Cow<'a, Robot> {
         let Self::Camera { n_joints, turn } = self else { return Cow::Borrowed(robot) };
         let mut robot = robot.clone();
@@ -186,7 +186,7 @@ impl Hypothesis {
         Cow::Owned(robot)
     }
 
-    /// The views, in the order of time, with their readings taken that way.
+    /// Returns the views, in the order of time, with their readings changed by this hypothesis.
     pub(crate) fn applied(&self, robot: &Robot, views: &[View]) -> Vec<View> {
         let Self::Shifted(by) = self else { return views.iter().map(|view| self.applied_to(robot, view)).collect() };
         let shifted = |(at, view): (usize, &View)| {
@@ -201,7 +201,7 @@ impl Hypothesis {
         views.iter().enumerate().filter_map(shifted).collect()
     }
 
-    /// The view with its own readings taken that way.
+    /// Returns the view with its own readings changed by this hypothesis.
     fn applied_to(&self, robot: &Robot, view: &View) -> View {
         let mut changed = view.clone();
         match self {
@@ -262,7 +262,7 @@ fn wrapped(robot: &Robot, joint: usize, travel_rad: f64) -> f64 {
     }
 }
 
-/// 1 or -1 where both joints turn about parallel axes however the joints between them stand.
+/// Sign 1 or -1 if both joints turn about parallel axes at any angles of the joints between them.
 fn parallel_sign(robot: &Robot, [a, b]: [usize; 2]) -> Option<f64> {
     let joints = robot.chain.joints();
     if joints[a..=b].iter().any(|joint| joint.kind.is_slide()) {

@@ -1,8 +1,8 @@
-//! A tag map in another frame than the arm's base: one rigid motion of all tags.
+//! Tag map in another frame than the arm's base: one rigid motion of all tags.
 //!
-//! The nominal arm tells where in the base's frame each view has its tags. The motion that takes these places to the
-//! map's is found by weighted least squares (Arun 1987), with weights of a Cauchy loss. It is as good as the datasheet:
-//! some centimetres. What is left goes to the place of the first joint, which gets columns with a wide prior.
+//! The nominal arm gives the base frame position of each view's tags. Weighted least squares finds the motion that
+//! takes these positions to the map's (Arun 1987), with weights of a Cauchy loss. It is as accurate as the datasheet:
+//! several centimetres. The rest goes to the pose of the first joint, which gets columns with a wide prior.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Vector3};
 
@@ -14,10 +14,10 @@ use armcal_core::joints::JointAngles;
 use armcal_core::robot::{Robot, SurveyedTag};
 use armcal_core::spatial::Pose;
 
-/// Where the arm sees a tag, base frame, and where the map has it, its own frame.
+/// Position of a tag by the arm, base frame, and by the map, its own frame.
 type Places = (Vector3<f64>, Vector3<f64>);
 
-/// The arm and its views with the tags as the map has them, without what was found of tags since.
+/// Returns the arm and its views with the tags as the map has them, without later findings on tags.
 pub(crate) fn as_given(robot: &Robot, map: &[SurveyedTag], views: &[View]) -> (Robot, Vec<View>) {
     let mut views = views.to_vec();
     for seen in views.iter_mut().flat_map(|view| &mut view.tags).filter(|seen| seen.corners().is_some()) {
@@ -26,7 +26,7 @@ pub(crate) fn as_given(robot: &Robot, map: &[SurveyedTag], views: &[View]) -> (R
     (Robot { tags: map.to_vec(), ..robot.clone() }, views)
 }
 
-/// The arm with the map's tags where they are in its base's frame.
+/// Returns the arm with the map's tags in its base frame.
 pub(crate) fn in_base(robot: &Robot, map_from_base: &Isometry3<f64>) -> Robot {
     let mut robot = robot.clone();
     for tag in &mut robot.tags {
@@ -35,7 +35,7 @@ pub(crate) fn in_base(robot: &Robot, map_from_base: &Isometry3<f64>) -> Robot {
     robot
 }
 
-/// The base in the map's frame, by the nominal arm; `None` where the views show too few tags.
+/// Pose of the base in the map's frame, by the nominal arm; `None` if the views show too few tags.
 pub(crate) fn map_from_base(robot: &Robot, views: &[View]) -> Option<Isometry3<f64>> {
     let places: Vec<Places> = views.iter().flat_map(|view| places(robot, view)).collect();
     let mut weights = vec![1.0; places.len()];
@@ -63,7 +63,7 @@ fn places(robot: &Robot, view: &View) -> Vec<Places> {
     known.map(of_tag).collect()
 }
 
-/// The motion that takes the first of each pair nearest to the second.
+/// Motion that takes the first of each pair nearest to the second.
 fn aligned(places: &[Places], weights: &[f64]) -> Option<Isometry3<f64>> {
     let sum: f64 = weights.iter().sum();
     let mean = |place: fn(&Places) -> Vector3<f64>| {
@@ -85,20 +85,20 @@ fn aligned(places: &[Places], weights: &[f64]) -> Option<Isometry3<f64>> {
     Some(Isometry3::from_parts((mapped_m - turn * seen_m).into(), turn.into()))
 }
 
-/// Gives `input` columns for what is left of the frame.
+/// Adds columns for the remaining frame error to `input`.
 pub(crate) fn free(input: &mut BundleInput<'_>) {
     input.model.n_links = input.model.n_links.max(1);
     input.scales.link_std[0] = FRAME_STD;
 }
 
-/// The map's frame in the base's, by an estimate that started from `map_from_base`.
+/// Pose of the map's frame in the base frame, by an estimate that started from `map_from_base`.
 pub(crate) fn base_from_map(found: &Estimate<'_>, map_from_base: &Isometry3<f64>) -> Isometry3<f64> {
     let robot = found.problem.robot;
     let moved = found.parameters().with_links(robot.clone()).chain.first_place();
     (map_from_base * moved * robot.chain.first_place().inverse()).inverse()
 }
 
-/// Beyond what a base is off that is estimated or named as such.
+/// Returns true if the motion is larger than a base error that is estimated or named as such.
 pub(crate) fn is_large(base_from_map: &Isometry3<f64>) -> bool {
     base_from_map.translation.vector.norm() > LEAST_M || base_from_map.rotation.angle() > LEAST_RAD
 }

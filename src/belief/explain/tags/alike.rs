@@ -1,8 +1,8 @@
-//! Tags that one motion took elsewhere, by the score of their survey.
+//! Tags that one motion displaced, by the score of their survey.
 //!
-//! The module `group` gives each tag of a group six numbers of its own, which a small motion of several tags does not
-//! pay for, and beside a base that may be off it finds others. Tags on one frame have six numbers together. With the
-//! survey's covariance S, the posterior's C and the estimate's departures d from the survey (all tags, on the right), a
+//! The module `group` gives each tag of a group six numbers of its own. A small motion of several tags does not pay for
+//! them, and a possible base error leads to other groups. Tags on one frame have six numbers together. S is the
+//! survey's covariance, C the posterior's, and d the estimate's departures from the survey (all tags, on the right). A
 //! motion g of the tags of a set G, `survey_i' = exp(g) survey_i`, has the score and information
 //!
 //! ```text
@@ -10,7 +10,7 @@
 //! I = sum over G, G of J_i^T (S^-1 (S - C) S^-1)_ik J_k
 //! ```
 //!
-//! all other parameters following (Rao 1948), and promises the evidence of `drawing::gain_nats` under a prior of g,
+//! with all other parameters following (Rao 1948). It promises the evidence of `drawing::gain_nats` under a prior of g,
 //! less the logarithm of the number of sets.
 
 use crate::explain::constants::tags_alike::LEAST_STD;
@@ -30,7 +30,7 @@ struct SurveyScore {
     places: Vec<Vector3<f64>>,
     score: Vec<Vector6<f64>>,
     information: Vec<Vec<Matrix6<f64>>>,
-    /// One sigma of the survey, m and rad.
+    /// Standard deviations of the survey, m and rad.
     std: [f64; 2],
 }
 
@@ -43,7 +43,7 @@ struct Motion {
 }
 
 impl Estimate<'_> {
-    /// Tags that one motion has elsewhere, as the views promise most of, if that is `least_nats` or more.
+    /// Tags that one motion displaced, for the set of the largest predicted gain, if that is `least_nats` or more.
     pub(crate) fn moved_alike(&self, least_nats: f64) -> Vec<TagFault> {
         let Some(score) = SurveyScore::new(self) else { return Vec::new() };
         let Some(best) = score.best().filter(|best| best.gain_nats > least_nats) else { return Vec::new() };
@@ -54,7 +54,7 @@ impl Estimate<'_> {
 }
 
 impl SurveyScore {
-    /// `None` where fewer than two tags are seen.
+    /// Score of the survey; `None` if fewer than two tags are seen.
     fn new(found: &Estimate<'_>) -> Option<Self> {
         let prior = &found.problem.prior;
         let std = |tag: usize| &prior.std[Block::Tag(tag)][..6];
@@ -91,7 +91,7 @@ impl SurveyScore {
         each.max_by(|a, b| a.gain_nats.total_cmp(&b.gain_nats))
     }
 
-    /// The motion of one set under the prior that promises most.
+    /// Motion of one set under the prior of the largest predicted gain.
     fn motion(&self, moved: Vec<usize>, n_sets: f64) -> Option<Motion> {
         let center: Vector3<f64> = moved.iter().map(|&at| self.places[at]).sum::<Vector3<f64>>() / moved.len() as f64;
         let about = Isometry3::from_parts(Translation3::from(center), nalgebra::UnitQuaternion::identity());

@@ -1,9 +1,10 @@
-//! Tags that are not where the survey has them.
+//! Test for tags that are not where the survey has them.
 //!
 //! Each tag's pose is estimated under its survey's prior. If the survey holds, the estimate departs from it by d (on
-//! the right, m and rad) with the covariance `S - C`, S the prior's and C the posterior's: what the data moved it by.
-//! In units of the prior, over the directions of which the data tell, `d^T (S - C)^-1 d` is chi-square. A tag beyond
-//! its limit is freed of its survey if that explains more than any other error of the geometry does.
+//! the right, m and rad) with the covariance `S - C`. S is the prior's, C the posterior's: the difference is what the
+//! data moved it by. In units of the prior, over the directions that the data determine, `d^T (S - C)^-1 d` is
+//! chi-square. A tag beyond its limit is freed of its survey if that explains more than any other error of the geometry
+//! does.
 
 use crate::explain::constants::tags_departure::{TAILS, TOLD_SHARE};
 use crate::judge::constants::FALSE_ALARM;
@@ -15,27 +16,27 @@ use crate::solve::estimate::Estimate;
 use armcal_core::spatial::log;
 use armcal_core::stats::chi_square_quantile;
 
-/// How far the estimate of one tag's pose is from its survey.
+/// Departure of one tag's estimated pose from its survey.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct TagDeparture {
     /// Index into the robot's tags.
     pub tag_idx: usize,
-    /// Distance of the tag's centre, m.
+    /// Distance of the tag's centre from its survey, m.
     pub shift_m: f64,
     pub chi2: f64,
     pub dof: usize,
 }
 
 impl TagDeparture {
-    /// Whether chance explains it, where `n` tags are tested.
+    /// Returns true if chance explains the departure, among `n` tags tested.
     fn is_by_chance(&self, n: usize) -> bool {
         self.chi2 <= TAILS * chi_square_quantile(1.0 - FALSE_ALARM / n.max(1) as f64, self.dof)
     }
 }
 
 impl Estimate<'_> {
-    /// The tag that is least likely where its survey has it, if that is more than chance, and explains more than any
-    /// link or mount that is not as drawn.
+    /// Tag with the most significant departure from its survey. `None` if chance explains it, or another link or mount
+    /// explains more.
     pub(crate) fn moved_tag(&self) -> Option<TagDeparture> {
         let departures: Vec<TagDeparture> =
             (0..self.problem.robot.tags.len()).filter_map(|tag_idx| self.tag_departure(tag_idx)).collect();
@@ -48,14 +49,14 @@ impl Estimate<'_> {
         (worst.chi2 > by_geometry).then_some(worst)
     }
 
-    /// Tags that the data have elsewhere than their survey, by more than chance.
+    /// Tags that the data displace from their survey by more than chance.
     pub(crate) fn departed_tags(&self) -> Vec<usize> {
         let all: Vec<TagDeparture> =
             (0..self.problem.robot.tags.len()).filter_map(|tag_idx| self.tag_departure(tag_idx)).collect();
         all.iter().filter(|departure| !departure.is_by_chance(all.len())).map(|departure| departure.tag_idx).collect()
     }
 
-    /// `None` where the data tell nothing of the tag.
+    /// Departure of one tag; `None` if the data determine nothing of it.
     pub(crate) fn tag_departure(&self, tag_idx: usize) -> Option<TagDeparture> {
         let (pose, covariance) = self.tag(tag_idx);
         let prior = &self.problem.prior;

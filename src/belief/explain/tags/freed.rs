@@ -14,13 +14,13 @@ use armcal_core::robot::{Robot, SurveyedTag};
 use armcal_core::spatial::{Pose, log};
 use armcal_core::stats::quantile;
 
-/// Which tags were freed, and the survey as it was.
+/// Tags that were freed, and the survey as it was.
 pub(crate) struct MovedTags {
     surveyed: Vec<SurveyedTag>,
     freed: Vec<usize>,
     /// Tags that were moved together.
     group: Vec<usize>,
-    /// More tags than may have moved do not fit: the survey stands, and other tests say what is wrong.
+    /// True if more tags do not fit than may have moved: the survey stands, and other tests name the cause.
     has_given_up: bool,
 }
 
@@ -29,18 +29,18 @@ impl MovedTags {
         Self { surveyed: robot.tags.clone(), freed: Vec::new(), group: Vec::new(), has_given_up: false }
     }
 
-    /// What freeing the next tag may bring: half of its chi-square, nats; zero where none was moved.
+    /// Predicted evidence gain of freeing the next tag, nats: half of its chi-square; zero if none was moved.
     pub(crate) fn gain_nats(&self, estimate: &Estimate<'_>) -> f64 {
         let moved = (!self.has_given_up).then(|| estimate.moved_tag()).flatten();
         moved.map_or(0.0, |moved| 0.5 * moved.chi2)
     }
 
-    /// Tags that are estimated because they are not where the survey has them.
+    /// Number of tags that are estimated because they are not where the survey has them.
     pub(crate) fn n_moved(&self) -> usize {
         self.freed.iter().chain(&self.group).collect::<std::collections::BTreeSet<_>>().len()
     }
 
-    /// Takes over what `drawing` says of tags, so that a freed tag's distance is from there.
+    /// Applies the tag faults in `drawing` to the survey, from which a freed tag's distance is counted.
     pub(crate) fn resurveyed(&mut self, robot: &mut Robot, drawing: &Drawing) {
         for fault in &drawing.tags {
             if let TagFault::Swapped(pair) = fault {
@@ -51,7 +51,8 @@ impl MovedTags {
         free(robot, &self.group);
     }
 
-    /// Frees the next tag of `robot` that `estimate` has elsewhere, or takes all of them back; whether it did either.
+    /// Frees the next tag of `robot` that `estimate` displaces, or returns all of them to the survey. Returns true if
+    /// it did either.
     pub(crate) fn revise(&mut self, estimate: &Estimate<'_>, views: &[View], robot: &mut Robot) -> bool {
         if self.has_given_up {
             return false;
@@ -74,7 +75,7 @@ impl MovedTags {
         true
     }
 
-    /// Frees a tag that the estimate has left out altogether, from where its observations have it.
+    /// Frees a tag whose observations the estimate rejects altogether, starting from where they have it.
     fn free_rejected(&mut self, estimate: &Estimate<'_>, views: &[View], robot: &mut Robot) -> bool {
         let rejected = estimate.rejected_tag(views);
         let is_held = |tag: &usize| !self.freed.contains(tag) && !self.group.contains(tag);
@@ -87,8 +88,8 @@ impl MovedTags {
         true
     }
 
-    /// The freed tags as findings, which refuse nothing: those in one another's places, and those that were moved
-    /// together, in one. A tag that is left out has a finding of its own.
+    /// Reports the freed tags as findings, which refuse nothing. Tags in one another's places share one, and so do
+    /// those that were moved together. A tag that is left out has its own finding.
     pub(crate) fn report(&self, estimate: &Estimate<'_>, calibration: &mut Calibration) {
         let rings = self.rings(estimate);
         let is_left = |tag: &&usize| !rings.iter().flatten().any(|of_ring| of_ring == *tag);
@@ -106,7 +107,7 @@ impl MovedTags {
         }
     }
 
-    /// Freed tags that hang in one another's places: each where the next one is surveyed, the last where the first is.
+    /// Freed tags in one another's places: each where the next one is surveyed, the last where the first is.
     pub(crate) fn rings(&self, estimate: &Estimate<'_>) -> Vec<Vec<usize>> {
         let mut left: Vec<usize> = self.group.iter().chain(&self.freed).copied().collect();
         left.sort_unstable();
@@ -144,8 +145,8 @@ impl MovedTags {
         (Finding { kind, name, size: None, unit: None, tool_error_m: None, time_s: None, repaired: true }, words)
     }
 
-    /// The size is the median distance of the tags from their survey. Whether several moved as one is not told: each
-    /// is estimated by itself.
+    /// Finding and text on moved tags, with their median distance from the survey. It does not say whether several
+    /// moved as one: each is estimated separately.
     fn finding(&self, estimate: &Estimate<'_>, tags: &[usize]) -> (Finding, String) {
         let by = |&tag: &usize| log(&self.surveyed[tag].base_from_tag.isometry().inv_mul(&estimate.tag(tag).0));
         let of_each =
@@ -164,7 +165,7 @@ impl MovedTags {
     }
 }
 
-/// Takes the survey's word on `tags` away.
+/// Removes the survey's constraint on `tags`.
 fn free(robot: &mut Robot, tags: &[usize]) {
     for &tag in tags {
         let tag = &mut robot.tags[tag];
@@ -172,14 +173,14 @@ fn free(robot: &mut Robot, tags: &[usize]) {
     }
 }
 
-/// `0.3`, or `0.3 to 4.1` where the values are not the same at that precision.
+/// Text of a range: `0.3`, or `0.3 to 4.1` if the values differ at that precision.
 fn range(values: &[f64], unit: f64) -> String {
     let least = format!("{:.1}", unit * values.iter().copied().fold(f64::INFINITY, f64::min));
     let most = format!("{:.1}", unit * values.iter().copied().fold(0.0, f64::max));
     if least == most { most } else { format!("{least} to {most}") }
 }
 
-/// `1, 2 and 3`.
+/// Text of a list: `1, 2 and 3`.
 fn list(names: &[String]) -> String {
     match names {
         [] => String::new(),

@@ -1,10 +1,10 @@
-//! Tags that were moved together: a panel that was knocked, a frame that was put back a little aside.
+//! Tags that were moved together: a panel that was knocked, a frame that was put back a little off.
 //!
-//! Where several tags are off, the estimate under their survey is a compromise, and every tag seems to have moved. So
-//! all tags are freed. Their departures d from the survey then have the covariance `V = C + S`, of the estimate and the
-//! survey, and the model `d = J m + sum of E_i x_i`: one motion m of all of them against the base, for which no tag is
-//! to blame, and a departure of its own of each tag i that was moved. Generalized least squares; the tags that save
-//! most of `d^T V^-1 d` were moved, while each saves enough. The evidence decides whether they stay.
+//! If several tags moved, the estimate under their survey is a compromise, and every tag seems to have moved. So all
+//! tags are freed. Their departures d from the survey then have the covariance `V = C + S`, of the estimate and the
+//! survey. The model is `d = J m + sum of E_i x_i`: m is one motion of all tags against the base, which no tag causes;
+//! x_i is the own departure of each moved tag i. In generalized least squares, the tags that save most of `d^T V^-1 d`
+//! were moved, while each saves enough. The evidence decides whether they stay.
 
 use crate::explain::constants::tags_freed::MIN_TRUSTED;
 use crate::explain::constants::tags_group::{LEAST_SAVING, LOOSE_STD_M, LOOSE_STD_RAD, MAX_TRIED_ALL};
@@ -16,7 +16,7 @@ use crate::solve::input::BundleInput;
 use armcal_core::robot::Robot;
 use armcal_core::spatial::{adjoint, log};
 
-/// The tags that were moved together; none where fewer than two were, or too few would stay.
+/// Tags that were moved together; none if fewer than two were, or too few would stay.
 pub(crate) fn moved_group(input: &BundleInput<'_>) -> Vec<TagFault> {
     let mut robot = input.robot.clone();
     for tag in &mut robot.tags {
@@ -49,10 +49,10 @@ pub(crate) fn moved_group(input: &BundleInput<'_>) -> Vec<TagFault> {
 struct Departures {
     /// Indices into the robot's tags, six rows each.
     tags: Vec<usize>,
-    /// Where each is by the survey, and by the views, base frame, m.
+    /// Position of each tag by the survey, and by the views, base frame, m.
     places: Vec<[Vector3<f64>; 2]>,
     whitened: DVector<f64>,
-    /// What makes departures white.
+    /// Factor of the covariance, which whitens departures.
     factor: Cholesky<f64, nalgebra::Dyn>,
     /// One motion of all tags, base frame, whitened.
     common: DMatrix<f64>,
@@ -85,13 +85,13 @@ impl Departures {
         Some(Self { tags: seen.into_iter().map(|(tag, _)| tag).collect(), places, whitened, factor, common })
     }
 
-    /// Places in `tags` of those that were moved.
+    /// Indices in `tags` of those that were moved.
     fn moved(&self) -> Vec<usize> {
         let n = self.tags.len();
         let most = most_moved(n);
         let priced = |moved: Vec<usize>| (self.fit(&moved).1 + LEAST_SAVING * moved.len() as f64, moved);
         let cheapest = |all: Vec<Vec<usize>>| all.into_iter().map(priced).min_by(|a, b| a.0.total_cmp(&b.0));
-        // One after the other finds the wrong ones where three of eight were moved.
+        // Adding one at a time finds the wrong ones if three of eight were moved.
         let mut best = cheapest(small_sets(n, most.min(3))).unwrap_or_default();
         while best.1.len() < most {
             let others = (0..n).filter(|at| !best.1.contains(at));
@@ -104,7 +104,7 @@ impl Departures {
         best.1
     }
 
-    /// Two of `moved` that are each at the other's place: not moved, but with exchanged ids.
+    /// Two of `moved` that are each at the other's place: their ids are exchanged, they did not move.
     fn exchanged(&self, moved: &[usize]) -> Option<TagFault> {
         let is_at = |a: usize, b: usize| {
             let [[own, found], [other, _]] = [self.places[a], self.places[b]];
@@ -115,12 +115,12 @@ impl Departures {
         Some(TagFault::Swapped([self.tags[a].min(self.tags[b]), self.tags[a].max(self.tags[b])]))
     }
 
-    /// Each moved tag's departure from the survey beside the common motion, six numbers each.
+    /// Departure of each moved tag from the survey beyond the common motion, six numbers each.
     fn own(&self, moved: &[usize]) -> DVector<f64> {
         self.fit(moved).0.rows_range(6..).into_owned()
     }
 
-    /// Common motion and departures of `moved`, and the chi-square that they leave.
+    /// Common motion and departures of `moved`, and the remaining chi-square.
     fn fit(&self, moved: &[usize]) -> (DVector<f64>, f64) {
         let n = self.whitened.len();
         let mut columns = DMatrix::zeros(n, 6 + 6 * moved.len());
@@ -152,7 +152,7 @@ pub(crate) fn candidate_sets(n: usize) -> Vec<Vec<usize>> {
     small_sets(n, most_moved(n).min(3)).into_iter().filter(|set| set.len() > 1).collect()
 }
 
-/// All sets of up to `most` of `n`; of many only the empty one.
+/// All sets of up to `most` of `n`; only the empty one if `n` is large.
 fn small_sets(n: usize, most: usize) -> Vec<Vec<usize>> {
     let mut all = vec![Vec::new()];
     let mut first = 0;

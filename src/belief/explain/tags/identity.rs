@@ -1,11 +1,11 @@
-//! Tags that are others than the survey has them for: two ids exchanged, a tag of another size, all of another size.
+//! Tags that differ from their survey: two exchanged ids, a tag of another size, or all of another size.
 //!
-//! The camera's poses T_i come from the other tags. A tag that is seen at m_i (camera frame, by its drawn size) and
-//! surveyed at p seems to be at `q_i = T_i m_i`. Where the median of q_i is the place of another tag that does not fit,
-//! and that one's is this one's, their ids are exchanged. A tag of another size is seen too far or too near by the
-//! ratio of the sizes: the median of `|T_i^-1 p| / |m_i|`, if that brings its observations together. Where all tags are
-//! of another size, so is each distance between two of them in one view: the median of `|p_a - p_b| / |m_a - m_b|`,
-//! which no joint has a part in.
+//! The camera's poses T_i come from the other tags. A tag that is seen at m_i (camera frame, by its stated size) and
+//! surveyed at p seems to be at `q_i = T_i m_i`. If the median of q_i is the place of another tag that does not fit,
+//! and the reverse holds, too, their ids are exchanged. A tag of another size is seen too far or too near by the ratio
+//! of the sizes. The ratio is the median of `|T_i^-1 p| / |m_i|`, if it brings the tag's observations together. If all
+//! tags are of another size, so is each distance between two of them in one view. The ratio is the median of
+//! `|p_a - p_b| / |m_a - m_b|`, which no joint affects.
 
 use crate::explain::constants::tags_identity::{
     CLOSER, LEAST_DISTANCE_M, LEAST_RATIO, LEAST_RATIO_OF_FITTING, MIN_OBSERVATIONS, MIN_SIZED, REJECTED_SHARE,
@@ -23,23 +23,24 @@ use armcal_core::robot::Robot;
 use armcal_core::spatial::Pose;
 use armcal_core::stats::quantile;
 
-/// What a tag may be in place of what the survey says.
+/// Fault of a tag's survey.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum TagFault {
-    /// Indices into the robot's tags.
+    /// Two tags with exchanged ids: indices into the robot's tags.
     Swapped([usize; 2]),
-    /// True size over the drawn one.
+    /// True size of one tag over the stated one.
     Size { tag_idx: usize, ratio: f64 },
-    /// The same of all tags: printed at another scale.
+    /// True size of all tags over the stated one: printed at another scale.
     AllSizes { ratio: f64 },
-    /// Moved with others, by about so much in m and rad (module `group`).
+    /// Moved with others, with prior standard deviations in m and rad (module `group`).
     Moved { tag_idx: usize, std: [f64; 2] },
-    /// Moved with others, by one motion of the base frame; its share of what the motion costs, nats (module `alike`).
+    /// Moved with others, by one motion of the base frame; `cost_nats`: its share of the motion's cost (module
+    /// `alike`).
     Alike { tag_idx: usize, base_motion: Isometry3<f64>, cost_nats: f64 },
 }
 
 impl TagFault {
-    /// Makes `robot`'s survey what it is under this fault.
+    /// Changes `robot`'s survey to that under this fault.
     pub(crate) fn apply(&self, robot: &mut Robot) {
         match *self {
             Self::Swapped([a, b]) => {
@@ -71,7 +72,7 @@ impl TagFault {
         }
     }
 
-    /// What it costs beside what an estimate under it counts, nats.
+    /// Cost of the fault beyond that in the evidence of an estimate under it, nats.
     pub(crate) fn cost_nats(&self) -> f64 {
         match *self {
             Self::Alike { cost_nats, .. } => cost_nats,
@@ -79,7 +80,7 @@ impl TagFault {
         }
     }
 
-    /// The tag, where it is one of several that were moved together.
+    /// Tag of this fault, if it is one of several that were moved together.
     pub(crate) fn moved_tag(&self) -> Option<usize> {
         match *self {
             Self::Moved { tag_idx, .. } | Self::Alike { tag_idx, .. } => Some(tag_idx),
@@ -87,21 +88,21 @@ impl TagFault {
         }
     }
 
-    /// Whether both say something of one tag.
+    /// Returns true if both faults concern one tag.
     pub(crate) fn meets(&self, other: &Self) -> bool {
         self.tags().iter().any(|tag| other.tags().contains(tag))
     }
 }
 
-/// A tag as the views have it.
+/// Observations of one tag in all views.
 struct SeenTag {
     tag_idx: usize,
-    /// (base_from_camera, position in the camera frame).
+    /// Pose base_from_camera and position in the camera frame, m, per observation.
     observations: Vec<(Isometry3<f64>, Vector3<f64>)>,
 }
 
 impl Estimate<'_> {
-    /// The faults of tags that `views` speak for; each has to prove itself by an estimate.
+    /// Possible tag faults by `views`; an estimate has to confirm each.
     pub(crate) fn tag_faults(&self, views: &[View]) -> Vec<TagFault> {
         let doubtful = self.doubtful_tags();
         let seen: Vec<SeenTag> = doubtful.into_iter().map(|tag_idx| self.seen(tag_idx, views)).collect();
@@ -118,8 +119,8 @@ impl Estimate<'_> {
         faults
     }
 
-    /// The size that differs the most of those of tags that fit so far: seen from all sides, such a tag stays where it
-    /// is, and its observations are off here and there.
+    /// Most significant size error of the tags that fit so far. If seen from all sides, such a tag stays where it is,
+    /// and its observations are off here and there.
     fn surest_size(&self, views: &[View]) -> Option<TagFault> {
         let robot = self.problem.robot;
         let all = (0..robot.tags.len()).map(|tag_idx| self.seen(tag_idx, views));
@@ -132,8 +133,7 @@ impl Estimate<'_> {
         large.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, fault)| fault)
     }
 
-    /// The tag most of whose observations are rejected, which agree on another place than its survey's, and that place,
-    /// base frame, m.
+    /// Tag most of whose observations are rejected but agree on another place, and that place, base frame, m.
     pub(crate) fn rejected_tag(&self, views: &[View]) -> Option<(usize, Vector3<f64>)> {
         let robot = self.problem.robot;
         let rejected = (0..robot.tags.len()).filter(|tag| self.rejected_share(*tag) > REJECTED_SHARE);
@@ -143,7 +143,7 @@ impl Estimate<'_> {
         Some((most.tag_idx, most.place(1.0)))
     }
 
-    /// Tags of which no observation fits, with the number of these.
+    /// Tags without a fitting observation, with the number of their observations.
     pub(crate) fn left_out_tags(&self) -> impl Iterator<Item = (usize, usize)> {
         let observations = &self.problem.observations;
         let n_of = |tag: usize| observations.iter().filter(|observation| observation.block == Block::Tag(tag)).count();
@@ -152,7 +152,7 @@ impl Estimate<'_> {
         unused.map(move |tag| (tag, n_of(tag))).filter(|(_, n)| *n >= MIN_OBSERVATIONS)
     }
 
-    /// Tags that do not fit, or that the data have elsewhere.
+    /// Tags that do not fit, or that the data displace from their survey.
     pub(crate) fn doubtful_tags(&self) -> Vec<usize> {
         let elsewhere = self.departed_tags();
         let is_doubtful = |tag: &usize| self.rejected_share(*tag) > REJECTED_SHARE || elsewhere.contains(tag);
@@ -165,7 +165,7 @@ impl Estimate<'_> {
         of_tag().filter(|observation| !observation.is_used).count() as f64 / of_tag().count().max(1) as f64
     }
 
-    /// Where the views that other tags place see a tag.
+    /// Observations of a tag in the views that other tags locate.
     fn seen(&self, tag_idx: usize, views: &[View]) -> SeenTag {
         let problem = &self.problem;
         let mut observations = Vec::new();
@@ -186,7 +186,7 @@ impl Estimate<'_> {
     }
 }
 
-/// True size of all tags over the drawn one, by the distances between tags of one view; `None` where the drawn size
+/// True size of all tags over the stated one, by the distances between tags of one view. `None` if the stated size
 /// explains them, or no view has two tags.
 pub(crate) fn common_size_ratio(views: &[View], robot: &Robot) -> Option<f64> {
     let place = |tag: &TagObservation| robot.tags[tag.tag_idx].base_from_tag.isometry().translation.vector;
@@ -207,7 +207,7 @@ pub(crate) fn common_size_ratio(views: &[View], robot: &Robot) -> Option<f64> {
 }
 
 impl SeenTag {
-    /// The median of where it seems to be, base frame.
+    /// Median position of the tag by its observations, base frame, m, for a size of `ratio` times the stated one.
     fn place(&self, ratio: f64) -> Vector3<f64> {
         let along = |axis: usize| {
             let all = self
@@ -219,7 +219,7 @@ impl SeenTag {
         Vector3::new(along(0), along(1), along(2))
     }
 
-    /// Whether the observations are nearer to one another than to the survey.
+    /// Returns true if the observations are nearer to one another than to the survey.
     fn is_elsewhere(&self, robot: &Robot) -> bool {
         let place = self.place(1.0);
         let off = self.observations.iter().map(|(base_from_camera, at)| base_from_camera * Point3::from(*at) - place);

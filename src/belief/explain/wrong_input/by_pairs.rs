@@ -1,4 +1,4 @@
-//! The reading of recording, map or lens with which the tags of each view fit one another.
+//! Search for the reading of recording, map or lens under which the tags of each view fit one another.
 
 use super::pairs::{Pairs, distances, mismatch};
 use super::{BETTER, GOOD, SIZE_TOLERANCE, StatedCamera, lens, map, recording};
@@ -9,7 +9,7 @@ use crate::views::view::{TagMeasurement, TagObservation, View};
 use armcal_core::optics::{CameraModel, TagFamily};
 use armcal_core::robot::SurveyedTag;
 
-/// The first of these: a reading of poses, map or lens that fits, exchanged ids, another map, a wrong scale.
+/// Returns the first that fits of these: a reading of poses, map or lens, exchanged ids, another map, a wrong scale.
 pub(crate) fn by_pairs(
     views: &[&View],
     tags: &[SurveyedTag],
@@ -36,7 +36,7 @@ pub(crate) fn by_pairs(
     is_scaled.then(|| of_scale(views, camera.tag_family, as_written))
 }
 
-/// A scale of recorded positions, by their distances alone: such landmarks have no rotation that could tell more.
+/// Wrong scale of recorded positions, by their distances only: such landmarks have no rotation that could reveal more.
 pub(crate) fn by_distances(views: &[&View], tags: &[SurveyedTag], family: TagFamily) -> Option<WrongInput> {
     let found = distances(views, tags)?;
     let is_scaled = (found.ratio - 1.0).abs() > SIZE_TOLERANCE;
@@ -49,7 +49,7 @@ fn wrong_by(as_written: &Pairs, input: WrongInputKind, otherwise: Option<f64>) -
     WrongInput { input, measure, mismatch, mismatch_otherwise: otherwise, size_hint: None }
 }
 
-/// The mismatch with recorded poses read otherwise; none where there are no poses.
+/// Mismatch of recorded poses under each other reading; empty if there are no poses.
 fn poses_otherwise(views: &[&View], tags: &[SurveyedTag], lens: &CameraModel) -> Vec<(WrongInputKind, Option<Pairs>)> {
     let is_pose = |seen: &TagObservation| matches!(seen.measured, TagMeasurement::Pose(_));
     if !views.iter().any(|view| view.tags.iter().any(is_pose)) {
@@ -62,7 +62,7 @@ fn poses_otherwise(views: &[&View], tags: &[SurveyedTag], lens: &CameraModel) ->
     recording::readings().into_iter().map(|(input, read)| (input, with(read))).collect()
 }
 
-/// Meaning of a scale of all distances: the tags' size where they are seen in pixels; for positions, their unit or the
+/// Meaning of a scale of all distances: the tags' size if they are seen in pixels; for positions, their unit or the
 /// detector's size.
 fn of_scale(views: &[&View], family: TagFamily, as_written: &Pairs) -> WrongInput {
     let ratio = as_written.ratio;

@@ -1,11 +1,11 @@
-//! Other lenses than robot.toml's: of another image size, focal length or model, without distortion.
+//! Possible lenses other than robot.toml's: of another image size, focal length or model, or without distortion.
 
 use super::SIZE_TOLERANCE;
 use crate::explain::constants::wrong_input_lens::{FISHEYE_RAD, FOCAL_STEP, FOCAL_STEPS, IMAGE_SCALES};
 use crate::say::wrong_input::WrongInputKind;
 use armcal_core::optics::{CameraModel, Fisheye, LensModel, Radtan};
 
-/// The lens as it may be meant.
+/// Possible meanings of the stated lens.
 pub(crate) fn readings(lens: &CameraModel) -> Vec<(WrongInputKind, CameraModel)> {
     let sizes = IMAGE_SCALES.map(|scale| (WrongInputKind::ImageScale(scale), scaled(lens, 1.0 / scale)));
     let models =
@@ -30,13 +30,14 @@ fn of_focal_length(lens: &CameraModel, ratio: f64) -> CameraModel {
     lens.with_intrinsics([fx * ratio, fy * ratio, cx, cy, a, b, c, d])
 }
 
-/// The lens with its stated focal length and centre alone.
+/// The lens with only its stated focal length and centre.
 fn without_distortion(lens: &CameraModel) -> CameraModel {
     let [fx, fy, cx, cy, ..] = lens.intrinsics();
     lens.with_intrinsics([fx, fy, cx, cy, 0.0, 0.0, 0.0, 0.0])
 }
 
-/// A lens of the same focal length and centre, without distortion: a fisheye for a pinhole, and the other way round.
+/// Lens of the other model with the same focal length and centre, without distortion: a fisheye for a pinhole, and the
+/// reverse.
 pub(crate) fn of_other_model(lens: &CameraModel) -> CameraModel {
     let (focal_px, center_px, resolution_px) = (lens.focal_px(), lens.center_px(), lens.resolution_px());
     let other: CameraModel = match lens.lens {

@@ -15,7 +15,7 @@ use armcal_core::robot::SurveyedTag;
 use armcal_core::spatial::Pose;
 use armcal_core::stats::quantile;
 
-/// The map as it may be meant.
+/// Possible meanings of the map.
 pub(crate) fn readings(tags: &[SurveyedTag]) -> Vec<(WrongInputKind, Vec<SurveyedTag>)> {
     let changed = |change: &dyn Fn(&SurveyedTag) -> SurveyedTag| tags.iter().map(change).collect::<Vec<_>>();
     let mut found = vec![(WrongInputKind::MapQuaternions, changed(&in_other_order))];
@@ -29,8 +29,8 @@ pub(crate) fn readings(tags: &[SurveyedTag]) -> Vec<(WrongInputKind, Vec<Surveye
     found
 }
 
-/// A size that stands beside its print: of tag36h11 the border square has 8 of the 10 cells that the whole print has.
-/// `None` where `ratio`, of the true size over the stated one, says neither.
+/// Hint that a size includes the print's margin, or lacks it: for tag36h11 the border square has 8 of the whole print's
+/// 10 cells. `None` if `ratio`, of the true size over the stated one, suggests neither.
 #[must_use]
 pub(crate) fn margin_hint(family: TagFamily, ratio: f64) -> Option<String> {
     let (border, whole) = (family.n_cells(), family.n_cells() + 2 * family.n_margin_cells());
@@ -51,11 +51,11 @@ pub(crate) fn margin_hint(family: TagFamily, ratio: f64) -> Option<String> {
     }
 }
 
-/// An axis each, and its sign.
+/// Source axis and sign of each axis.
 pub(crate) type SignedAxes = [(usize, f64); 3];
 
-/// Left-handed readings of a position, in words: one axis of the other sign, or two axes exchanged. What is
-/// right-handed turns the map as a whole, and the arm has a part in it.
+/// Left-handed readings of a position, with their text: one axis of the other sign, or two axes exchanged. Right-handed
+/// ones turn the map as a whole, which affects the arm, too.
 pub(crate) fn other_axes() -> impl Iterator<Item = (String, SignedAxes)> {
     let changed = |change: &dyn Fn(&mut SignedAxes)| {
         let mut axes = [0, 1, 2].map(|axis| (axis, 1.0));
@@ -68,7 +68,7 @@ pub(crate) fn other_axes() -> impl Iterator<Item = (String, SignedAxes)> {
     mirrored.into_iter().chain(exchanged).map(move |axes| (format!("({})", axes.map(word).join(", ")), axes))
 }
 
-/// The tag at its position read by these axes; its rotation stays.
+/// Returns the tag with its position read by these axes; its rotation stays.
 fn with_axes(tag: &SurveyedTag, axes: SignedAxes) -> SurveyedTag {
     let pose = tag.base_from_tag.isometry();
     let place = Vector3::from(axes.map(|(axis, sign)| sign * pose.translation.vector[axis]));
@@ -76,8 +76,8 @@ fn with_axes(tag: &SurveyedTag, axes: SignedAxes) -> SurveyedTag {
     SurveyedTag { base_from_tag: Pose::from_isometry(placed), ..tag.clone() }
 }
 
-/// The 23 rotations that take a cube to itself and are not the identity, w at least 0: the conventions of tag frames
-/// differ by one of them, whichever corner is the first and wherever z points.
+/// The 23 rotations that take a cube to itself and are not the identity, w at least 0. Conventions of tag frames differ
+/// by one of them, in the first corner and in the direction of z.
 pub(crate) fn quarter_turns() -> impl Iterator<Item = UnitQuaternion<f64>> {
     let about = |axis: Vector3<f64>, n: u8| UnitQuaternion::from_scaled_axis(axis * (f64::from(n) * FRAC_PI_2));
     let faces = (0..4).map(move |n| about(Vector3::x(), n)).chain([1, 3].map(|n| about(Vector3::y(), n)));
@@ -90,15 +90,15 @@ fn turned_by(tag: &SurveyedTag, turn: &UnitQuaternion<f64>) -> SurveyedTag {
     SurveyedTag { base_from_tag: Pose::from_isometry(tag.base_from_tag.isometry() * turn), ..tag.clone() }
 }
 
-/// A tag whose quaternion was written x, y, z, w.
+/// Returns the tag with its quaternion read as x, y, z, w.
 fn in_other_order(tag: &SurveyedTag) -> SurveyedTag {
     let pose = tag.base_from_tag.isometry();
     let turned = Isometry3::from_parts(pose.translation, reordered(&pose.rotation));
     SurveyedTag { base_from_tag: Pose::from_isometry(turned), ..tag.clone() }
 }
 
-/// Tags that hang in one another's places, as the others have them: their ids, and their mismatch as written and so
-/// taken. The tag that fits the others least is set aside, until those that are left fit one another.
+/// Ids of tags in one another's places, by the other tags; and their mismatch as written and exchanged. The tag that
+/// fits the others least is set aside, until the remaining ones fit one another.
 pub(crate) fn exchanged_ids(views: &[&View], tags: &[SurveyedTag], lens: &CameraModel) -> Option<(Vec<u32>, f64, f64)> {
     let posed: Vec<Vec<PosedTag<'_>>> = views.iter().map(|view| posed_tags(view, tags, lens)).collect();
     let (mut sound, mut doubtful) = (tags.iter().filter(|tag| tag.is_known()).collect::<Vec<_>>(), Vec::new());

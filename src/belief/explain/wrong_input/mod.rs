@@ -1,9 +1,9 @@
-//! A file that the images contradict: how the tags stand to one another is seen without the arm.
+//! Input files that the images contradict: the images show the tags' relative poses without the arm.
 //!
-//! `pairs` measures by how much the tags of one view differ from the map; a large mismatch means that map or lens is
-//! wrong, and no joint has a part in it. `recording`, `map` and `lens` have other readings of their file; `by_pairs`
-//! names the one that makes the mismatch small. `recording` looks at pixels, and at rotations of a single landmark;
-//! `positions` at positions without rotations.
+//! `pairs` measures how much the tags of one view differ from the map. A large mismatch means that map or lens is
+//! wrong, regardless of the joints. `recording`, `map` and `lens` have other readings of their file; `by_pairs` names
+//! the one with a small mismatch. `recording` also tests pixels, and rotations of a single landmark; `positions` tests
+//! positions without rotations.
 
 pub(crate) mod by_pairs;
 pub(crate) mod lens;
@@ -22,7 +22,7 @@ use armcal_core::robot::{Robot, SurveyedTag};
 use by_pairs::{by_distances, by_pairs};
 use pairs::mismatch;
 
-/// The input that explains why the views do not fit; `tags` as the map has them.
+/// Wrong input that explains why the views do not fit; `tags`: as in the map.
 pub(crate) fn wrong_input(data: &CaptureData, tags: &[SurveyedTag], robot: &Robot) -> Option<WrongInput> {
     let of_first = data.fit.iter().chain(&data.held_out).filter(|view| view.camera == 0);
     let views: Vec<&View> = of_first.take(MAX_VIEWS).collect();
@@ -38,14 +38,14 @@ pub(crate) fn wrong_input(data: &CaptureData, tags: &[SurveyedTag], robot: &Robo
     }
 }
 
-/// What is stated of a camera and of what it looks at.
+/// Stated values of a camera and its scene.
 #[derive(Clone, Copy)]
 pub(crate) struct StatedCamera<'a> {
     pub lens: &'a CameraModel,
     pub tag_family: TagFamily,
 }
 
-/// The same without an arm, of views of one camera: `data` has its corners.
+/// Wrong input without an arm, for views of one camera; `data` has its corners.
 pub(crate) fn wrong_input_of_camera(
     data: &CaptureData,
     tags: &[SurveyedTag],

@@ -1,8 +1,8 @@
 //! Pairs of tags in one view: the map's distances against those seen, without the arm.
 //!
-//! Of two tags a and b in one view, a's pose in the camera `C_a` and the map's `a_from_b` say where b is. Its distance
-//! from where it is seen, over the distance between both, is the mismatch; the median over all pairs counts. One scale
-//! of all tags is taken out beforehand, by the median ratio of the map's distances to the seen ones.
+//! For two tags a and b in one view, a's pose in the camera `C_a` and the map's `a_from_b` predict b's position. The
+//! mismatch is its distance from the seen position, over the distance between both; the median over all pairs counts.
+//! One scale of all tags is removed first, by the median ratio of the map's distances to the seen ones.
 
 use crate::explain::constants::wrong_input_pairs::MIN_PAIRS;
 use nalgebra::{Isometry3, Point3, Vector3};
@@ -12,16 +12,16 @@ use armcal_core::optics::{CameraModel, solve_square_both};
 use armcal_core::robot::SurveyedTag;
 use armcal_core::stats::quantile;
 
-/// Of all pairs of tags in one view: the map's distances over those seen, and the mismatch with that scale.
+/// Median over all pairs of tags in one view: the map's distances over those seen, and the mismatch with that scale.
 pub(crate) struct Pairs {
     pub ratio: f64,
     pub mismatch: f64,
 }
 
-/// A tag as one view has it.
+/// Tag with its poses in one view.
 pub(crate) struct PosedTag<'a> {
     pub surveyed: &'a SurveyedTag,
-    /// In the camera; two where a square has two.
+    /// Poses in the camera frame; two if a square has two.
     poses: Vec<Isometry3<f64>>,
 }
 
@@ -40,7 +40,7 @@ pub(crate) fn mismatch(views: &[&View], tags: &[SurveyedTag], lens: &CameraModel
     Some(Pairs { ratio, mismatch: quantile(&mismatches, 0.5)? })
 }
 
-/// Mismatch of positions without rotations: how far the ratio of the distances of two tags is from that of most.
+/// Mismatch of positions without rotations: deviation of the distance ratio of two tags from the median ratio.
 pub(crate) fn distances(views: &[&View], tags: &[SurveyedTag]) -> Option<Pairs> {
     let place_m = |seen: &TagObservation| {
         let tag = tags.get(seen.tag_idx).filter(|tag| tag.is_known())?;
@@ -89,12 +89,13 @@ impl PosedTag<'_> {
         self.poses[0].translation.vector
     }
 
-    /// Where the map and the tag's poses have the camera, in the map's frame.
+    /// Camera positions by the map and the tag's poses, in the map's frame, m.
     pub(crate) fn camera_places_m(&self) -> impl Iterator<Item = Vector3<f64>> + '_ {
         self.poses.iter().map(|pose| (self.surveyed.base_from_tag.isometry() * pose.inverse()).translation.vector)
     }
 
-    /// Where this tag and the map have `other`, against where it is seen.
+    /// Distance between the position of `other` by this tag and the map and its seen position, over the distance of
+    /// both.
     fn mismatch_of(&self, other: &Self, ratio: f64) -> f64 {
         let (from, to) = (self.surveyed.base_from_tag.isometry(), other.surveyed.base_from_tag.isometry());
         let place = Point3::from(from.inv_mul(to).translation.vector / ratio);
@@ -104,7 +105,7 @@ impl PosedTag<'_> {
     }
 }
 
-/// Where the tag `id` is seen against where the tags `others` have it, if it hangs at `place`; median.
+/// Median mismatch of the tag `id` with its position by the tags `others`, if it is mounted at `place`.
 pub(crate) fn mismatch_at(
     posed: &[Vec<PosedTag<'_>>],
     id: u32,

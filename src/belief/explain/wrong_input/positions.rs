@@ -1,8 +1,8 @@
-//! Recorded positions without rotations that are those of the camera in the tag's frame.
+//! Test for recorded positions without rotations that are those of the camera in the tag's frame.
 //!
-//! With the map's rotation of a tag such a position says where the camera is, and all tags of a view must say the same.
-//! Where a view has one tag, or the distances of tags that are turned alike are right all the same, the arm by its
-//! datasheet says where the camera is.
+//! With the map's rotation of a tag such a position gives the camera's position, and all tags of a view must agree on
+//! it. The arm by its datasheet gives the camera's position in two cases: a view has one tag, or its tags are turned
+//! alike, so that their distances fit both ways.
 
 use nalgebra::{Point3, Vector3};
 
@@ -16,15 +16,15 @@ use armcal_core::joints::JointAngles;
 use armcal_core::robot::{Robot, SurveyedTag};
 use armcal_core::stats::quantile;
 
-/// A position, its tag's place in the map, and the camera's place if the position is that of the camera in the tag's
-/// frame.
+/// Recorded position, its tag's position in the map, and the camera's position if the recorded one is that of the
+/// camera in the tag's frame.
 struct Positioned {
     in_camera_m: Vector3<f64>,
     tag_m: Vector3<f64>,
     camera_m: Vector3<f64>,
 }
 
-/// Positions that are inverse, by the tags of each view or by the arm.
+/// Wrong direction of positions, by the tags of each view or by the arm.
 pub(crate) fn by_positions(views: &[&View], tags: &[SurveyedTag], robot: &Robot) -> Option<WrongInput> {
     let of_view = |view: &&View| view.tags.iter().filter_map(|seen| positioned(seen, tags)).collect::<Vec<_>>();
     let positions: Vec<Vec<Positioned>> = views.iter().map(of_view).collect();
@@ -35,7 +35,7 @@ pub(crate) fn by_positions(views: &[&View], tags: &[SurveyedTag], robot: &Robot)
     by_tags.or_else(|| wrong_direction(MismatchMeasure::Positions, off_the_arm(views, &positions, robot)?, NEAR_ARM))
 }
 
-/// `good`: below this the inverse positions fit.
+/// Wrong direction if the inverse positions fit and the written ones do not. `good`: mismatch below which they fit.
 fn wrong_direction(measure: MismatchMeasure, [as_written, inverse]: [f64; 2], good: f64) -> Option<WrongInput> {
     let is_inverse = as_written > BAD && inverse < good.min(BETTER * as_written);
     let input = WrongInputKind::RecordedDirection;
@@ -52,7 +52,7 @@ fn positioned(seen: &TagObservation, tags: &[SurveyedTag]) -> Option<Positioned>
     is_position.then_some(Positioned { in_camera_m: seen.center_in_camera_m, tag_m, camera_m })
 }
 
-/// How far apart two tags of a view have the camera, over their distance; median.
+/// Median distance between the camera positions by two tags of a view, over the tags' distance.
 fn disagreement(positions: &[Vec<Positioned>]) -> Option<f64> {
     let mut all = Vec::new();
     for of_view in positions {
@@ -64,8 +64,8 @@ fn disagreement(positions: &[Vec<Positioned>]) -> Option<f64> {
     quantile(&all, 0.5)
 }
 
-/// By the datasheet's arm, over the distance between camera and tag: where the tag is not as written, and where the
-/// camera is not if the positions are inverse; medians.
+/// Median errors against the datasheet's arm, over the distance between camera and tag: of the tag as written, and of
+/// the camera if the positions are inverse.
 fn off_the_arm(views: &[&View], positions: &[Vec<Positioned>], robot: &Robot) -> Option<[f64; 2]> {
     let mut all = [Vec::new(), Vec::new()];
     for (view, of_view) in views.iter().zip(positions) {

@@ -1,8 +1,7 @@
 //! Other readings of the recording: pixels of another image, poses in another order or direction.
 //!
-//! Where views have several landmarks, these tell which reading is right (`by_pairs`). Where a view has one, the arm by
-//! its datasheet tells where that stands: the rotations of `base_from_tag` over the views must agree but for what
-//! sensors may be off.
+//! If views have several landmarks, these determine the right reading (`by_pairs`). If a view has one, the arm by its
+//! datasheet locates it. The rotations of `base_from_tag` over the views must then agree within the sensors' errors.
 
 use crate::explain::constants::wrong_input_recording::{BEYOND_IMAGE, GOOD_SPREAD_RAD, MIN_ROTATIONS, SPREAD_RAD};
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion};
@@ -14,7 +13,7 @@ use armcal_core::joints::JointAngles;
 use armcal_core::robot::Robot;
 use armcal_core::stats::quantile;
 
-/// Corners that are no pixels of an image of that size.
+/// Wrong input of corners that are not pixels of an image of the stated size.
 pub(crate) fn beside_image(stated_px: [u32; 2], data: &CaptureData) -> Option<WrongInputKind> {
     let (smallest_px, largest_px) = (data.smallest_px, data.largest_px);
     let sides_px = stated_px.map(f64::from);
@@ -29,10 +28,10 @@ pub(crate) fn beside_image(stated_px: [u32; 2], data: &CaptureData) -> Option<Wr
     }
 }
 
-/// How a recorded pose may be meant.
+/// Possible meaning of a recorded pose.
 pub(crate) type Reading = fn(&Isometry3<f64>) -> Isometry3<f64>;
 
-/// Recorded poses as they may be meant. A reader may have inverted them already, so that each order of quaternions
+/// Possible meanings of recorded poses. A reader may have inverted them already, so that each order of quaternions
 /// counts for the pose and for its inverse.
 pub(crate) fn readings() -> [(WrongInputKind, Reading); 11] {
     use WrongInputKind::{RecordedDirection, RecordedOrderAndDirection, RecordedQuaternions, RecordedRotations};
@@ -55,7 +54,7 @@ fn with(pose: &Isometry3<f64>, turn: fn(&UnitQuaternion<f64>) -> UnitQuaternion<
     Isometry3::from_parts(pose.translation, turn(&pose.rotation))
 }
 
-/// The view with its recorded poses read that way.
+/// Returns the view with its recorded poses read by `read`.
 pub(crate) fn read_by(view: &View, read: Reading) -> View {
     let mut view = view.clone();
     for seen in &mut view.tags {
@@ -66,7 +65,7 @@ pub(crate) fn read_by(view: &View, read: Reading) -> View {
     view
 }
 
-/// Of recorded poses of one landmark a view.
+/// Wrong reading of recorded poses, by the rotations of one landmark per view.
 pub(crate) fn by_rotations(views: &[&View], robot: &Robot) -> Option<WrongInput> {
     let base_from_camera = |view: &View| {
         let angle_rad = |joint: usize| robot.sensors[joint].center_rad + view.travel_rad[joint];
@@ -87,7 +86,7 @@ pub(crate) fn by_rotations(views: &[&View], robot: &Robot) -> Option<WrongInput>
         spread_rad(&posed.iter().map(turned).collect::<Vec<_>>())
     };
     let as_written = spread(|pose| *pose)?;
-    // Rotations alone do not tell the inverse of a pose from that of its rotation.
+    // Rotations do not distinguish the inverse of a pose from that of its rotation.
     let readings = readings().into_iter().filter(|(input, _)| *input != WrongInputKind::RecordedRotations);
     let spreads = readings.filter_map(|(input, read)| Some((input, spread(read)?)));
     let (input, least) = spreads.min_by(|a, b| a.1.total_cmp(&b.1))?;
@@ -101,7 +100,8 @@ pub(crate) fn by_rotations(views: &[&View], robot: &Robot) -> Option<WrongInput>
     })
 }
 
-/// Median angle of a landmark's rotations from the one that is nearest to all others; the largest of all landmarks.
+/// Median angle of a landmark's rotations from the one that is nearest to all others, rad; the largest of all
+/// landmarks.
 fn spread_rad(poses: &[(usize, Isometry3<f64>)]) -> Option<f64> {
     let mut tags: Vec<usize> = poses.iter().map(|(tag, _)| *tag).collect();
     tags.sort_unstable();
@@ -117,13 +117,13 @@ fn spread_rad(poses: &[(usize, Isometry3<f64>)]) -> Option<f64> {
     tags.into_iter().filter_map(of_tag).reduce(f64::max)
 }
 
-/// `[w, x, y, z]` as read, of what was `[x, y, z, w]`.
+/// Rotation that was written `[x, y, z, w]` and read as `[w, x, y, z]`.
 pub(crate) fn reordered(read: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
     let [x, y, z, w] = [read.w, read.i, read.j, read.k];
     UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z))
 }
 
-/// The same the other way: `[x, y, z, w]` as read, of what was `[w, x, y, z]`.
+/// Rotation that was written `[w, x, y, z]` and read as `[x, y, z, w]`.
 pub(crate) fn reordered_back(read: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
     let [w, x, y, z] = [read.i, read.j, read.k, read.w];
     UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z))

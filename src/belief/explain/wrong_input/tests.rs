@@ -17,7 +17,7 @@ use armcal_core::log::read_recording;
 use armcal_core::optics::{LensModel, TagFamily, solve_square};
 use armcal_core::spatial::Pose;
 
-/// The sample's views, and the arm with the tags that were around it.
+/// Views of the sample, and the arm with the tags in its scene.
 fn sample() -> (CaptureData, Robot) {
     static SAMPLE: LazyLock<(CaptureData, Robot)> = LazyLock::new(read_sample);
     SAMPLE.clone()
@@ -34,7 +34,7 @@ fn found(data: &CaptureData, robot: &Robot) -> Option<WrongInputKind> {
     wrong_input(data, &robot.tags, robot).map(|wrong| wrong.input)
 }
 
-/// Each tag's place as `change` makes it of its index and pose.
+/// Returns the robot with each tag's pose as `change` makes it of its index and pose.
 fn with_tags(robot: &Robot, change: impl Fn(usize, &Isometry3<f64>) -> Isometry3<f64>) -> Robot {
     let mut robot = robot.clone();
     for (k, tag) in robot.tags.iter_mut().enumerate() {
@@ -50,7 +50,7 @@ fn a_map_and_a_lens_that_are_right_are_not_blamed() {
     let pairs = mismatch(&views, &robot.tags, &robot.camera.lens).expect("pairs of tags");
     assert!(pairs.mismatch < 0.5 * GOOD && (pairs.ratio - 1.0).abs() < 0.01, "{} {}", pairs.mismatch, pairs.ratio);
     assert_eq!(found(&data, &robot), None);
-    // Nor is a frame that is turned or shifted as a whole: the arm has a part in it.
+    // A frame that is turned or shifted as a whole is not named either, because the arm is involved.
     let turn = Isometry3::new(Vector3::new(0.3, 0.0, 0.1), Vector3::new(0.0, 0.0, 1.6));
     assert_eq!(found(&data, &with_tags(&robot, |_, pose| turn * pose)), None);
 }
@@ -66,7 +66,7 @@ fn quaternions_of_the_map_in_the_other_order_are_told() {
     insta::assert_snapshot!("map_quaternions", format!("{wrong}; {}", wrong.remedy()));
 }
 
-/// The conventions of other programs: z into the tag, another first corner, x out of the tag.
+/// Conventions of other programs: z into the tag, another first corner, x out of the tag.
 #[test]
 fn tags_that_are_all_turned_alike_are_told_with_the_turn() {
     let (data, robot) = sample();
@@ -166,7 +166,7 @@ fn corners_that_are_no_pixels_of_the_image_are_told() {
     assert_eq!(found(&rounded, &robot), None);
 }
 
-/// Rectified images, with the lens as it was before.
+/// The images are rectified, with the lens as it was before.
 #[test]
 fn a_distortion_that_the_images_do_not_have_is_told() {
     let (data, mut robot) = sample();
@@ -201,7 +201,7 @@ fn a_tag_size_is_told_and_the_margin_of_the_print() {
 /// A tag that nearly all views show.
 const OFTEN_SEEN: usize = 4;
 
-/// All landmarks by what a program may have written of their poses.
+/// Returns all landmarks as a program may have written their poses.
 fn recorded(data: &CaptureData, robot: &Robot, write: impl Fn(&Isometry3<f64>) -> TagMeasurement) -> CaptureData {
     let mut data = data.clone();
     for seen in data.fit.iter_mut().chain(&mut data.held_out).flat_map(|view| &mut view.tags) {
@@ -212,7 +212,7 @@ fn recorded(data: &CaptureData, robot: &Robot, write: impl Fn(&Isometry3<f64>) -
     data
 }
 
-/// One landmark a view, by its pose as a program may have written it.
+/// Returns one landmark per view, with its pose as a program may have written it.
 fn posed(data: &CaptureData, robot: &Robot, write: impl Fn(&Isometry3<f64>) -> Isometry3<f64>) -> CaptureData {
     let mut data = data.clone();
     for view in data.fit.iter_mut().chain(&mut data.held_out) {
@@ -232,7 +232,7 @@ fn recorded_poses_in_another_order_or_direction_are_told() {
     assert_eq!(found(&|pose| pose.inverse()), Some(WrongInputKind::RecordedDirection));
 }
 
-/// The tags of one view tell how their poses are to be read, with the map as it is.
+/// The tags of one view determine the reading of their poses, with the map as it is.
 #[test]
 fn recorded_poses_of_several_tags_are_told_without_the_arm() {
     let (data, robot) = sample();
@@ -250,7 +250,7 @@ fn recorded_poses_of_several_tags_are_told_without_the_arm() {
     assert_eq!(found(&of_inverse), Some(WrongInputKind::RecordedRotations));
 }
 
-/// Poses that are right do not hide a map that is wrong.
+/// Right poses do not hide a wrong map.
 #[test]
 fn a_wrong_map_is_told_by_recorded_poses_too() {
     let (data, robot) = sample();
@@ -263,7 +263,7 @@ fn a_wrong_map_is_told_by_recorded_poses_too() {
     assert_eq!(found(&data, &with_tags(&robot, scaled)), Some(WrongInputKind::MapUnit("mm".to_owned())));
 }
 
-/// With their rotations or without them.
+/// The positions come with their rotations or without them.
 #[test]
 fn a_scale_of_recorded_positions_is_not_called_the_size_of_the_tags() {
     let (data, robot) = sample();
@@ -289,8 +289,8 @@ fn a_scale_of_recorded_positions_is_not_called_the_size_of_the_tags() {
     }
 }
 
-/// Landmarks by their positions alone: as they are, or those of the camera in the tag's frame. Of all tags, of one a
-/// view, and of tags that are turned alike, whose distances are the same both ways.
+/// Landmarks have only positions: as they are, or those of the camera in the tag's frame. The cases are all tags, one
+/// per view, and tags that are turned alike, whose distances are the same both ways.
 #[test]
 fn positions_of_the_inverse_transform_are_told() {
     let (data, robot) = sample();
@@ -316,7 +316,7 @@ fn positions_of_the_inverse_transform_are_told() {
     }
 }
 
-/// A map that is stretched looks as tags of another size do: the words name both.
+/// A stretched map looks like tags of another size: the words name both.
 #[test]
 fn a_stretched_map_is_told_with_its_ratio() {
     let (data, robot) = sample();
