@@ -1,4 +1,4 @@
-//! Constants of `batch` that decide something: unit, source and effect of each, by the file that uses it.
+//! Constants that decide something in `batch`: unit, source and effect of each, by the file that uses it.
 
 pub(crate) mod marked_calibrations {
     /// Least number of views for a fit.

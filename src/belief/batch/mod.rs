@@ -1,6 +1,6 @@
 //! A complete calibration from a recording.
 //!
-//! `marked_calibrations` runs the calibrations that a recording marks; `rounds` is the default method: estimate,
+//! `marked_calibrations` runs the calibrations that a recording marks. `rounds` is the default method: estimate,
 //! explanations, checks, in rounds; `tables` writes its results. `interim` estimates during a capture. `slips_in_views`
 //! compares a calibration by positions with the slips that `bundle` finds.
 

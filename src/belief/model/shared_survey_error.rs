@@ -1,9 +1,9 @@
 //! Error that all tags of a map share: the error of its anchor tag.
 //!
 //! The anchor has the place A and the error `A exp(xi)`, `xi = (rho, omega)`. A tag at x in its frame then has the
-//! error `R (rho - [x] omega)`, where R is the rotation of A. A prior of each single tag does not model that. Its
-//! information stays within that of all tags together if the shared variance counts 1/w times in each, and the sum of
-//! all w is one (covariance intersection, Julier and Uhlmann 1997).
+//! error `R (rho - [x] omega)`, where R is the rotation of A. A prior of each single tag does not model that. Such
+//! priors hold no more information than all tags have together if the shared variance counts 1/w times in each. The sum
+//! of all w is one (covariance intersection, Julier and Uhlmann 1997).
 
 use crate::model::constants::shared_survey_error::{ANCHOR_WEIGHT, POSITION_WEIGHT};
 use nalgebra::{Isometry3, Matrix3x6};

@@ -1,4 +1,4 @@
-//! Constants of `say` that decide something: unit, source and effect of each, by the file that uses it.
+//! Constants that decide something in `say`: unit, source and effect of each, by the file that uses it.
 
 pub(crate) mod reading_error {
     /// Real part of a unit quaternion from which on the rotation counts as none: less than 0.2 deg is rounding.

@@ -73,7 +73,8 @@ pub enum Refusal {
         /// Root mean square distance in the fitted views.
         fit_m: f64,
     },
-    /// The tool error that the recording explains exceeds the tolerance with more than 5 % probability.
+    /// The tool error due to the uncertainty of the recording alone exceeds the tolerance with more than 5 %
+    /// probability.
     BeyondTolerance {
         /// Number of the target with the highest probability, from 1.
         target: usize,

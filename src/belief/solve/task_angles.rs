@@ -1,9 +1,9 @@
 //! Joint angles at the task's targets, at which the tool error is predicted.
 //!
 //! A pose that the task states is used unchanged. For a position, inverse kinematics starts from several configurations
-//! where a solution is likely. Their order: the rest of the arm at it (as a `reach` moves there), the stowed pose, the
-//! other rests, the views with the nearest tool, and random ones. A single start may end at a joint limit although the
-//! target is within reach.
+//! where a solution is likely. First are the rest of the arm at it (as a `reach` moves there), the stowed pose and the
+//! other rests. Then come the views with the nearest tool, and random ones. A single start may end at a joint limit
+//! although the target is within reach.
 
 use crate::solve::constants::task_angles::{N_NEAREST_VIEWS, N_RANDOM_STARTS, TOLERANCE_M};
 use nalgebra::Vector3;

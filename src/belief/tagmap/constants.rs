@@ -1,4 +1,4 @@
-//! Constants of `tagmap` that decide something: unit, source and effect of each, by the file that uses it.
+//! Constants that decide something in `tagmap`: unit, source and effect of each, by the file that uses it.
 
 pub(crate) mod adjust {
     use armcal_core::numeric::Damping;

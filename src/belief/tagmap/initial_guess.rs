@@ -1,7 +1,7 @@
 //! Initial guess: groups of tags that images connect, each laid out from the relative poses that images vote for.
 //!
-//! Pairs of tags are joined in the order of their weight (a spanning tree, Kruskal 1956), as long as the vote of their
-//! images is clear; a pair whose images contradict each other is skipped. `grow` then lays the groups out again.
+//! Pairs of tags are joined in the order of their weight (a spanning tree, Kruskal 1956), provided the vote of their
+//! images is clear. A pair whose images contradict each other is skipped. `grow` then lays the groups out again.
 
 use armcal_core::codes::{Code, Warning};
 use nalgebra::Isometry3;

@@ -78,8 +78,8 @@ pub(super) struct Extra {
     pub(super) pose: Isometry3<f64>,
 }
 
-/// Link by the attitude sensor between the rotations of two blocks of one view: world_from_moving * moving_from_camera
-/// = world_from_fixed * fixed_from_camera.
+/// Link by the attitude sensor between the rotations of two blocks of one view:
+/// world_from_moving * moving_from_camera = world_from_fixed * fixed_from_camera.
 #[derive(Clone, Debug)]
 pub(super) struct AttitudeLink {
     pub(super) moving: usize,

@@ -166,7 +166,7 @@ impl TagMap {
         counts
     }
 
-    /// Joint covariance of several tags, 6 rows each in the order of `ids`, in the form of [`MappedTag::covariance`];
+    /// Joint covariance of several tags, 6 rows each in the order of `ids`, in the form of [`MappedTag::covariance`].
     /// `None` if one of them is not in the map.
     #[must_use]
     pub fn joint_covariance(&self, ids: &[u32]) -> Option<DMatrix<f64>> {

@@ -173,8 +173,8 @@ impl ProblemBuilder<'_, '_> {
     }
 }
 
-/// Finds cameras and tags that converged to a wrong pose (mostly the mirror image of the right one), and moves them
-/// where their images fit better. Returns true if there were any.
+/// Finds cameras and tags that converged to a wrong pose (mostly the mirror image), and moves them where their images
+/// fit better. Returns true if there were any.
 fn repair(problem: &mut MapProblem<'_>) -> bool {
     let mut changed = false;
     for idx in 0..problem.blocks.len() {

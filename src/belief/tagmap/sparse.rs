@@ -1,8 +1,8 @@
 //! Sparse symmetric systems of 6x6 blocks, solved by Cholesky factorization.
 //!
-//! The reduced system of the tags, without cameras, has a block where two tags were seen together (Triggs et al. 2000,
-//! sec. 6.1): few of all pairs. Blocks are eliminated in the order of least degree; ties go by number, so that the
-//! order is reproducible. The fill is found once and used for every iteration.
+//! The reduced system of the tags, without cameras, has a block for each pair of tags seen together: few of all (Triggs
+//! et al. 2000, sec. 6.1). Blocks are eliminated in the order of least degree; ties go by number, so that the order is
+//! reproducible. The fill is found once and used for every iteration.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;

@@ -243,8 +243,8 @@ fn has_the_gradients_curvature(robot: Robot, camera_error_std: Option<[f64; 2]>)
     assert!(worst.0 < TOLERANCE, "{worst:?} of {n} columns");
 }
 
-/// Linearizing again allocates only two vectors, regardless of the number of views and tags: the distance of the state
-/// from the prior's means, and the force of the prior.
+/// Linearizing again allocates only two vectors, regardless of the number of views and tags. They hold the distance of
+/// the state from the prior's means, and the force of the prior.
 #[test]
 fn linearizing_again_takes_two_vectors_and_no_more() {
     let case = case(titan_with_gripper_tag(), 3);

@@ -1,5 +1,5 @@
-//! A gain that departs from its datasheet more than nearly all do: it is named, and unobservable angles get larger
-//! sigmas.
+//! A gain that departs from its datasheet more than nearly all do: it is named. Parameters that views do not determine
+//! get larger sigmas.
 
 use crate::batch::tests::failures::{Case, case_with_range};
 use crate::explain::failures::FailureAdjusted;

@@ -28,7 +28,7 @@ pub(super) fn is_target(text: &str) -> bool {
     text.lines().any(|line| line.trim_start().starts_with("target_type"))
 }
 
-/// Parses a target. Tags are numbered from the lower left by rows; the board's frame has its origin at the first tag's
+/// Parses a target. Tags are numbered from the lower left by rows. The board's frame has its origin at the first tag's
 /// lower left corner, x right, y up, z out of the board.
 pub(super) fn parse(file: &Path, text: &str) -> Result<TagFile, RobotError> {
     let raw: TargetYaml = yaml::parse(file, text)?;
