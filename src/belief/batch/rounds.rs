@@ -655,7 +655,7 @@ impl<'a> BundleCalibration<'a> {
 
     /// Returns the consistency of the views with the prior, and the refusals for it.
     fn prior_consistency(&self, setup: &BundleSetup) -> (Option<PriorConsistency>, Vec<Refusal>) {
-        // The same views by another path, as from several recordings, have another hash and end at the same time.
+        // Another path to the same views, as from several recordings, changes their hash but not their end time.
         let last = self.data.data.fit.iter().map(|view| view.end.nanos).max();
         let is_reused = self.prior.is_some_and(|prior| {
             prior.messages_hash == self.data.messages_hash || Some(prior.valid.time_nanos) == last

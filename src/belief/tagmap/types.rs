@@ -155,7 +155,7 @@ pub struct MapInput<'a> {
 pub enum MapRejection {
     /// No prior names the tag, and there is no default size.
     UnknownTag,
-    /// The same id is at two places of the image, and nothing shows which one is right.
+    /// Two detections in the image have this id, and nothing shows which one is right.
     SeenTwice,
     /// A corner has no bearing in the lens model.
     OutOfView,

@@ -114,7 +114,7 @@ fn the_lens_of_a_second_camera_is_a_block() {
     let [one, two] = within.map(|count| count / n);
     let nees = 8.0 * nees / n;
     println!("lens of a second camera: {one:.2} within one sigma, {two:.2} within two, NEES {nees:.2} of 8");
-    // Of the 320 numbers, the 8 of one lens are not independent of each other; a chi-square of 8 degrees has a variance
+    // The 8 numbers of one lens, among 320, are not independent of each other; a chi-square of 8 degrees has a variance
     // of 16.
     assert!((0.6..0.76).contains(&one) && two > 0.92 && (6.1..9.9).contains(&nees), "{one} {two} {nees}");
 }
