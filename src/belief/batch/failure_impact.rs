@@ -1,4 +1,4 @@
-//! What failed joints cost at the tool, and whether the task can do with them.
+//! Effect of failed joints on the tool error, and whether the task tolerates it.
 
 use crate::batch::constants::failure_impact::{MIN_VIEWS_SINCE, UNIT_SHARE};
 use crate::explain::failure_detection::is_suspicious;
@@ -22,23 +22,23 @@ use armcal_core::stats::Summary;
 use armcal_core::streams::ReachTask;
 use nalgebra::Matrix3;
 
-/// An estimate with failed joints, on the way to the tool.
+/// An estimate with failed joints, as input for the predicted tool error.
 pub(crate) struct FailureImpact<'a> {
     pub datasheet: &'a Robot,
-    /// As the estimate has it, camera and tags where they were found.
+    /// The arm as estimated, with camera and tags at their estimated poses.
     pub robot: &'a Robot,
     pub views: &'a [View],
-    /// With the readings as they were read.
+    /// The views with the readings as they were read.
     pub as_read: &'a [View],
     pub failures: &'a [Failure],
     pub found: &'a Estimate<'a>,
     pub parameters: &'a JointParameters,
-    /// With the locked joints' rows.
+    /// Covariance of the parameters, including the rows of locked joints.
     pub covariance: &'a ParameterCovariance,
     pub task: Option<TaskRests<'a>>,
 }
 
-/// How a failed joint's angle is known.
+/// Source of a failed joint's angle.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum AngleSource {
     AsItIs,
@@ -47,23 +47,23 @@ enum AngleSource {
 }
 
 impl FailureImpact<'_> {
-    /// The tool error that is to be expected as things are.
+    /// Predicted tool error over the task with the failures as they are.
     pub(crate) fn tool_error_m(&self) -> Option<Summary> {
         self.prediction().map(|predicted| predicted.error_m)
     }
 
-    /// The same at each target.
+    /// Predicted tool error at each target with the failures as they are.
     pub(crate) fn prediction(&self) -> Option<ToolErrorPrediction> {
         self.prediction_where(usize::MAX, AngleSource::AsItIs)
     }
 
-    /// Of those that have a place in the result: reversed sensors and other scales are findings alone.
+    /// Tables of the failed joints; reversed sensors and other scales are only findings, and have no table.
     pub(crate) fn tables(&self) -> Vec<FailedJointTable> {
         let tabled = self.of_sensors().filter(|failure| failure.line.is_none());
         tabled.map(|failure| self.table(failure)).collect()
     }
 
-    /// The failures of sensors: not those of joints that have another one's readings.
+    /// The failures of sensors, without those of joints that have another joint's readings.
     fn of_sensors(&self) -> impl Iterator<Item = &Failure> {
         self.failures.iter().filter(|failure| self.joint_read(failure).is_none())
     }
@@ -104,7 +104,7 @@ impl FailureImpact<'_> {
         }
     }
 
-    /// What shows it; a slip with its size as estimated in the end, with all else.
+    /// Evidence of the failure; a slip has the size that the complete estimate gives it.
     fn evidence(&self, failure: &Failure) -> String {
         let step =
             failure.since.and_then(|since| Some((since, self.found.step(failure.joint, self.views[since].end)?)));
@@ -115,7 +115,7 @@ impl FailureImpact<'_> {
         }
     }
 
-    /// Where a locked joint stands and one sigma, rad: the mean over the views, which all show one angle.
+    /// Mean angle of a locked joint over the views and its sigma, rad; all views show the same angle.
     fn locked_angle(&self, failure: &Failure) -> Option<(f64, f64)> {
         if !failure.kind.stands_still() {
             return None;
@@ -128,7 +128,7 @@ impl FailureImpact<'_> {
         Some((angle_rad, std_rad))
     }
 
-    /// Root mean square over the views in which the camera alone told the angle.
+    /// Standard deviation of the angle, root mean square over the views where only the camera determines it.
     fn camera_std_rad(&self, failure: &Failure) -> Option<f64> {
         let freed: Vec<f64> = failure
             .views
@@ -139,7 +139,7 @@ impl FailureImpact<'_> {
         (!freed.is_empty()).then(|| (freed.iter().sum::<f64>() / freed.len() as f64).sqrt())
     }
 
-    /// With the angle of `joint` known in that way, those of the other failed joints as they are.
+    /// Tool error with the angle of `joint` from the source `known`, and the other failed joints as they are.
     fn tool_error_where(&self, joint: usize, known: AngleSource) -> Option<Summary> {
         self.prediction_where(joint, known).map(|predicted| predicted.error_m)
     }
@@ -148,7 +148,7 @@ impl FailureImpact<'_> {
         self.prediction_by(|failure| if failure.joint == joint { known } else { AngleSource::AsItIs })
     }
 
-    /// With the angle of each failed joint known as `source` says.
+    /// Prediction with the angle of each failed joint from the source that `source` returns for it.
     fn prediction_by(&self, source: impl Fn(&Failure) -> AngleSource) -> Option<ToolErrorPrediction> {
         let mut robot = self.robot.clone();
         let mut covariance = self.covariance.clone();
@@ -165,7 +165,7 @@ impl FailureImpact<'_> {
                     robot = robot.with_failed(&[declared]);
                 }
                 AngleSource::AsItIs if failure.has_no_sensor_now() => {
-                    // Uniform over the range.
+                    // Uniform distribution over the range.
                     (spec.offset_std_rad, spec.gain_std) = (0.0, 0.0);
                     residual_std_rad[j] = spec.half_range_rad / 3.0_f64.sqrt();
                 }
@@ -186,7 +186,7 @@ impl FailureImpact<'_> {
         predict_tool_error(&robot, self.parameters, &covariance, self.task)
     }
 
-    /// Each failed joint as a finding: the estimate takes account of it.
+    /// Finding for each failed sensor: the estimate takes account of it.
     pub(crate) fn findings(&self) -> Vec<Finding> {
         self.of_sensors().map(|failure| self.finding(failure)).collect()
     }
@@ -217,7 +217,7 @@ impl FailureImpact<'_> {
         }
     }
 
-    /// Whether a sensor of another scale is estimated with the rest, and the rest fits.
+    /// Returns true if a sensor of another scale is estimated with the other parameters, and the data fit.
     fn is_calibrated_anew(&self, failure: &Failure) -> bool {
         !failure.leaves_no_sensor() && !is_suspicious(self.found)
     }
@@ -227,7 +227,7 @@ impl FailureImpact<'_> {
         Some(self.views[view_idx].end.since_s(first))
     }
 
-    /// Why the calibration cannot be used for its task, or at all.
+    /// Reasons why the calibration must not be used for its task, or at all.
     pub(crate) fn refusals(&self) -> Vec<Refusal> {
         self.failures.iter().filter_map(|failure| self.refusal(failure)).collect()
     }
@@ -262,7 +262,7 @@ impl FailureImpact<'_> {
         if self.is_within_tolerance_without(failure) {
             return None;
         }
-        // Without a task every joint is needed, but for those that the user declares to be without a sensor.
+        // Without a task every joint is needed, except those that the user declares to have no sensor.
         let is_known = failure.found == FailureSource::Declared && failure.lost_since.is_none();
         if tolerance_m.is_none() && is_known {
             return None;
@@ -280,7 +280,7 @@ impl FailureImpact<'_> {
 }
 
 impl FailureImpact<'_> {
-    /// The joint of that name has the readings of `with`.
+    /// Returns the refusal for a joint of that name with the readings of `with`.
     fn alike(&self, joint: String, with: usize) -> MisreadReadings {
         let as_drawn = PositionProblem::new(self.datasheet, self.as_read).rms_m(&JointParameters::default());
         let (with, views) = (self.robot.sensors[with].joint.clone(), self.as_read.len());
@@ -292,8 +292,8 @@ impl FailureImpact<'_> {
         }
     }
 
-    /// Whether the decision rule accepts all targets that can be judged without that sensor, the camera telling the
-    /// angles of other joints that have none.
+    /// Returns true if the decision rule accepts all targets that can be judged without that sensor. The camera
+    /// determines the angles of other joints without a sensor.
     fn is_within_tolerance_without(&self, failure: &Failure) -> bool {
         let is_told = |other: &Failure| other.has_no_sensor_now() && !other.kind.stands_still();
         let source = |other: &Failure| {

@@ -1,4 +1,4 @@
-//! What the views captured so far say, for whoever must go on by it: margins and poses to come.
+//! Estimate from the views captured so far, for use during the capture: margins and further poses.
 
 use crate::batch::rounds::{BundleCalibration, EstimatePurpose};
 use crate::file::calibration::Calibration;
@@ -14,11 +14,11 @@ use armcal_core::time::Stamp;
 /// Estimates by `bundle` from the views captured since `from`, one view or more, starting from the datasheet or a
 /// `prior`.
 ///
-/// It is not judged: no view is left out, no failed joint looked for, and its status says nothing. Its covariance is
-/// what margins are made of, so it is refused where the residuals show that the model does not hold.
+/// The estimate is not judged: no view is held out, failed joints are not searched, and its status means nothing.
+/// Margins depend on its covariance, so it is refused where the residuals show that the model does not hold.
 ///
 /// # Errors
-/// [`CalibError`] where the views tell nothing yet, or contradict each other or the prior.
+/// [`CalibError`] where the views determine nothing yet, or contradict each other or the prior.
 pub fn interim_estimate(
     recording: &Recording,
     robot: &Robot,
@@ -43,7 +43,7 @@ pub fn interim_estimate(
     }
     let data = CalibrationData {
         name,
-        // Nothing is written of it.
+        // The interim estimate is not written to a file.
         messages_hash: String::new(),
         data,
         gripper_tag_data: None,

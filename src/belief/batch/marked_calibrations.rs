@@ -1,4 +1,4 @@
-//! From a recording to a calibration: each calibration that the recording marks in its turn.
+//! Calibrations from a recording: each one that the recording marks, in their order.
 
 pub use crate::batch::constants::marked_calibrations::MIN_VIEWS;
 use armcal_core::log::Recording;
@@ -21,12 +21,11 @@ use crate::views::error::CalibError;
 use crate::views::scale_identification::identify_scales;
 use crate::views::view::CaptureData;
 
-/// Calibrates `robot`'s joint sensors from the captured views of a recording, by the tags that it says were there.
+/// Calibrates `robot`'s joint sensors from the captured views of a recording, with the tags that the recording states.
 ///
-/// A recording that marks its calibrations is worked through as it was marked, and the last one is the result: each
-/// uses the views of its mark's span, a warm one starts from the last accepted one before it. Without such a mark all
-/// captured views make one calibration. Sensors whose scale was measured on the way (`identify` marks) take it from
-/// there.
+/// A recording with marked calibrations runs them as marked, and the last one is the result. Each uses the views of its
+/// mark's span; a warm one starts from the last accepted one before it. Without such a mark all captured views make one
+/// calibration. Sensors whose scale an `identify` mark measured use that scale.
 ///
 /// # Errors
 /// [`CalibError`] when the recording holds nothing to fit. A doubtful fit is returned with [`Status::Refused`].
@@ -34,10 +33,10 @@ pub fn calibrate(recording: &Recording, robot: &Robot, method: CalibrationMethod
     calibrate_with_survey(recording, &surveyed(recording, robot), method)
 }
 
-/// The same, by the tags of `robot` whatever the recording says of them: a survey or a map that was made elsewhere.
+/// Calibrates as [`calibrate`] does, but with the tags of `robot`, from a survey or map that was made elsewhere.
 ///
 /// # Errors
-/// As [`calibrate`].
+/// Fails as [`calibrate`] does.
 pub fn calibrate_with_survey(
     recording: &Recording,
     robot: &Robot,
@@ -68,7 +67,7 @@ struct MarkedCalibration {
     is_warm: bool,
 }
 
-/// In the order of time.
+/// Returns the marked calibrations in the order of time.
 fn marked_calibrations(recording: &Recording) -> Vec<MarkedCalibration> {
     let mut marked: Vec<(Stamp, MarkedCalibration)> = Vec::new();
     for (idx, (_, message)) in recording.messages.iter().enumerate() {
@@ -80,7 +79,7 @@ fn marked_calibrations(recording: &Recording) -> Vec<MarkedCalibration> {
     marked.into_iter().map(|(_, marked)| marked).collect()
 }
 
-/// A recording on its way through the calibrations that it marks.
+/// State of a recording while its marked calibrations run.
 struct MarkedRun<'a> {
     recording: &'a Recording,
     robot: &'a Robot,
@@ -104,7 +103,7 @@ impl MarkedRun<'_> {
         let warm = calibrate_data(data.clone(), self.method, prior)?;
         let contradicted = warm.prior.as_ref().filter(|prior| !prior.agrees);
         let Some(contradicted) = contradicted.map(|table| table.clone().unused()) else { return Ok(warm) };
-        // Something happened to the arm since: the new views alone tell how it is now, if they are enough.
+        // The arm has changed since the prior: the new views determine its state without it, if they are enough.
         match calibrate_data(data, self.method, None)? {
             mut fresh if fresh.status == Status::Accepted => {
                 let slips: Vec<_> = prior.iter().flat_map(|prior| slips_since(prior, &fresh, self.robot)).collect();
@@ -122,7 +121,7 @@ impl MarkedRun<'_> {
         let mut data = associate_within(self.recording, &robot, marked.span);
         let (robot, identified) = identify_scales(&data, &robot)?;
         if !identified.is_empty() {
-            // Travel is counted in the sensor's own scale.
+            // Travel is in the sensor's own scale.
             data = associate_within(self.recording, &robot, marked.span);
         }
         let gripper_tag_data = self.gripper_tag_data(&robot, marked);
@@ -138,24 +137,24 @@ impl MarkedRun<'_> {
         Ok(CalibrationData { name, messages_hash, data, gripper_tag_data, held_out, robot, identified })
     }
 
-    /// The views that tell of the camera mount where these are more than the marked ones: what the tag on the gripper
-    /// showed before stays true for a warm start; a fresh one forgets it.
+    /// The views that determine the camera mount, if there are more than the marked ones. Earlier views of the gripper
+    /// tag stay valid for a warm start; a fresh one ignores them.
     fn gripper_tag_data(&self, robot: &Robot, marked: &MarkedCalibration) -> Option<CaptureData> {
         let (_, to) = marked.span.filter(|_| marked.is_warm && robot.gripper_tag.is_some())?;
         Some(associate_within(self.recording, robot, Some((Stamp { nanos: i64::MIN }, to))))
     }
 }
 
-/// Whether `prior` was made from views that are among these: they must not count twice.
+/// Returns true if `prior` was made from views of `data`, which must not count twice.
 fn rests_on(prior: &Calibration, data: &CaptureData) -> bool {
     data.fit.iter().chain(&data.held_out).any(|view| view.end.nanos <= prior.valid.time_nanos)
 }
 
-/// Calibrates from views; a `prior` is where the search starts instead of the datasheet, and has weight under `bundle`.
-/// Other methods go by the first camera's views alone.
+/// Calibrates from views. The search starts from `prior` instead of the datasheet, and under `bundle` the prior has
+/// weight. Other methods use only the first camera's views.
 ///
 /// # Errors
-/// As [`calibrate`].
+/// Fails as [`calibrate`] does.
 pub fn calibrate_data(
     mut data: CalibrationData,
     method: CalibrationMethod,
@@ -181,10 +180,10 @@ pub fn calibrate_data(
     }
 }
 
-/// By `bundle` from the datasheet; `listener` is told of the estimate by the views.
+/// Calibrates by `bundle` from the datasheet; `listener` receives the estimate by the views.
 ///
 /// # Errors
-/// As [`calibrate`].
+/// Fails as [`calibrate`] does.
 pub(crate) fn calibrate_bundle(
     data: CalibrationData,
     listener: &mut EstimateListener<'_>,
@@ -193,7 +192,7 @@ pub(crate) fn calibrate_bundle(
     BundleCalibration::new(data, None, EstimatePurpose::Final)?.with_listener(listener).calibrate()
 }
 
-/// Refuses what holds too little to be fitted.
+/// Returns an error if the data hold too little for a fit.
 fn check_views(data: &CalibrationData) -> Result<(), CalibError> {
     let CalibrationData { name, data, robot, .. } = data;
     if data.fit.is_empty() {

@@ -1,8 +1,8 @@
-//! A calibration from a recording, as a whole.
+//! A complete calibration from a recording.
 //!
-//! `marked_calibrations` works through the calibrations that a recording marks; `rounds` is the default method:
-//! estimate, explanations, checks, in rounds; `tables` writes what it found. `interim` estimates during a capture.
-//! `slips_in_views` holds a calibration by positions against the slips that `bundle` finds.
+//! `marked_calibrations` runs the calibrations that a recording marks. `rounds` is the default method: estimate,
+//! explanations, checks, in rounds; `tables` writes its results. `interim` estimates during a capture. `slips_in_views`
+//! compares a calibration by positions with the slips that `bundle` finds.
 
 pub(crate) mod constants;
 pub(crate) mod failure_impact;

@@ -53,31 +53,31 @@ use armcal_core::stats::Summary;
 use nalgebra::Matrix3;
 use std::collections::BTreeSet;
 
-/// What an estimate is for.
+/// Purpose of an estimate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum EstimatePurpose {
-    /// With all that a verdict needs.
+    /// The complete estimate, with all data that a verdict needs.
     Final,
-    /// The estimate and its covariance, to go on by while views are still being captured.
+    /// The estimate and its covariance, for use while views are still being captured.
     Interim,
 }
 
-/// A calibration by `bundle` before it is made.
+/// A calibration by `bundle` in progress.
 pub(crate) struct BundleCalibration<'a> {
-    /// All views are fitted; the held-out ones, too.
+    /// Data of the calibration; all views are fitted, including the held-out ones.
     data: CalibrationData,
     prior: Option<&'a Calibration>,
     map: Option<MapResult>,
-    /// As they were given.
+    /// The tags as surveyed.
     surveyed: Vec<SurveyedTag>,
     purpose: EstimatePurpose,
-    /// Tags that were freed of their survey.
+    /// Tags that are no longer tied to their survey.
     moved: MovedTags,
-    /// What of the drawing is estimated.
+    /// Terms of the nominal model that are estimated.
     drawing: Drawing,
-    /// By what the readings of moving joints were moved to the camera's clock, s, and what decided it.
+    /// Offset that moved the readings of moving joints to the camera's clock, s, and the decision for it.
     clock: Option<(f64, Selection)>,
-    /// Who is told of the last estimate by the views.
+    /// Receives the last estimate by the views.
     listener: Option<&'a mut EstimateListener<'a>>,
     /// The views with the readings as they were read.
     as_read: Vec<View>,
@@ -85,20 +85,20 @@ pub(crate) struct BundleCalibration<'a> {
 
 /// Result of a round of the calibration.
 enum Round {
-    /// Clock, survey or drawing are taken otherwise from now on: the views for the next round.
+    /// Clock, survey or nominal model changed: the views for the next round.
     Revised(Vec<View>),
     Done(Box<Calibration>),
 }
 
 /// A change of the views for the next round.
 enum Otherwise {
-    /// Joint readings are moved by the offset of their clock.
+    /// Joint readings are shifted by the offset of their clock.
     ReadLater { offset_s: f64 },
-    /// Survey or drawing changed, and with them the tags' sizes.
+    /// Survey or nominal model changed, and with them the tags' sizes.
     Resized,
 }
 
-/// Is told of an estimate and what it was made from.
+/// Callback that receives an estimate and its input.
 pub(crate) type EstimateListener<'a> = dyn FnMut(&BundleInput<'_>, &Estimate<'_>) + 'a;
 
 /// An estimate, and the setup and failures that it was made under.
@@ -107,14 +107,14 @@ struct Estimated<'a> {
     failures: &'a [Failure],
     estimate: Estimate<'a>,
     selections: Vec<Selection>,
-    /// The measured lengths against the views.
+    /// Innovations of the measured lengths against the views.
     lengths: Vec<LengthInnovation>,
     touches: Option<Touched<'a>>,
 }
 
-/// What touches added to an estimate.
+/// Effect of touches on an estimate.
 struct Touched<'a> {
-    /// By the views alone.
+    /// The estimate by the views only.
     before: Estimate<'a>,
     update: TouchUpdate,
 }
@@ -125,9 +125,9 @@ impl<'a> Estimated<'a> {
     }
 }
 
-/// What an estimate means, before it is judged.
+/// Derived results of an estimate, before the verdict.
 struct Diagnosis {
-    /// With the estimated angles where no sensor tells them.
+    /// The views, with estimated angles where no sensor reads them.
     views: Vec<View>,
     held_out: HeldOutMetrics,
     innovations: Vec<Innovations>,
@@ -150,7 +150,7 @@ impl<'a> BundleCalibration<'a> {
         let views = data.data.fit.iter().chain(&data.data.held_out);
         let seen: BTreeSet<usize> = views.flat_map(|view| view.tags.iter().map(|tag| tag.tag_idx)).collect();
         count_as_independent(&mut data.robot, |tag| seen.contains(&tag));
-        // `bundle` moves the tags itself: the map is where it starts.
+        // `bundle` estimates the tags itself: the map is only its initial guess.
         let mapped = map_unknown_tags(&data.name, &mut data.data, &data.robot)?;
         let map = mapped.map(|mapped| {
             data.robot = mapped.start(&data.robot);
@@ -189,7 +189,7 @@ impl<'a> BundleCalibration<'a> {
         }
     }
 
-    /// The first estimate, then the stages in their order.
+    /// Runs one round: the first estimate, then the stages in their order.
     fn round(&mut self, mut views: Vec<View>) -> Result<Round, CalibError> {
         let sizes_m: Vec<f64> = self.data.robot.tags.iter().map(|tag| tag.size_m).collect();
         let declared = declared(&self.data.robot, &views);
@@ -227,7 +227,7 @@ impl<'a> BundleCalibration<'a> {
         self.finish(estimated).map(|calibration| Round::Done(Box::new(calibration)))
     }
 
-    /// Searches for a cause that needs a new estimate. The first that finds one ends the round.
+    /// Searches for a cause that needs a new estimate. The first one with a result ends the round.
     const REVISIONS: [fn(&mut Self, &Estimated<'_>) -> Option<Otherwise>; 2] =
         [Self::find_clock, Self::revise_survey_and_drawing];
 
@@ -235,7 +235,7 @@ impl<'a> BundleCalibration<'a> {
     const REFINEMENTS: [for<'e> fn(&Self, Estimated<'e>) -> Estimated<'e>; 3] =
         [Self::add_walks, Self::add_lengths, Self::add_touches];
 
-    /// Checks and reports. Each reads what those before it wrote; the last may put another cause first.
+    /// Checks and reports. Each one reads the results of those before it; the last may put another cause first.
     const STATEMENTS: [fn(&Self, &Estimated<'_>, &Diagnosis, &mut Calibration); 6] = [
         Self::judge_by_views,
         Self::judge_by_touches,
@@ -277,7 +277,7 @@ impl<'a> BundleCalibration<'a> {
         Estimated { estimate, lengths, ..estimated }
     }
 
-    /// Takes the touches in, if there are enough and every joint up to the tool has a sensor.
+    /// Adds the touches, if there are enough and every joint up to the tool has a sensor.
     fn add_touches<'e>(&self, mut estimated: Estimated<'e>) -> Estimated<'e> {
         let (robot, touches) = (&self.data.robot, &self.data.data.touches);
         let has_sensors = (0..robot.tool.mount.n_joints).all(|joint| !estimated.setup.has_no_sensor(joint));
@@ -293,7 +293,7 @@ impl<'a> BundleCalibration<'a> {
         if let Some(listener) = self.listener.take() {
             listener(&estimated.setup.input(), estimated.by_views());
         }
-        // What no sensor told at a rest stays as it was stowed.
+        // Joints that no sensor read at a rest keep their stowed angle.
         for failure in estimated.failures.iter().filter(|failure| failure.has_no_sensor_now()) {
             let stowed_rad = self.data.robot.stowed[failure.joint];
             self.data.data.rests.values_mut().for_each(|rest| rest[failure.joint] = stowed_rad);
@@ -316,7 +316,7 @@ impl<'a> BundleCalibration<'a> {
         Ok(calibration)
     }
 
-    /// Checks of the estimate by the views.
+    /// Checks the estimate by the views.
     fn judge_by_views(&self, estimated: &Estimated<'_>, diagnosis: &Diagnosis, calibration: &mut Calibration) {
         let input = &BundleInput { views: &diagnosis.views, ..estimated.setup.input() };
         let (found, innovations, lengths) = (estimated.by_views(), &diagnosis.innovations[..], &estimated.lengths[..]);
@@ -345,9 +345,9 @@ impl<'a> BundleCalibration<'a> {
         found.report_drawing(&self.drawing, &models, &at, calibration);
     }
 
-    /// Where the calibration is refused and the images contradict a file, or the readings mean something else than the
-    /// input map says, that comes first. Several repaired tags are refused, too, where one other reading of the whole
-    /// map or of the lens explains them.
+    /// Puts a wrong input first among the refusals: the images contradict a file, or the readings do not mean what the
+    /// input map says. Several repaired tags are refused, too, where one other reading of the whole map or lens
+    /// explains them.
     fn blame_input(&self, estimated: &Estimated<'_>, _: &Diagnosis, calibration: &mut Calibration) {
         let failures = estimated.failures;
         if calibration.status != Status::Refused {
@@ -374,7 +374,7 @@ impl<'a> BundleCalibration<'a> {
         if calibration.refusals.iter().any(|refusal| refusal.code() == Code::JointsAlike) {
             return;
         }
-        // A scale or unit has been named, and explains all.
+        // A named scale or unit explains all refusals.
         let is_of_line = |refusal: &Refusal| matches!(refusal, Refusal::SensorLine { .. } | Refusal::SensorUnit { .. });
         let is_of_scale = |refusal: &Refusal| is_of_line(refusal) || matches!(refusal, Refusal::BeyondDatasheet { .. });
         if calibration.refusals.iter().any(is_of_line) && calibration.refusals.iter().all(is_of_scale) {
@@ -395,7 +395,7 @@ impl<'a> BundleCalibration<'a> {
         calibration.refuse_first_for(search.find().or_else(|| self.unpaired(estimated)).map(Refusal::MisreadReadings));
     }
 
-    /// With the tags as they were given, where nothing explains the views.
+    /// Searches for readings in a wrong order, with the tags as surveyed, where no model explains the views.
     fn unpaired(&self, estimated: &Estimated<'_>) -> Option<MisreadReadings> {
         if !is_suspicious(estimated.by_views()) {
             return None;
@@ -412,8 +412,8 @@ impl<'a> BundleCalibration<'a> {
         is_final.then(|| lens_that_fits(&self.drawing, input, found)).flatten()
     }
 
-    /// The offset between the clocks, where it is found for the first time; from then on the readings are at the times
-    /// of the images, for all that is made of the views.
+    /// Takes the offset between the clocks when an estimate has it for the first time. From then on the readings of all
+    /// views are at the times of the images.
     fn find_clock(&mut self, estimated: &Estimated<'_>) -> Option<Otherwise> {
         if self.clock.is_some() {
             return None;
@@ -425,7 +425,7 @@ impl<'a> BundleCalibration<'a> {
         Some(Otherwise::ReadLater { offset_s })
     }
 
-    /// Survey or drawing, where they are to be taken otherwise than so far.
+    /// Revises survey or nominal model, if a change explains the views better.
     fn revise_survey_and_drawing(&mut self, estimated: &Estimated<'_>) -> Option<Otherwise> {
         let Estimated { setup, estimate, .. } = estimated;
         let by_moved_tag = self.moved.gain_nats(estimate);
@@ -458,7 +458,7 @@ impl<'a> BundleCalibration<'a> {
         estimate(&BundleInput { evidence, ..setup.input() }).map(|estimate| (estimate, Vec::new()))
     }
 
-    /// Held-out figures, the arm as estimated, and the covariance of its sensors.
+    /// Computes the held-out figures, the arm as estimated, and the covariance of its sensors.
     fn diagnose(&self, estimated: &mut Estimated<'_>) -> Diagnosis {
         let Estimated { setup, estimate, .. } = estimated;
         let robot = &self.data.robot;
@@ -477,7 +477,7 @@ impl<'a> BundleCalibration<'a> {
         estimate.widen_unusual();
         let parameters = estimate.joint_parameters().to_vec();
         let residual_std_rad = std::array::from_fn(|joint| match robot.sensors.get(joint) {
-            // Nothing is known of a joint distal to the camera but its datasheet.
+            // A joint distal to the camera has only its datasheet.
             Some(spec) if parameters.iter().all(|p| p.joint != joint) => spec.linearity_std_rad,
             _ => estimate.residual_std_rad(joint),
         });
@@ -487,7 +487,7 @@ impl<'a> BundleCalibration<'a> {
         Diagnosis { robot: estimate.as_found(&setup.applied.robot), views, held_out, innovations, covariance }
     }
 
-    /// The result's tables, and the verdict by what all methods have.
+    /// Returns the tables of the result, with the verdict from the checks that all methods share.
     fn report(&mut self, estimated: &Estimated<'_>, diagnosis: &Diagnosis) -> Calibration {
         let Estimated { setup, estimate, selections, .. } = estimated;
         for outlier in &estimate.outliers {
@@ -589,7 +589,7 @@ impl<'a> BundleCalibration<'a> {
         calibration.refuse_first_for(refusals);
     }
 
-    /// Writes what rests on priors alone to the result, and refuses it where that may be more than the task allows.
+    /// Writes the parts that depend on priors only, and refuses the result where they may exceed the task's tolerance.
     fn state_reservations(&self, estimated: &Estimated<'_>, diagnosis: &Diagnosis, calibration: &mut Calibration) {
         let parameters = estimated.estimate.parameters();
         let touches = estimated.touches.as_ref().map(|touched| &touched.update);
@@ -598,10 +598,10 @@ impl<'a> BundleCalibration<'a> {
             |at: &[JointAngles], median_m: f64| estimated.by_views().prior_impact_with(touches, at, median_m);
         let Some(by_data) = self.impact(estimated, diagnosis, &parameters).prediction() else {
             if self.data.data.task.is_some() {
-                // No target is within reach: all are named.
+                // No target is within reach: all of them are reported.
                 return;
             }
-            // Without a task the views' own configurations stand for it, and there is no limit.
+            // Without a task the configurations of the views replace it, and there is no limit.
             let views = estimated.estimate.view_angles();
             let sensors = parameters.sensors(&diagnosis.robot);
             let by_data = views.iter().map(|at| diagnosis.covariance.tool_position_m2(&diagnosis.robot, &sensors, at));
@@ -653,9 +653,9 @@ impl<'a> BundleCalibration<'a> {
         });
     }
 
-    /// Whether the views agree with the prior, and what that refuses for.
+    /// Returns the consistency of the views with the prior, and the refusals for it.
     fn prior_consistency(&self, setup: &BundleSetup) -> (Option<PriorConsistency>, Vec<Refusal>) {
-        // The same views by another path, as from several recordings, have another hash and end at the same time.
+        // Another path to the same views, as from several recordings, changes their hash but not their end time.
         let last = self.data.data.fit.iter().map(|view| view.end.nanos).max();
         let is_reused = self.prior.is_some_and(|prior| {
             prior.messages_hash == self.data.messages_hash || Some(prior.valid.time_nanos) == last
@@ -681,7 +681,7 @@ impl<'a> BundleCalibration<'a> {
 }
 
 impl Otherwise {
-    /// Changes `views`; `sizes_m` are the tags' sizes before the change.
+    /// Applies the change to `views`; `sizes_m` are the tags' sizes before the change.
     fn take(self, views: &mut [View], sizes_m: &[f64], robot: &Robot) {
         match self {
             Self::ReadLater { offset_s } => views.iter_mut().for_each(|view| view.read_later(offset_s)),
@@ -690,7 +690,7 @@ impl Otherwise {
     }
 }
 
-/// Moves the centres of tags in the camera's frame to where tags of their present size are; `sizes_m` were before.
+/// Scales the tag centres in the camera's frame from the old sizes, `sizes_m`, to the present sizes.
 fn rescale(views: &mut [View], sizes_m: &[f64], robot: &Robot) {
     for seen in views.iter_mut().flat_map(|view| &mut view.tags).filter(|seen| seen.corners().is_some()) {
         seen.center_in_camera_m *= robot.tags[seen.tag_idx].size_m / sizes_m[seen.tag_idx];

@@ -1,8 +1,8 @@
-//! A calibration by positions against the slips that `bundle` finds in the same views.
+//! Check of a calibration by positions for slips that `bundle` finds in the same views.
 //!
-//! Methods on positions take a sensor's offset as the same in all views and judge themselves by their own residuals. A
-//! slip widens these a little, and nothing else shows it. `bundle` tests for one by likelihood and by the views' order,
-//! against the stated sizes of noise and sensors.
+//! Methods on positions assume the same sensor offset in all views and judge themselves by their own residuals. A slip
+//! widens these only a little, and no other figure shows it. `bundle` tests for one by likelihood and by the views'
+//! order, against the stated sigmas of noise and sensors.
 
 use crate::batch::rounds::{BundleCalibration, EstimatePurpose};
 use crate::file::calibration::{Calibration, Status};
@@ -10,8 +10,8 @@ use crate::file::failed_joint::FailedJointTable;
 use crate::say::refusal::Refusal;
 use crate::views::calibration_data::CalibrationData;
 
-/// Refuses an accepted `calibration` by positions where a sensor slipped among the views of `data`, if these hold
-/// corners: the noise of positions has no datasheet.
+/// Refuses an accepted `calibration` by positions if a sensor slipped among the views of `data`. Only views with
+/// corners are tested: the noise of positions has no datasheet.
 pub(crate) fn refuse_slips(calibration: &mut Calibration, data: CalibrationData) {
     let mut tags = data.data.fit.iter().flat_map(|view| &view.tags);
     if calibration.status == Status::Accepted && tags.all(|tag| tag.is_in_pixels()) {

@@ -1,9 +1,9 @@
 //! Sensors that slipped between an earlier calibration and this one.
 //!
-//! Where prior and new views contradict each other and the new views alone are the result, both calibrations are held
-//! against each other: the mean change d of a joint's angle at the same readings, over the angles that both cover, with
-//! both covariances and the sensor's drift over the time between. A change beyond [`MIN_SIGMAS`] of that, and beyond
-//! what drifts, is a slip; views do not tell when it was, except before the first of them.
+//! Where prior and new views contradict each other and the result uses only the new views, both calibrations are
+//! compared. The mean change of a joint's angle at the same readings is taken over the angles that both cover. Its
+//! variance holds both covariances and the sensor's drift over the time between. A change beyond [`MIN_SIGMAS`] of
+//! that, and beyond drift, is a slip. Views determine only that it was before the first of them.
 
 use crate::batch::constants::slips_since::{MIN_SIGMAS, MIN_SLIP_RAD, N_ANGLES};
 use nalgebra::DVector;
@@ -15,11 +15,11 @@ use crate::say::finding::{Finding, FindingKind, FindingUnit};
 use armcal_core::robot::Robot;
 use armcal_core::sensor::ConditionChange;
 
-/// A calibration as it is compared.
+/// One of the two calibrations in the comparison.
 struct Side<'a> {
     calibration: &'a Calibration,
     parameters: JointParameters,
-    /// From its reference to that of the later one.
+    /// Change of conditions from this calibration's reference to that of the later one.
     change: ConditionChange,
 }
 
@@ -39,7 +39,7 @@ impl Side<'_> {
     }
 }
 
-/// What slipped between `before` and `now`, whose sensors are `robot`'s.
+/// Returns the slips between `before` and `now`; `robot` has the sensors of `now`.
 pub(crate) fn slips_since(before: &Calibration, now: &Calibration, robot: &Robot) -> Vec<Finding> {
     let (old, new) = (before.parameters(robot), now.parameters(robot));
     let change = new.reference.departure_from(&old.reference);
@@ -67,7 +67,7 @@ fn slip(robot: &Robot, joint: usize, (old, new): (&Side<'_>, &Side<'_>), elapsed
     let ((was_rad, was_var), (is_rad, is_var)) =
         (old.mean_angle(robot, joint, &travels), new.mean_angle(robot, joint, &travels));
     let drift_var = drift_std_rad_per_sqrt_h(&robot.sensors[joint]).powi(2) * elapsed_h;
-    // The reading went up by what the angle at the same reading went down.
+    // The reading rose by as much as the angle at the same reading fell.
     let size_rad = was_rad - is_rad;
     let std_rad = (was_var + is_var + drift_var).sqrt();
     (size_rad.abs() > MIN_SLIP_RAD.max(MIN_SIGMAS * std_rad)).then(|| Finding {
@@ -76,7 +76,7 @@ fn slip(robot: &Robot, joint: usize, (old, new): (&Side<'_>, &Side<'_>), elapsed
         size: Some(size_rad),
         unit: Some(FindingUnit::of_joint(robot.sensors[joint].moves)),
         tool_error_m: None,
-        // Before the first view.
+        // The slip was before the first view.
         time_s: Some(0.0),
         repaired: true,
     })

@@ -45,7 +45,7 @@ fn decided(selection: &Selection) -> String {
     format!("{name}: {}, {:+.1} nats", if selection.is_in { "in" } else { "out" }, selection.gain_nats)
 }
 
-/// By what the readings had been moved to the camera's clock before: the estimate is of what was left.
+/// Adds the offset by which the readings had already been moved to the camera's clock: the estimate is the remainder.
 pub(crate) fn add_clock(model: &mut ModelTable, offset_s: f64, selection: &Selection) {
     if let Some([left_s, _]) = &mut model.time_offset_s {
         *left_s += offset_s;
@@ -53,7 +53,7 @@ pub(crate) fn add_clock(model: &mut ModelTable, offset_s: f64, selection: &Selec
     model.decided.insert(0, decided(selection));
 }
 
-/// The camera mount as estimated; the tags tell of it, too.
+/// The camera mount as estimated; tags determine it, too.
 pub(crate) fn camera_mount_table(robot: &Robot, found: &Estimate<'_>, views: &[View]) -> CameraMount {
     let (mount, covariance) = found.mount(0);
     let link_from_camera: Pose<Link, Camera> = Pose::from_isometry(mount);
@@ -73,7 +73,7 @@ pub(crate) fn camera_mount_table(robot: &Robot, found: &Estimate<'_>, views: &[V
     }
 }
 
-/// Each further camera whose mount was estimated.
+/// Tables of the further cameras with an estimated mount.
 pub(crate) fn further_camera_tables(robot: &Robot, found: &Estimate<'_>, views: &[View]) -> Vec<FurtherCamera> {
     let table = |number: usize| {
         let (mount, covariance) = found.mount(number);
@@ -91,7 +91,7 @@ pub(crate) fn further_camera_tables(robot: &Robot, found: &Estimate<'_>, views: 
     (1..=robot.further_cameras.len()).filter(|&number| found.has(Block::Mount(number))).map(table).collect()
 }
 
-/// Each lens that was estimated.
+/// Tables of the estimated lenses.
 pub(crate) fn lens_tables(robot: &Robot, found: &Estimate<'_>) -> Vec<LensResult> {
     let table = |number: usize| {
         let at = found.problem.layout.at(Block::Lens(number))?;
@@ -102,7 +102,7 @@ pub(crate) fn lens_tables(robot: &Robot, found: &Estimate<'_>) -> Vec<LensResult
     found.cameras().filter_map(table).collect()
 }
 
-/// The map's tags where `bundle` found them.
+/// The tag map with the poses that `bundle` estimated.
 #[must_use]
 pub(crate) fn map_table(mut map: MapResult, robot: &Robot, found: &Estimate<'_>) -> MapResult {
     for tag in &mut map.tag {
@@ -119,7 +119,7 @@ pub(crate) fn map_table(mut map: MapResult, robot: &Robot, found: &Estimate<'_>)
     map
 }
 
-/// The prior and how well the views agree with it.
+/// The prior and its consistency with the views.
 pub(crate) fn prior_table(
     prior: &Calibration,
     elapsed_h: f64,
@@ -141,8 +141,7 @@ pub(crate) fn prior_table(
     }
 }
 
-/// The covariance with the camera mount's rows, so that a warm start knows it together with the joints; of the joints'
-/// parameters those that `kept` has.
+/// Covariance of the camera mount and of the joint parameters in `kept`, so that a warm start knows their correlation.
 pub(crate) fn covariance_with_mount(robot: &Robot, found: &Estimate<'_>, kept: &[String]) -> Option<CovarianceTable> {
     let full = with_mount_rows(found)?;
     let all = found.joint_parameters();
@@ -156,7 +155,7 @@ pub(crate) fn covariance_with_mount(robot: &Robot, found: &Estimate<'_>, kept: &
     Some(CovarianceTable::new(rows.iter().map(name).collect(), &matrix))
 }
 
-/// The sensors as estimated, those of joints without one as their datasheets say.
+/// The sensors as estimated; joints without a sensor keep their datasheets.
 pub(crate) fn with_datasheets(estimated: &Robot, datasheet: &Robot, setup: &BundleSetup) -> Vec<JointSensorSpec> {
     let pairs = estimated.sensors.iter().zip(&datasheet.sensors).enumerate();
     pairs.map(|(joint, (own, nominal))| if setup.has_no_sensor(joint) { nominal } else { own }.clone()).collect()
@@ -169,7 +168,7 @@ pub(crate) fn outlier_name(outlier: &Outlier, views: &[View]) -> String {
     format!("view {number}: tag {}{corner}: {:.0} sigma", outlier.tag_id, outlier.sigmas)
 }
 
-/// Gains and offsets that keep the datasheet's value: of joints distal to the camera, and of failed ones.
+/// Gains and offsets that keep the datasheet's value: those of joints distal to the camera, and of failed ones.
 pub(crate) fn unobservable(robot: &Robot, setup: &BundleSetup, estimate: &Estimate<'_>) -> Vec<Unobservable> {
     let all = (0..robot.n_joints())
         .flat_map(|joint| [ParameterKind::Gain, ParameterKind::Offset].map(|kind| Parameter { joint, kind }));

@@ -1,7 +1,7 @@
-//! Contradictions to the belief as a whole: repeated images, a base that moves on, a lens that was changed.
+//! Contradictions to the estimate as a whole: repeated images, a base that keeps moving, a changed lens.
 //!
 //! Each explanation of a view is one thing that moved or failed once. Clocks that jump, images that stand still and
-//! another lens are none of these: they come out as large or repeated moves, after which the covariance means nothing.
+//! another lens are none of these. They result in large or repeated moves, after which the covariance means nothing.
 
 use crate::follow::constants::doubts::{
     BASE_MOVES, FROZEN_VIEWS, MAX_BASE_SHARE, MOVED_AGAIN, MOVED_RAD, RECENT_VIEWS, SAME_PX,
@@ -13,12 +13,12 @@ use crate::views::conditions::apart_rad;
 use crate::views::view::View;
 use armcal_core::robot::Robot;
 
-/// Images and events so far that may contradict the belief.
+/// Images and events so far that may contradict the estimate.
 #[derive(Clone, Default)]
 pub(crate) struct Doubts {
     /// The first view with the latest image.
     image: Option<View>,
-    /// Views in a row that repeat it.
+    /// Number of consecutive views that repeat this image.
     n_frozen: usize,
     /// Events of the last views, each with the number of views at that time.
     recent: Vec<(usize, Finding)>,
@@ -26,7 +26,8 @@ pub(crate) struct Doubts {
 }
 
 impl Doubts {
-    /// Returns true where `view` has the image of the one before it although a joint before the camera has moved since.
+    /// Returns true if `view` has the image of the view before it although a joint proximal to the camera has moved
+    /// since.
     pub(crate) fn repeats_image(&mut self, view: &View, robot: &Robot) -> bool {
         let before = self.image.as_ref().filter(|before| shows_same(before, view));
         let Some(has_moved) = before.map(|before| has_moved(before, view, robot)) else {
@@ -37,7 +38,7 @@ impl Doubts {
         has_moved
     }
 
-    /// Takes in what happened by the view of that number, to an arm of that reach.
+    /// Adds the events of view number `n_views`; `reach_m` is the arm's reach.
     pub(crate) fn hear(&mut self, events: &[OnlineEvent], n_views: usize, reach_m: f64) {
         for event in events {
             self.recent.retain(|(at, _)| n_views.saturating_sub(*at) <= RECENT_VIEWS);
@@ -46,7 +47,8 @@ impl Doubts {
         }
     }
 
-    /// Returns the doubt that holds now. Images may move again; what else happened is in the belief for good.
+    /// Returns the present doubt. Images may change again; all other doubts stay, because the estimate includes their
+    /// events.
     pub(crate) fn now(&self) -> Option<Doubt> {
         let frozen = (self.n_frozen >= FROZEN_VIEWS).then_some(Doubt::FrozenImages { views: self.n_frozen });
         frozen.or(self.lasting)
@@ -60,7 +62,7 @@ impl Doubts {
         is_doubtful.then_some(Doubt::Base { times: sizes_m.len(), most_m })
     }
 
-    /// A tag alone may hang loose. Several together, or the mount, do not move again and again.
+    /// A single tag may be loose. Several together, or the mount, do not move repeatedly.
     fn of_lens(&self) -> Option<Doubt> {
         let moved: Vec<&Finding> = self.recent.iter().map(|(_, finding)| finding).filter(|f| is_of_images(f)).collect();
         let is_again = |&k: &usize| {
@@ -75,7 +77,7 @@ fn is_of_images(finding: &Finding) -> bool {
     matches!(finding.kind, FindingKind::CameraMount | FindingKind::TagMoved | FindingKind::TagsMoved)
 }
 
-/// Returns true where one of the tags, or the mount, is in both.
+/// Returns true if both findings name one of the tags, or the mount.
 fn is_of_same(a: &Finding, b: &Finding) -> bool {
     names(a).any(|name| names(b).any(|other| other == name))
 }
@@ -85,7 +87,7 @@ fn names(finding: &Finding) -> impl Iterator<Item = &str> {
     finding.name.split(", ").flat_map(|names| names.split(" and "))
 }
 
-/// Returns true where both views show the same tags at the same corners, to rounding.
+/// Returns true if both views show the same tags at the same corners, to rounding.
 fn shows_same(a: &View, b: &View) -> bool {
     let is_seen = !a.tags.is_empty() && a.tags.len() == b.tags.len() && a.camera == b.camera;
     is_seen
@@ -96,7 +98,7 @@ fn shows_same(a: &View, b: &View) -> bool {
         })
 }
 
-/// Returns true where a joint before the camera stands elsewhere.
+/// Returns true if a joint proximal to the camera has another angle.
 fn has_moved(before: &View, now: &View, robot: &Robot) -> bool {
     let mut sensors = robot.sensors.iter().enumerate().take(robot.n_seen_joints());
     sensors.any(|(joint, spec)| apart_rad(spec, now.travel_rad[joint], before.travel_rad[joint]).abs() > MOVED_RAD)

@@ -1,9 +1,9 @@
-//! The error that all tags of a map share: that of the tag which carries it.
+//! Error that all tags of a map share: the error of its anchor tag.
 //!
-//! With the anchor's place A and its error `A exp(xi)`, `xi = (rho, omega)`, a tag at x in its frame is off by
-//! `R (rho - [x] omega)`, R the rotation of A. A prior of each tag by itself does not know that. It says no more than
-//! the tags know together where the variance that they share counts 1/w times in each, the sum of all w one (covariance
-//! intersection, Julier and Uhlmann 1997).
+//! The anchor has the place A and the error `A exp(xi)`, `xi = (rho, omega)`. A tag at x in its frame then has the
+//! error `R (rho - [x] omega)`, where R is the rotation of A. A prior of each single tag does not model that. Such
+//! priors hold no more information than all tags have together if the shared variance counts 1/w times in each. The sum
+//! of all w is one (covariance intersection, Julier and Uhlmann 1997).
 
 use crate::model::constants::shared_survey_error::{ANCHOR_WEIGHT, POSITION_WEIGHT};
 use nalgebra::{Isometry3, Matrix3x6};
@@ -16,21 +16,21 @@ use armcal_core::spatial::skew;
 pub(crate) struct SharedSurveyError {
     /// Place of the anchor in the frame of the map.
     pub(crate) anchor: Isometry3<f64>,
-    /// One sigma per axis.
+    /// One sigma of the anchor's position per axis.
     pub(crate) position_std_m: f64,
-    /// One sigma per axis.
+    /// One sigma of the anchor's rotation per axis.
     pub(crate) rotation_std_rad: f64,
 }
 
 impl SharedSurveyError {
-    /// Returns the error that the tags of `robot` share; `None` where each was surveyed by itself.
+    /// Returns the error that the tags of `robot` share; `None` if each was surveyed independently.
     pub(crate) fn of(robot: &Robot) -> Option<Self> {
         let anchor = robot.tag(robot.anchor_tag?).filter(|tag| tag.is_known())?;
         let SurveyedTag { position_std_m, rotation_std_rad, .. } = *anchor;
         Some(Self { anchor: *anchor.base_from_tag.isometry(), position_std_m, rotation_std_rad })
     }
 
-    /// Shared part of the variances of a tag's position, m^2, and rotation, rad^2: never more than all of `std`.
+    /// Shared part of the variances of a tag's position, m^2, and rotation, rad^2, limited to `std`.
     fn variances(&self, tag: &Isometry3<f64>, std: [f64; 2]) -> [f64; 2] {
         let by_turn_m = self.rotation_std_rad * self.anchor.inv_mul(tag).translation.vector.norm();
         let shared = [self.position_std_m.powi(2) + by_turn_m.powi(2), self.rotation_std_rad.powi(2)];
@@ -43,13 +43,13 @@ impl SharedSurveyError {
         [0, 1].map(|k| (std[k].powi(2) + (1.0 / weights[k] - 1.0) * shared[k]).sqrt())
     }
 
-    /// Variance of a tag's position by what it does not share, m^2.
+    /// Part of a tag's position variance that it does not share, m^2.
     pub(crate) fn own_variance_m2(&self, tag: &SurveyedTag) -> f64 {
         let std = [tag.position_std_m, tag.rotation_std_rad];
         tag.position_std_m.powi(2) - self.variances(tag.base_from_tag.isometry(), std)[0]
     }
 
-    /// Motion of a tag's position in the frame of the map by one sigma of each axis of the anchor, m.
+    /// Motion of a tag's position in the frame of the map for one sigma of each axis of the anchor, m.
     pub(crate) fn motion_m(&self, tag: &SurveyedTag) -> Matrix3x6<f64> {
         let turn = *self.anchor.rotation.to_rotation_matrix().matrix();
         let x = self.anchor.inv_mul(tag.base_from_tag.isometry()).translation.vector;
@@ -58,7 +58,7 @@ impl SharedSurveyError {
     }
 }
 
-/// Weights of position and rotation in what tags tell of their map's place.
+/// Weights of the tags' positions and rotations in the estimate of their map's place.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Weights {
     anchor: [f64; 2],
@@ -66,7 +66,7 @@ pub(crate) struct Weights {
 }
 
 impl Weights {
-    /// Returns those of `n_others` tags beside the anchor, which may be missing.
+    /// Returns the weights for the anchor, if there is one, and for `n_others` other tags.
     pub(crate) fn of(has_anchor: bool, n_others: usize) -> Self {
         let anchor = if n_others == 0 { 1.0 } else { ANCHOR_WEIGHT };
         let left = if has_anchor { 1.0 - ANCHOR_WEIGHT } else { 1.0 };
@@ -87,8 +87,7 @@ impl Weights {
     }
 }
 
-/// Gives the known tags of `robot` the standard deviations under which those of them that `is_seen` count as
-/// independent.
+/// Gives the known tags of `robot` standard deviations under which those with `is_seen` count as independent.
 pub(crate) fn count_as_independent(robot: &mut Robot, is_seen: impl Fn(usize) -> bool) {
     let Some(shared) = SharedSurveyError::of(robot) else { return };
     let anchor_tag = robot.anchor_tag;
@@ -114,7 +113,7 @@ mod tests {
     use armcal_core::stats::stream_rng;
     use rand::RngExt;
 
-    /// Tags about an anchor, all of whose error is the anchor's.
+    /// A robot with tags around an anchor whose errors are only the anchor's.
     fn robot(seed: u64) -> Robot {
         let mut rng = stream_rng(seed, "anchored");
         let mut robot = titan();
@@ -133,7 +132,7 @@ mod tests {
         robot
     }
 
-    /// The information of all tags on a motion of the map is not above the anchor's own in any direction.
+    /// The information of all tags on a motion of the map must not exceed the anchor's own in any direction.
     #[test]
     fn tags_together_are_not_surer_of_the_map_than_its_anchor_is() {
         for seed in 0..20 {
@@ -157,7 +156,7 @@ mod tests {
         }
     }
 
-    /// The motion of each tag by the anchor against the motion of the whole map.
+    /// Compares the motion of each tag by the anchor with the motion of the whole map.
     #[test]
     fn tags_move_with_their_anchor() {
         let robot = robot(3);

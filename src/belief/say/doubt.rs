@@ -1,28 +1,28 @@
-//! Doubts about an online belief as a whole, in words.
+//! Doubts about an online estimate as a whole, in words.
 
 use std::fmt;
 
 use armcal_core::codes::{Code, Coded};
 use armcal_core::units::Unit;
 
-/// A reason not to rely on an online belief, whatever its covariance says.
+/// A reason not to rely on an online estimate, however small its covariance is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Doubt {
-    /// The images stand still while joints before the camera move.
+    /// The images stand still while joints proximal to the camera move.
     FrozenImages {
         /// Views whose images repeat an earlier one.
         views: usize,
     },
     /// The base seems to have moved often or far.
     Base {
-        /// How many times.
+        /// Number of motions.
         times: usize,
-        /// The farthest of them, m.
+        /// Largest of these motions, m.
         most_m: f64,
     },
-    /// Camera or tags that had moved seem to move on.
+    /// Camera or tags that had moved seem to keep moving.
     Lens {
-        /// Events of them.
+        /// Number of these events.
         events: usize,
     },
 }

@@ -1,4 +1,4 @@
-//! What a calibration found to be other than robot.toml, survey and drawing say.
+//! Differences that a calibration found from robot.toml, survey and nominal model (URDF).
 
 use armcal_core::codes::{Code, Coded};
 use armcal_core::kinematics::JointKind;
@@ -9,28 +9,28 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Finding {
-    /// Cause; its code in files.
+    /// Cause; written as its code in files.
     #[serde(rename = "code")]
     pub kind: FindingKind,
     /// Joint, tag id or link.
     pub name: String,
-    /// In `unit`; absent where the finding has no size.
+    /// Size in `unit`; absent where the finding has no size.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub size: Option<f64>,
-    /// Absent where the finding has no size.
+    /// Unit of `size`; absent where the finding has no size.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<FindingUnit>,
-    /// Root mean square over the task, where it was predicted.
+    /// Tool error, root mean square over the task, m; absent where it was not predicted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tool_error_m: Option<f64>,
-    /// When it happened, s since the first view.
+    /// Time of the event, s since the first view.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time_s: Option<f64>,
-    /// Whether the estimate takes account of it.
+    /// True if the estimate takes account of the finding.
     pub repaired: bool,
 }
 
-/// What may be other than it was said to be.
+/// Kind of a difference from the stated values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FindingKind {
@@ -42,22 +42,22 @@ pub enum FindingKind {
     TagSize,
     /// Tags with one another's ids: two, or more in a ring.
     TagSwapped,
-    /// A tag of which no observation fits the others; the size is their number.
+    /// A tag without any observation that fits the others; the size is the number of its observations.
     TagLeftOut,
-    /// The lens against robot.toml; the size is the relative error of its focal length.
+    /// A lens that differs from robot.toml; the size is the relative error of its focal length.
     Lens,
     /// The lens is of the other model: a fisheye called a pinhole, or the other way round.
     LensModel,
-    /// A link's length or twist against the drawing.
+    /// A link whose length or twist differs from the nominal model (URDF).
     Link,
     /// A joint or the base's mount that gives under the arm's weight, or a load at the tool: the size is its compliance
     /// or the load.
     Sag,
-    /// The camera's mount against the drawing, beyond its prior.
+    /// A camera mount that differs from its nominal pose beyond its prior.
     CameraMount,
-    /// The base against the survey, or all tags together.
+    /// The base, or all tags together, displaced from the survey.
     Base,
-    /// The tool point or links beyond the camera, by touches of surveyed surfaces.
+    /// The tool point or links distal to the camera, by touches of surveyed surfaces.
     Tool,
     /// A sensor that slipped on its shaft; the size is the step.
     SensorSlip,
@@ -69,7 +69,7 @@ pub enum FindingKind {
     SensorFailed,
     /// A sensor with more error from view to view than its datasheet allows; the size is one sigma.
     SensorWorn,
-    /// A gain or offset that few sensors of the datasheet have; the size is how far it is off.
+    /// A gain or offset that few sensors of the datasheet have; the size is its departure from the datasheet.
     SensorUnusual,
     /// A sensor whose offset walks at random; the size is one sigma over the views.
     OffsetWalks,
@@ -109,31 +109,31 @@ impl Coded for Finding {
     }
 }
 
-/// SI, and plain numbers.
+/// Unit of a finding's size: SI, or 1 for plain numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum FindingUnit {
-    /// Lengths.
+    /// Metre, for lengths.
     #[serde(rename = "m")]
     Metre,
-    /// Angles.
+    /// Radian, for angles.
     #[serde(rename = "rad")]
     Radian,
-    /// Counts.
+    /// One, for counts and ratios.
     #[serde(rename = "1")]
     One,
-    /// Compliances.
+    /// Radian per newton metre, for compliances of joints and mounts.
     #[serde(rename = "rad/(N m)")]
     RadianPerNewtonMetre,
-    /// Compliances of slides.
+    /// Metre per newton, for compliances of slides.
     #[serde(rename = "m/N")]
     MetrePerNewton,
-    /// Loads.
+    /// Newton, for loads.
     #[serde(rename = "N")]
     Newton,
 }
 
 impl FindingUnit {
-    /// Of a joint's coordinate.
+    /// Unit of a joint's coordinate: metre for a slide, else radian.
     #[must_use]
     pub fn of_joint(kind: JointKind) -> Self {
         if kind.is_slide() { Self::Metre } else { Self::Radian }

@@ -4,7 +4,7 @@ use crate::say::finding::{Finding, FindingKind, FindingUnit};
 use armcal_core::optics::{CameraModel, LensModel};
 
 impl FindingKind {
-    /// In words: `tag moved`.
+    /// Name of the kind in words: `tag moved`.
     #[must_use]
     pub fn words(self) -> &'static str {
         match self {
@@ -33,7 +33,7 @@ impl FindingKind {
 }
 
 impl Finding {
-    /// The size in units that people measure in: `12.0 mm`.
+    /// The size in everyday units: `12.0 mm`.
     #[must_use]
     pub fn size_in_words(&self) -> Option<String> {
         Some(self.unit?.in_words(self.size?))
@@ -41,7 +41,7 @@ impl Finding {
 }
 
 impl FindingUnit {
-    /// A value in the unit that people measure in: `12.0 mm`.
+    /// A value in an everyday unit: `12.0 mm`.
     #[must_use]
     pub fn in_words(self, value: f64) -> String {
         match self {
@@ -55,7 +55,7 @@ impl FindingUnit {
     }
 }
 
-/// An event of the online estimate; `at_rad`: of a worn spot the joint's angle at its middle.
+/// An event of the online estimate in words; `at_rad` is the joint angle at the middle of a worn spot.
 pub(crate) fn event(finding: &Finding, at_rad: Option<f64>) -> String {
     let Finding { kind, name, size, .. } = finding;
     let size = size.unwrap_or(f64::NAN);
@@ -100,7 +100,7 @@ pub(crate) fn explanation(kind: FindingKind, name: &str) -> String {
     }
 }
 
-/// The explanation that no joint alone has.
+/// The explanation that blames no single joint.
 pub(crate) fn drift() -> String {
     "all sensors drifted more than expected".to_owned()
 }
@@ -115,7 +115,7 @@ pub(crate) fn key_of_joint(key: &str, joint: &str) -> String {
     format!("{key} of {joint}")
 }
 
-/// `the reading is off in 3 of 20 views (2, 9, 15)`; `what`: what is wrong with it there.
+/// `the reading is off in 3 of 20 views (2, 9, 15)`; `what` says what is wrong with the reading there.
 pub(crate) fn reading_in_views(what: &str, [n_there, n]: [usize; 2], numbers: &[String]) -> String {
     format!("the reading {what} in {n_there} of {n} views ({})", numbers.join(", "))
 }
@@ -125,7 +125,7 @@ pub(crate) fn lost_reading([n_off, n_since]: [usize; 2], number: u32) -> String 
     format!("the reading is off in {n_off} of the last {n_since} views, since view {number}")
 }
 
-/// A lens of the other model, as it was found.
+/// A lens of the other model, with its estimated intrinsics.
 pub(crate) fn other_lens_model(camera: &str, lens: &CameraModel) -> String {
     let model = if matches!(lens.lens, LensModel::Radtan(_)) { "pinhole" } else { "equidistant" };
     let ([fx, fy], [cx, cy]) = (lens.focal_px(), lens.center_px());
@@ -147,13 +147,13 @@ pub fn skipped_poses(skipped: usize, captured: usize) -> String {
     )
 }
 
-/// Says that a file with the status `accepted` has reasons of a refusal.
+/// Says that a file with the status `accepted` states reasons for a refusal.
 pub(crate) fn accepted_and_refused(refusal: Option<&str>) -> String {
     let key = refusal.map_or("[[refusals]]", |_| "refusal");
     format!("is `accepted`, but {key} says why the result was refused: it was edited; calibrate again")
 }
 
-/// A walk of an offset, so large over the views (std), and its effect.
+/// Warning of an offset that walks at random; `walked` is the std of the walk over the views.
 pub(crate) fn offset_walks(joint: &str, walked: &str) -> String {
     format!(
         "the offset of {joint} walks at random, by {walked} (std) during the capture; the predicted tool error \

@@ -1,17 +1,17 @@
-//! An error of the link geometry: which element, in which way, how large, and what it means at the tool.
+//! An error of the link geometry: the element, kind and size of the error, and its effect at the tool.
 
 use std::fmt;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// In which way an element of the geometry is off.
+/// Kind of a geometry error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ErrorKind {
-    /// Of the element's place, m.
+    /// Error of the element's position, m.
     Shift,
-    /// Of its attitude, rad.
+    /// Error of the element's attitude, rad.
     Turn,
 }
 
@@ -26,31 +26,31 @@ impl ErrorKind {
     }
 }
 
-/// What the score test of link geometry found.
+/// Error that the score test of the link geometry found.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct GeometryError {
     /// The link, `camera mount` or `base (or all tags)`.
     pub element: String,
-    /// The joint that sits on it; none for the camera.
+    /// The joint on the element; absent for the camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub joint: Option<String>,
-    /// Shifted or turned.
+    /// Kind of the error: shift or turn.
     pub error: ErrorKind,
-    /// In the element's own axes, m or rad.
+    /// Error in the element's axes, m or rad.
     pub size: [f64; 3],
     /// Chi-square of the score test.
     pub chi2: f64,
-    /// Chi-square that chance exceeds too seldom to be believed.
+    /// Limit of `chi2`, which chance exceeds too rarely to be the cause.
     pub limit: f64,
-    /// Root mean square over the task, m.
+    /// Tool error, root mean square over the task, m.
     pub tool_error_m: f64,
 }
 
-/// What stands for the base, or for all tags together: no view tells them apart.
+/// Element name for the base and for all tags together: views cannot distinguish the two.
 pub(crate) const BASE: &str = "base (or all tags)";
 
 impl GeometryError {
-    /// What to do about it.
+    /// Advice to correct the error.
     #[must_use]
     pub fn remedy(&self) -> &'static str {
         match (self.element.as_str(), &self.joint) {

@@ -1,8 +1,8 @@
-//! The unit that a length was written in, by its ratio to the true one.
+//! The unit that a length was written in, from its ratio to the true length.
 
 use crate::say::constants::length_unit::{NEAR, UNITS};
 
-/// The unit of which `ratio` make a metre, where that is another than the metre.
+/// Returns the unit of which `ratio` make a metre; `None` for the metre and for unknown units.
 #[must_use]
 pub(crate) fn unit_of(ratio: f64) -> Option<&'static str> {
     UNITS.iter().find(|(_, per_m)| (ratio / per_m - 1.0).abs() < NEAR).map(|(name, _)| *name)

@@ -1,4 +1,4 @@
-//! Why a tag map is not given out.
+//! Refusals of tag maps: reasons not to write the map.
 
 use std::fmt;
 
@@ -6,22 +6,22 @@ use crate::say::refusal::Refusal;
 use crate::say::wrong_input::{MismatchMeasure, WrongInput, WrongInputKind};
 use armcal_core::codes::{Code, Coded};
 
-/// The file in which an arm's lenses are stated, as sentences name it.
+/// The file that states an arm's lenses, as sentences name it.
 pub(crate) const ROBOT_FILE: &str = "robot.toml";
 
 /// A cause for which a map must not be used.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MapRefusal {
-    /// What is wrong.
+    /// The fault of the inputs.
     pub cause: MapRefusalCause,
     /// Name of the file that states the lenses.
     pub lens_file: String,
 }
 
-/// What is wrong with the inputs of a map.
+/// Fault in the inputs of a map.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MapRefusalCause {
-    /// What a calibration would be refused for, too.
+    /// A reason that would also refuse a calibration.
     OfCalibration(Refusal),
     /// Another reading of the lens with which the corners fit one map.
     OtherLens {
@@ -29,7 +29,7 @@ pub enum MapRefusalCause {
         reading: WrongInputKind,
         /// Distance of measured and predicted corners with it, root mean square.
         rms_px: f64,
-        /// The same with the lens as stated.
+        /// Root mean square distance with the lens as stated.
         stated_rms_px: f64,
     },
     /// No tag whose place is known fits the views.
@@ -44,9 +44,9 @@ pub enum MapRefusalCause {
 /// Sizes that the views contradict.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WrongSizes {
-    /// The tag of that size; `None` for all tags.
+    /// The tag with the wrong size; `None` for all tags.
     pub tag: Option<u32>,
-    /// Sizes over the stated ones.
+    /// Ratio of the sizes to the stated ones.
     pub factor: f64,
 }
 
@@ -126,7 +126,7 @@ impl fmt::Display for MapRefusal {
     }
 }
 
-/// The sentence with the name of the file in which this lens is stated.
+/// Returns the sentence with the name of the file that states this lens.
 pub(crate) fn in_lens_file(text: &str, lens_file: &str) -> String {
     text.replace("[camera] of robot.toml", if lens_file == ROBOT_FILE { "[camera] of robot.toml" } else { lens_file })
         .replace(ROBOT_FILE, lens_file)

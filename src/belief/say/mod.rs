@@ -1,9 +1,9 @@
-//! What is said of a calibration, and its words: the same in terminal, report, replay and files.
+//! Statements about a calibration, and their words: the same in terminal, report, replay and files.
 //!
-//! `finding` is what was found to be other than stated, `refusal` why a result must not be used (`wrong_input`,
-//! `reading_error`, `geometry_error`, `moved_body` are causes), `reservation` its limits, `doubt` reasons not to rely on
-//! an online belief. `repair` says what to do about a finding, `sensor_keys` which lines correct a reading. Their words
-//! are in this room and nowhere else.
+//! `finding` is a difference from the stated values, `refusal` why a result must not be used (`wrong_input`,
+//! `reading_error`, `geometry_error`, `moved_body` are causes), `reservation` its limits. `doubt` holds reasons not to
+//! rely on an online estimate. `repair` is the advice on a finding, `sensor_keys` the lines that correct a reading.
+//! Only this folder holds their words.
 
 pub(crate) mod constants;
 pub(crate) mod doubt;

@@ -1,26 +1,26 @@
-//! What moved between two views, and what to do about it.
+//! Bodies that moved between two views, and the remedy.
 
 use std::fmt;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What has one place before two views and another one after.
+/// A body whose pose differs before and after a gap between two views.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MovedBody {
-    /// A camera on the arm, on its mount.
+    /// A camera on the arm that moved on its mount.
     Camera,
-    /// A camera that stands still, or the arm's base before it.
+    /// A camera that stands still, or the base of the arm that it looks at.
     StandingCamera,
-    /// The arm's base, or all tags beside it.
+    /// The arm's base, or all tags that stand around it.
     BaseOrTags,
-    /// All tags that the arm carries before a camera that stands still.
+    /// All tags that the arm carries in front of a camera that stands still.
     CarriedTags,
 }
 
 impl MovedBody {
-    /// Advice to keep it in its place.
+    /// Advice to keep the body in its place.
     pub(crate) fn remedy(self) -> &'static str {
         match self {
             Self::Camera => "fasten the camera, then calibrate again from views after it",

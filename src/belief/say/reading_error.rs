@@ -1,4 +1,4 @@
-//! Joint readings that mean something else than the input map and robot.toml say: as data and in words.
+//! Joint readings that do not mean what the input map and robot.toml say: as data and in words.
 
 use std::fmt;
 
@@ -17,9 +17,9 @@ use armcal_core::kinematics::JointKind;
 pub struct JointZero {
     /// Name of the joint in the URDF.
     pub joint: String,
-    /// Angle minus reading, rad; a slide's way, m.
+    /// Angle minus reading, rad; for a slide, way minus reading, m.
     pub off_rad: f64,
-    /// Turns or slides.
+    /// Kind of the joint: turns or slides.
     #[serde(default, skip_serializing_if = "JointKind::is_turning")]
     pub moves: JointKind,
     /// The reading at angle zero that explains the views.
@@ -34,38 +34,38 @@ pub struct JointZero {
 pub struct SignedJoint {
     /// Name of the joint in the URDF.
     pub joint: String,
-    /// 1 where it is added, -1 where it is subtracted.
+    /// 1 if its angle is added, -1 if it is subtracted.
     pub sign: f64,
 }
 
-/// One way in which readings differ from the angles that they are read as.
+/// One kind of difference between the readings and the angles that they are read as.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", tag = "error")]
 pub enum ReadingError {
     /// Two joints have each other's readings.
     Exchanged {
-        /// Their names in the URDF.
+        /// Names of the two joints in the URDF.
         joints: [String; 2],
     },
     /// All joints are in the reverse order.
     Reversed {
-        /// Their names in the URDF, base first.
+        /// Names of the joints in the URDF, base first.
         joints: Vec<String>,
     },
     /// Several joints have one another's readings, in a circle.
     InCircle {
-        /// Their names in the URDF.
+        /// Names of the joints in the URDF.
         joints: Vec<String>,
-        /// The joint under whose name each one's readings are recorded.
+        /// For each of `joints`, the joint under whose name its readings are recorded.
         recorded: Vec<String>,
     },
     /// One joint's reading is a sum of its own angle and those of other joints.
     Sum {
         /// Name of the joint in the URDF.
         joint: String,
-        /// 1, or -1 where its own angle is subtracted.
+        /// 1 if the joint's own angle is added, -1 if it is subtracted.
         own: f64,
-        /// The others.
+        /// The other joints of the sum.
         with: Vec<SignedJoint>,
     },
     /// One joint's reading contains another joint's angle.
@@ -74,28 +74,28 @@ pub enum ReadingError {
         joint: String,
         /// The joint whose angle is added.
         with: String,
-        /// 1 where it is added, -1 where it is subtracted.
+        /// 1 if that angle is added, -1 if it is subtracted.
         sign: f64,
     },
     /// One joint has the readings of another one.
     Alike {
-        /// Name of the joint in the URDF whose angles they are not.
+        /// Name in the URDF of the joint whose angles these are not.
         joint: String,
-        /// The joint that they belong to.
+        /// The joint that the readings belong to.
         with: String,
-        /// Views in which they are the same.
+        /// Number of views in which the readings of both joints are the same.
         views: usize,
     },
     /// Readings of 0 to 360 deg, of joints whose ranges lie about zero.
     OtherTurns {
-        /// Their names in the URDF.
+        /// Names of the joints in the URDF.
         joints: Vec<String>,
-        /// One turn of the first of them.
+        /// One turn of the first of `joints`, counts.
         wrap_counts: f64,
     },
-    /// Zeros differ.
+    /// Joint zeros differ from robot.toml.
     Zeros {
-        /// The joints concerned; two of a parallel pair.
+        /// The joints concerned; for a parallel pair, both.
         joints: Vec<JointZero>,
     },
     /// One joint's readings are in another unit or scale.
@@ -110,26 +110,26 @@ pub enum ReadingError {
     },
     /// Each view has the readings of another view.
     Shifted {
-        /// So many views later are its own readings; negative: before.
+        /// Number of views from a view to the one with its readings; negative if that one is earlier.
         views: i32,
     },
-    /// The views have the joint readings of other instants, in no order that was found.
+    /// The views have the joint readings of other instants, in no order that the search found.
     Unpaired {
-        /// Views that were looked at.
+        /// Number of views in the search.
         views: usize,
-        /// Probability that readings in a random order go with the camera's places as well.
+        /// Probability that readings in a random order agree as well with the camera's positions.
         p: f64,
     },
     /// The tag map is in another frame than the base's.
     MapFrame {
-        /// Its frame in the base's, m.
+        /// Position of the map's frame in the base frame, m.
         position_m: [f64; 3],
-        /// Rotation of its frame in the base's: w, x, y, z.
+        /// Rotation of the map's frame in the base frame: w, x, y, z.
         turn: [f64; 4],
     },
     /// The camera is not where robot.toml says.
     Camera {
-        /// The link that carries it, where that is another one.
+        /// The link that carries the camera; absent where it is the stated one.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         link: Option<String>,
         /// Rotation that follows the stated `quaternion_wxyz`: w, x, y, z.
@@ -140,14 +140,14 @@ pub enum ReadingError {
 /// The reading error that explains the views, with those that explain them nearly as well.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MisreadReadings {
-    /// The likeliest one.
+    /// The most probable error.
     pub found: ReadingError,
-    /// Others within the margin of evidence.
+    /// Other errors within the margin of evidence.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub alternatives: Vec<ReadingError>,
     /// Root mean square distance between predicted and surveyed tags, by the datasheet and the readings as they are, m.
     pub tag_error_m: f64,
-    /// The same root mean square after correction and calibration, m; absent where no tag was predicted.
+    /// Root mean square distance after correction and calibration, m; absent where no tag was predicted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub corrected_m: Option<f64>,
 }
@@ -259,7 +259,7 @@ fn signed_sum<'a>(terms: impl Iterator<Item = (f64, &'a str)>) -> String {
     sum
 }
 
-/// `None` of all that are no zeros.
+/// Remedy for wrong zeros; `None` for any other error.
 fn zeros_remedy(error: &ReadingError) -> Option<String> {
     let ReadingError::Zeros { joints } = error else { return None };
     let one = |zero: &JointZero| match zero.input_zero {
@@ -272,7 +272,7 @@ fn zeros_remedy(error: &ReadingError) -> Option<String> {
     Some(format!("set the zeros in {table}, if the URDF is right: {}", lines.join("; ")))
 }
 
-/// `None` of all that is not the frame of the map.
+/// Remedy for a map in another frame; `None` for any other error.
 fn frame_remedy(error: &ReadingError) -> Option<String> {
     let ReadingError::MapFrame { position_m: [x, y, z], turn } = error else { return None };
     let [qw, qx, qy, qz] = turn.map(|value| format!("{value:.4}"));
@@ -291,7 +291,7 @@ fn any_turn_in_words([w, x, y, z]: &[f64; 4]) -> String {
 }
 
 impl MisreadReadings {
-    /// Only at the arm can zeros and the frame of the map be distinguished.
+    /// Remedy for zeros and the frame of the map, which only a look at the arm can distinguish.
     fn remedy_of_zeros_or_frame(&self) -> String {
         let all = || std::iter::once(&self.found).chain(&self.alternatives);
         let (zeros, frame) = (all().find_map(zeros_remedy), all().find_map(frame_remedy));

@@ -1,4 +1,4 @@
-//! Why a calibration is refused: cause, evidence and remedy as data. Their words are made in `words` and nowhere else.
+//! Reasons why a calibration is refused: cause, evidence and remedy as data. Only `words` puts them into words.
 
 pub(crate) use crate::say::constants::refusal::MIN_USED_SHARE;
 use std::borrow::Cow;
@@ -21,7 +21,7 @@ use crate::say::wrong_input::WrongInput;
 
 pub(crate) mod words;
 
-/// One reason to refuse. Angles in rad, lengths in m.
+/// One reason for a refusal. Angles in rad, lengths in m.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "cause", rename_all = "snake_case")]
 pub enum Refusal {
@@ -34,9 +34,9 @@ pub enum Refusal {
     },
     /// The solver did not converge.
     NotSolved {
-        /// Stalled or degenerate.
+        /// Outcome of the solver: stalled or degenerate.
         outcome: Outcome,
-        /// Steps or evaluations until then.
+        /// Number of steps or evaluations until the solver stopped.
         #[serde(default)]
         evaluations: usize,
     },
@@ -44,7 +44,7 @@ pub enum Refusal {
     TooFewHeldOutViews {
         /// Held-out views that show a tag.
         views: usize,
-        /// The fewest that are enough.
+        /// Least number of views for a verdict.
         needed: usize,
     },
     /// No held-out view shows a usable tag.
@@ -53,145 +53,148 @@ pub enum Refusal {
     NoBetterThanDatasheet {
         /// Root mean square distance between predicted and surveyed tags.
         held_out_m: f64,
-        /// The same with the datasheet's sensors.
+        /// Root mean square distance with the datasheet's sensors.
         datasheet_m: f64,
     },
-    /// Held-out views fit no better, beyond chance, than with mount and map fitted and the datasheet's sensors.
+    /// Held-out views fit no better, beyond chance, than a baseline: the datasheet's sensors, with mount and map
+    /// fitted.
     NoBetterThanBaseline {
         /// Position error of the tags in held-out views.
         held_out_m: f64,
-        /// The same with mount and map alone.
+        /// Position error of the tags in held-out views with only mount and map fitted.
         baseline_m: f64,
-        /// Probability of as large an improvement where there is none.
+        /// Probability of at least this improvement by chance.
         p_value: f64,
     },
     /// Held-out views fit much worse than fitted ones.
     Overfitted {
         /// Root mean square distance between predicted and surveyed tags.
         held_out_m: f64,
-        /// The same of the fitted views.
+        /// Root mean square distance in the fitted views.
         fit_m: f64,
     },
-    /// The tool error, by the recording alone, exceeds the tolerance with more than 5 % probability.
+    /// The tool error due to the uncertainty of the recording alone exceeds the tolerance with more than 5 %
+    /// probability.
     BeyondTolerance {
-        /// Number of the target where that is most likely, from 1.
+        /// Number of the target with the highest probability, from 1.
         target: usize,
-        /// Probability there.
+        /// Probability of exceeding the tolerance at that target.
         probability: f64,
-        /// U95 there.
+        /// U95 at that target: radius that holds the tool error with 95 % probability.
         u95_m: f64,
         /// The task's tolerance.
         tolerance_m: f64,
-        /// Keys of robot.toml with the sigmas that are most of it: what they state no view tells.
+        /// Keys of robot.toml whose sigmas cause most of the tool error: no view constrains the values that they state.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         survey: Vec<String>,
-        /// Whether the camera stands still.
+        /// True if the camera stands still.
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         is_watched: bool,
     },
-    /// Stated sigmas of unobservable parameters make it exceed the tolerance.
+    /// Stated sigmas of unobservable parameters make the tool error exceed the tolerance.
     PriorsBeyondTolerance {
-        /// Number of the target where that is most likely, from 1.
+        /// Number of the target with the highest probability, from 1.
         target: usize,
-        /// Probability there.
+        /// Probability of exceeding the tolerance at that target.
         probability: f64,
-        /// U95 there.
+        /// U95 at that target: radius that holds the tool error with 95 % probability.
         u95_m: f64,
         /// The task's tolerance.
         tolerance_m: f64,
-        /// The largest part of it.
+        /// The parameter with the largest part of the tool error.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         most: Option<String>,
     },
     /// Targets of the task that cannot be judged.
     TargetsNotJudged {
-        /// Their numbers, from 1.
+        /// Numbers of these targets, from 1.
         targets: Vec<usize>,
     },
     /// Targets that need angles far beyond the captured views.
     TargetsNotCovered {
-        /// Their numbers, from 1.
+        /// Numbers of these targets, from 1.
         targets: Vec<usize>,
-        /// Each joint concerned, its captured range and the excess, in words.
+        /// For each joint concerned, its captured range and the excess, in words.
         ranges: Vec<String>,
     },
-    /// Held-out positions or poses are off by more than their stated noise explains, or than may be without one.
+    /// Held-out positions or poses have larger errors than their stated noise explains, or than the limit without a
+    /// stated one.
     HeldOutError {
         /// Root mean square distance between predicted and surveyed tags.
         held_out_m: f64,
-        /// The largest that is accepted.
+        /// Largest accepted distance.
         limit_m: f64,
         /// Source of the limit.
         source: HeldOutLimitSource,
     },
     /// Rotations of recorded poses contradict the positions and the joints.
     RotationNoise {
-        /// Their noise as fitted, one sigma.
+        /// Noise of the rotations as fitted, one sigma.
         rotation_rad: f64,
-        /// The largest that is accepted.
+        /// Largest accepted noise.
         limit_rad: f64,
         /// The noise that the input map states.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         stated_rad: Option<f64>,
     },
-    /// A file is not as it is said to be, and the images show it without the arm.
+    /// A file does not hold what it should, and the images show it without the arm.
     WrongInput(WrongInput),
-    /// Joint readings mean something else than the input map and robot.toml say.
+    /// Joint readings do not mean what the input map and robot.toml say.
     MisreadReadings(MisreadReadings),
     /// Camera, base or tags moved while the views were captured.
     MovedBetweenViews {
-        /// What moved.
+        /// The body that moved.
         body: MovedBody,
-        /// Name of the camera, where there are several.
+        /// Name of the camera; absent where there is only one.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         camera: Option<String>,
-        /// Numbers of the last view before it and of the first one after it.
+        /// Numbers of the last view before the motion and of the first view after it.
         views: [u32; 2],
-        /// How far it moved; a base or tags at the origin of the frame of the tag map.
+        /// Shift of the body; for a base or tags, at the origin of the tag map's frame.
         shift_m: f64,
-        /// By how much it turned.
+        /// Rotation angle of the body.
         turn_rad: f64,
     },
     /// Another link geometry explains the data, and joint sensors do not.
     Geometry(GeometryError),
     /// An element of the geometry departs from its nominal pose by more than a repair may.
     RepairTooLarge {
-        /// The link, mount or base.
+        /// The link, mount or base that departs.
         element: String,
         /// The estimated departure, in `unit`.
         size: f64,
-        /// Metres or radians.
+        /// Unit of `size`: metres or radians.
         unit: FindingUnit,
-        /// One sigma, stated or the default.
+        /// One sigma of the nominal pose, stated or the default.
         stated_std: f64,
-        /// The largest repair in these sigmas.
+        /// Largest repair, in multiples of `stated_std`.
         most_sigmas: f64,
-        /// Length of the link, where the departure exceeds it.
+        /// Length of the link; absent where the departure does not exceed it.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         length_m: Option<f64>,
     },
-    /// The size of a tag, or of all, differs from the tag map's by more than a repair may.
+    /// The size of one tag, or of all, differs from the tag map's by more than a repair may.
     TagSizeRepair {
-        /// The tag, or all.
+        /// The tag with the other size, or `all`.
         element: String,
         /// Estimated size over the stated one.
         ratio: f64,
-        /// The stated one of the tag, or of the first, m.
+        /// Stated size of that tag, or of the first tag, m.
         stated_m: f64,
     },
     /// The focal length differs from the stated one by more than a repair may.
     Lens {
-        /// Name of the further camera; `None`: the first.
+        /// Name of the camera; `None` for the first one.
         camera: Option<String>,
         /// Estimated focal length over that of robot.toml.
         ratio: f64,
         /// One sigma of `ratio`.
         std: f64,
-        /// One sigma of the stated focal length, as a share of it.
+        /// One sigma of the stated focal length, relative.
         stated_std: f64,
-        /// The largest repair in these sigmas.
+        /// Largest repair, in multiples of `stated_std`.
         most_sigmas: f64,
-        /// As estimated, px.
+        /// Estimated focal lengths along columns and rows, px.
         focal_px: [f64; 2],
     },
     /// A joint's error from view to view is beyond what such a sensor can have.
@@ -202,67 +205,67 @@ pub enum Refusal {
         std_rad: f64,
         /// The datasheet's linearity.
         datasheet_std_rad: f64,
-        /// Whether the joint slides: figures are in m then, not in rad.
+        /// Kind of the joint; the figures of a slide are in m, not in rad.
         #[serde(default, skip_serializing_if = "JointKind::is_turning")]
         moves: JointKind,
     },
-    /// Sensors' offsets walk at random, and what they do after the views is more than the task tolerates.
+    /// Sensors' offsets walk at random, and their walk after the views exceeds the task's tolerance.
     OffsetsWalk {
-        /// Name of the joint whose offset walks most.
+        /// Name of the joint with the largest walk.
         joint: String,
         /// One sigma of its walk from the first view to the last.
         walked_rad: f64,
-        /// Whether the joint slides: figures are in m then, not in rad.
+        /// Kind of the joint; the figures of a slide are in m, not in rad.
         #[serde(default, skip_serializing_if = "JointKind::is_turning")]
         moves: JointKind,
-        /// U95 at the worst target, with as much again.
+        /// U95 at the worst target, including as large a walk again.
         u95_m: f64,
         /// The task's tolerance.
         tolerance_m: f64,
     },
-    /// A joint's readings are in another unit than the input map says.
+    /// A joint's readings are in a unit other than the input map says.
     SensorUnit {
         /// Name of the joint in the URDF.
         joint: String,
-        /// Angle or way over reading.
+        /// Angle, or way of a slide, over reading.
         gain: f64,
-        /// Turns or slides.
+        /// Kind of the joint: turns or slides.
         #[serde(default, skip_serializing_if = "JointKind::is_turning")]
         moves: JointKind,
         /// `factor` of the input map with that gain; absent: readings are counts.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         input_factor: Option<f64>,
     },
-    /// A sensor is farther from a straight line than one of its datasheet can be.
+    /// A sensor departs farther from a straight line than one of its datasheet can.
     Nonlinearity {
-        /// The joint's name.
+        /// Name of the joint.
         joint: String,
-        /// Fitted size of the nonlinearity.
+        /// One sigma of the nonlinearity, as fitted.
         std_rad: f64,
-        /// Linearity by the datasheet.
+        /// Linearity in the datasheet.
         datasheet_std_rad: f64,
-        /// Whether the joint slides: figures are in m then, not in rad.
+        /// Kind of the joint; the figures of a slide are in m, not in rad.
         #[serde(default, skip_serializing_if = "JointKind::is_turning")]
         moves: JointKind,
     },
-    /// Corners are farther off than the stated noise explains.
+    /// Corner residuals are larger than the stated noise explains.
     CornerNoise {
-        /// Of corners averaged over a view.
+        /// Residual of corners averaged over a view.
         residual_px: f64,
-        /// Noise of one frame, by robot.toml.
+        /// Noise of one frame, from robot.toml.
         stated_px: f64,
-        /// Largest residual that is accepted.
+        /// Largest accepted residual.
         limit_px: f64,
     },
-    /// Under the stated corner noise most observations fit nothing, under a larger one nearly all do.
+    /// Most observations do not fit under the stated corner noise; nearly all fit under a larger one.
     CornerNoiseUnderstated {
         /// Residual of corners averaged over a view, with the larger noise.
         residual_px: f64,
-        /// Of one frame, by robot.toml.
+        /// Noise of one frame, from robot.toml.
         stated_px: f64,
         /// Number of tag observations that are rejected under the stated noise.
         outliers: usize,
-        /// Number of all.
+        /// Number of all tag observations.
         observations: usize,
     },
     /// A gain or offset that no sensor of this datasheet has.
@@ -271,60 +274,60 @@ pub enum Refusal {
         parameter: String,
         /// Distance from the datasheet in its prior's standard deviations.
         sigmas: f64,
-        /// Estimated departure: a share of a gain; an offset, rad, of a slide, m.
+        /// Estimated departure: relative for a gain; for an offset in rad, of a slide in m.
         off: f64,
-        /// Share, radians or metres.
+        /// Unit of `off`: share, radians or metres.
         unit: FindingUnit,
     },
     /// Too many tag observations do not fit.
     Outliers {
         /// Number of rejected tag observations.
         outliers: usize,
-        /// Number of all.
+        /// Number of all tag observations.
         observations: usize,
     },
-    /// Held-out views are predicted worse than the estimate says.
+    /// The errors of predicted held-out views exceed the uncertainty of the estimate.
     Innovations {
-        /// Which innovations.
+        /// Quantity whose innovations are tested.
         quantity: InnovationQuantity,
         /// Chi-square over its degrees of freedom; 1 is expected.
         per_dof: f64,
-        /// Largest `per_dof` that is no warning.
+        /// Largest `per_dof` without a warning.
         limit: f64,
         /// Range of `per_dof` in 95 % of cases, by chance alone.
         expected: [f64; 2],
     },
-    /// The tool touched surveyed surfaces elsewhere than it was predicted to.
+    /// The tool touched surveyed surfaces at other places than predicted.
     Touch {
-        /// Along the normal of the surface that is farthest off: positive is out of it.
+        /// Error along the normal of the surface with the largest error; positive points out of it.
         off_m: f64,
-        /// That surface.
+        /// Name of that surface.
         surface: String,
-        /// Of all touches together.
+        /// Chi-square of all touches together.
         chi2: f64,
-        /// Largest `chi2` that is no reason.
+        /// Largest `chi2` that does not refuse.
         limit: f64,
-        /// What explains it, alike.
+        /// Causes that explain the touches about equally well.
         causes: Vec<String>,
         /// The link that carries the tool.
         link: String,
-        /// From the drawn tool point to one that would explain it best, axes of `link`.
+        /// Shift from the nominal tool point to the one that explains the touches best, axes of `link`.
         tool_point_m: [f64; 3],
     },
     /// A measured length and the views contradict each other.
     Length {
-        /// What was measured.
+        /// The measured length, in words.
         what: String,
-        /// The key that states it.
+        /// The key that states the length.
         key: String,
-        /// As stated.
+        /// Length as stated.
         measured_m: f64,
-        /// By the views and all else.
+        /// Length from the views and all other data.
         by_views_m: f64,
         /// One sigma of the difference.
         std_m: f64,
     },
-    /// The prior rests on the same messages.
+    /// The prior was made from the same messages.
     PriorReused,
     /// The prior's covariance has no inverse.
     PriorSingular,
@@ -332,68 +335,68 @@ pub enum Refusal {
     PriorUntested,
     /// Prior and views cannot both be right.
     PriorContradicted {
-        /// The joint that is off the most in its own sigma.
+        /// The joint with the largest error in units of its own sigma.
         joint: String,
-        /// Mean over the views; positive where the new views put its angle above the prior's.
+        /// Mean angle difference over the views; positive if the new views put the joint's angle above the prior's.
         off_rad: f64,
         /// One sigma of `off_rad`.
         off_std_rad: f64,
-        /// Whether the joint slides: figures are in m then, not in rad.
+        /// Kind of the joint; the figures of a slide are in m, not in rad.
         #[serde(default, skip_serializing_if = "JointKind::is_turning")]
         moves: JointKind,
         /// Square of the estimate's move from the prior under its covariance.
         chi2: f64,
-        /// Number of directions that the views tell enough of to be tested.
+        /// Number of directions that the views determine well enough to test.
         degrees_of_freedom: usize,
         /// The 0.999 quantile of `chi2`.
         limit: f64,
-        /// Share of the observations that fit anything near the prior.
+        /// Share of observations that fit near the prior.
         used_share: f64,
-        /// How many joints are off by more than chance.
+        /// Number of joints whose errors are larger than chance explains.
         #[serde(default)]
         joints_off: usize,
-        /// How far the camera was moved since, where that alone explains it.
+        /// Motion of the camera since the prior; absent unless it alone explains the contradiction.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         camera_moved: Option<CameraMoved>,
     },
-    /// A sensor slipped, and too few views show it as it is now.
+    /// A sensor slipped, and too few views show it after the slip.
     TooFewViewsSinceSlip {
         /// Name of the joint in the URDF.
         joint: String,
-        /// What shows the slip, in words.
+        /// Evidence of the slip, in words.
         evidence: String,
-        /// Views since the slip.
+        /// Number of views since the slip.
         views: usize,
     },
-    /// A sensor slipped during the capture, and the method knows no step.
+    /// A sensor slipped during the capture, and the method does not model steps.
     SlipNotEstimated {
         /// Name of the joint in the URDF.
         joint: String,
-        /// What shows the slip, in words.
+        /// Evidence of the slip, in words.
         evidence: String,
     },
-    /// A sensor that reads the other way, or of another scale, and the rest does not fit with its gain estimated.
+    /// A sensor is reversed or has another scale, and the other data do not fit with its gain estimated.
     SensorLine {
-        /// The joint.
+        /// Name of the joint.
         joint: String,
-        /// Of the angle by the reading, 1 by the datasheet.
+        /// Slope of the angle by the reading; 1 by the datasheet.
         slope: f64,
         /// `factor` of the input map with that slope; absent: readings are counts.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         input_factor: Option<f64>,
     },
-    /// A sensor failed whose joint the task needs.
+    /// A sensor failed, and the task needs its joint.
     SensorFailed {
         /// Name of the joint in the URDF.
         joint: String,
-        /// What is wrong with its sensor.
+        /// Failure of the sensor.
         kind: FailedKind,
-        /// Number of the first view in which it is wrong; absent where all are.
+        /// Number of the first view with the failure; absent where all views have it.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         since_view: Option<u32>,
-        /// Over the task's targets, 95th percentile, without the sensor; absent where nothing predicts it.
+        /// Tool error without the sensor, 95th percentile over the task's targets; absent where nothing predicts it.
         tool_error_m: Option<f64>,
-        /// The same while the camera shows the joint's angle.
+        /// Tool error while the camera shows the joint's angle, same percentile; absent where nothing predicts it.
         tool_error_by_camera_m: Option<f64>,
         /// The task's tolerance; absent without a task.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -401,12 +404,12 @@ pub enum Refusal {
     },
 }
 
-/// A camera that was mounted anew.
+/// Motion of a camera that was mounted again.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CameraMoved {
-    /// How far it was shifted.
+    /// Shift of the camera.
     pub shift_m: f64,
-    /// By how much it was turned.
+    /// Rotation angle of the camera.
     pub turn_rad: f64,
 }
 
@@ -422,18 +425,18 @@ pub enum HeldOutLimitSource {
     Reach,
 }
 
-/// Which innovations of held-out views are tested.
+/// Quantity whose held-out innovations are tested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum InnovationQuantity {
-    /// Poses of the cameras, six numbers a view.
+    /// Camera poses, six numbers per view.
     CameraPoses,
     /// All measured coordinates.
     Coordinates,
 }
 
 impl InnovationQuantity {
-    /// As sentences call it.
+    /// Name of the quantity in sentences.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -444,31 +447,31 @@ impl InnovationQuantity {
 }
 
 impl Refusal {
-    /// Whether it is about the data themselves, so that it comes before what a fit of them shows.
+    /// Returns true if the reason concerns the data themselves, so that it precedes results of their fit.
     #[must_use]
     pub fn is_about_data(&self) -> bool {
         matches!(self, Self::TooFewViews { .. } | Self::NotSolved { .. } | Self::TooFewViewsSinceSlip { .. })
     }
 
-    /// Which reason is told first: what makes all others a consequence. Those of one rank stay in their order.
+    /// Rank in the order of reasons, ascending: a cause comes before its consequences. Equal ranks keep their order.
     pub(crate) fn rank(&self) -> u8 {
         match self {
             // A wrong file or a motion explains why few views are left.
             Self::WrongInput(_) | Self::MovedBetweenViews { .. } => 0,
             Self::TooFewViews { .. } | Self::TooFewViewsSinceSlip { .. } => 1,
             Self::MisreadReadings(_) | Self::Lens { .. } | Self::PriorReused => 2,
-            // Under a prior that does not hold, links and sensors seem to be off.
+            // Under a wrong prior, links and sensors seem to have errors.
             Self::PriorContradicted { .. } => 3,
-            // Where hardly any observation fits, the solver's end and every test of the rest say nothing.
+            // Where hardly any observation fits, the solver's outcome and all tests of the rest mean nothing.
             Self::Outliers { outliers, observations } if 2 * outliers > *observations => 4,
             Self::CornerNoiseUnderstated { .. } => 4,
-            // Another scale makes offsets and links seem off.
+            // Another scale imitates errors of offsets and links.
             Self::SensorLine { .. } | Self::SensorUnit { .. } => 5,
             _ => 6,
         }
     }
 
-    /// A wrong file or reading, or a motion, which the further reasons follow from: what they advise is moot.
+    /// Returns true for a wrong file or reading, or a motion, that causes the further reasons: their advice is moot.
     fn explains_others(&self) -> bool {
         matches!(
             self,
@@ -476,7 +479,7 @@ impl Refusal {
         )
     }
 
-    /// What to do about it.
+    /// Advice to remove the cause.
     #[must_use]
     pub fn remedy(&self) -> Cow<'static, str> {
         match self {
@@ -597,7 +600,7 @@ fn remedy_of_line(found: Rescaled<'_>) -> String {
     }
 }
 
-/// Those whose advice counts: all, or the first one where it explains the others.
+/// Returns the refusals whose advice counts: all, or only the first one where it explains the others.
 #[must_use]
 pub fn with_advice(refusals: &[Refusal]) -> &[Refusal] {
     let explains = refusals.first().is_some_and(Refusal::explains_others);
@@ -672,7 +675,7 @@ pub mod in_files {
     /// Writes code, text and evidence of each refusal.
     ///
     /// # Errors
-    /// Those of the serializer.
+    /// Errors of the serializer.
     pub fn serialize<S: Serializer>(refusals: &[Refusal], serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_seq(refusals.iter().map(|evidence| {
             let text = format!("{}; {}", evidence.cause(), evidence.remedy());
@@ -683,7 +686,7 @@ pub mod in_files {
     /// Reads the evidence; code and text follow from it.
     ///
     /// # Errors
-    /// Those of the deserializer.
+    /// Errors of the deserializer.
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<Refusal>, D::Error> {
         Vec::deserialize(deserializer)
     }

@@ -10,29 +10,29 @@ use armcal_core::robot::FailedKind;
 pub struct FailedJoint<'a> {
     /// Name of the joint in the URDF.
     pub joint: &'a str,
-    /// Failure.
+    /// Kind of the failure.
     pub kind: FailedKind,
-    /// Evidence.
+    /// Evidence of the failure.
     pub evidence: &'a str,
-    /// Its sensor slipped, and is calibrated as it is since then.
+    /// True if the sensor slipped and is calibrated as it is since the slip.
     pub slipped: bool,
 }
 
 /// An error of the arm or its survey that the result corrects.
 #[derive(Clone, Debug)]
 pub struct Repair {
-    /// For scripts.
+    /// Code for scripts.
     pub code: Code,
-    /// Cause.
+    /// Cause of the error.
     pub cause: String,
-    /// Remedy.
+    /// Advice to remove the cause.
     pub remedy: String,
-    /// Value that the result uses; empty where the remedy says it.
+    /// Statement of the value that the result uses; empty where the remedy states it.
     taken: &'static str,
 }
 
 impl Repair {
-    /// Remedy, and what an accepted result has meanwhile.
+    /// Remedy, and the value that an accepted result uses until then.
     #[must_use]
     pub fn remedy_and_result(&self) -> String {
         let colon = if self.taken.is_empty() { "" } else { ": " };
@@ -53,7 +53,7 @@ pub fn repairs(findings: &[Finding], failed: &[FailedJoint<'_>], since: &str) ->
     failed.iter().map(of_joint).chain(placed.into_iter().filter_map(|(_, found)| of_finding(found, since))).collect()
 }
 
-/// Findings that a user can act on, in the order in which they are told.
+/// Findings that a user can act on, in the order in which they are reported.
 const REPAIRS: [FindingKind; 12] = [
     FindingKind::SensorScale,
     FindingKind::SensorSlip,
@@ -122,7 +122,7 @@ fn of_finding(found: &Finding, since: &str) -> Option<Repair> {
     Some(Repair { code: found.code(), cause, remedy, taken })
 }
 
-/// Cause, remedy and what the result does about tags that are not as surveyed.
+/// Cause, remedy and effect on the result of tags that differ from the survey.
 fn of_tags(found: &Finding) -> (String, String, &'static str) {
     let name = &found.name;
     match found.kind {
@@ -169,7 +169,7 @@ fn size(found: &Finding) -> String {
     found.size_in_words().unwrap_or_else(|| "away".to_owned())
 }
 
-/// ` by 1.74 deg`, where it has a size.
+/// ` by 1.74 deg`; empty where the finding has no size.
 fn by(found: &Finding) -> String {
     found.size_in_words().map_or_else(String::new, |size| format!(" by {size}"))
 }
@@ -187,7 +187,7 @@ fn of_joint(failed: &FailedJoint<'_>) -> Repair {
 }
 
 impl FailedJoint<'_> {
-    /// Remedy.
+    /// Advice to remove the failure.
     #[must_use]
     pub fn remedy(&self) -> String {
         let joint = self.joint;
@@ -255,7 +255,7 @@ mod tests {
             finding(FindingKind::Sag, "base", 0.1, FindingUnit::RadianPerNewtonMetre),
         ];
         let others = causes(&others, &[]);
-        // Of a joint that is told of already nothing is said twice; what was not repaired is a refusal's.
+        // A joint that is already reported is not reported twice; an error that was not repaired belongs to a refusal.
         findings[1].name = "elbow".to_owned();
         findings[0].repaired = false;
         let told = after_slip("the sensor slipped by 1.74 deg");

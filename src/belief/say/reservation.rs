@@ -1,4 +1,4 @@
-//! What a calibration rests on beside the data: elements of the geometry that no view shows.
+//! Reservations of a calibration: elements of the geometry that no view constrains, and that depend on priors.
 
 use crate::say::finding::FindingUnit;
 use std::fmt;
@@ -8,22 +8,22 @@ use serde::{Deserialize, Serialize};
 
 use armcal_core::codes::Code;
 
-/// One element that the data do not tell, so that the answer holds only as far as its prior does.
+/// One element that the data do not determine, so that the result holds only if its prior does.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Reservation {
     /// The element and its axis: `camera mount, turn about y`.
     pub what: String,
-    /// One sigma of the drawing, in `unit`.
+    /// One sigma of the nominal value, in `unit`.
     pub prior_std: f64,
     /// Unit of `prior_std`.
     pub unit: FindingUnit,
-    /// By one sigma of the prior, root mean square over the task, m; of several axes the largest.
+    /// Tool error per sigma of the prior, root mean square over the task, m; for several axes, the largest.
     pub tool_error_m: f64,
-    /// The same for each axis of `what`, where it has several that differ.
+    /// Tool error for each axis of `what`, m, where it has several that differ.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub by_axis_m: Vec<f64>,
-    /// U95 includes it: false where robot.toml states no sigma, and `prior_std` is the default.
+    /// True if U95 includes the element; false where robot.toml states no sigma, and `prior_std` is the default.
     #[serde(default = "is_included", skip_serializing_if = "Clone::clone")]
     pub included: bool,
 }
@@ -33,7 +33,7 @@ fn is_included() -> bool {
 }
 
 impl Reservation {
-    /// Code of the element, or that of what U95 leaves out.
+    /// Code of the element; for an element that U95 does not include, `NotIncluded`.
     #[must_use]
     pub fn code(&self) -> Code {
         let elements = [
@@ -46,7 +46,7 @@ impl Reservation {
         if self.included { element.map_or(Code::Link, |(_, code)| code) } else { Code::NotIncluded }
     }
 
-    /// Tool error by one `unit` of the element, m per m or m per rad.
+    /// Tool error per `unit` of the element, m per m or m per rad.
     #[must_use]
     pub fn tool_error_per_unit(&self) -> f64 {
         self.tool_error_m / self.prior_std
@@ -57,7 +57,7 @@ impl fmt::Display for Reservation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { what, prior_std, unit, tool_error_m, by_axis_m, included } = self;
         let all_m = if by_axis_m.is_empty() { std::slice::from_ref(tool_error_m) } else { by_axis_m };
-        // One unit that people measure in.
+        // The everyday unit.
         let (scale, name) = match unit {
             FindingUnit::Metre => (1e3, "mm"),
             FindingUnit::Radian => (1f64.to_degrees(), "deg"),

@@ -1,37 +1,37 @@
-//! Keys that correct how a joint is read: of robot.toml for counts, of the input map for readings stated as angles.
+//! Keys that correct the scale of a joint: in robot.toml for counts, in the input map for readings stated as angles.
 
 use crate::say::constants::sensor_keys::{SIGN_ALONE, SIGNIFICANT_DIGITS};
 use armcal_core::kinematics::JointKind;
 
-/// A joint's angle is another multiple of its reading.
+/// A joint whose angle is another multiple of its reading.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rescaled<'a> {
     /// Name of the joint in the URDF.
     pub joint: &'a str,
-    /// Angle over reading, as it is read.
+    /// Angle over reading, under the present scale.
     pub slope: f64,
     /// `factor` of the input map with that slope; `None`: readings are counts.
     pub input_factor: Option<f64>,
 }
 
 impl Rescaled<'_> {
-    /// The slope that the joint is thought to have by what kind of error it is.
+    /// Returns the joint with the assumed slope for its kind of error.
     pub(crate) fn taken_as(self, slope: f64) -> Self {
         Self { slope, input_factor: self.input_factor.map(|factor| factor * slope / self.slope), ..self }
     }
 
-    /// A sensor that only goes the other way has its own scale.
+    /// Returns a reversed sensor with the scale of its datasheet, if its slope is near -1.
     pub(crate) fn with_own_scale_if_reversed(self) -> Self {
         if (self.slope + 1.0).abs() < SIGN_ALONE { self.taken_as(-1.0) } else { self }
     }
 
-    /// The slope of readings in another unit is the ratio of the two.
+    /// Returns the joint with the slope of another unit: the ratio of the two units.
     pub(crate) fn of_another_unit(self, moves: JointKind) -> Self {
         let ratio = if moves.is_slide() { 1e-3 } else { 1f64.to_radians() };
         self.taken_as(if self.slope < 1.0 { ratio } else { ratio.recip() })
     }
 
-    /// The line to change.
+    /// The line to change, as advice.
     pub(crate) fn line(&self) -> String {
         let Self { joint, slope, input_factor } = *self;
         match input_factor {
@@ -46,7 +46,7 @@ impl Rescaled<'_> {
     }
 }
 
-/// A figure with enough digits for a file.
+/// Formats a figure with enough digits for a file.
 pub(crate) fn significant(value: f64) -> String {
     let before = value.abs().max(f64::MIN_POSITIVE).log10().floor() as i32 + 1;
     let digits = (SIGNIFICANT_DIGITS - before).max(1) as usize;

@@ -1,6 +1,6 @@
-//! Sentences of parts of sentences.
+//! Complete sentences from parts of sentences.
 
-/// A capital first, a full stop last; a name that begins with a small letter keeps it.
+/// Capitalises the text and ends it with a full stop; a first word with an underscore is a name and keeps its case.
 #[must_use]
 pub fn sentence(text: &str) -> String {
     let first_word = text.split([' ', ':']).next().unwrap_or_default();

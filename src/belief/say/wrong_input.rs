@@ -5,21 +5,22 @@ use serde::{Deserialize, Serialize};
 
 use armcal_core::codes::{Code, Coded};
 
-/// An input that is not what it is said to be, and how well the views fit with it and without.
+/// An input that is not what its file says, and the mismatch of the views with it and with its correction.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct WrongInput {
-    /// Which, and how it should be read.
+    /// The input, and its correct meaning.
     pub input: WrongInputKind,
     /// Quantity of `mismatch`.
     #[serde(default, skip_serializing_if = "MismatchMeasure::is_of_distances")]
     pub measure: MismatchMeasure,
-    /// As it is written: of two tags, where the one is not seen over its distance from the other; of rotations, rad; of
-    /// positions, where the tag is not by the arm over its distance from the camera.
+    /// Mismatch of the input as written. Distances: position error between two tags over their distance. Rotations: rad.
+    /// Positions: error of the tag's position by the arm over its distance from the camera.
     pub mismatch: f64,
-    /// The same with the input put right; absent where nothing puts it right.
+    /// Mismatch with the corrected input; absent where no correction is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mismatch_otherwise: Option<f64>,
-    /// What of the tags was measured in place of their size, in words, where their print tells it.
+    /// Dimension of the tags that was measured instead of their size, in words; absent where their print does not show
+    /// it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub size_hint: Option<String>,
 }
@@ -44,13 +45,13 @@ impl MismatchMeasure {
 }
 
 impl WrongInput {
-    /// One reading of the whole map or of the lens, which explains all tags at once.
+    /// Returns true if one reading of the whole map or of the lens explains all tags at once.
     pub(crate) fn is_of_all_tags(&self) -> bool {
         !matches!(self.input, WrongInputKind::ExchangedIds(_) | WrongInputKind::OtherMap)
     }
 }
 
-/// What may be wrong.
+/// Kind of a wrong input.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum WrongInputKind {
@@ -60,44 +61,44 @@ pub enum WrongInputKind {
     RecordedQuaternions,
     /// The recorded poses are those of the camera in the landmark's frame, or the other way round.
     RecordedDirection,
-    /// Both: quaternions in the other order, of the inverse poses.
+    /// The recorded rotations are quaternions in the other order, of the inverse poses.
     RecordedOrderAndDirection,
-    /// The recorded rotations are inverse, the positions are not.
+    /// The recorded rotations are inverse, but the positions are not.
     RecordedRotations,
-    /// The recorded positions are in this unit, and not in metres.
+    /// The recorded positions are in this unit, not in metres.
     RecordedUnit(String),
-    /// The recorded positions are so many times as far apart as the map has the tags.
+    /// The recorded positions are this many times as far apart as the tags of the map.
     RecordedScale(f64),
-    /// The lens is that of an image of another size: columns and rows by robot.toml, and the largest ones of a corner.
+    /// The lens belongs to an image of another size.
     ImageSize {
-        /// By robot.toml.
+        /// Columns and rows of the image, from robot.toml.
         stated_px: [u32; 2],
-        /// At least.
+        /// Largest column and row of a corner, which the image must reach at least.
         seen_px: [f64; 2],
     },
-    /// Corners have negative columns or rows; the smallest ones.
+    /// Corners have negative columns or rows; the value holds the smallest ones.
     NegativePixels([f64; 2]),
     /// Corners are shares of the image, not pixels.
     ImageShares,
-    /// The lens is that of an image of so many times the recorded one's size.
+    /// The lens belongs to an image this many times the recorded one's size.
     ImageScale(f64),
-    /// The lens has so many times its stated focal length.
+    /// The lens has this many times its stated focal length.
     FocalLength(f64),
     /// The lens is of the other model: a fisheye called a pinhole, or the other way round.
     LensModel,
     /// The corners come from images without the distortion that robot.toml states.
     Distortion,
-    /// All tags are of so many times their stated size.
+    /// All tags have this many times their stated size.
     TagSize(f64),
-    /// The map's positions are in this unit, and not in metres.
+    /// The map's positions are in this unit, not in metres.
     MapUnit(String),
-    /// The map's axes are others, in words: `(y, x, z)`, `(x, -y, z)`.
+    /// The map's positions have other axes, in words: `(y, x, z)`, `(x, -y, z)`.
     MapAxes(String),
     /// All tags of the map are turned alike: the rotation, w, x, y, z, that follows each `quaternion_wxyz`.
     TagFrames([f64; 4]),
-    /// These tags hang in one another's places.
+    /// These tags have one another's places.
     ExchangedIds(Vec<u32>),
-    /// The tags do not stand to one another as the map says, whatever is tried.
+    /// The tags are not placed as the map says, and no other reading of the files explains them.
     OtherMap,
 }
 

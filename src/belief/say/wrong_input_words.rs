@@ -9,7 +9,7 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use crate::say::wrong_input::{MismatchMeasure, WrongInput, WrongInputKind};
 
 impl WrongInput {
-    /// What to do about it.
+    /// Advice to correct the input.
     #[must_use]
     pub fn remedy(&self) -> Cow<'static, str> {
         let WrongInputKind::TagFrames(turn) = &self.input else { return self.usual_remedy().into() };
@@ -233,8 +233,8 @@ pub(crate) fn turn_in_words([w, x, y, z]: &[f64; 4]) -> String {
     format!("{:.0} deg about {name}", turn.angle().to_degrees())
 }
 
-/// In what medium a lens shows a focal length of `ratio` times the stated one: sea water has the refractive index 1.34,
-/// by which a flat window in front of the lens multiplies the focal length (Treibitz et al. 2012).
+/// The medium in which a lens shows a focal length of `ratio` times the stated one. Sea water has the refractive index
+/// 1.34, by which a flat window in front of the lens multiplies the focal length (Treibitz et al. 2012).
 pub(crate) fn medium_of_lens(ratio: f64) -> &'static str {
     match ratio {
         r if (r / WATER - 1.0).abs() < NEAR => ". A lens of air shows this factor in water",

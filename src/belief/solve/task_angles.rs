@@ -1,8 +1,9 @@
-//! The arm's angles at the task's targets: where a tool error is predicted.
+//! Joint angles at the task's targets, at which the tool error is predicted.
 //!
-//! A pose that the task gives is taken as it is. For a position inverse kinematics is started where a solution is
-//! likely: where the arm rested for it, as a `reach` goes there, at the stowed pose, at the other rests, at the views
-//! whose tool is nearest, and at last at random. One start may end at a limit beside a target that is within reach.
+//! A pose that the task states is used unchanged. For a position, inverse kinematics starts from several configurations
+//! where a solution is likely. First are the rest of the arm at it (as a `reach` moves there), the stowed pose and the
+//! other rests. Then come the views with the nearest tool, and random ones. A single start may end at a joint limit
+//! although the target is within reach.
 
 use crate::solve::constants::task_angles::{N_NEAREST_VIEWS, N_RANDOM_STARTS, TOLERANCE_M};
 use nalgebra::Vector3;
@@ -15,7 +16,7 @@ use armcal_core::robot::{FailedJoint, FailedKind, Robot};
 use armcal_core::stats::stream_rng;
 use armcal_core::streams::JointAngles;
 
-/// The arm's angles at each target that is within reach.
+/// Returns the joint angles at each target that is within reach.
 #[must_use]
 pub fn task_angles(robot: &Robot, task: TaskRests<'_>) -> Vec<JointAngles> {
     numbered_task_angles(robot, task).into_iter().map(|(_, angles)| angles).collect()
@@ -28,7 +29,7 @@ pub(crate) fn numbered_task_angles(robot: &Robot, task: TaskRests<'_>) -> Vec<(u
     numbered.filter_map(|(target_idx, target_m)| Some((target_idx, search.angles(target_idx, *target_m)?))).collect()
 }
 
-/// Angles within the limits, drawn evenly; locked joints are stowed.
+/// Random angles within the limits, uniformly distributed; locked joints are stowed.
 pub(crate) fn random_start(robot: &Robot, settings: &IkSettings, rng: &mut ChaCha8Rng) -> JointAngles {
     JointAngles::from_fn(robot.n_joints(), |j| {
         let limits = settings.limits[j];
@@ -70,7 +71,7 @@ impl<'a> TargetSearch<'a> {
         by_views.or_else(|| self.random_starts(target_idx).find_map(|start| from(&start)))
     }
 
-    /// Returns true where no joint up to the tool is locked at another angle.
+    /// Returns true if no joint up to the tool is locked at another angle.
     fn takes(&self, pose: &JointAngles) -> bool {
         let n = self.robot.tool.mount.n_joints;
         (0..n).all(|j| !self.settings.locked[j] || pose[j] == self.robot.stowed[j])
@@ -83,7 +84,7 @@ impl<'a> TargetSearch<'a> {
         solve_position(&robot.chain, &robot.tool.mount, &goal, &start, settings).ok()
     }
 
-    /// The angles read at the views whose tool is nearest to the target, the nearest first.
+    /// Measured angles of the views whose tool is nearest to the target, nearest first.
     fn nearest_views(&self, target_m: &Vector3<f64>) -> Vec<JointAngles> {
         let off_m = |angles: &JointAngles| {
             let tool = self.robot.chain.link_poses(angles).frame(&self.robot.tool.mount);
@@ -103,7 +104,7 @@ impl<'a> TargetSearch<'a> {
         })
     }
 
-    /// Those of a target are its own: targets beside it do not change them.
+    /// Random starts for a target; other targets do not change them.
     fn random_starts(&self, target_idx: u32) -> impl Iterator<Item = JointAngles> + '_ {
         let mut rng = stream_rng(u64::from(target_idx), "starts of a target");
         (0..N_RANDOM_STARTS).map(move |_| random_start(self.robot, &self.settings, &mut rng))
@@ -122,8 +123,8 @@ mod tests {
     use armcal_core::time::SIMULATION_EPOCH;
     use std::collections::BTreeMap;
 
-    /// A target is predicted for where the arm stood at it; for the stowed pose's solution where it was never reached
-    /// for, or where no solution leads from the rest.
+    /// A target is predicted at the arm's rest for it. Without a rest, or if no solution leads from it, the stowed
+    /// pose's solution counts.
     #[test]
     fn a_target_is_predicted_where_the_arm_rested_for_it() {
         let robot = titan();
@@ -132,7 +133,7 @@ mod tests {
         for (joint, by_rad) in [(0, -0.6), (1, -0.5), (2, 0.8), (3, -0.9), (4, 0.5)] {
             rested[joint] += by_rad;
         }
-        // Wrong sensors: it rested beside the target.
+        // The sensors are wrong: the arm rested next to the target.
         let mut at_target = rested;
         (0..5).for_each(|joint| at_target[joint] += 0.02);
         let task = ReachTask {
@@ -153,7 +154,7 @@ mod tests {
         assert_eq!(angles(&[(1, rested)]), by_stowed);
     }
 
-    /// Poses within the limits, drawn at random, and the task of their tool positions.
+    /// Random poses within the limits, and the task of their tool positions.
     fn random_task(robot: &Robot, seed: u64, n: usize) -> (Vec<JointAngles>, ReachTask) {
         let task = ReachTask { stamp: Default::default(), targets_m: Vec::new(), tolerance_m: 0.01, poses: Vec::new() };
         let rests = BTreeMap::new();
@@ -165,7 +166,8 @@ mod tests {
         (poses, ReachTask { targets_m, ..task })
     }
 
-    /// One start leads to a part of the reachable targets. Those at views lead to all of them, random ones to more.
+    /// A single start reaches a part of the targets within reach. Starts at views reach all of them; random ones reach
+    /// more than a single start.
     #[test]
     fn a_target_within_reach_is_found_without_rests() {
         let (robot, rests) = (titan(), BTreeMap::new());
@@ -196,7 +198,8 @@ mod tests {
         assert_eq!(numbered.iter().map(|(idx, _)| *idx).collect::<Vec<_>>(), [1]);
     }
 
-    /// A pose is judged at its own angles, whatever other posture leads there; a joint locked elsewhere stays there.
+    /// A pose is judged at its own angles, even if another configuration leads there; a joint locked elsewhere stays
+    /// there.
     #[test]
     fn a_pose_of_the_task_is_taken_as_it_is() {
         for seed in 10..14 {

@@ -1,8 +1,8 @@
-//! Levenberg-Marquardt on cameras and tags, and which detections it believes.
+//! Levenberg-Marquardt on cameras and tags, and the selection of the detections in use.
 //!
-//! First with a loss under which outliers lose their pull (Cauchy, its width from the median of the residuals), then
-//! without those that stay far off, with a loss that is quadratic for all but the rarest of honest residuals, so that
-//! the answer is as good as least squares.
+//! The first loss is Cauchy's, under which outliers lose their pull; the median of the residuals gives its width. Then
+//! detections with large residuals are rejected. The last loss is quadratic for all but the rarest of correct
+//! residuals, so that the result is as good as least squares.
 
 pub(super) use crate::tagmap::constants::adjust::MAX_STEPS;
 use crate::tagmap::constants::adjust::{
@@ -17,7 +17,7 @@ use crate::tagmap::problem::{Block, MapProblem};
 use armcal_core::numeric::{self, LeastSquares, Loss, Outcome, Proposal, Stop, StopRule};
 use armcal_core::spatial::exp;
 
-/// Lowers the cost from the state of `problem` on; whether it came to rest.
+/// Lowers the cost from the state of `problem`; returns true if the search converged.
 pub(super) fn minimize(problem: &mut MapProblem<'_>, loss: Loss, converged: f64) -> bool {
     let n_steps = MAX_ITERATIONS.min(problem.steps_left);
     if n_steps == 0 {
@@ -38,12 +38,12 @@ pub(super) fn minimize(problem: &mut MapProblem<'_>, loss: Loss, converged: f64)
     }
 }
 
-/// The map's poses, the trial state in the problem itself.
+/// A search over the map's poses; the trial state is in the problem itself.
 struct Search<'a, 'b> {
     problem: &'a mut MapProblem<'b>,
     loss: Loss,
     normal: NormalEquations,
-    /// What was accepted last.
+    /// The last accepted state.
     state: State,
     has_trial: bool,
 }
@@ -82,7 +82,7 @@ impl LeastSquares for Search<'_, '_> {
     }
 }
 
-/// What an adjustment changes.
+/// Poses that an adjustment changes.
 struct State {
     tags: Vec<Isometry3<f64>>,
     extras: Vec<Isometry3<f64>>,
@@ -129,7 +129,7 @@ fn step(problem: &mut MapProblem<'_>, normal: &NormalEquations, damping: f64) ->
     true
 }
 
-/// The corners' standard deviation over the one given, from the median length of the residuals of what is used.
+/// Ratio of the corners' standard deviation to the given one, from the median length of the residuals in use.
 pub(super) fn scale(problem: &MapProblem<'_>) -> f64 {
     let mut lengths = Vec::new();
     for block in &problem.blocks {
@@ -141,14 +141,14 @@ pub(super) fn scale(problem: &MapProblem<'_>) -> f64 {
     if lengths.is_empty() {
         return 1.0;
     }
-    // Where the poses take up much of what is measured, residuals are smaller than the noise.
+    // Where the poses absorb much of the measurements, residuals are smaller than the noise.
     let freedom = degrees_of_freedom(problem) as f64 / (2 * lengths.len()) as f64;
     let middle = lengths.len() / 2;
     let (_, median, _) = lengths.select_nth_unstable_by(middle, f64::total_cmp);
     (median.sqrt() / MEDIAN_OF_LENGTH / freedom.max(0.05).sqrt()).clamp(SCALE_BOUNDS.0, SCALE_BOUNDS.1)
 }
 
-/// Residual coordinates less unknowns; views of one tag alone take part on both sides.
+/// Residual coordinates less unknowns; a view of a single tag counts in both numbers.
 pub(super) fn degrees_of_freedom(problem: &MapProblem<'_>) -> usize {
     let used = problem.observations.iter().filter(|seen| seen.is_used).count();
     let blocks = problem
@@ -161,7 +161,7 @@ pub(super) fn degrees_of_freedom(problem: &MapProblem<'_>) -> usize {
     (8 * used + 6 * priors).saturating_sub(unknowns)
 }
 
-/// From a rough start to near the answer.
+/// Moves a rough initial guess near the solution.
 pub(super) fn approach(problem: &mut MapProblem<'_>) {
     // Loops that do not close yet must not count as outliers.
     let loss = Loss::Huber { k: FIRST_WIDTH * scale(problem) };
@@ -172,8 +172,8 @@ pub(super) fn approach(problem: &mut MapProblem<'_>) {
     }
 }
 
-/// Uses exactly the detections that agree to within `beyond` standard deviations (root mean square over their corners,
-/// of the scale found); whether that changed anything.
+/// Uses exactly the detections whose corners agree within `beyond` standard deviations (root mean square, in the
+/// estimated scale). Returns true if the selection changed.
 pub(super) fn select(problem: &mut MapProblem<'_>, beyond: f64) -> bool {
     let limit = 4.0 * 2.0 * (beyond * scale(problem)).powi(2);
     let mut changed = false;
@@ -190,7 +190,7 @@ pub(super) fn select(problem: &mut MapProblem<'_>, beyond: f64) -> bool {
     changed
 }
 
-/// To the answer.
+/// Runs the last adjustment, to convergence.
 pub(super) fn finish(problem: &mut MapProblem<'_>) -> bool {
     let loss = Loss::Huber { k: HUBER_WIDTH * scale(problem) };
     minimize(problem, loss, CONVERGED)

@@ -1,4 +1,4 @@
-//! From the solved problem to the map.
+//! The map from the solved problem.
 
 use crate::say::map_words::disagreeing_detections;
 use crate::tagmap::constants::assemble::{FAR_FROM_KNOWN, MIN_REJECTED, REJECTED_SHARE};
@@ -79,7 +79,7 @@ pub(super) fn assemble(
     }
 }
 
-/// Tags whose known place disagrees with the views, and tags most of whose detections were rejected.
+/// Warnings of tags whose known place disagrees with the views, and of tags with many rejected detections.
 fn doubts(problem: &MapProblem<'_>) -> Vec<Warning> {
     let mut out = Vec::new();
     let mut counts = vec![(0_usize, 0_usize); problem.tags.len()];
@@ -117,7 +117,7 @@ fn is_used(problem: &MapProblem<'_>, range: std::ops::Range<usize>) -> bool {
 
 /// Distances between measured and predicted corners, px.
 struct Pixels {
-    /// By tag.
+    /// Distances for each tag.
     used: Vec<Vec<f64>>,
     unused: Vec<f64>,
 }
@@ -179,7 +179,7 @@ fn mapped(problem: &MapProblem<'_>, pixels: &Pixels, inverse: Option<&SelectedIn
         .collect()
 }
 
-/// Where each further group was, from the first, in each view of two or more.
+/// Pose of each further group in the frame of the first, for each view of two or more groups.
 fn relative(
     problem: &MapProblem<'_>,
     screened: &Screened,

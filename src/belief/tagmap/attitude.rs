@@ -1,4 +1,4 @@
-//! The attitude sensor: how a moving body is turned, seen against a fixed one.
+//! Attitude sensor: rotation of a moving body against a fixed one.
 //!
 //! With the sensor's A = world_from_moving, the rotations of the two blocks M = moving_from_camera and F =
 //! fixed_from_camera of one view, and W = world_from_fixed, unknown but the same in all views: `E = F^-1 W^-1 A M` is
@@ -49,7 +49,7 @@ pub(super) fn add(normal: &mut NormalEquations, problem: &MapProblem<'_>) {
             }
         }
     }
-    // The world's place is nowhere asked for; it stays.
+    // The position of the world frame has no effect, so it is held.
     for link in problem.links.iter().take(1) {
         let node = problem.extras[link.world].node;
         for k in 0..3 {
@@ -64,16 +64,16 @@ fn rotational(block: &Matrix3<f64>) -> Matrix6<f64> {
     out
 }
 
-/// What is linked: views with an attitude that show the moving group and a static one.
+/// Groups to link: views with an attitude show the moving group and a static one.
 pub(super) struct Wanted {
     pub(super) moving_group: usize,
     pub(super) fixed_group: usize,
     pub(super) information: f64,
 }
 
-/// Ties the blocks; gives them and the world's turn their nodes.
+/// Links the blocks; gives them and the world's rotation their nodes.
 pub(super) fn link(problem: &mut MapProblem<'_>, attitudes: &[Option<UnitQuaternion<f64>>], wanted: &Wanted) {
-    // Blocks are in the order of views and groups.
+    // Blocks are sorted by view and group.
     let find = |blocks: &[Block], view: usize, group: usize| {
         blocks.binary_search_by_key(&(view, group), |block| (block.view, block.group)).ok()
     };
@@ -106,7 +106,7 @@ pub(super) fn link(problem: &mut MapProblem<'_>, attitudes: &[Option<UnitQuatern
     }
 }
 
-/// Least squares of the angles, from the first.
+/// Mean rotation by least squares of the angles, starting from the first.
 fn mean_rotation(turns: &[UnitQuaternion<f64>]) -> UnitQuaternion<f64> {
     let Some(mut mean) = turns.first().copied() else { return UnitQuaternion::identity() };
     for _ in 0..10 {

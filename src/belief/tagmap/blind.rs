@@ -1,4 +1,4 @@
-//! A map of some of the views by the tags' sizes alone: no known place that is wrong can disturb it.
+//! A map of some of the views from the tags' sizes only: no wrong known place can disturb it.
 
 use crate::tagmap::adjust::{degrees_of_freedom, scale};
 use crate::tagmap::constants::adjust::HUBER_WIDTH;
@@ -17,10 +17,10 @@ pub(super) struct Blind {
     settings: MapSettings,
 }
 
-/// How well a map fits.
+/// Misfit of a map.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Misfit {
-    /// Of the corners over the stated one.
+    /// Variance of the corners over the stated one.
     pub(super) variance: f64,
     pub(super) freedom: usize,
     pub(super) n_used: usize,
@@ -56,18 +56,18 @@ impl Misfit {
         Self { variance: solved.noise_scale.powi(2) * chi_square / freedom.max(1) as f64, freedom, n_used }
     }
 
-    /// Log evidence of this over `other`, without what its further unknowns cost.
+    /// Log evidence of this misfit over `other`, without the cost of its further unknowns.
     pub(super) fn gain_over(&self, other: &Self) -> f64 {
         0.5 * self.freedom.min(other.freedom) as f64 * (other.variance / self.variance).ln()
     }
 
-    /// With a penalty for what was left out.
+    /// Variance with a penalty for rejected detections; lower is better.
     pub(super) fn rank(&self) -> f64 {
         self.variance * (self.n_used.max(1) as f64).powi(-2)
     }
 }
 
-/// Under which a solution of these is a minimum.
+/// Loss under which such a solution is a minimum.
 pub(super) fn loss_of(solved: &Solved<'_>) -> Loss {
     Loss::Huber { k: HUBER_WIDTH * scale(&solved.problem) }
 }

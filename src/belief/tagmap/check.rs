@@ -1,4 +1,4 @@
-//! Input that cannot be meant.
+//! Checks for input that makes no sense.
 
 use std::collections::BTreeSet;
 
@@ -47,7 +47,7 @@ pub(super) fn check(input: &MapInput<'_>, settings: &MapSettings) -> Result<(), 
     anchor(input, settings)
 }
 
-/// Refuses corners most of which run the wrong way round.
+/// Refuses input whose corners mostly run the wrong way round.
 fn corner_order(input: &MapInput<'_>) -> Result<(), TagMapError> {
     let all = || input.views.iter().flat_map(|view| &view.tags);
     let (n, of) = (all().filter(|tag| turns_right(&tag.corners_px)).count(), all().count());

@@ -1,4 +1,4 @@
-//! A map that is only given out where the views do not contradict the files it is made with.
+//! A map that is only returned if the views do not contradict its input files.
 
 use nalgebra::Vector3;
 
@@ -18,11 +18,11 @@ use crate::tagmap::solve::{Solved, solve};
 use crate::tagmap::types::{MapInput, MapSettings, TagMapError};
 use armcal_core::codes::{Code, Warning};
 
-/// [`solve`], and the tests of a calibration that need no arm: other readings of the known places, another lens, tags
-/// of another size or that moved.
+/// Solves as [`solve`] does, and tests the input as a calibration does, but without an arm. The tests search for other
+/// readings of the known places, another lens, and tags of another size or that moved.
 ///
 /// # Errors
-/// [`TagMapError`] as [`solve`] gives it, and [`TagMapError::Refused`] where a file is contradicted.
+/// [`TagMapError`] as [`solve`] returns it, and [`TagMapError::Refused`] if the views contradict a file.
 pub fn checked_map(input: &MapInput<'_>, settings: &MapSettings) -> Result<TagMap, TagMapError> {
     let map = solve(input, settings);
     if let Err(TagMapError::CornerOrder { .. }) = map {
@@ -45,7 +45,7 @@ fn refused(refusal: MapRefusal) -> TagMapError {
     TagMapError::Refused(Box::new(refusal))
 }
 
-/// The map with the lenses that the views show, where `map` would be another one; odd tags named.
+/// Returns the map with the lenses that fit the views, if they change `map`; adds warnings of odd tags.
 fn of_right_lens(input: &MapInput<'_>, settings: &MapSettings, mut map: TagMap) -> Result<TagMap, TagMapError> {
     let blind = Blind::of(input, settings);
     let other = other_lenses(&blind, input.cameras);
@@ -75,7 +75,7 @@ fn mapped_with(input: &MapInput<'_>, settings: &MapSettings, other: &OtherLenses
     Some(map)
 }
 
-/// Whether a tag is elsewhere by more than its stated standard deviations hold.
+/// Returns true if a tag's position differs by more than its standard deviations allow.
 fn is_another(stated: &TagMap, found: &TagMap) -> bool {
     let is_elsewhere = |tag: &MappedTag| {
         let Some(other) = found.tag(tag.id).filter(|other| other.group == tag.group) else { return true };

@@ -1,4 +1,4 @@
-//! What a further unknown would explain: the corners' motion with it, the poses of cameras and tags following.
+//! Effect of further unknowns: the motion of the corners, while the poses of cameras and tags follow.
 //!
 //! Residual r, poses x, further unknowns u: `r - P x - U u`. Without the poses the information on u is
 //! `H = U^T U - U^T P (P^T P)^-1 P^T U`, and at the solution of the poses the right side is `b = U^T r`. The step is
@@ -22,20 +22,20 @@ pub(super) struct Corner<'c> {
     pub(super) seen: &'c Observation,
     pub(super) camera: &'c CameraModel,
     pub(super) camera_from_tag: Isometry3<f64>,
-    /// In the camera's frame, m.
+    /// Position in the camera's frame, m.
     pub(super) point: Point3<f64>,
     pub(super) image: ImagePoint,
 }
 
-/// d(pixel)/d(unknown) of a corner, a column for each unknown.
+/// Jacobian d(pixel)/d(unknown) of a corner, one column for each unknown.
 pub(super) type ByUnknown = OMatrix<f64, U2, Dyn>;
 
-/// Further unknowns.
+/// Further unknowns of the map.
 pub(super) struct Columns<'c> {
     pub(super) n: usize,
-    /// The detections that they move.
+    /// Returns true for detections that the unknowns move.
     pub(super) concerns: &'c dyn Fn(&Observation) -> bool,
-    /// How; `None` where the lens does not see the corner. The number tells the corner.
+    /// Jacobian of a corner with the given number; `None` where the lens does not see the corner.
     pub(super) by_unknown: &'c dyn Fn(&Corner<'_>, usize) -> Option<ByUnknown>,
 }
 
@@ -45,12 +45,12 @@ pub(super) struct Information {
     /// Diagonal of the matrix with all poses held.
     with_poses_held: DVector<f64>,
     pub(super) right: DVector<f64>,
-    /// d(pose of the node)/d(unknowns).
+    /// Jacobians d(pose of the node)/d(unknowns).
     pub(super) nodes: Vec<OMatrix<f64, U6, Dyn>>,
 }
 
 impl Information {
-    /// The step, and by how much it lowers the sum of squares; `None` where the views do not determine it.
+    /// The step and its decrease of the sum of squares; `None` where the views do not determine it.
     pub(super) fn step(&self) -> Option<(DVector<f64>, f64)> {
         if (0..self.right.len()).any(|k| self.matrix[(k, k)] <= DETERMINED * self.with_poses_held[k]) {
             return None;
@@ -61,7 +61,7 @@ impl Information {
     }
 }
 
-/// The poses' normal equations at a solution, solved for any right side.
+/// The poses' normal equations at a solution, factorized for any right side.
 pub(super) struct Linearized<'p, 'a> {
     problem: &'p MapProblem<'a>,
     loss: Loss,
@@ -74,13 +74,13 @@ pub(super) struct Linearized<'p, 'a> {
 struct Sums {
     matrix: DMatrix<f64>,
     right: DVector<f64>,
-    /// By block; of those that the columns move.
+    /// Products for each block that the columns move.
     blocks: BTreeMap<usize, OMatrix<f64, U6, Dyn>>,
     nodes: BTreeMap<usize, OMatrix<f64, U6, Dyn>>,
 }
 
 impl<'p, 'a> Linearized<'p, 'a> {
-    /// `None` where the views do not determine every pose.
+    /// Linearizes at the solution; `None` where the views do not determine every pose.
     pub(super) fn of(problem: &'p MapProblem<'a>, loss: Loss) -> Option<Self> {
         let mut normal = NormalEquations::new(problem);
         normal.update(problem, loss);
@@ -146,7 +146,7 @@ impl<'p, 'a> Linearized<'p, 'a> {
         }
     }
 
-    /// The nodes' poses as they follow a column.
+    /// Motion of the nodes' poses that follows a column.
     fn followed(&self, sums: &Sums, column: usize) -> Vec<Vector6<f64>> {
         let mut right = vec![Vector6::zeros(); self.problem.n_nodes];
         for (node, cross) in &sums.nodes {
@@ -164,7 +164,7 @@ impl<'p, 'a> Linearized<'p, 'a> {
         self.factor.solve(&right)
     }
 
-    /// A camera's pose as it follows a column.
+    /// Motion of a camera's pose that follows a column.
     fn block_followed(&self, sums: &Sums, idx: usize, column: usize, nodes: &[Vector6<f64>]) -> Vector6<f64> {
         if let Some(node) = self.problem.blocks[idx].node {
             return nodes[node];

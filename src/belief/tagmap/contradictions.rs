@@ -1,4 +1,4 @@
-//! What the views contradict without a doubt about any single detection: groups that must be one map, and ids on two
+//! Contradictions in the views that need no doubt about a single detection: groups that must be one map, and ids on two
 //! tags.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -12,7 +12,7 @@ use crate::tagmap::tag_pairs::is_rigid;
 use crate::tagmap::types::{Body, MapDetection, MapInput, MapSettings};
 use armcal_core::codes::{Code, Warning};
 
-/// Returns the warnings of all of them.
+/// Returns the warnings of all contradictions.
 pub(super) fn contradictions(input: &MapInput<'_>, settings: &MapSettings, problem: &MapProblem<'_>) -> Vec<Warning> {
     let twins = ids_on_two_tags(input, settings);
     let twins = twins.into_iter().map(|(id, n)| Warning::new(Code::MapTagDisagrees, id_on_two_tags(id, n)));
@@ -21,7 +21,7 @@ pub(super) fn contradictions(input: &MapInput<'_>, settings: &MapSettings, probl
     twins.chain(apart).collect()
 }
 
-/// Ids that stand at two places of one image, with the number of such images.
+/// Ids that are at two places of one image, with the number of such images.
 fn ids_on_two_tags(input: &MapInput<'_>, settings: &MapSettings) -> Vec<(u32, usize)> {
     let is_mapped = |id: u32| settings.default_tag.is_some() || input.tags.iter().any(|tag| tag.id == id);
     let mut n_images: BTreeMap<u32, usize> = BTreeMap::new();
@@ -34,7 +34,7 @@ fn ids_on_two_tags(input: &MapInput<'_>, settings: &MapSettings) -> Vec<(u32, us
     n_images.into_iter().filter(|(_, n)| *n >= MIN_TWICE).collect()
 }
 
-/// Whether two squares do not overlap: one tag found twice is at one place.
+/// Returns true if two squares do not overlap: one tag detected twice is at one place.
 fn are_apart(a: &MapDetection, b: &MapDetection) -> bool {
     let corner = |of: &MapDetection, k: usize| Point2::from(Vector2::from(of.corners_px[k]));
     let half =
@@ -43,8 +43,8 @@ fn are_apart(a: &MapDetection, b: &MapDetection) -> bool {
     (middle(a) - middle(b)).norm() > half(a) + half(b)
 }
 
-/// Two tags of different groups that the most images show together, and the number of images that show tags of both
-/// groups; `None` where no groups have many in common.
+/// Two groups that many images show together: their pair of tags with the most common images, and the number of images
+/// that show both groups. `None` where no groups have many in common.
 fn apart(problem: &MapProblem<'_>, bodies: &[Body]) -> Option<([u32; 2], usize)> {
     let mut of_groups: BTreeMap<(usize, usize), usize> = BTreeMap::new();
     let mut of_tags: BTreeMap<(usize, usize), usize> = BTreeMap::new();
@@ -69,7 +69,7 @@ fn groups_of(problem: &MapProblem<'_>, (a, b): (usize, usize)) -> (usize, usize)
     (a.min(b), a.max(b))
 }
 
-/// Whether tags that keep their relative place are in different groups.
+/// Returns true if tags that keep their relative place are in different groups.
 fn is_contrary(problem: &MapProblem<'_>, bodies: &[Body], (a, b): (usize, usize)) -> bool {
     let (a, b) = (&problem.tags[a], &problem.tags[b]);
     let are_mapped = a.group != usize::MAX && b.group != usize::MAX;

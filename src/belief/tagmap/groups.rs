@@ -1,4 +1,4 @@
-//! From tags and observations to groups with a frame each, and to the unknowns of the adjustment.
+//! Groups of tags with a frame each, and the unknowns of the adjustment, from tags and observations.
 
 use crate::tagmap::constants::groups::LEAST_STD;
 use std::collections::{BTreeMap, BTreeSet};
@@ -10,10 +10,10 @@ use crate::tagmap::problem::{Block, Extra, MapProblem, Observation, PosePrior, T
 use crate::tagmap::result::GroupFrame;
 use crate::tagmap::types::{Body, MapSettings};
 
-/// A tag, its known place in the group's frame, and the standard deviations of that.
+/// A tag, its known place in the group's frame, and the standard deviations of that place.
 type Place = (usize, Isometry3<f64>, Option<[f64; 6]>);
 
-/// A group as it is now.
+/// A group of connected tags in its present state.
 #[derive(Clone, Debug)]
 pub(super) struct Group {
     /// Indices of the tags, ascending.
@@ -21,7 +21,7 @@ pub(super) struct Group {
     pub(super) frame: GroupFrame,
 }
 
-/// Sets up groups, frames, priors, nodes and blocks anew for the observations in use. `problem.tags` hold provisional
+/// Builds groups, frames, priors, nodes and blocks again for the observations in use. `problem.tags` hold provisional
 /// poses that are right relative to each other among those of one `label`.
 pub(super) fn build(
     problem: &mut MapProblem<'_>,
@@ -41,7 +41,7 @@ pub(super) fn build(
             Group { tags, frame }
         })
         .collect();
-    // Anchored ones first, then by their first tag.
+    // Anchored groups come first; then the first tag decides.
     groups.sort_by_key(|group| (matches!(group.frame, GroupFrame::Tag(_)), group.tags[0]));
     problem.extras.clear();
     problem.links.clear();
@@ -61,7 +61,7 @@ fn components(observations: &[Observation], label: &[usize]) -> Vec<Vec<usize>> 
     let mut root: Vec<usize> = (0..label.len()).collect();
     let find = |root: &mut [usize], mut at: usize| {
         while root[at] != at {
-            // Halves the way for the next one.
+            // Halves the way for the next search.
             root[at] = root[root[at]];
             at = root[at];
         }
@@ -82,15 +82,15 @@ fn components(observations: &[Observation], label: &[usize]) -> Vec<Vec<usize>> 
     components.into_values().collect()
 }
 
-/// The body in whose frame a group is: that of the base tag, or the first with a place, of those with a tag of known
-/// place.
+/// The body whose frame is the group's: that of the base tag. Without it, the first body with a place counts, among
+/// those with a tag of known place.
 fn frame_body(tags: &[TagState], group: &[usize], bodies: &[Body], settings: &MapSettings) -> Option<usize> {
     let given = || group.iter().map(|tag| &tags[*tag]).filter(|tag| tag.given.is_some());
     let base = given().find(|tag| Some(tag.id) == settings.base_tag).map(|tag| tag.body);
     base.or_else(|| given().map(|tag| tag.body).min_by_key(|body| (bodies[*body].pose.is_none(), *body)))
 }
 
-/// Where a body lies in the frame of another, if that is known.
+/// Pose of a body in the frame of another; `None` if it is not known.
 fn placed(bodies: &[Body], frame: usize, body: usize) -> Option<Isometry3<f64>> {
     if frame == body {
         return Some(Isometry3::identity());
@@ -98,7 +98,7 @@ fn placed(bodies: &[Body], frame: usize, body: usize) -> Option<Isometry3<f64>> 
     Some(bodies[frame].pose?.inv_mul(&bodies[body].pose?))
 }
 
-/// Moves a group into its frame, holds what is exact, and gives the rest nodes and priors.
+/// Moves a group into its frame, holds exact places, and gives the other tags nodes and priors.
 fn anchor(problem: &mut MapProblem<'_>, idx: usize, group: &Group, bodies: &[Body], settings: &MapSettings) {
     let frame = frame_body(&problem.tags, &group.tags, bodies, settings);
     let place_of = |tag: &TagState| {
@@ -122,7 +122,7 @@ fn anchor(problem: &mut MapProblem<'_>, idx: usize, group: &Group, bodies: &[Bod
         tag.pose.rotation.renormalize();
         let place = places.iter().find(|place| place.0 == at);
         match place {
-            // A single tag of known place is the gauge; how well it is known is the same for all.
+            // A single tag of known place is the gauge; the uncertainty of its place is common to all tags.
             Some((_, pose, std)) if std.is_none() || is_only_one => tag.pose = *pose,
             None if places.is_empty() && at == reference => tag.pose = target,
             _ => {
@@ -143,7 +143,8 @@ fn information(std: &[f64; 6]) -> Vector6<f64> {
     Vector6::from(*std).map(|std| 1.0 / std.max(LEAST_STD).powi(2))
 }
 
-/// Bodies whose place is not known, but those of two or more of their tags on them: the body's place is estimated too.
+/// Adds the places of bodies as unknowns: bodies without a known place, but with known places of two or more tags on
+/// them.
 fn place_bodies(problem: &mut MapProblem<'_>, group: &Group, places: &[Place]) {
     let mut by_body: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     for &at in &group.tags {
@@ -167,7 +168,7 @@ fn place_bodies(problem: &mut MapProblem<'_>, group: &Group, places: &[Place]) {
     }
 }
 
-/// One block for each image and group; cameras placed by the tags as they are.
+/// Makes one block for each image and group; the present tags place the cameras.
 fn make_blocks(problem: &mut MapProblem<'_>) {
     let tags = &problem.tags;
     problem.observations.sort_by_key(|seen| (seen.view, tags[seen.tag].group, seen.tag));
@@ -178,7 +179,7 @@ fn make_blocks(problem: &mut MapProblem<'_>) {
         let same = |seen: &&Observation| seen.view == view && tags[seen.tag].group == group;
         let range = start..start + problem.observations[start..].iter().take_while(same).count();
         start = range.end;
-        // A tag of which nothing is used has no group.
+        // A tag without any used detection has no group.
         if group != usize::MAX {
             let pose = locate(problem, &range).unwrap_or_else(Isometry3::identity);
             blocks.push(Block { view, group, range, node: None, pose });
@@ -187,7 +188,7 @@ fn make_blocks(problem: &mut MapProblem<'_>) {
     problem.blocks = blocks;
 }
 
-/// The camera by what is used of a block, or by all of it where nothing is.
+/// Pose of the camera from the used observations of a block, or from all of them if none is used.
 fn locate(problem: &MapProblem<'_>, range: &std::ops::Range<usize>) -> Option<Isometry3<f64>> {
     let all = &problem.observations[range.clone()];
     let any_used = all.iter().any(|seen| seen.is_used);

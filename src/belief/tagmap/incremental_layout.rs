@@ -1,9 +1,9 @@
 //! Initial poses of the tags of a group, one tag after the other.
 //!
-//! The tree of relative poses connects neighbours by long ways round, along which errors add up. So each group is laid
-//! out again from its most seen tag on: next is always the tag that shares most with those already placed; its images
-//! are located by all placed tags in them, and it is put where its images, together, want it. Neighbours then agree to
-//! a few pixels however long the chain, which the adjustment needs.
+//! The tree of relative poses connects neighbours through long chains, along which errors add up. So each group is laid
+//! out again from its most seen tag. The next tag is always the one that shares most with those already placed. All
+//! placed tags in its images locate these images, and all images together place the tag. Neighbours then agree within a
+//! few pixels in any length of chain, which the adjustment needs.
 
 use crate::tagmap::constants::incremental_layout::MAX_IMAGES;
 use nalgebra::Isometry3;
@@ -14,7 +14,7 @@ use crate::tagmap::tag_pairs::{Pairs, consensus};
 use crate::tagmap::vote::is_finite;
 use armcal_core::optics::CameraModel;
 
-/// What growing looks at.
+/// Inputs of the layout.
 struct Growing<'a> {
     cameras: &'a [CameraModel],
     observations: &'a [Observation],
@@ -24,15 +24,15 @@ struct Growing<'a> {
     images: Vec<Vec<usize>>,
 }
 
-/// What is there already.
+/// Tags that are already placed.
 struct Placed<'a> {
     pose: &'a mut [Isometry3<f64>],
     is_placed: Vec<bool>,
-    /// What each tag shares with the placed ones of its group.
+    /// Weight that each tag shares with the placed ones of its group.
     shared: Vec<f64>,
 }
 
-/// Replaces the poses of the tags of each `label`; those of the tree stay where nothing better is found.
+/// Replaces the poses of the tags of each `label`; poses of the tree stay where no better one is found.
 pub(super) fn grow(
     cameras: &[CameraModel],
     observations: &[Observation],
@@ -49,7 +49,7 @@ pub(super) fn grow(
         in_all[*b] += pair.weight;
     }
     for _ in 0..n {
-        // Any that shares something with the placed ones; failing that the most seen of a new group.
+        // Any tag that shares something with the placed ones; otherwise the most seen tag of a new group.
         let best = |value: &[f64], least: f64| {
             let open = (0..n).filter(|tag| !placed.is_placed[*tag] && value[*tag] > least);
             open.max_by(|a, b| value[*a].total_cmp(&value[*b]).then(b.cmp(a)))
@@ -81,13 +81,13 @@ fn images_of(observations: &[Observation], n: usize) -> Vec<Vec<usize>> {
 }
 
 impl Growing<'_> {
-    /// The pose of `tag` that its images want, given the placed tags in them.
+    /// Pose of `tag` that fits its images best, given the placed tags in them.
     fn place(&self, placed: &Placed<'_>, tag: usize) -> Option<Isometry3<f64>> {
         let by_vote = self.by_vote(placed, tag);
         let (chosen, most) = self.choose(placed, tag)?;
         let located = self.locate(placed, &chosen, None);
         let mut candidates: Vec<Isometry3<f64>> = by_vote.into_iter().collect();
-        // A camera located by one tag alone may be mirrored; then only the vote tells.
+        // A camera located by a single tag may be mirrored; then only the vote decides.
         if most > 1 || candidates.is_empty() {
             candidates.extend(place_tag(self.cameras, &located).map(|(found, _)| found));
         }
@@ -104,7 +104,7 @@ impl Growing<'_> {
         placed.is_placed[other] && self.label[other] == self.label[tag]
     }
 
-    /// By the placed tag that shares most, both solutions of each square considered.
+    /// Pose by the placed tag that shares most, from both solutions of each square.
     fn by_vote(&self, placed: &Placed<'_>, tag: usize) -> Option<Isometry3<f64>> {
         let around = self.pairs.around(tag);
         let around = around.filter(|((a, b), _)| self.is_known(placed, tag, if *a == tag { *b } else { *a }));
@@ -121,7 +121,8 @@ impl Growing<'_> {
         of_view.filter(move |seen| self.is_known(placed, tag, seen.tag))
     }
 
-    /// Images with placed tags, spread over all; with two or more, where there are such. And the most that one has.
+    /// Images with placed tags, spread over all, preferably with two or more; and the largest number of placed tags in
+    /// one.
     fn choose(&self, placed: &Placed<'_>, tag: usize) -> Option<(Vec<usize>, usize)> {
         let count = |at: &usize| (self.beside(placed, *at).count(), *at);
         let mut chosen: Vec<(usize, usize)> = self.images[tag].iter().map(count).collect();
@@ -132,7 +133,8 @@ impl Growing<'_> {
         Some((chosen.into_iter().step_by(step).map(|(_, at)| at).collect(), most))
     }
 
-    /// The cameras of images, by the placed tags in them, and the tag itself where a pose of it is proposed.
+    /// Observations of images with their cameras' poses, from the placed tags and from the proposed pose of the tag
+    /// itself.
     fn locate(
         &self,
         placed: &Placed<'_>,

@@ -1,8 +1,7 @@
-//! Where to begin: groups of tags that images connect, each laid out from the relative poses that images vote for.
+//! Initial guess: groups of tags that images connect, each laid out from the relative poses that images vote for.
 //!
-//! Pairs of tags are joined in the order of how much is seen of both (a spanning tree, Kruskal 1956), so long as the
-//! vote of their images carries; a pair whose images contradict each other is passed over. `grow` then lays the groups
-//! out anew.
+//! Pairs of tags are joined in the order of their weight (a spanning tree, Kruskal 1956), provided the vote of their
+//! images is clear. A pair whose images contradict each other is skipped. `grow` then lays the groups out again.
 
 use armcal_core::codes::{Code, Warning};
 use nalgebra::Isometry3;
@@ -13,7 +12,7 @@ use crate::tagmap::tag_pairs::{Pair, Pairs, consensus};
 use crate::tagmap::types::{Body, MapSettings};
 use armcal_core::optics::CameraModel;
 
-/// For each tag: its group's number, and its pose in the group's provisional frame.
+/// Number of each tag's group, and its pose in the group's provisional frame.
 pub(super) struct Layout {
     pub(super) label: Vec<usize>,
     pub(super) pose: Vec<Isometry3<f64>>,
@@ -30,7 +29,7 @@ pub(super) fn lay_out(
     let mut forest = Forest::new(tags.len());
     let pairs = Pairs::of(observations, tags, bodies);
     let mut order: Vec<(&(usize, usize), &Pair)> = pairs.iter().collect();
-    // Much seen of both first; ties by number.
+    // Pairs with the largest weight come first; the number decides ties.
     order.sort_by(|a, b| b.1.weight.total_cmp(&a.1.weight).then(a.0.cmp(b.0)));
     let mut single = Vec::new();
     for &((a, b), pair) in &order {
@@ -48,7 +47,7 @@ pub(super) fn lay_out(
         if forest.label[a] == forest.label[b] {
             continue;
         }
-        // One wrong id would tie two whole groups together; a tag by itself harms nobody.
+        // One wrong id would tie two whole groups together; a single tag does no harm.
         if forest.size(a) > 1 && forest.size(b) > 1 {
             let (first, second, n) = (tags[a].id, tags[b].id, pair.n_views());
             let text =
@@ -79,11 +78,11 @@ impl Forest {
         self.label.iter().filter(|label| **label == self.label[tag]).count()
     }
 
-    /// The tree of `b` moves into the frame of the tree of `a`.
+    /// Moves the tree of `b` into the frame of the tree of `a`.
     fn join(&mut self, a: usize, b: usize, a_from_b: &Isometry3<f64>) {
         let (to, from) = (self.label[a], self.label[b]);
         let mut carry = self.pose[a] * a_from_b * self.pose[b].inverse();
-        // A tree's rounding would double with each that it joins.
+        // Without this a tree's rounding error would double with each joined tree.
         carry.rotation.renormalize();
         for (label, pose) in self.label.iter_mut().zip(&mut self.pose) {
             if *label == from {

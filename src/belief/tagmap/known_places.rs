@@ -1,6 +1,6 @@
-//! Known places that the views contradict, read otherwise: the tests of a calibration, which need no arm for it.
+//! Other readings of known places that the views contradict: tests of a calibration that need no arm.
 //!
-//! Tags of one rigid body in the views of one camera are looked at together (`explain::wrong_input`).
+//! Each test uses the tags of one rigid body in the views of one camera (`explain::wrong_input`).
 
 use std::collections::BTreeMap;
 
@@ -19,19 +19,19 @@ use armcal_core::robot::SurveyedTag;
 use armcal_core::spatial::Pose;
 use armcal_core::streams::JointAngles;
 
-/// What speaks against a map before the cause is known.
+/// Evidence against a map before the cause is known.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Doubt {
-    /// Something does.
+    /// True if there is any evidence.
     pub(super) is_any: bool,
-    /// Most tags do, or the fit as a whole.
+    /// True if most tags, or the fit as a whole, are in doubt.
     is_of_most: bool,
-    /// The sizes disagree with the known distances.
+    /// True if the sizes disagree with the known distances.
     is_of_scale: bool,
 }
 
 impl Doubt {
-    /// There is no map.
+    /// The doubt where no map exists.
     pub(super) const NO_MAP: Self = Self { is_any: true, is_of_most: true, is_of_scale: true };
 
     pub(super) fn of(map: &TagMap) -> Self {
@@ -45,7 +45,7 @@ impl Doubt {
     }
 }
 
-/// The reading of the known places, the lens or the corners that explains why the views contradict them.
+/// Returns the reading of the known places, the lens or the corners that explains why the views contradict them.
 pub(super) fn wrong_input(input: &MapInput<'_>, settings: &MapSettings, doubt: Doubt) -> Option<WrongInput> {
     let bodies = rigid_bodies(input);
     let cameras = 0..input.cameras.len();
@@ -63,15 +63,15 @@ fn of_body(
     let stated = StatedCamera { lens: &input.cameras[camera], tag_family: settings.tag_family };
     if !doubt.is_any {
         let views: Vec<&View> = data.fit.iter().collect();
-        // Places that the views confirm are read as they are meant.
+        // Places that the views confirm have no other reading.
         mismatch(&views, tags, stated.lens).filter(|pairs| pairs.mismatch >= GOOD)?;
     }
     let wrong = wrong_input_of_camera(&data, tags, stated)?;
     is_said(&wrong.input, settings.mode, doubt, tags.len()).then_some(wrong)
 }
 
-/// Where given places are not believed, they may be those of long ago: only a reading of all of them is a cause then,
-/// for the place of the base tag is written as theirs are.
+/// Returns true if a map reports the finding. Where given places are not used, they may be outdated. Then only a
+/// reading of all of them is a cause, because the base tag's place is written in the same form.
 fn is_said(found: &WrongInputKind, mode: MapMode, doubt: Doubt, n_tags: usize) -> bool {
     use WrongInputKind as Kind;
     match (found, mode) {
@@ -84,7 +84,7 @@ fn is_said(found: &WrongInputKind, mode: MapMode, doubt: Doubt, n_tags: usize) -
     }
 }
 
-/// The tags with known places, by what keeps them together.
+/// The tags with known places, grouped by the rigid body that carries them.
 fn rigid_bodies(input: &MapInput<'_>) -> Vec<Vec<SurveyedTag>> {
     let mut bodies: BTreeMap<Option<usize>, Vec<SurveyedTag>> = BTreeMap::new();
     for tag in input.tags {
@@ -114,7 +114,7 @@ fn is_known(tag: &TagPrior) -> bool {
     tag.std.is_none_or(is_within)
 }
 
-/// The views of a camera that show two of the tags, evenly over all of them.
+/// The views of a camera that show two of the tags, spread evenly over all views.
 fn data_of(input: &MapInput<'_>, camera: usize, tags: &[SurveyedTag]) -> CaptureData {
     let mut data = CaptureData::default();
     let mut views = Vec::new();

@@ -1,4 +1,4 @@
-//! The lenses that the views show, poses of cameras and tags estimated with them.
+//! Lenses estimated from the views, together with the poses of cameras and tags.
 
 use nalgebra::{DMatrix, DVector, Dyn, Matrix6, OMatrix, U6};
 
@@ -13,23 +13,23 @@ use crate::tagmap::problem::MapProblem;
 use armcal_core::numeric::Loss;
 use armcal_core::optics::CameraModel;
 
-/// How sure fitted lenses are, and how the tags follow them.
+/// Errors of fitted lenses, and the effect on the tags.
 #[derive(Clone, Debug)]
 pub(super) struct LensErrors {
-    /// Of the intrinsics of all cameras, eight each.
+    /// Covariance of the intrinsics of all cameras, eight each.
     pub(super) covariance: DMatrix<f64>,
-    /// d(pose of the node)/d(intrinsics).
+    /// Jacobians d(pose of the node)/d(intrinsics).
     pub(super) nodes: Vec<OMatrix<f64, U6, Dyn>>,
 }
 
 impl LensErrors {
-    /// What the lenses' errors add to the joint covariance of two nodes.
+    /// Contribution of the lenses' errors to the joint covariance of two nodes.
     pub(super) fn common(&self, a: usize, b: usize) -> Matrix6<f64> {
         &self.nodes[a] * &self.covariance * self.nodes[b].transpose()
     }
 }
 
-/// The lenses with which the problem fits best, from those that it has on.
+/// Returns the lenses with the best fit, starting from those of the problem.
 pub(super) fn fit_lenses(problem: &MapProblem<'_>) -> Option<Vec<CameraModel>> {
     let loss = loss_of(problem);
     let stated = problem.cameras.to_vec();
@@ -51,7 +51,7 @@ pub(super) fn fit_lenses(problem: &MapProblem<'_>) -> Option<Vec<CameraModel>> {
     Some(best.cameras.into_owned())
 }
 
-/// At a solution with fitted lenses.
+/// Errors of the lenses at a solution with fitted lenses.
 pub(super) fn lens_errors(problem: &MapProblem<'_>) -> Option<LensErrors> {
     let information = information(&Linearized::of(problem, loss_of(problem))?, problem.cameras.len());
     let precision = &information.matrix + wide(&problem.cameras);
@@ -76,7 +76,7 @@ fn information(linearized: &Linearized<'_, '_>, n_cameras: usize) -> Information
     })
 }
 
-/// What is known of any lens: keeps a step possible where the views do not determine it.
+/// Prior information on any lens: keeps a step possible where the views do not determine it.
 fn wide(cameras: &[CameraModel]) -> DMatrix<f64> {
     let of_camera = |camera: &CameraModel| {
         let [focal_x, focal_y] = camera.focal_px().map(|focal_px| WIDE_FOCAL * focal_px);
@@ -98,7 +98,7 @@ fn step_within(information: &Information, stated: &[CameraModel], now: &[CameraM
     Some((&information.matrix + wide).cholesky()?.solve(&right))
 }
 
-/// The problem with lenses a step on and poses to match; `None` where it fits no better.
+/// Returns the problem with lenses after a step and poses that follow; `None` if it fits no better.
 fn stepped<'a>(problem: &MapProblem<'a>, step: &DVector<f64>, loss: Loss, least: f64) -> Option<(MapProblem<'a>, f64)> {
     let mut next = problem.clone();
     for (idx, camera) in next.cameras.to_mut().iter_mut().enumerate() {

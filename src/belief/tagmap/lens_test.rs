@@ -1,4 +1,4 @@
-//! Whether the corners contradict the stated lenses.
+//! Test of the stated lenses against the corners.
 
 use crate::checks::constants::drawing_report::MAX_REPAIR_SIGMAS;
 use crate::explain::wrong_input::lens::readings;
@@ -17,25 +17,25 @@ use armcal_core::optics::CameraModel;
 
 /// Lenses that fit better than the stated ones.
 pub(super) struct OtherLenses {
-    /// Where they are another reading of the stated ones, and not these with other figures.
+    /// The reading, if the lenses are another reading of the stated ones; `None` if they are these with other figures.
     reading: Option<WrongInputKind>,
     pub(super) lenses: Vec<CameraModel>,
     misfit: Misfit,
     stated: Misfit,
-    /// One sigma of the focal length of each, relative.
+    /// One sigma of the focal length of each lens, relative.
     pub(super) focal_std: Vec<f64>,
-    /// Log evidence over the stated ones.
+    /// Log evidence over the stated lenses.
     pub(super) gain_nats: f64,
 }
 
-/// Lenses as one start leads to them.
+/// Lenses fitted from one start.
 struct Fitted {
     reading: Option<WrongInputKind>,
     lenses: Vec<CameraModel>,
     misfit: Misfit,
 }
 
-/// The lenses that explain the corners significantly better than the stated ones, if any do.
+/// Returns the lenses that explain the corners significantly better than the stated ones; `None` if there are none.
 pub(super) fn other_lenses(blind: &Blind, stated: &[CameraModel]) -> Option<OtherLenses> {
     let as_stated = Misfit::of(&blind.solved(stated)?);
     let mut best = fitted(blind, None, stated.to_vec())?;
@@ -45,7 +45,7 @@ pub(super) fn other_lenses(blind: &Blind, stated: &[CameraModel]) -> Option<Othe
             let other = fitted(blind, Some(start.reading.clone()), start.lenses.clone());
             best = other.filter(|other| other.is_much_better(&best)).unwrap_or(best);
         }
-        // A reading without any figure of its own is the simpler cause.
+        // A reading without fitted figures is the simpler cause.
         if let Some(simple) = starts.into_iter().find(|start| start.rank < AS_GOOD * best.misfit.rank()) {
             best.reading = Some(simple.reading);
         }
@@ -73,7 +73,7 @@ pub(super) fn other_lenses(blind: &Blind, stated: &[CameraModel]) -> Option<Othe
     })
 }
 
-/// Another reading of the lenses, and how well the corners fit with it as it is.
+/// Another reading of the lenses, and its misfit without a fit of figures.
 struct Start {
     rank: f64,
     reading: WrongInputKind,
@@ -86,7 +86,7 @@ impl Fitted {
     }
 }
 
-/// Other readings of the lenses, those first with which the corners fit best as they are.
+/// Other readings of the lenses, sorted by misfit without a fit of figures, best first.
 fn starts(blind: &Blind, stated: &[CameraModel]) -> Vec<Start> {
     let mut of_each = stated.iter().map(readings);
     let Some(of_first) = of_each.next() else { return Vec::new() };
@@ -108,7 +108,7 @@ fn starts(blind: &Blind, stated: &[CameraModel]) -> Vec<Start> {
     ranked
 }
 
-/// Lenses fitted from these on, in turn with the map and the choice of detections.
+/// Fits lenses from these, alternately with the map and the selection of detections.
 fn fitted(blind: &Blind, reading: Option<WrongInputKind>, lenses: Vec<CameraModel>) -> Option<Fitted> {
     let at = |lenses: &[CameraModel]| {
         let solved = blind.solved(lenses)?;
@@ -120,7 +120,7 @@ fn fitted(blind: &Blind, reading: Option<WrongInputKind>, lenses: Vec<CameraMode
         let Some(lenses) = next else { break };
         let Some((of_next, after)) = at(&lenses) else { break };
         if of_next.rank() > WORTH_A_ROUND * misfit.rank() {
-            // It may still be the minimum of this choice of detections.
+            // The present lenses may still be the minimum for this selection of detections.
             if of_next.rank() < misfit.rank() {
                 (best, misfit) = (lenses, of_next);
             }
@@ -132,7 +132,7 @@ fn fitted(blind: &Blind, reading: Option<WrongInputKind>, lenses: Vec<CameraMode
 }
 
 impl OtherLenses {
-    /// Why no map is made with them: lenses that are not the stated ones.
+    /// Reason why no map is made with lenses that are not the stated ones.
     pub(super) fn refusal(&self, stated: &[CameraModel], settings: &MapSettings) -> Option<MapRefusal> {
         let of_reading = self.reading.clone().map(|reading| MapRefusalCause::OtherLens {
             reading,
@@ -144,7 +144,7 @@ impl OtherLenses {
         Some(MapRefusal { cause, lens_file: settings.lens_file.clone() })
     }
 
-    /// A focal length beyond what a calibration repairs.
+    /// Refusal of a focal length beyond the limit of a calibration's repair.
     fn far_focal(&self, number: usize, stated: &[CameraModel], stated_std: f64) -> Option<Refusal> {
         let (found, std) = (self.lenses[number].focal_px(), self.focal_std[number]);
         let of_axis = |axis: usize| found[axis] / stated[number].focal_px()[axis];
@@ -162,7 +162,7 @@ impl OtherLenses {
 }
 
 impl Misfit {
-    /// Of a corner in each direction.
+    /// Root mean square error of a corner in each direction, px.
     fn rms_px(&self, settings: &MapSettings) -> f64 {
         self.variance.sqrt() * settings.corner_std_px
     }

@@ -104,8 +104,8 @@ impl NormalEquations {
         }
     }
 
-    /// residual = log(T^-1 B P) for a tag at T whose place on a body at B is P; B is the identity for the group's own
-    /// body.
+    /// Adds the prior of a tag: residual = log(T^-1 B P) for a tag at T with place P on a body at B. For the group's
+    /// own body B is the identity.
     fn add_prior(&mut self, problem: &MapProblem<'_>, tag: &TagState) {
         let (Some(prior), Some(node)) = (&tag.prior, tag.node) else { return };
         let owner = prior.owner.map(|owner| &problem.extras[owner]);
@@ -125,7 +125,7 @@ impl NormalEquations {
     }
 }
 
-/// The cost alone.
+/// Computes the cost without derivatives.
 pub(super) fn cost(problem: &MapProblem<'_>, loss: Loss) -> f64 {
     let mut cost = attitude::cost(problem);
     for block in &problem.blocks {

@@ -1,4 +1,4 @@
-//! Where the camera was, by the tags of one image whose places are known; and the same for a tag by its images.
+//! Pose of a camera from the tags of one image whose places are known; pose of a tag from its images.
 
 use crate::tagmap::constants::localize::{COMPARE_PX, MAX_IMAGES, UNDAMPED};
 use nalgebra::{Isometry3, Matrix6, Point3, Vector6};
@@ -10,7 +10,7 @@ use armcal_core::numeric::{LeastSquares, Loss, Proposal, StopRule, minimize};
 use armcal_core::optics::CameraModel;
 use armcal_core::spatial::{adjoint, exp};
 
-/// How badly poses fit: the Cauchy loss over all corners, in squared pixels.
+/// Misfit of poses: the Cauchy loss over all corners, px^2.
 fn cost(camera: &CameraModel, camera_from_tag: &Isometry3<f64>, seen: &Observation) -> f64 {
     let loss = Loss::Cauchy { c: COMPARE_PX };
     // Corners have about the same noise; the loss's width is in pixels.
@@ -18,8 +18,7 @@ fn cost(camera: &CameraModel, camera_from_tag: &Isometry3<f64>, seen: &Observati
     squares(camera, camera_from_tag, seen).into_iter().map(|n2| loss.of(n2 * px * px).0).sum()
 }
 
-/// frame_from_camera for which the tags fit best, out of each tag's own two solutions, refined on all corners; and its
-/// misfit.
+/// Returns frame_from_camera with the best fit, from each tag's two solutions, refined on all corners; and its misfit.
 pub(super) fn localize(
     cameras: &[CameraModel],
     seen: &[(&Observation, Isometry3<f64>)],
@@ -87,7 +86,7 @@ fn refined(
     (search.at, search.least)
 }
 
-/// Gauss-Newton under the comparing loss.
+/// Gauss-Newton step under the comparing loss.
 fn step(
     cameras: &[CameraModel],
     seen: &[(&Observation, Isometry3<f64>)],
@@ -121,7 +120,7 @@ fn information(
     sums.weighted(1.0)
 }
 
-/// A tag's pose for which its images fit best, out of the solutions of each, and its misfit; `images` with
+/// Returns a tag's pose with the best fit to its images, from the solutions of each, and its misfit; `images` with
 /// frame_from_camera.
 pub(super) fn place_tag(
     cameras: &[CameraModel],
@@ -142,7 +141,7 @@ pub(super) fn place_tag(
     best
 }
 
-/// A tag's pose by a few Gauss-Newton steps under the comparing loss, cameras held.
+/// Returns a tag's pose after a few Gauss-Newton steps under the comparing loss, with the cameras held.
 pub(super) fn refine_tag(
     cameras: &[CameraModel],
     images: &[(&Observation, Isometry3<f64>)],

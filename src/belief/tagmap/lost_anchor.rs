@@ -1,8 +1,8 @@
-//! Why a map has lost the tags whose places are known: their sizes, or those of all tags, are others than stated.
+//! Cause of a map without the tags whose places are known: their sizes, or those of all tags, are not as stated.
 //!
-//! A map of the same views by the sizes alone (`blind`) shows it. Where two known tags are in it, their distance over
-//! the known one tells the factor of all sizes. A single known tag that fits nowhere is seen at `t + s R p` from each
-//! camera (R, t) of that map, p its place by the stated size: its own factor s is where these come together.
+//! A map of the same views from the sizes only (`blind`) shows it. If two known tags are in it, their distance over the
+//! known one is the factor of all sizes. A single known tag that fits nowhere is seen at `t + s R p` from each camera
+//! (R, t) of that map. Here p is its place by the stated size, and its own factor s is where these positions meet.
 
 use nalgebra::Vector3;
 
@@ -14,7 +14,7 @@ use crate::tagmap::solve::Solved;
 use crate::tagmap::types::{MapInput, MapSettings};
 use armcal_core::stats::quantile;
 
-/// Why no tag of known place is in the map; `None` where one is, or no place is known.
+/// Cause why no tag of known place is in the map; `None` if one is, or no place is known.
 pub(super) fn lost_anchor(input: &MapInput<'_>, settings: &MapSettings, map: &TagMap) -> Option<MapRefusalCause> {
     let known = input.tags.iter().filter(|tag| tag.pose.is_some() || Some(tag.id) == settings.base_tag);
     let mut tags: Vec<u32> = known.map(|tag| tag.id).chain(settings.base_tag).collect();
@@ -22,7 +22,7 @@ pub(super) fn lost_anchor(input: &MapInput<'_>, settings: &MapSettings, map: &Ta
     tags.dedup();
     let mut anchored = map.groups.iter().filter(|group| matches!(group.frame, GroupFrame::Body(_))).peekable();
     let is_lost = anchored.peek().is_none();
-    // Alone in its group, although images show it with others.
+    // The tag is alone in its group, although images show it with others.
     let is_alone = map.is_contradicted && anchored.flat_map(|group| &group.tags).all(|id| tags.contains(id));
     let has_others = tags.len() < map.tags.len();
     if tags.is_empty() || !(is_lost || is_alone && has_others) {
@@ -33,7 +33,7 @@ pub(super) fn lost_anchor(input: &MapInput<'_>, settings: &MapSettings, map: &Ta
     (is_lost || sizes.is_some()).then_some(MapRefusalCause::AnchorLost { tags, sizes })
 }
 
-/// The sizes that a map without known places shows to be others than stated.
+/// Sizes that a map without known places contradicts.
 pub(super) fn wrong_sizes(input: &MapInput<'_>, solved: &Solved<'_>, known: &[u32]) -> Option<WrongSizes> {
     let is_wrong = |factor: &f64| factor.is_finite() && *factor > 0.0 && factor.ln().abs() > LEAST_FACTOR.ln();
     let of_all = common_factor(input, solved).filter(is_wrong).map(|factor| WrongSizes { tag: None, factor });
@@ -44,7 +44,7 @@ pub(super) fn wrong_sizes(input: &MapInput<'_>, solved: &Solved<'_>, known: &[u3
     of_all.or_else(of_one)
 }
 
-/// True sizes over the stated ones, by the distances of known tags of one group: the median.
+/// True sizes over the stated ones: the median over the distances of known tags of one group.
 fn common_factor(input: &MapInput<'_>, solved: &Solved<'_>) -> Option<f64> {
     let place = |id: u32| {
         let tag = solved.problem.tags.iter().find(|tag| tag.id == id && tag.group != usize::MAX)?;
@@ -60,7 +60,7 @@ fn common_factor(input: &MapInput<'_>, solved: &Solved<'_>) -> Option<f64> {
     quantile(&factors, 0.5)
 }
 
-/// True size of a tag over the stated one, by where the cameras that other tags place see it.
+/// True size of a tag over the stated one, from its directions in cameras that other tags place.
 fn own_factor(solved: &Solved<'_>, id: u32) -> Option<f64> {
     let problem = &solved.problem;
     let tag = problem.tags.iter().position(|tag| tag.id == id)?;

@@ -1,12 +1,12 @@
-//! Tag mapping: poses of tags from camera views alone; no joint angle is used.
+//! Tag mapping: poses of tags from camera views only; no joint angle is used.
 //!
 //! `screen` validates detections and solves each square; `vote`, `initial_guess` and `incremental_layout` lay out
-//! groups of tags; `linearize`, `normal_equations`, `sparse` and `adjust` are the bundle adjustment on corner pixels
-//! (Triggs et al. 2000); `result` is the map with its accuracy; `scale` finds wrong tag sizes. `checked` gives a map
-//! out where its files are not contradicted: `known_places` reads them otherwise, `lens_test` and `lens_fit` look for
-//! another lens, `odd_tags` for sizes and moves, by `columns` of a map without known places (`blind`), `lost_anchor` and
-//! `contradictions` for what cannot be one map. `tag_mapping` maps the tags of a calibration; `files` reads and writes files of tags and cameras, `recording` gets views from
-//! recordings.
+//! groups of tags. `linearize`, `normal_equations`, `sparse` and `adjust` are the bundle adjustment on corner pixels
+//! (Triggs et al. 2000). `result` is the map with its accuracy; `scale` finds wrong tag sizes. `checked` returns a map
+//! if the views do not contradict its files. For that, `known_places` tries other readings, and `lens_test` and
+//! `lens_fit` search for another lens. `odd_tags` searches for wrong sizes and moves, with `columns` of a map without
+//! known places (`blind`). `lost_anchor` and `contradictions` find parts that cannot be one map. `tag_mapping` maps the
+//! tags of a calibration; `files` reads and writes files of tags and cameras, `recording` reads views from recordings.
 
 mod adjust;
 mod assemble;

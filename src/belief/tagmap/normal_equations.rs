@@ -1,4 +1,4 @@
-//! Normal equations of the map and the Schur complement that eliminates the views.
+//! Normal equations of the map and the Schur complement that marginalises the views.
 
 use crate::tagmap::constants::normal_equations::UNDETERMINED;
 use std::sync::Arc;
@@ -8,11 +8,11 @@ use nalgebra::{Matrix6, Vector6};
 use crate::tagmap::problem::MapProblem;
 use crate::tagmap::sparse::{Pattern, System};
 
-/// The equations of the nodes alone.
+/// The normal equations of the nodes, without the marginalised blocks.
 pub(super) struct Reduced {
     pub(super) system: System,
     pub(super) right: Vec<Vector6<f64>>,
-    /// Of each block that was eliminated.
+    /// Inverse of each block that was marginalised.
     pub(super) inverses: Vec<Matrix6<f64>>,
 }
 
@@ -20,12 +20,12 @@ pub(super) struct Reduced {
 #[derive(Clone, Debug)]
 pub(super) struct NormalEquations {
     pub(super) pattern: Arc<Pattern>,
-    /// Of each block: its own part and right side.
+    /// Own part and right side of each block.
     pub(super) own: Vec<Matrix6<f64>>,
     pub(super) own_right: Vec<Vector6<f64>>,
-    /// Of each observation: block by tag.
+    /// Cross term of each observation: block by tag.
     pub(super) cross: Vec<Matrix6<f64>>,
-    /// Of the nodes: diagonal, right side, and blocks off the diagonal that come from priors and attitudes.
+    /// Parts of the nodes: diagonal, right side, and blocks off the diagonal that come from priors and attitudes.
     pub(super) nodes: Vec<Matrix6<f64>>,
     pub(super) nodes_right: Vec<Vector6<f64>>,
     pub(super) off_diagonal: Vec<(usize, usize, Matrix6<f64>)>,
@@ -33,8 +33,8 @@ pub(super) struct NormalEquations {
 }
 
 impl NormalEquations {
-    /// The reduced system with `damping` added to each diagonal, relative to it; and the inverses of the eliminated
-    /// blocks.
+    /// Returns the reduced system with `damping` added to each diagonal, relative to it, and the inverses of the
+    /// marginalised blocks.
     pub(super) fn reduce(&self, problem: &MapProblem<'_>, damping: f64) -> Option<Reduced> {
         let mut system = System::zeros(&self.pattern);
         let mut right = self.nodes_right.clone();
@@ -74,7 +74,7 @@ impl NormalEquations {
         Some(Reduced { system, right, inverses })
     }
 
-    /// The step of an eliminated block, from the steps of the nodes.
+    /// Step of a marginalised block, from the steps of the nodes.
     pub(super) fn back_substitute(
         &self,
         problem: &MapProblem<'_>,

@@ -1,6 +1,6 @@
-//! Tags that are not what or where the others say: of another size than stated, or moved during the recording.
+//! Tags that contradict the others: of another size than stated, or moved during the recording.
 //!
-//! Each of these is a further unknown of the map (`columns`); the one that gains most is named.
+//! Each of these faults is a further unknown of the map (`columns`); the one with the largest gain is named.
 
 use nalgebra::{DVector, Vector3};
 
@@ -13,16 +13,16 @@ use crate::tagmap::solve::Solved;
 use armcal_core::codes::{Code, Warning};
 use armcal_core::spatial::adjoint;
 
-/// What is odd about a tag.
+/// Fault of an odd tag.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Oddity {
-    /// Its size over the stated one.
+    /// Another size: true size over the stated one.
     Size(f64),
-    /// It moved: by how much (m, rad), and how many of all its detections are before.
+    /// A move: its distance and angle, and the number of all detections `n` that are before it.
     Moved { distance_m: f64, angle_rad: f64, n_before: usize, n: usize },
 }
 
-/// An odd tag, and what it explains.
+/// An odd tag, and its gain in evidence.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct OddTag {
     pub(super) id: u32,
@@ -42,7 +42,7 @@ impl OddTag {
         }
     }
 
-    /// Smaller ones do no harm, and no print and no board is without them.
+    /// Returns true if the fault is large enough to matter; smaller ones belong to any print and board.
     fn is_large(&self) -> bool {
         match self.oddity {
             Oddity::Size(factor) => (factor - 1.0).abs() > LEAST_SIZE,
@@ -51,7 +51,7 @@ impl OddTag {
     }
 }
 
-/// The odd tag that explains most, if one does.
+/// Returns the odd tag with the largest gain, if one is significant.
 pub(super) fn odd_tag(solved: &Solved<'_>) -> Option<OddTag> {
     let linearized = Linearized::of(&solved.problem, loss_of(solved))?;
     let misfit = Misfit::of(solved);
@@ -85,7 +85,7 @@ impl Search<'_, '_> {
         Some(OddTag { id, oddity: Oddity::Size(step[0].exp()), gain_nats })
     }
 
-    /// After some parts of its detections.
+    /// Candidates for a move of the tag, after some parts of its detections.
     fn of_moves(&self, tag: usize) -> Vec<OddTag> {
         let seen = self.solved.problem.observations.iter().filter(|seen| seen.tag == tag && seen.is_used);
         let mut views: Vec<usize> = seen.map(|seen| seen.view).collect();

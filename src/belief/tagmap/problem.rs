@@ -1,4 +1,4 @@
-//! What the bundle adjustment works on.
+//! Data and state of the bundle adjustment.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Matrix2, Vector2, Vector3};
 
 use armcal_core::optics::{CameraModel, SquarePose};
 
-/// One tag in one image, checked and solved by itself.
+/// One tag in one image, checked and solved individually.
 #[derive(Clone, Debug)]
 pub(super) struct Observation {
     /// Index into the sorted views.
@@ -26,20 +26,20 @@ pub(super) struct Observation {
 }
 
 impl Observation {
-    /// camera_from_tag of the square by itself, both ways.
+    /// Both solutions for camera_from_tag of the square.
     pub(super) fn solutions(&self) -> impl Iterator<Item = &SquarePose> {
         std::iter::once(&self.best).chain(&self.other)
     }
 }
 
-/// A pose that is known to within a standard deviation.
+/// A pose that is known within standard deviations.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PosePrior {
-    /// owner_from_tag.
+    /// Pose owner_from_tag.
     pub(super) pose: Isometry3<f64>,
-    /// 1/std^2 along the tag's axes.
+    /// Information 1/std^2 along the tag's axes.
     pub(super) information: nalgebra::Vector6<f64>,
-    /// Node of the owner where its place is estimated; `None`: the owner's frame is the group's.
+    /// Index of the owner in the extras if its place is estimated; `None`: the owner's frame is the group's.
     pub(super) owner: Option<usize>,
 }
 
@@ -49,10 +49,10 @@ pub(super) struct TagState {
     pub(super) id: u32,
     pub(super) size_m: f64,
     pub(super) body: usize,
-    /// As given: body_from_tag and its standard deviations, exact where `None`.
+    /// Given pose, body_from_tag, and its standard deviations; exact if these are `None`.
     pub(super) given: Option<(Isometry3<f64>, Option<[f64; 6]>)>,
     pub(super) group: usize,
-    /// Place in the reduced system; `None` is held.
+    /// Index in the reduced system; `None` for a held tag.
     pub(super) node: Option<usize>,
     pub(super) prior: Option<PosePrior>,
     pub(super) pose: Isometry3<f64>,
@@ -63,22 +63,22 @@ pub(super) struct TagState {
 pub(super) struct Block {
     pub(super) view: usize,
     pub(super) group: usize,
-    /// Its observations.
+    /// Range of the block's observations.
     pub(super) range: Range<usize>,
-    /// Place in the reduced system where another block depends on it (attitude); `None` is eliminated.
+    /// Index in the reduced system if another block depends on it (attitude); `None`: the block is marginalised.
     pub(super) node: Option<usize>,
-    /// frame_from_camera.
+    /// Pose frame_from_camera.
     pub(super) pose: Isometry3<f64>,
 }
 
-/// A pose in the reduced system that is no tag's: a body's place in its group, or the turn of the world.
+/// A pose in the reduced system that is no tag's: a body's place in its group, or the rotation of the world.
 #[derive(Clone, Debug)]
 pub(super) struct Extra {
     pub(super) node: usize,
     pub(super) pose: Isometry3<f64>,
 }
 
-/// The attitude sensor ties the rotations of two blocks of one view:
+/// Link by the attitude sensor between the rotations of two blocks of one view:
 /// world_from_moving * moving_from_camera = world_from_fixed * fixed_from_camera.
 #[derive(Clone, Debug)]
 pub(super) struct AttitudeLink {
@@ -93,13 +93,13 @@ pub(super) struct AttitudeLink {
 #[derive(Clone, Debug)]
 pub(super) struct MapProblem<'a> {
     pub(super) cameras: Cow<'a, [CameraModel]>,
-    /// Sorted by block and tag.
+    /// Observations, sorted by block and tag.
     pub(super) observations: Vec<Observation>,
     pub(super) tags: Vec<TagState>,
     pub(super) blocks: Vec<Block>,
     pub(super) extras: Vec<Extra>,
     pub(super) links: Vec<AttitudeLink>,
     pub(super) n_nodes: usize,
-    /// Steps that adjustments may still make.
+    /// Number of steps that adjustments may still make.
     pub(super) steps_left: usize,
 }

@@ -1,4 +1,4 @@
-//! Views from recordings, ours and others'.
+//! Views from recordings, in our format and others.
 
 use crate::tagmap::constants::recording::{MAX_GAP_S, UNIT_TOLERANCE};
 use armcal_core::codes::{Code, Coded};
@@ -12,22 +12,22 @@ use crate::tagmap::types::{MapDetection, MapView};
 use armcal_core::log::{Completeness, LogError, RawMessage, decode, for_each_raw, ros, topics};
 use armcal_core::time::Stamp;
 
-/// Views of a recording, and what was left out.
+/// Views of a recording, and counts of skipped messages and detections.
 #[derive(Clone, Debug)]
 pub struct RecordedViews {
-    /// By camera, then in the order of the file.
+    /// Views, sorted by camera, then in the order of the file.
     pub views: Vec<MapView>,
     /// Topic of each camera that has one in the recording: (index of the camera, topic).
     pub topics: Vec<(usize, String)>,
-    /// Whether the file could be read to its end.
+    /// Tells if the file could be read to its end.
     pub completeness: Completeness,
-    /// Messages and detections that were left out, by reason.
+    /// Number of skipped messages and detections, by reason.
     pub left_out: BTreeMap<&'static str, usize>,
-    /// Of those, the ones that could not be read; the rest was asked for.
+    /// Number of messages of `left_out` that could not be read; rules excluded the others.
     pub n_unreadable: usize,
 }
 
-/// Why a recording has no views.
+/// Reason why a recording yields no views.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum ViewsError {
@@ -41,16 +41,16 @@ pub enum ViewsError {
     NoTopic { path: PathBuf, wanted: Vec<String>, found: Vec<String> },
 }
 
-/// What a recording holds for a map.
+/// Contents of a recording that a map uses.
 #[derive(Default)]
 struct Contents {
     arrays: BTreeMap<String, Vec<(Stamp, Option<ros::AprilTagDetectionArray>)>>,
     attitudes: Vec<(Stamp, UnitQuaternion<f64>)>,
 }
 
-/// Reads the detections of `cameras`: of each the topic that its file names, if the recording has it; failing that
-/// `topic`, or the only one that there is, for the first camera. `rules` says which detections are left out or stand
-/// for others.
+/// Reads the detections of `cameras`. Each camera has the topic that its file names, if the recording has it. Otherwise
+/// the first camera has `topic`, or the only one in the recording. `rules` states the detections that are skipped or
+/// stand for others.
 ///
 /// # Errors
 /// [`ViewsError`].
@@ -177,7 +177,7 @@ fn seen(
     Some(MapDetection { id, corners_px, covariance_px2: None })
 }
 
-/// Between the two neighbours in time.
+/// Attitude at `stamp`, interpolated between the two neighbours in time.
 fn attitude_at(attitudes: &[(Stamp, UnitQuaternion<f64>)], stamp: Stamp) -> Option<UnitQuaternion<f64>> {
     let after = attitudes.partition_point(|(at, _)| *at < stamp);
     let (later, later_turn) = attitudes.get(after)?;

@@ -1,4 +1,4 @@
-//! The map, and how good it is.
+//! The map, and its accuracy.
 
 use armcal_core::codes::Warning;
 use std::collections::BTreeMap;
@@ -19,16 +19,16 @@ pub struct MappedTag {
     pub size_m: f64,
     /// Index into [`TagMap::groups`].
     pub group: usize,
-    /// In the group's frame.
+    /// Pose in the group's frame.
     pub frame_from_tag: Isometry3<f64>,
-    /// Of a perturbation on the right, `frame_from_tag * exp(xi)`, xi = (translation m, rotation rad) along the tag's
-    /// axes. It is relative to what anchors the group: zero for a tag that is held.
+    /// Covariance of a perturbation on the right, `frame_from_tag * exp(xi)`, xi = (translation m, rotation rad) along
+    /// the tag's axes. It is relative to the anchor of the group: zero for a held tag.
     pub covariance: Matrix6<f64>,
-    /// Number of views in the fit that show it.
+    /// Number of views in the fit that show the tag.
     pub n_views: usize,
-    /// Of its corners: root mean square distance between measured and predicted pixel; 0 where none is used.
+    /// Root mean square distance between measured and predicted corners of the tag, px; 0 if no corner is used.
     pub rms_px: f64,
-    /// Held at the place it was given, or at the origin.
+    /// True if the tag is held at its given place, or at the origin.
     pub is_fixed: bool,
     /// Index into the solver's free tags.
     pub(super) node: Option<usize>,
@@ -56,12 +56,12 @@ impl MappedTag {
     }
 }
 
-/// In which frame a group's tags are.
+/// Frame of a group's tags.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum GroupFrame {
-    /// That of a body, by tags whose places on it are known.
+    /// Frame of the body with this name, from tags whose places on it are known.
     Body(String),
-    /// That of one of its tags, for nothing ties the group to any other.
+    /// Frame of the tag with this id, because nothing ties the group to any other.
     Tag(u32),
 }
 
@@ -72,73 +72,74 @@ pub struct MapGroup {
     pub frame: GroupFrame,
     /// Indices into the input's bodies.
     pub bodies: Vec<usize>,
-    /// Ascending.
+    /// Ids of the tags, ascending.
     pub tags: Vec<u32>,
     /// Views in the fit that show a tag of the group.
     pub n_views: usize,
 }
 
-/// Where one group was seen from another's frame, in one view that shows both.
+/// Pose of one group in another's frame, in one view that shows both.
 #[derive(Clone, Debug)]
 pub struct RelativeBodyPose {
     /// Index into the input's views.
     pub view: usize,
     /// Indices into [`TagMap::groups`].
     pub first: usize,
-    /// See `first`.
+    /// Index into [`TagMap::groups`] of the second group.
     pub second: usize,
-    /// Frame of the first group from that of the second.
+    /// Pose of the second group's frame in the first's.
     pub first_from_second: Isometry3<f64>,
-    /// On the right, (translation m, rotation rad) along the axes of the second group's frame.
+    /// Covariance of a perturbation on the right, (translation m, rotation rad) along the axes of the second group's
+    /// frame.
     pub covariance: Matrix6<f64>,
 }
 
-/// What [`super::solve`] finds.
+/// Result of [`super::solve`].
 #[derive(Clone, Debug)]
 pub struct TagMap {
     /// The anchored groups first, then by their smallest tag.
     pub groups: Vec<MapGroup>,
-    /// By id.
+    /// Tags, sorted by id.
     pub tags: Vec<MappedTag>,
-    /// For each view of the input and each group: frame_from_camera, where it shows tags of the group.
+    /// For each view of the input, frame_from_camera of each group with tags in it.
     pub views: Vec<BTreeMap<usize, Isometry3<f64>>>,
-    /// By view, then by `second`; `first` is the same for all of a view.
+    /// Relative poses, sorted by view, then by `second`; `first` is the same for all of a view.
     pub relative: Vec<RelativeBodyPose>,
-    /// All of the input, rejected ones included.
+    /// Number of all detections in the input, including rejected ones.
     pub n_detections: usize,
-    /// Detections in the fit.
+    /// Number of detections in the fit.
     pub n_used: usize,
-    /// Root mean square distance between measured and predicted corner over all that are in the fit, px.
+    /// Root mean square distance between measured and predicted corners of all detections in the fit, px.
     pub rms_px: f64,
-    /// The same over those too that were rejected as inconsistent but have a prediction.
+    /// Root mean square distance that also includes rejected detections which have a prediction, px.
     pub rms_all_px: f64,
-    /// Median distance between measured and predicted corner over all that are in the fit.
+    /// Median distance between measured and predicted corners of all detections in the fit, px.
     pub median_px: f64,
-    /// Sum of squared whitened residuals and its degrees of freedom.
+    /// Sum of squared whitened residuals.
     pub chi_square: f64,
-    /// Corner and prior residuals less the unknowns of tags and views.
+    /// Number of corner and prior residuals less the unknowns of tags and views.
     pub degrees_of_freedom: usize,
-    /// By what the corners' standard deviations were multiplied in the end; 1 if the noise was given.
+    /// Final factor of the corners' standard deviations; 1 if the noise was given.
     pub noise_scale: f64,
-    /// By view, then by id.
+    /// Rejected detections, sorted by view, then by id.
     pub rejected: Vec<RejectedDetection>,
     /// Tags whose size disagrees with the known distances between tags.
     pub scale_warnings: Vec<ScaleWarning>,
-    /// Sentences for people; empty where nothing is doubtful.
+    /// Warnings as sentences; empty if nothing is doubtful.
     pub warnings: Vec<Warning>,
-    /// Whether groups that must be one map fell apart, or an id is on two tags.
+    /// True if groups that must be one map fell apart, or an id is on two tags.
     pub is_contradicted: bool,
-    /// Whether the last fit found a minimum.
+    /// True if the last fit found a minimum.
     pub has_converged: bool,
-    /// Steps of all fits.
+    /// Number of steps of all fits.
     pub n_steps: usize,
     pub(super) factor: Option<Factor>,
-    /// Of lenses that were estimated with the map; without, they count as exact.
+    /// Errors of lenses that were estimated with the map; `None`: lenses count as exact.
     pub(super) lens_errors: Option<LensErrors>,
 }
 
 impl TagMap {
-    /// The map with what its estimated lenses add to the covariances of its tags.
+    /// Returns the map with the errors of its estimated lenses added to the covariances of its tags.
     pub(super) fn with_lens_errors(mut self, errors: LensErrors) -> Self {
         for tag in &mut self.tags {
             if let Some(node) = tag.node {
@@ -149,13 +150,13 @@ impl TagMap {
         self
     }
 
-    /// The tag of that id; `None` where the map lacks it.
+    /// Returns the tag with that id; `None` if the map has none.
     #[must_use]
     pub fn tag(&self, id: u32) -> Option<&MappedTag> {
         self.tags.binary_search_by_key(&id, |tag| tag.id).ok().map(|idx| &self.tags[idx])
     }
 
-    /// How many detections were rejected for each reason.
+    /// Number of rejected detections for each reason.
     #[must_use]
     pub fn rejected_by_reason(&self) -> BTreeMap<MapRejection, usize> {
         let mut counts = BTreeMap::new();
@@ -165,8 +166,8 @@ impl TagMap {
         counts
     }
 
-    /// Joint covariance of several tags, 6 rows for each in the order asked for, as [`MappedTag::covariance`]; `None`
-    /// if one of them is not in the map.
+    /// Joint covariance of several tags, 6 rows each in the order of `ids`, in the form of [`MappedTag::covariance`].
+    /// `None` if one of them is not in the map.
     #[must_use]
     pub fn joint_covariance(&self, ids: &[u32]) -> Option<DMatrix<f64>> {
         let nodes = ids.iter().map(|id| self.tag(*id).map(|tag| tag.node)).collect::<Option<Vec<_>>>()?;

@@ -1,8 +1,8 @@
-//! Tag sizes that are off, by tags whose distance is known.
+//! Wrong tag sizes, from tags with a known distance.
 //!
-//! A square solved with a size that is too large by a factor lies farther away by the same factor, along the same line
-//! of sight. So with two tags of known distance D at p_a and p_b (camera frame), `|s_a p_a - s_b p_b| = D` tells the
-//! factors s by which the sizes must be multiplied: 1 where they are right.
+//! A square solved with a size that is too large by a factor lies farther away by the same factor. It stays on the same
+//! line of sight. Two tags of known distance D are at p_a and p_b (camera frame). The equation `|s_a p_a - s_b p_b| =
+//! D` holds for the factors s of their true sizes over the stated ones: 1 for a correct size.
 
 use crate::tagmap::constants::scale::{
     EXPLAINS, FARTHEST, LEAST_FACTOR, MAX_ROOTS, MAX_SAMPLES, ONE_PLACE_M, SURE_SHARE,
@@ -16,9 +16,9 @@ use crate::tagmap::types::MapInput;
 /// A size that cannot be right.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScaleWarning {
-    /// The tags whose sizes are off by the same factor; all with a known place, or one.
+    /// Tags whose sizes have the same wrong factor: all tags with a known place, or one.
     pub tags: Vec<u32>,
-    /// Their sizes times this would agree with the known distances.
+    /// Factor by which their sizes would agree with the known distances.
     pub factor: f64,
 }
 
@@ -44,20 +44,20 @@ struct Sample {
 }
 
 impl Sample {
-    /// How far the distance is from the known one, with the sizes multiplied.
+    /// Error of the distance with the sizes multiplied, natural logarithm of its ratio to the known one.
     fn disagreement(&self, factor_of: &impl Fn(u32) -> f64) -> f64 {
         let measured = (self.at_a * factor_of(self.a) - self.at_b * factor_of(self.b)).norm();
         (measured / self.distance_m).ln().abs().min(FARTHEST)
     }
 
-    /// Factors of tag `of` alone that give the known distance.
+    /// Factors of tag `of`, with the other held, that give the known distance.
     fn roots(&self, of: u32) -> Vec<f64> {
         let (free, held) = if of == self.a { (&self.at_a, &self.at_b) } else { (&self.at_b, &self.at_a) };
         let (a, b) = (free.norm_squared(), free.dot(held));
         let c = held.norm_squared() - self.distance_m * self.distance_m;
         let under = b * b - a * c;
         if under < 0.0 {
-            // No factor reaches the distance; the nearest approach is the best there is.
+            // No factor reaches the distance; the nearest approach is the best one.
             return vec![b / a];
         }
         vec![(b - under.sqrt()) / a, (b + under.sqrt()) / a]
@@ -86,7 +86,7 @@ pub(super) fn check(input: &MapInput<'_>, screened: &Screened) -> Vec<ScaleWarni
                 best = Some((left, ScaleWarning { tags: tags.to_vec(), factor }));
             }
         };
-        // All of them first: of explanations that are as good it is the likelier one.
+        // All tags together come first: of equally good explanations this is the more probable one.
         if warnings.is_empty() {
             let ratio = |s: &Sample| s.distance_m / (s.at_a - s.at_b).norm();
             thinned(samples.iter().map(ratio).collect(), MAX_ROOTS)
@@ -100,7 +100,7 @@ pub(super) fn check(input: &MapInput<'_>, screened: &Screened) -> Vec<ScaleWarni
         }
         let Some((left, warning)) = best else { break };
         let is_small = (1.0 / LEAST_FACTOR..=LEAST_FACTOR).contains(&warning.factor);
-        // With several sizes off, one explanation takes only its share.
+        // With several wrong sizes, one explanation removes only its share.
         let share = 1.0 - (1.0 - EXPLAINS) / ids.len().max(1) as f64;
         if is_small || left > share * now {
             break;
@@ -111,7 +111,7 @@ pub(super) fn check(input: &MapInput<'_>, screened: &Screened) -> Vec<ScaleWarni
     warnings
 }
 
-/// Evenly over the sorted values.
+/// Selects at most `most` values, evenly over the sorted ones.
 fn thinned(mut values: Vec<f64>, most: usize) -> Vec<f64> {
     values.sort_by(f64::total_cmp);
     let n = values.len();
@@ -121,7 +121,7 @@ fn thinned(mut values: Vec<f64>, most: usize) -> Vec<f64> {
 fn samples(input: &MapInput<'_>, screened: &Screened) -> Vec<Sample> {
     let place = |id: u32| {
         let tag = input.tags.iter().find(|tag| tag.id == id)?;
-        // A place that is hardly known tells no distance.
+        // A place with a large sigma determines no distance.
         let is_sure = tag.std.is_none_or(|std| std[..3].iter().all(|std| *std < SURE_SHARE * tag.size_m));
         let pose = tag.pose.filter(|_| is_sure)?;
         let body = &input.bodies[tag.body];

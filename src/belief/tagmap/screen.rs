@@ -1,5 +1,5 @@
-//! From detections to observations: sorted, so that the order of the input does not matter, and each a square by
-//! itself.
+//! Observations from detections: sorted, so that the order of the input does not matter, with each square solved
+//! individually.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -19,9 +19,9 @@ pub(super) struct SortedView {
 
 pub(super) struct Screened {
     pub(super) views: Vec<SortedView>,
-    /// By id; those seen alone.
+    /// Tags that views show, sorted by id.
     pub(super) tags: Vec<TagState>,
-    /// By view and tag.
+    /// Observations, sorted by view and tag.
     pub(super) observations: Vec<Observation>,
     pub(super) rejected: Vec<RejectedDetection>,
     pub(super) n_detections: usize,
@@ -69,7 +69,7 @@ pub(super) fn screen(input: &MapInput<'_>, settings: &MapSettings) -> Screened {
     }
 }
 
-/// Everything about a view, so that equal keys are equal views.
+/// Key of a view that holds all its data, so that equal keys mean equal views.
 fn sort_key(view: &MapView) -> (i64, usize, Vec<(u32, [u64; 8])>) {
     let bits = |tag: &MapDetection| {
         let [[a, b], [c, d], [e, f], [g, h]] = tag.corners_px;
@@ -80,7 +80,7 @@ fn sort_key(view: &MapView) -> (i64, usize, Vec<(u32, [u64; 8])>) {
     (view.stamp.nanos, view.camera, tags)
 }
 
-/// What is known of each tag, as the mode has it.
+/// Known data of each tag, as the mode permits.
 fn known_tags(input: &MapInput<'_>, settings: &MapSettings) -> BTreeMap<u32, TagState> {
     let with_pose = || input.tags.iter().filter(|tag| tag.pose.is_some()).map(|tag| tag.id);
     let seen: BTreeSet<u32> = input.views.iter().flat_map(|view| view.tags.iter().map(|tag| tag.id)).collect();
@@ -130,7 +130,7 @@ fn observe(
     if !is_square {
         return Err(MapRejection::NotASquare);
     }
-    // A second solution that fits as badly as no detector measures is none.
+    // A second solution with a misfit beyond any detector's error does not count.
     let other =
         other.filter(|other| other.rms_px <= settings.max_square_rms_px && is_finite(other.camera_from_tag.isometry()));
     let plain = Matrix2::identity() / settings.corner_std_px;

@@ -1,4 +1,4 @@
-//! From views to a map, step by step.
+//! Steps from the views to a map.
 
 use std::borrow::Cow;
 
@@ -20,13 +20,13 @@ use crate::tagmap::{adjust, linearize};
 use armcal_core::codes::{Code, Warning};
 use armcal_core::numeric::Loss;
 
-/// Finds where the tags are, by bundle adjustment on the corner pixels of all views (Triggs et al. 2000).
+/// Estimates the poses of the tags by bundle adjustment on the corner pixels of all views (Triggs et al. 2000).
 ///
-/// Nothing but the views, the tags' sizes and the places of some tags enters. The result does not depend on the order
+/// The only inputs are the views, the tags' sizes and the places of some tags. The result does not depend on the order
 /// of views, tags or detections.
 ///
 /// # Errors
-/// [`TagMapError`] when the input cannot be meant, or shows none of the tags that would anchor the map.
+/// [`TagMapError`] if the input makes no sense, or shows no tag that could anchor the map.
 pub fn solve(input: &MapInput<'_>, settings: &MapSettings) -> Result<TagMap, TagMapError> {
     Ok(Solved::of(input, settings)?.map())
 }
@@ -36,7 +36,7 @@ pub(super) struct Solved<'a> {
     pub(super) input: MapInput<'a>,
     pub(super) problem: MapProblem<'a>,
     pub(super) groups: Vec<Group>,
-    /// By what the corners' standard deviations were multiplied.
+    /// Factor of the corners' standard deviations.
     pub(super) noise_scale: f64,
     screened: Screened,
     has_converged: bool,
@@ -98,7 +98,7 @@ impl<'a> Solved<'a> {
     }
 }
 
-/// Why no more steps were made, where that was so.
+/// Warning that the steps were used up; `None` if they were not.
 fn contradiction(problem: &MapProblem<'_>) -> Option<Warning> {
     let n = adjust::MAX_STEPS;
     let what = format!("the views contradict each other: after {n} steps the map still moved, and no more are made");
@@ -122,7 +122,8 @@ struct ProblemBuilder<'a, 'b> {
 }
 
 impl ProblemBuilder<'_, '_> {
-    /// From the layout to the solution: groups, factor of the corners' noise, and whether it came to rest.
+    /// Solves from the layout; returns the groups, the factor of the corners' noise, and true if the solution
+    /// converged.
     fn adjust(&self, problem: &mut MapProblem<'_>) -> (Vec<Group>, f64, bool) {
         let mut groups = self.build(problem);
         approach(problem);
@@ -153,7 +154,7 @@ impl ProblemBuilder<'_, '_> {
         (groups, noise_scale, has_converged)
     }
 
-    /// Groups, unknowns and attitude links for the observations in use.
+    /// Builds groups, unknowns and attitude links for the observations in use.
     fn build(&self, problem: &mut MapProblem<'_>) -> Vec<Group> {
         let groups = build(problem, self.label, self.input.bodies, self.settings);
         let Some(moving) = self.settings.attitude_body else { return groups };
@@ -172,8 +173,8 @@ impl ProblemBuilder<'_, '_> {
     }
 }
 
-/// Finds cameras and tags that have come to rest in a wrong place (the mirror image of the right one, mostly), and puts
-/// them where their images fit better; whether there were any.
+/// Finds cameras and tags that converged to a wrong pose (mostly the mirror image), and moves them where their images
+/// fit better. Returns true if there were any.
 fn repair(problem: &mut MapProblem<'_>) -> bool {
     let mut changed = false;
     for idx in 0..problem.blocks.len() {
@@ -210,7 +211,7 @@ fn repair(problem: &mut MapProblem<'_>) -> bool {
     changed
 }
 
-/// Makes the corners' standard deviations what the residuals show; the factor.
+/// Scales the corners' standard deviations to the residuals; returns the factor.
 fn rescale(problem: &mut MapProblem<'_>) -> f64 {
     let freedom = adjust::degrees_of_freedom(problem);
     if freedom < MIN_FREEDOM {

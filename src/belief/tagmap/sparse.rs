@@ -1,22 +1,22 @@
-//! Sparse symmetric systems of 6x6 blocks, by Cholesky.
+//! Sparse symmetric systems of 6x6 blocks, solved by Cholesky factorization.
 //!
-//! The reduced camera-free system of the tags has a block where two tags were seen together (Triggs et al. 2000, sec.
-//! 6.1): few of all pairs. Blocks are eliminated in the order of least degree (ties by number, so that the order is
-//! always the same), with the fill found once and used for every iteration.
+//! The reduced system of the tags, without cameras, has a block for each pair of tags seen together: few of all (Triggs
+//! et al. 2000, sec. 6.1). Blocks are eliminated in the order of least degree; ties go by number, so that the order is
+//! reproducible. The fill is found once and used for every iteration.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use nalgebra::{Matrix6, Vector6};
 
-/// Which blocks there are, in the order of elimination.
+/// Positions of the nonzero blocks, in the order of elimination.
 #[derive(Debug)]
 pub(super) struct Pattern {
-    /// Place in the order of elimination of each node.
+    /// Position in the order of elimination, for each node.
     place: Vec<usize>,
-    /// Rows below the diagonal of each column, ascending places.
+    /// Rows below the diagonal of each column, ascending positions.
     rows: Vec<Vec<usize>>,
-    /// Where each column's blocks begin.
+    /// Index of the first block of each column.
     start: Vec<usize>,
 }
 
@@ -94,7 +94,7 @@ impl System {
         }
     }
 
-    /// By places.
+    /// Block by positions in the order of elimination.
     fn at(&self, row: usize, column: usize) -> Matrix6<f64> {
         match row.cmp(&column) {
             std::cmp::Ordering::Equal => self.diagonal[row],
@@ -103,7 +103,7 @@ impl System {
         }
     }
 
-    /// L of L L^T; `None` if the matrix is not positive definite.
+    /// Factorizes into L of L L^T; `None` if the matrix is not positive definite.
     pub(super) fn factorize(mut self) -> Option<Factor> {
         let pattern = Arc::clone(&self.pattern);
         for column in 0..pattern.rows.len() {
@@ -167,9 +167,9 @@ impl Factor {
         pattern.place.iter().map(|&place| x[place]).collect()
     }
 
-    /// The blocks of the inverse that the matrix has, and those that the factor has besides: of `L` and the inverse
-    /// `Z`, with `U = L_kj L_jj^-1`, `Z_ij = -sum_k Z_ik U_kj` over the rows k of column j, all of them in the pattern
-    /// (Takahashi 1973; Erisman and Tinney 1975). As much work as to factorize.
+    /// Computes the blocks of the inverse in the pattern of the factor, which includes that of the matrix. With `L`,
+    /// the inverse `Z` and `U = L_kj L_jj^-1`: `Z_ij = -sum_k Z_ik U_kj` over the rows k of column j. All of these are
+    /// in the pattern (Takahashi 1973; Erisman and Tinney 1975). The cost is that of a factorization.
     pub(super) fn selected_inverse(&self) -> SelectedInverse {
         let pattern = Arc::clone(&self.pattern);
         let mut inverse = System::zeros(&pattern);
@@ -192,7 +192,7 @@ impl Factor {
         SelectedInverse { inverse }
     }
 
-    /// The six columns of the inverse that belong to `node`, by nodes.
+    /// The six columns of the inverse that belong to `node`, indexed by node.
     pub(super) fn inverse_column(&self, node: usize) -> Vec<Matrix6<f64>> {
         let pattern = &*self.pattern;
         let n = pattern.rows.len();
@@ -224,7 +224,7 @@ pub(super) struct SelectedInverse {
 }
 
 impl SelectedInverse {
-    /// Of two nodes that share a block of the matrix, or of one.
+    /// Block of two nodes that share a block of the matrix, or of one node.
     pub(super) fn block(&self, a: usize, b: usize) -> Matrix6<f64> {
         let place = &self.inverse.pattern.place;
         self.inverse.at(place[a], place[b])
@@ -238,7 +238,7 @@ mod tests {
     use nalgebra::{DMatrix, DVector};
     use rand::RngExt;
 
-    /// A random sparse positive definite matrix, both ways, and its pairs of nodes.
+    /// A random sparse positive definite matrix as a system and dense, and its pairs of nodes.
     fn random(n: usize, seed: u64) -> (System, DMatrix<f64>, Vec<(usize, usize)>) {
         let mut rng = stream_rng(seed, "blocks");
         let edges: Vec<(usize, usize)> =
@@ -288,7 +288,7 @@ mod tests {
         }
     }
 
-    /// A corridor: each node shares a block with the six before it, and the numbers say nothing of their order.
+    /// A corridor: each node shares a block with the six before it, and the numbers do not reveal their order.
     #[test]
     fn a_chain_has_as_many_blocks_as_it_is_long() {
         const N: usize = 1000;

@@ -1,9 +1,9 @@
-//! Where the tags are, when no survey says it: from the captured views themselves, before any joint enters.
+//! Poses of tags without a survey, from the captured views themselves, before any joint enters.
 //!
-//! `tagmap` solves cameras and tags together from the fitted views' corner pixels; what is known of some tags (the base
-//! tag at least) anchors it, with its standard deviations. The map's tags then stand for surveyed ones. Their errors
-//! are not independent: a base tag that is turned by a little turns the whole map about it (0.2 deg is 7 mm at 2 m), so
-//! that the joint covariance of all positions, anchor included, goes into the predicted tool error.
+//! `tagmap` solves cameras and tags together from the fitted views' corner pixels. The known places of some tags (at
+//! least the base tag) anchor it, with their standard deviations. The map's tags then replace surveyed ones. Their
+//! errors are not independent: a small rotation of the base tag turns the whole map about it (0.2 deg is 7 mm at 2 m).
+//! So the joint covariance of all positions, including the anchor, enters the predicted tool error.
 
 use crate::tagmap::constants::tag_mapping::MAX_RELATIVE_STD_M;
 use std::collections::BTreeMap;
@@ -20,7 +20,7 @@ use armcal_core::robot::{Robot, SurveyedTag, TagSurvey};
 use armcal_core::spatial::{Base, Pose, Tag, skew};
 
 impl Mapped {
-    /// The mapped tags as a start: those that were unknown stay so, known ones stay where the survey has them.
+    /// Returns the mapped tags as initial guess: unknown tags stay unknown, known ones keep their surveyed places.
     pub(crate) fn start(&self, drawn: &Robot) -> Robot {
         let mut start = drawn.clone();
         for (tag, mapped) in start.tags.iter_mut().zip(&self.robot.tags) {
@@ -32,7 +32,7 @@ impl Mapped {
     }
 }
 
-/// Maps the tags where some of them are unknown; `None` where the survey knows all of them.
+/// Maps the tags if some of them are unknown; `None` if the survey knows all of them.
 ///
 /// # Errors
 /// [`CalibError::Map`] where the views make no map.
@@ -48,15 +48,15 @@ pub(crate) fn map_unknown_tags(
     mapped.map(Some).map_err(|problem| CalibError::Map { recording: name.to_owned(), problem })
 }
 
-/// What the estimator goes on with.
+/// Result of the mapping as input of the estimator.
 pub(crate) struct Mapped {
-    /// With the map's tags; those that are left out stand nowhere and are in no view.
+    /// The robot with the map's tags; tags that are left out have no place and are in no view.
     pub robot: Robot,
     pub errors: CommonErrors,
     pub result: MapResult,
 }
 
-/// Maps the tags of `data`'s fitted views; takes the detections of tags that the map lacks out of all views.
+/// Maps the tags of `data`'s fitted views; removes the detections of tags that the map lacks from all views.
 fn map_tags(data: &mut CaptureData, robot: &Robot) -> Result<Mapped, String> {
     let views: Vec<MapView> = data.fit.iter().map(|view| map_view(view, robot)).collect();
     let bodies = [Body { name: robot.base_link.clone(), is_static: true, pose: Some(Isometry3::identity()) }];
@@ -104,7 +104,7 @@ fn prior(tag: &SurveyedTag) -> TagPrior {
         size_m: tag.size_m,
         body: 0,
         pose: tag.is_known().then(|| *tag.base_from_tag.isometry()),
-        // The solver wants all of them above zero, or none.
+        // The solver needs all of them above zero, or none.
         std: (position > 0.0 && rotation > 0.0).then_some(std),
     }
 }
@@ -113,7 +113,7 @@ fn prior(tag: &SurveyedTag) -> TagPrior {
 struct Anchor {
     id: u32,
     group: usize,
-    /// Sigma of its place where the solver held it: all tags share its error. None where the map's covariance has it.
+    /// Sigma of its place if the solver held it: all tags share its error. `None` if the map's covariance includes it.
     held_std: Option<[f64; 6]>,
 }
 
@@ -130,7 +130,7 @@ fn anchor(map: &TagMap, robot: &Robot) -> Option<Anchor> {
     })
 }
 
-/// Why a tag is left out; `None` for one that is not.
+/// Reason why a tag is left out; `None` for one that is in the map.
 fn reason(map: &TagMap, tag: &SurveyedTag, anchor: &Anchor) -> Option<String> {
     let Some(found) = map.tag(tag.id) else { return Some("was seen in no view together with another tag".to_owned()) };
     if found.group != anchor.group {
@@ -171,7 +171,7 @@ fn mapped(map: &TagMap, robot: &Robot, anchor: &Anchor, left_out: &BTreeMap<u32,
         let std = |row: usize| joint[(6 * n + row, 6 * n + row)].max(0.0).sqrt();
         let tag = &mut survey.tags[k];
         tag.base_from_tag = pose;
-        // As the residuals see it: what the whole map is off by, the joints take up.
+        // Sigma as in the residuals: joints absorb the error of the whole map.
         tag.position_std_m = relative_std_m(map, ids[n], anchor.id).unwrap_or(0.0);
         tag.rotation_std_rad = ([3, 4, 5].map(|row| std(row).powi(2)).iter().sum::<f64>() / 3.0).sqrt();
         tags.push(MapTag {
@@ -202,14 +202,14 @@ fn mapped(map: &TagMap, robot: &Robot, anchor: &Anchor, left_out: &BTreeMap<u32,
     Mapped { robot: robot.clone().with_survey(survey), errors, result }
 }
 
-/// Along the base frame's axes, of the tag in row `n` of the joint covariance.
+/// Standard deviation of the position of the tag in row `n` of the joint covariance, along the base frame's axes, m.
 fn position_std_m(joint: &DMatrix<f64>, n: usize, pose: &Pose<Base, Tag>) -> [f64; 3] {
     let turn = *pose.rotation().to_rotation_matrix().matrix();
     let covariance = turn * joint.fixed_view::<3, 3>(6 * n, 6 * n) * turn.transpose();
     [0, 1, 2].map(|k| covariance[(k, k)].max(0.0).sqrt())
 }
 
-/// What an anchor that was held adds to the joint covariance of `ids`: it carries the whole map with it.
+/// Contribution of a held anchor to the joint covariance of `ids`: its error moves the whole map.
 ///
 /// With `T = A X` and `A exp(xi0)`, the tag moves by `X^-1 xi0 X`: `omega = R^T omega0`,
 /// `rho = R^T (rho0 - [t]x omega0)`.
@@ -228,7 +228,7 @@ fn shared_error(map: &TagMap, ids: &[u32], anchor: &Anchor) -> DMatrix<f64> {
     &jacobian * variances * jacobian.transpose()
 }
 
-/// Covariance of all tags' positions in the base frame, three rows a tag; zero for those that are left out.
+/// Covariance of all tags' positions in the base frame, three rows per tag; zero for tags that are left out.
 fn positions_m2(survey: &TagSurvey, used: &[usize], joint: &DMatrix<f64>) -> DMatrix<f64> {
     let mut out = DMatrix::zeros(3 * survey.tags.len(), 3 * survey.tags.len());
     let turn = |k: usize| *survey.tags[k].base_from_tag.rotation().to_rotation_matrix().matrix();

@@ -13,7 +13,7 @@ use crate::tagmap::vote;
 pub(super) struct Pair {
     /// Indices of the observations.
     seen: Vec<(usize, usize)>,
-    /// Sum over the images of the smaller square, px^2: about the information on their relative pose.
+    /// Sum over the images of the smaller square, px^2: a measure of the information on the relative pose of both tags.
     pub(super) weight: f64,
 }
 
@@ -24,14 +24,14 @@ impl Pair {
     }
 }
 
-/// All pairs, by the smaller index and the larger one.
+/// All pairs, keyed by the smaller index and the larger one.
 pub(super) struct Pairs {
     pairs: BTreeMap<(usize, usize), Pair>,
     around: Vec<Vec<usize>>,
 }
 
 impl Pairs {
-    /// Pairs of tags that keep their relative pose.
+    /// Collects the pairs of tags that keep their relative pose.
     pub(super) fn of(observations: &[Observation], tags: &[TagState], bodies: &[Body]) -> Self {
         let mut pairs: BTreeMap<(usize, usize), Pair> = BTreeMap::new();
         for of_view in observations.chunk_by(|a, b| a.view == b.view) {
@@ -59,7 +59,7 @@ impl Pairs {
         self.pairs.iter()
     }
 
-    /// Those of one tag.
+    /// Pairs that contain one tag.
     pub(super) fn around(&self, tag: usize) -> impl Iterator<Item = ((usize, usize), &Pair)> {
         self.around[tag].iter().filter_map(move |other| {
             let key = (tag.min(*other), tag.max(*other));
@@ -68,7 +68,7 @@ impl Pairs {
     }
 }
 
-/// Whether tags of the two bodies keep their relative pose.
+/// Returns true if tags of the two bodies keep their relative pose.
 pub(super) fn is_rigid(bodies: &[Body], a: usize, b: usize) -> bool {
     a == b || (bodies[a].is_static && bodies[b].is_static)
 }

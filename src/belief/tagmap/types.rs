@@ -1,4 +1,4 @@
-//! What a tag map is made from.
+//! Input and settings of a tag map.
 
 use armcal_core::codes::{Code, Coded};
 use nalgebra::{Isometry3, Matrix2, UnitQuaternion};
@@ -14,41 +14,40 @@ use armcal_core::time::Stamp;
 /// One tag in one image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MapDetection {
-    /// As detected.
+    /// Id as detected.
     pub id: u32,
-    /// Raw pixels in the order of `optics::square_corners`.
+    /// Corners in raw pixels, in the order of `optics::square_corners`.
     pub corners_px: [[f64; 2]; 4],
-    /// Of each corner; `None` takes [`MapSettings::corner_std_px`] in both directions.
+    /// Covariance of each corner; `None` means [`MapSettings::corner_std_px`] in both directions.
     pub covariance_px2: Option<[Matrix2<f64>; 4]>,
 }
 
-/// What one camera saw in one image.
+/// Detections of one camera in one image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MapView {
     /// Index into [`MapInput::cameras`].
     pub camera: usize,
     /// Time of the exposure.
     pub stamp: Stamp,
-    /// As detected, in any order; unknown tags included.
+    /// Detections in any order, including unknown tags.
     pub tags: Vec<MapDetection>,
     /// world_from_body of the moving body that carries an attitude sensor ([`MapSettings::attitude_body`]), at the
     /// stamp.
     pub attitude: Option<UnitQuaternion<f64>>,
 }
 
-/// Something rigid that carries tags.
+/// A rigid body that carries tags.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Body {
     /// Name in files.
     pub name: String,
     /// Static bodies do not move relative to each other, so that their tags make one map; a moving one has its own.
     pub is_static: bool,
-    /// frame_from_body for static bodies that know their places relative to each other; `None` is estimated from the
-    /// tags.
+    /// Pose frame_from_body of a static body in the common frame; `None` if the tags shall determine it.
     pub pose: Option<Isometry3<f64>>,
 }
 
-/// What is known of a tag before.
+/// Prior knowledge of a tag.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TagPrior {
     /// Number of the tag.
@@ -57,30 +56,30 @@ pub struct TagPrior {
     pub size_m: f64,
     /// Index into [`MapInput::bodies`].
     pub body: usize,
-    /// body_from_tag, where it is known.
+    /// Pose body_from_tag; `None` if unknown.
     pub pose: Option<Isometry3<f64>>,
-    /// Standard deviations of that pose: translation (m) and rotation (rad) along the tag's axes. `None` is exact.
+    /// Standard deviations of `pose`: translation (m) and rotation (rad) along the tag's axes. `None` means exact.
     pub std: Option<[f64; 6]>,
 }
 
-/// How much of the tags' poses is believed.
+/// Use of the given poses of tags.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum MapMode {
-    /// Every pose given is exact: cameras are located, and what disagrees shows.
+    /// Every given pose is exact: cameras are located, and disagreeing tags are reported.
     Known,
-    /// Poses given hold to within their standard deviations.
+    /// Given poses hold within their standard deviations.
     #[default]
     PartlyKnown,
     /// Only the base tag's pose is used, as exact.
     Unknown,
 }
 
-/// Where the scale of the covariances comes from.
+/// Source of the scale of the covariances.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum NoiseScale {
     /// The corners' covariances are as given.
     Given,
-    /// They are scaled by what the residuals show.
+    /// The residuals scale the corners' covariances.
     #[default]
     Estimated,
 }
@@ -88,21 +87,23 @@ pub enum NoiseScale {
 /// Settings of a map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MapSettings {
-    /// How much of the tags' poses is believed.
+    /// Use of the given poses of tags.
     pub mode: MapMode,
-    /// The tag that anchors the map; without it the tags with poses do, and failing that the first of each group.
+    /// The tag that anchors the map; `None`: the tags with poses do, or else the first tag of each group.
     pub base_tag: Option<u32>,
-    /// Of a corner, each direction; where the detections bring no covariances.
+    /// Standard deviation of a corner in each direction, px; used if the detections have no covariances.
     pub corner_std_px: f64,
-    /// Whether the residuals scale the covariances.
+    /// Source of the scale of the covariances.
     pub noise: NoiseScale,
     /// Size and body of tags that no prior names; `None` rejects them.
     pub default_tag: Option<(f64, usize)>,
-    /// Detections that fit no square to within this are none, px rms. Assumed; three pixels is far beyond any detector.
+    /// Largest misfit of a detection to a square, px rms; beyond it the detection is rejected. Assumed; three pixels is
+    /// far beyond any detector.
     pub max_square_rms_px: f64,
-    /// Detections whose corners are farther off than this many standard deviations (rms) are rejected. Assumed.
+    /// Largest misfit of a detection's corners in standard deviations (rms); beyond it the detection is rejected.
+    /// Assumed.
     pub reject_beyond_sigmas: f64,
-    /// Images in which two groups of tags must be seen together to become one.
+    /// Number of images in which two groups of tags must be seen together to become one.
     pub min_link_views: usize,
     /// The body with the attitude sensor.
     pub attitude_body: Option<usize>,
@@ -136,36 +137,36 @@ impl Default for MapSettings {
     }
 }
 
-/// All that [`super::solve`] works on.
+/// Input of [`super::solve`].
 #[derive(Clone, Copy, Debug)]
 pub struct MapInput<'a> {
-    /// Lenses.
+    /// Lens of each camera.
     pub cameras: &'a [CameraModel],
-    /// In any order.
+    /// Views in any order.
     pub views: &'a [MapView],
     /// Bodies that carry the tags.
     pub bodies: &'a [Body],
-    /// Each id once.
+    /// Tags, each id once.
     pub tags: &'a [TagPrior],
 }
 
-/// Why a detection is not in the map.
+/// Reason why a detection is not in the map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum MapRejection {
     /// No prior names the tag, and there is no default size.
     UnknownTag,
-    /// The same id stands twice in the image; which one is right cannot be told.
+    /// Two detections in the image have this id, and nothing shows which one is right.
     SeenTwice,
     /// A corner has no bearing in the lens model.
     OutOfView,
     /// The corners are not those of a square seen from its front.
     NotASquare,
-    /// The corners disagree with all else that is known of camera and tag: a wrong id, or badly blurred.
+    /// The corners disagree with all other data on camera and tag: a wrong id, or a strong blur.
     Inconsistent,
 }
 
 impl MapRejection {
-    /// As files write it.
+    /// Name in files.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -177,7 +178,7 @@ impl MapRejection {
         }
     }
 
-    /// Whether it speaks against the data; a tag that nobody named does not.
+    /// Returns true if the reason indicates a fault in the data; a tag without a prior does not.
     #[must_use]
     pub fn is_fault(self) -> bool {
         self != Self::UnknownTag
@@ -189,13 +190,13 @@ impl MapRejection {
 pub struct RejectedDetection {
     /// Index into [`MapInput::views`].
     pub view: usize,
-    /// As detected.
+    /// Id as detected.
     pub id: u32,
-    /// The first check that it failed.
+    /// First check that the detection failed.
     pub reason: MapRejection,
 }
 
-/// Why no map came out.
+/// Reason why no map is returned.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum TagMapError {

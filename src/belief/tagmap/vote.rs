@@ -1,9 +1,9 @@
-//! Where one tag is from another, by a vote of the images that show both.
+//! Relative pose of two tags, by a vote of the images that show both.
 //!
-//! A square seen nearly head-on has two poses (Collins and Bartoli 2014), so that each image of two tags gives up to
-//! four relative poses, one of them right. Wrong ones differ from image to image, right ones agree: the pose with the
-//! least sum of truncated squared Mahalanobis distances to the nearest pose of each other image wins, and is refined on
-//! its voters.
+//! A square seen nearly head-on has two poses (Collins and Bartoli 2014). So each image of two tags yields up to four
+//! relative poses, one of them right. Wrong ones differ from image to image, right ones agree. Each pose is rated by
+//! truncated squared Mahalanobis distances to the nearest pose of each other image. The pose with the least sum wins,
+//! and is refined on its voters.
 
 use crate::tagmap::constants::vote::{AGREES, MAX_VOTERS, VOTE_STD_PX};
 use nalgebra::{Isometry3, Matrix6, Vector6};
@@ -18,14 +18,14 @@ struct Hypothesis {
     covariance: Matrix6<f64>,
 }
 
-/// What a vote gave.
+/// Result of a vote.
 pub(super) struct Consensus {
     pub(super) first_from_second: Isometry3<f64>,
     pub(super) n_agreeing: usize,
     pub(super) n_voters: usize,
 }
 
-/// The relative pose that most of `pairs` agree on; the pairs are of one image each.
+/// Returns the relative pose that most of `pairs` agree on; each pair is of one image.
 pub(super) fn vote(pairs: &[(&Observation, &Observation)]) -> Option<Consensus> {
     let mut voters: Vec<Vec<Hypothesis>> = chosen(pairs).into_iter().map(|(a, b)| hypotheses(a, b)).collect();
     voters.retain(|voter| !voter.is_empty());
@@ -54,7 +54,7 @@ pub(super) fn vote(pairs: &[(&Observation, &Observation)]) -> Option<Consensus> 
     Some(Consensus { first_from_second, n_agreeing, n_voters: voters.len() })
 }
 
-/// The images in which the relative pose is best determined, spread over them in their order.
+/// The images that determine the relative pose best, spread over all in their order.
 fn chosen<'a>(pairs: &[(&'a Observation, &'a Observation)]) -> Vec<(&'a Observation, &'a Observation)> {
     if pairs.len() <= MAX_VOTERS {
         return pairs.to_vec();
@@ -78,11 +78,11 @@ fn hypotheses(first: &Observation, second: &Observation) -> Vec<Hypothesis> {
         Hypothesis { first_from_second, covariance: covariance * (VOTE_STD_PX * VOTE_STD_PX) }
     };
     let all = first.solutions().flat_map(|a| second.solutions().map(move |b| of(a, b)));
-    // A square that its corners hardly determine has a covariance that is none.
+    // A square that its corners hardly determine has no valid covariance.
     all.filter(|one| is_finite(&one.first_from_second) && one.covariance.cholesky().is_some()).collect()
 }
 
-/// The nearest hypothesis of a voter: as a step from the candidate, and its squared distance.
+/// The nearest hypothesis of a voter, and its squared distance from the candidate.
 fn nearest<'a>(candidate: &Hypothesis, voter: &'a [Hypothesis]) -> Option<(&'a Hypothesis, f64)> {
     let measured = voter.iter().filter_map(|other| {
         let step = log(&candidate.first_from_second.inv_mul(&other.first_from_second));
@@ -92,7 +92,7 @@ fn nearest<'a>(candidate: &Hypothesis, voter: &'a [Hypothesis]) -> Option<(&'a H
     measured.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Weighted mean of the voters that agree, and their number.
+/// Weighted mean of the agreeing voters, and their number.
 fn refined(start: Isometry3<f64>, voters: &[Vec<Hypothesis>]) -> (Isometry3<f64>, usize) {
     let mut at = start;
     let mut n_agreeing = 0;

@@ -1,4 +1,4 @@
-//! Readings about the view of a moving arm: what its sensors read a little earlier or later.
+//! Readings around the view of a moving arm: those of its sensors a little earlier or later.
 
 use crate::views::constants::motion::{N_STEPS, STEP_S};
 use armcal_core::streams::JointAngles;
@@ -8,13 +8,13 @@ use armcal_core::streams::JointAngles;
 pub struct Motion(Vec<(JointAngles, JointAngles)>);
 
 impl Motion {
-    /// Takes travel, rad, and rate, rad/s, at seconds after the view; `None` where they are not known at a step.
+    /// Makes a motion from travel, rad, and rate, rad/s, at seconds after the view; `None` if a step has none.
     pub(crate) fn new(at: impl Fn(f64) -> Option<(JointAngles, JointAngles)>) -> Option<Self> {
         let steps = (0..=2 * N_STEPS).map(|k| at((k as f64 - N_STEPS as f64) * STEP_S));
         steps.collect::<Option<Vec<_>>>().map(Self)
     }
 
-    /// Change of the travel from the view to `by_s` later, and the rate then; `None` beyond the steps.
+    /// Change of the travel from the view to `by_s` later, and the rate at that time; `None` beyond the steps.
     pub(crate) fn later(&self, by_s: f64) -> Option<(JointAngles, JointAngles)> {
         let at_steps = by_s / STEP_S + N_STEPS as f64;
         if !(0.0..=2.0 * N_STEPS as f64).contains(&at_steps) {

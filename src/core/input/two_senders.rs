@@ -10,9 +10,9 @@ use crate::time::Stamp;
 
 /// Readings in a row that are compared. Assumed: two senders at rates up to 1 to 5 take turns often enough in them.
 const N_TOGETHER: usize = 12;
-/// They lie within this, s: an arm that goes to and fro between two poses takes longer. Assumed.
+/// Longest duration of such a group of readings, s: an arm that moves between two poses takes longer. Assumed.
 const TOGETHER_S: f64 = 1.0;
-/// Changes from one value to the other among them. Assumed: noise and single faults make fewer.
+/// Least number of changes from one value to the other in such a group. Assumed: noise and single faults make fewer.
 const MIN_CHANGES: usize = 4;
 /// Distance of the two values over the spread of the readings at each. Assumed: noise stays far below.
 const OVER_SPREAD: f64 = 4.0;
@@ -20,7 +20,7 @@ const OVER_SPREAD: f64 = 4.0;
 const OVER_STEP: f64 = 3.0;
 /// Senders that are nearer to each other count as one, rad or m. Assumed: coarse readings of one sensor.
 const LEAST_APART: f64 = 5e-3;
-/// And over the sensor's noise, standard deviations.
+/// Distance of the two values over the sensor's noise, standard deviations.
 const OVER_NOISE: f64 = 6.0;
 /// Share of the groups of readings that show two values, and their least number. Assumed.
 const MIN_SHARE: f64 = 0.1;
@@ -41,7 +41,7 @@ pub const ONE_SENDER: &str = "record one source of the joints only, or remove th
 /// One joint's values by two senders.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TwoSenders {
-    /// Their difference, rad or m.
+    /// Difference between the two senders' values, rad or m.
     pub apart: f64,
     /// Time between two readings that differ so, s.
     pub within_s: f64,
@@ -66,7 +66,8 @@ pub fn two_senders(stamps: &[Stamp], values: &[f64], least: f64, turn: Option<f6
     leaps(&stamps[..stamps.len().min(n_steps + 1)], step)
 }
 
-/// The same of all joints that the robot needs, of the joint where they differ most; for the recording's own topic.
+/// Checks all joints that the robot needs, in the recording's own topic. The error states the joint with the largest
+/// difference between its senders.
 ///
 /// # Errors
 /// [`InputError::TwoSenders`].

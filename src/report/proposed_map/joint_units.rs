@@ -6,20 +6,20 @@ use armcal_core::robot::{JointSensorSpec, Robot};
 pub(in crate::report) const MAX_RAD: f64 = 4.0 * std::f64::consts::PI;
 /// A robot folder whose readings are radians has one count per radian.
 const RADIANS_WITHIN: f64 = 1e-6;
-/// An angle may lie so far outside of the joint's range: sensors are off. Assumed.
+/// Distance of an angle beyond the joint's range that an error of the sensor explains, rad. Assumed.
 const BEYOND_RANGE_RAD: f64 = 0.2;
-/// The same of a slide, m. Assumed.
+/// Distance of a slide beyond its range that an error of the sensor explains, m. Assumed.
 const BEYOND_RANGE_M: f64 = 0.05;
-/// An arm whose joints all stay so near to zero was not moved for a calibration. Assumed.
+/// Largest angle of an arm that was not moved for a calibration, rad: no joint exceeds it. Assumed.
 const STOOD_RAD: f64 = 0.12;
 
-/// What the numbers of a robot's joints are.
+/// Units of the numbers in a robot's joint readings.
 pub(in crate::report) struct JointUnits {
-    /// As the input map has it; `None` where they may be as the robot's sensors count.
+    /// Unit as the input map states it; `None` if the numbers may be counts of the robot's sensors.
     pub unit: Option<&'static str>,
-    /// The largest number of joints that turn, without its sign.
+    /// Largest absolute number of joints that turn.
     pub largest: f64,
-    /// The slides' numbers are millimetres.
+    /// True if the slides' numbers are millimetres.
     pub are_slides_mm: bool,
 }
 
@@ -31,7 +31,7 @@ pub(in crate::report) struct StatedUnits {
 }
 
 impl JointUnits {
-    /// The units by the largest number of each joint, which `largest` has without its sign.
+    /// Returns the units that fit the largest number of each joint; `largest` returns its absolute value.
     pub fn of(robot: &Robot, stated: StatedUnits, largest: impl Fn(&JointSensorSpec) -> Option<f64>) -> Self {
         let sensors = robot.sensors.iter().filter_map(|spec| Some((spec, largest(spec)?)));
         let (slides, turning): (Vec<_>, Vec<_>) = sensors.partition(|(spec, _)| spec.moves.is_slide());

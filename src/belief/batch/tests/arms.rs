@@ -1,4 +1,4 @@
-//! Arms that several tests look at: their views, and what they are estimated to be.
+//! Arms that several tests share: their views and estimates.
 
 use std::sync::LazyLock;
 
@@ -19,9 +19,9 @@ static TITAN: LazyLock<Robot> = LazyLock::new(titan);
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Built {
     AsDrawn,
-    /// The link before this joint is a centimetre longer.
+    /// The link before this joint is 1 cm longer.
     Longer(usize),
-    /// Longer by as much, and turned.
+    /// The link before this joint is 1 cm longer and turned.
     LongerAndTurned(usize),
 }
 
@@ -55,7 +55,7 @@ pub(crate) fn arm(built: Built, seed: u64) -> &'static Arm {
     })
 }
 
-/// The model that explains its views better, and the estimate by that one, if there is one.
+/// The model that explains the arm's views better, and the estimate by it; `None` if there is none.
 pub(crate) fn better(built: Built, seed: u64) -> Option<&'static (Drawing, Estimate<'static>)> {
     static BETTER: Shared<(Built, u64), Option<(Drawing, Estimate<'static>)>> = Shared::new();
     let arm = arm(built, seed);

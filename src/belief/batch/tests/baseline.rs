@@ -1,4 +1,4 @@
-//! Calibrations against mount and map alone.
+//! Calibrations compared with a fit of mount and map only.
 
 use rand::seq::SliceRandom;
 
@@ -19,10 +19,10 @@ use armcal_core::numeric::Outcome;
 use armcal_core::routine::Method;
 
 const SEEDS: std::ops::Range<u64> = 7000..7020;
-/// Of those, one whose estimate no other test finds fault with where the readings are shuffled.
+/// A seed of `SEEDS` with shuffled readings whose estimate passes all other tests.
 const SHUFFLED_SEED: u64 = 7013;
 const N_VIEWS: usize = 25;
-/// The simplest that there is.
+/// The simplest method.
 const BY_POSITIONS: CalibrationMethod =
     CalibrationMethod::Positions { method: Method::MinimumDistance, solve: least_squares };
 
@@ -45,15 +45,15 @@ fn least_squares(
     Some(PositionSolution { determined: free.to_vec(), solution, covariance, by_mount, unobservable: Vec::new() })
 }
 
-/// What the sensors of an arm are.
+/// State of an arm's sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Sensors {
     AsDrawn,
-    /// Within the datasheet's sigmas.
+    /// Errors within the datasheet's sigmas.
     OutOfCalibration,
     /// The readings belong to other views.
     Shuffled,
-    /// Within the datasheet's sigmas; in two views a tag is told as another one.
+    /// Errors within the datasheet's sigmas; in two views one tag has another tag's id.
     TagsMisread,
 }
 
@@ -96,7 +96,7 @@ fn calibrate_views(sensors: Sensors, method: CalibrationMethod, seed: u64) -> Ca
     calibrate_data(data, method, None).expect("a result")
 }
 
-/// The first tag of `view` gets the id of one that the view does not show.
+/// Gives the first tag of `view` the id of a tag that the view does not show.
 fn misread_a_tag(view: &mut View, n_tags: usize) {
     let unseen = (0..n_tags).find(|tag_idx| view.tags.iter().all(|tag| tag.tag_idx != *tag_idx));
     let tag_idx = unseen.expect("a tag that is not in view");
@@ -107,7 +107,7 @@ fn misread_a_tag(view: &mut View, n_tags: usize) {
 struct Counts {
     beaten: usize,
     refused: usize,
-    /// For being no better than the datasheet's sensors.
+    /// Number of refusals because the result is no better than the datasheet's sensors.
     no_better: usize,
 }
 

@@ -1,4 +1,4 @@
-//! Warm starts on the estimator's own model: the prior's chi-square is one, a slip is seen, few views suffice.
+//! Warm starts on the estimator's own model: the prior's chi-square is one, a slip is detected, few views suffice.
 
 use nalgebra::{Vector3, Vector6};
 
@@ -30,13 +30,13 @@ use armcal_core::stats::quantile;
 const FULL_VIEWS: usize = 30;
 const WARM_VIEWS: usize = 5;
 const HOURS: f64 = 4.0;
-/// What the estimator assumes of sensors whose datasheet is silent.
+/// Drift that the estimator assumes for sensors without a stated drift.
 const DRIFT_RAD_PER_SQRT_H: f64 = 0.02 * std::f64::consts::PI / 180.0;
 
-/// One arm, calibrated, and looked at again some hours later with its oil 5 K warmer.
+/// One calibrated arm, and later views of it with oil that is 5 K warmer.
 struct Case {
     robot: Robot,
-    /// As it is now.
+    /// The arm at the time of the later views.
     truth: Truth,
     prior: Calibration,
     later: Vec<View>,
@@ -50,7 +50,7 @@ fn case(seed: u64, slip: Option<(usize, f64)>, n_later: usize) -> Case {
     })
 }
 
-/// The arm to which `happens` befell since its calibration.
+/// Returns an arm that `happens` changes after its calibration.
 fn case_with(seed: u64, n_later: usize, happens: impl Fn(&mut Truth)) -> Case {
     let robot = titan();
     let mut rng = rng(seed, "warm");
@@ -72,7 +72,7 @@ fn case_with(seed: u64, n_later: usize, happens: impl Fn(&mut Truth)) -> Case {
     Case { robot, truth, prior, later }
 }
 
-/// Readings without noise of their own: what a joint is off is drawn already.
+/// Removes the readings' own noise: the joint errors are drawn already.
 fn still_readings(mut views: Vec<View>) -> Vec<View> {
     for view in &mut views {
         view.n_readings = 1_000_000;
@@ -80,7 +80,7 @@ fn still_readings(mut views: Vec<View>) -> Vec<View> {
     views
 }
 
-/// Views at other conditions: the angles of the truth are those under them.
+/// Views at other conditions; the angles of `truth` hold under them.
 fn later(robot: &Robot, truth: &Truth, noise: &Noise, n: usize, rng: &mut rand_chacha::ChaCha8Rng) -> Vec<View> {
     // `views` sets conditions of its own: another reference is the same as other conditions.
     let mut shifted = truth.clone();
@@ -94,7 +94,7 @@ fn later(robot: &Robot, truth: &Truth, noise: &Noise, n: usize, rng: &mut rand_c
     out
 }
 
-/// As calibration.toml has it, rounding and all.
+/// The calibration as calibration.toml has it, including rounding.
 fn calibration(robot: &Robot, found: &Estimate<'_>, views: &[View]) -> Calibration {
     let parameters = found.parameters();
     let covariance = ParameterCovariance {
@@ -137,7 +137,8 @@ fn agreement(case: &Case) -> PriorConsistency {
     CalibrationPrior::new(&case.prior, &applied).expect("a covariance").consistency(&case.later).expect("solved")
 }
 
-/// The earlier calibration found another lens than robot.toml has: what follows starts from that lens, and keeps it.
+/// The earlier calibration found another lens than robot.toml states: the warm start begins with that lens and keeps
+/// it.
 #[test]
 fn the_lens_of_the_prior_is_taken_up() {
     const STD: [f64; 8] = [0.5, 0.5, 0.5, 0.5, 5e-4, 5e-4, 5e-4, 5e-4];
@@ -177,8 +178,8 @@ fn an_honest_prior_has_its_chi_square_and_is_not_refused() {
     }
     let mean = share.iter().sum::<f64>() / SEEDS as f64;
     eprintln!("chi-square over its degrees of freedom: {mean:.3}; {refused} of {SEEDS} refused");
-    // The survey's errors are the same both times, which makes the two agree a little better than two independent
-    // looks.
+    // The survey's errors are the same in both calibrations, so the two agree a little better than two independent
+    // ones.
     assert!((0.75..1.15).contains(&mean), "chi-square over its degrees of freedom: {mean:.3}");
     assert!(refused <= 1, "{refused} of {SEEDS} refused");
 }
@@ -200,7 +201,7 @@ fn a_slip_of_one_degree_is_refused_and_named() {
     }
 }
 
-/// The sensors are as they were: none is blamed.
+/// The sensors are unchanged, so no sensor may be blamed.
 #[test]
 fn a_camera_that_was_mounted_anew_is_named_with_its_motion() {
     for seed in 0..6 {
@@ -228,7 +229,7 @@ fn a_large_slip_is_not_blamed_on_the_camera() {
     }
 }
 
-/// Tool errors of an answer over the middle of the range, under the later views' conditions, rms, m.
+/// Tool errors over the middle of the range under the later views' conditions, root mean square, m.
 fn tool_error_m(case: &Case, parameters: &JointParameters) -> f64 {
     let at = |p: &JointParameters, view: &View| -> Vector3<f64> {
         let departure: ConditionChange = view.conditions.departure_from(&p.reference);
@@ -246,7 +247,7 @@ fn tool_error_m(case: &Case, parameters: &JointParameters) -> f64 {
 fn five_warm_views_are_as_good_as_a_full_calibration() {
     let (mut warm_m, mut cold_m, mut full_m) = (Vec::new(), Vec::new(), Vec::new());
     for seed in 200..220 {
-        // Errors are looked at in all later views; the warm start has the first five of them.
+        // Errors are evaluated in all later views; the warm start uses the first five of them.
         let case = case(seed, None, FULL_VIEWS);
         let few: Vec<View> = case.later[..WARM_VIEWS].to_vec();
         let applied = FailureAdjusted::new(&case.robot, &few, &[], &JointParameters::default());

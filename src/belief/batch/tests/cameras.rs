@@ -19,7 +19,7 @@ fn the_covariance_is_honest_with_a_second_camera() {
     assert_honest(&tally(&titan_with_two_cameras(), 0..100, 20), "with a second camera");
 }
 
-/// The titan with two cameras beside each other on its wrist: what its joints are off in a pose is in both their views.
+/// The titan with two cameras next to each other on its wrist: both share the joint errors of a pose.
 fn stereo() -> Robot {
     let mut robot = titan_with_two_cameras();
     robot.further_cameras[0].mount = robot.camera.mount;
@@ -27,14 +27,14 @@ fn stereo() -> Robot {
     robot
 }
 
-/// Root mean square of the tool's error, mm, and mean NEES.
+/// Root mean square tool error, mm, and mean NEES.
 #[derive(Clone, Copy, Debug, Default)]
 struct Errors {
     rms_mm: f64,
     nees: f64,
 }
 
-/// By the first camera alone, by both, and by both as if each had seen poses of its own.
+/// Errors with the first camera only, with both, and with both as if each had its own poses.
 fn compared(robot: &Robot, n_seeds: u64) -> [Errors; 3] {
     let mut sums = [Errors::default(); 3];
     for seed in 0..n_seeds {
@@ -62,7 +62,7 @@ fn what_two_cameras_see_of_one_pose_is_not_counted_twice_over_100_seeds() {
     one_pose_counts_once(100, 2.4..3.8, [0.97, 0.5]);
 }
 
-/// Limits of NEES by both, of their error over that of one camera, and of the NEES that counting twice adds.
+/// Checks the ratios for both cameras: NEES, error over that of one camera, and the NEES that counting twice adds.
 fn one_pose_counts_once(n_seeds: u64, limits: Range<f64>, [most_rms, least_more]: [f64; 2]) {
     for (robot, what) in [
         (stereo(), "beside each other"),
@@ -77,7 +77,7 @@ fn one_pose_counts_once(n_seeds: u64, limits: Range<f64>, [most_rms, least_more]
     }
 }
 
-/// The titan with two cameras, the second through a lens that robot.toml knows to its sigmas alone.
+/// The titan with two cameras; robot.toml knows the second lens only within its sigmas.
 fn with_other_second_lens(known: &Robot, seed: u64) -> Robot {
     let mut rng = rng(seed, "second lens");
     let mut robot = known.clone();
@@ -88,7 +88,7 @@ fn with_other_second_lens(known: &Robot, seed: u64) -> Robot {
     robot
 }
 
-/// Its eight numbers about the truth: how many of all seeds' are within one and two sigmas, and mean NEES.
+/// Checks the lens's eight numbers: shares within one and two sigmas of the truth over all seeds, and mean NEES.
 #[test]
 fn the_lens_of_a_second_camera_is_a_block() {
     const SEEDS: Range<u64> = 5000..5040;
@@ -114,6 +114,7 @@ fn the_lens_of_a_second_camera_is_a_block() {
     let [one, two] = within.map(|count| count / n);
     let nees = 8.0 * nees / n;
     println!("lens of a second camera: {one:.2} within one sigma, {two:.2} within two, NEES {nees:.2} of 8");
-    // 320 numbers, of which those of one lens are not independent; a chi-square of 8 degrees has a variance of 16.
+    // The 8 numbers of one lens, among 320, are not independent of each other; a chi-square of 8 degrees has a variance
+    // of 16.
     assert!((0.6..0.76).contains(&one) && two > 0.92 && (6.1..9.9).contains(&nees), "{one} {two} {nees}");
 }

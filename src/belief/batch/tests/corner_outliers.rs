@@ -1,4 +1,4 @@
-//! Single corners that do not belong, against whole observations that go for them.
+//! Rejection of single wrong corners, compared with rejection of their whole observations.
 
 use std::ops::Range;
 
@@ -20,7 +20,7 @@ const N_VIEWS: usize = 30;
 /// A corner: view, tag, number.
 type Corner = (usize, u32, usize);
 
-/// Moves one corner of each observation by 5 to 30 px, with that probability.
+/// Moves one corner of an observation by 5 to 30 px, with the given probability for each observation.
 fn soil(views: &mut [View], probability: f64, rng: &mut ChaCha8Rng) -> Vec<Corner> {
     let mut soiled = Vec::new();
     for (view_idx, view) in views.iter_mut().enumerate() {
@@ -39,7 +39,7 @@ fn soil(views: &mut [View], probability: f64, rng: &mut ChaCha8Rng) -> Vec<Corne
     soiled
 }
 
-/// Squared error of the tool, m^2, and NEES, means over the task.
+/// Squared tool error, m^2, and NEES, means over the task.
 pub(crate) fn tool_error(case: &Case<'_>, found: &Estimate<'_>, seed: u64) -> [f64; 2] {
     let (at, covariance, parameters) = (found.parameters(), found.joint_covariance(), found.joint_parameters());
     let travels = task(case.robot, &mut rng(seed, "task"));
@@ -54,15 +54,15 @@ pub(crate) fn tool_error(case: &Case<'_>, found: &Estimate<'_>, seed: u64) -> [f
     sums.map(|sum| sum / travels.len() as f64)
 }
 
-/// What rejecting corners has over rejecting their whole observations, on the same views.
+/// Figures of rejecting corners over those of rejecting their whole observations, on the same views.
 struct Paired {
-    /// Tool error over that of the other, 5, 50, 95 % of the seeds, and of all.
+    /// Tool error by corners over that by whole observations: 5, 50 and 95 % of the seeds, and of all together.
     ratio: [f64; 4],
     /// NEES by corners and by whole observations.
     nees: [f64; 2],
     n_soiled: usize,
     n_named: usize,
-    /// Corners and observations that were rejected without being soiled.
+    /// Number of rejected corners and observations that were not soiled.
     n_wrongly: usize,
 }
 
@@ -94,7 +94,7 @@ fn paired(seeds: Range<u64>, probability: f64) -> Paired {
     Paired { ratio: [low, median, high, (sums[0] / sums[1]).sqrt()], nees, n_soiled, n_named, n_wrongly }
 }
 
-/// With one corner in twenty observations off by 5 to 30 px, and in one of three.
+/// Soils one corner in one of twenty observations, and in one of three, by 5 to 30 px.
 #[test]
 fn a_corner_that_does_not_belong_goes_alone_and_costs_less_than_its_tag() {
     single_corners_go_alone(12, 1.7..4.5);
@@ -119,7 +119,7 @@ fn single_corners_go_alone(n_seeds: u64, nees_limits: Range<f64>) {
     }
 }
 
-/// Two corners off, or all of them: the observation goes as a whole.
+/// With two wrong corners or four, the whole observation is rejected.
 #[test]
 fn what_fits_nowhere_goes_as_a_whole() {
     let robot = titan();
@@ -137,7 +137,7 @@ fn what_fits_nowhere_goes_as_a_whole() {
     }
 }
 
-/// What reports show as rejected is what the estimate rejected, and no more.
+/// Reports show as rejected exactly the corners and observations that the estimate rejected.
 #[test]
 fn details_mark_the_corners_and_observations_that_were_rejected() {
     let robot = titan();

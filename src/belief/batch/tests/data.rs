@@ -26,7 +26,7 @@ pub fn titan() -> Robot {
     load(&Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots/titan4")).expect("the robot reads")
 }
 
-/// The titan with distances between its tags, each a little off, that leave some tag out.
+/// The titan with measured distances between some of its tags, each with a small error.
 pub fn titan_with_taped_tags() -> Robot {
     let mut robot = titan();
     for (a, b) in [(0, 3), (3, 5), (1, 4)] {
@@ -43,8 +43,8 @@ pub fn titan_with_gripper_tag() -> Robot {
         .expect("the robot reads")
 }
 
-/// The titan with a second camera before its last two joints, which in the middle of their ranges looks where the first
-/// one does, from beside it.
+/// The titan with a second camera before its last two joints. In the middle of their ranges it looks from the side at
+/// the place that the first one sees.
 pub fn titan_with_two_cameras() -> Robot {
     let mut robot = titan();
     let middle = JointAngles::from_fn(robot.n_joints(), |j| robot.sensors[j].center_rad);
@@ -57,7 +57,7 @@ pub fn titan_with_two_cameras() -> Robot {
     robot
 }
 
-/// [`watched_titan`] with a second camera that stands beside the first and looks at the same place.
+/// [`watched_titan`] with a second camera next to the first that looks at the same place.
 pub fn titan_watched_by_two() -> Robot {
     let mut robot = watched_titan();
     let first = robot.camera.mount.link_from_frame;
@@ -67,7 +67,7 @@ pub fn titan_watched_by_two() -> Robot {
     robot
 }
 
-/// The titan before a camera that stands still and looks at it, with tags on all sides of its hand.
+/// The titan in front of a fixed camera that looks at it, with tags on all sides of its hand.
 pub fn watched_titan() -> Robot {
     const N_AROUND: usize = 6;
     let mut robot = titan();
@@ -105,7 +105,7 @@ pub fn normal(rng: &mut ChaCha8Rng) -> f64 {
     StandardNormal.sample(rng)
 }
 
-/// An arm as it really is.
+/// The true state of an arm.
 #[derive(Clone, Debug)]
 pub struct Truth {
     pub parameters: JointParameters,
@@ -113,7 +113,7 @@ pub struct Truth {
     pub further_mounts: Vec<Isometry3<f64>>,
     pub tags: Vec<Isometry3<f64>>,
     pub gripper_tag: Option<Isometry3<f64>>,
-    /// One sigma of how far the base leans in each view, about each horizontal axis.
+    /// One sigma of the base's lean in each view, about each horizontal axis.
     pub lean_rad: f64,
 }
 
@@ -122,7 +122,7 @@ fn moved(pose: &Isometry3<f64>, std_m: f64, std_rad: f64, rng: &mut ChaCha8Rng) 
 }
 
 impl Truth {
-    /// Drawn from the priors of `model` under `scales`.
+    /// Draws a truth from the priors of `model` under `scales`.
     pub fn draw(robot: &Robot, model: &Model, scales: &Hyperparameters, rng: &mut ChaCha8Rng) -> Self {
         let mut parameters = JointParameters { reference: reference(), ..JointParameters::default() };
         for parameter in model.parameters() {
@@ -173,17 +173,17 @@ pub fn reference() -> Conditions {
     Conditions { oil_c: Some(13.0), pressure_pa: Some(2e7), stamp: Some(SIMULATION_EPOCH) }
 }
 
-/// What is measured of each tag.
+/// Noise of the measurements in a view.
 #[derive(Clone, Copy, Debug)]
 pub struct Noise {
     pub corner_px: f64,
     pub n_frames: usize,
-    /// Of each joint in each view, rad.
+    /// Noise of each joint in each view, rad.
     pub joint_rad: [f64; MAX_JOINTS],
 }
 
-/// Views by the first camera at `n` random poses where it sees three tags or more, each followed by those of the
-/// further cameras that see one there.
+/// Views by the first camera at `n` random poses where it sees at least three tags. Each is followed by the views of
+/// the further cameras that see a tag there.
 pub fn views(robot: &Robot, truth: &Truth, noise: &Noise, n: usize, rng: &mut ChaCha8Rng) -> Vec<View> {
     let mut out: Vec<View> = Vec::new();
     let mut n_poses = 0;
@@ -226,13 +226,13 @@ pub fn views(robot: &Robot, truth: &Truth, noise: &Noise, n: usize, rng: &mut Ch
     out
 }
 
-/// What the view's camera sees at the arm's true angles.
+/// Adds the detections of the view's camera at the arm's true angles.
 fn look(robot: &Robot, truth: &Truth, noise: &Noise, (view, angles): (&mut View, &JointAngles), rng: &mut ChaCha8Rng) {
     let loads = view.up.map_or(*robot.chain.loads(), |up| robot.chain.loads().with_up(up));
     let poses = robot.chain.corrected_link_poses_under(angles, &truth.parameters.links, &loads);
     let camera = robot.camera_at(view.camera);
     let base_from_camera = poses.link(camera.mount.n_joints) * truth.mount_of(view.camera);
-    // Tags beside the arm stay where they are when its base bends.
+    // Tags around the arm do not move when its base bends.
     let base_from_tags = if robot.is_watched() { poses.frame(&robot.tag_frame) } else { Isometry3::identity() };
     for (tag_idx, tag) in robot.tags.iter().enumerate() {
         let camera_from_tag = base_from_camera.inv_mul(&(base_from_tags * truth.tags[tag_idx]));

@@ -1,4 +1,4 @@
-//! Drawings that are wrong: links and base estimated beside the sensors.
+//! Wrong nominal models: links and base are estimated together with the sensors.
 
 use nalgebra::Vector3;
 
@@ -18,7 +18,7 @@ use armcal_core::robot::Robot;
 use armcal_core::sensor::ConditionChange;
 use armcal_core::stats::quantile;
 
-/// An arm's views, and the sensors that it really has.
+/// An arm's views and true sensors.
 pub(crate) struct Case {
     pub views: Vec<View>,
     pub model: Model,
@@ -34,7 +34,7 @@ pub(crate) fn case_changed(robot: &Robot, real: &Robot, seed: u64, change: impl 
     Case { views, model, truth }
 }
 
-/// Distances between the tool of `real` with the true sensors and that of `robot` as found, m, at drawn travels.
+/// Distances between the tool of `real` with the true sensors and that of `robot` as estimated, m, at drawn travels.
 pub(crate) fn tool_errors_m(
     real: &Robot,
     truth: &JointParameters,
@@ -95,7 +95,7 @@ fn a_wrong_link_is_estimated_over_24_arms() {
     wrong_links_are_estimated(6, 2.5);
 }
 
-/// The tool is off by at most `most` times what it is off with the right drawing.
+/// Checks that the tool error is at most `most` times that under the correct nominal model.
 fn wrong_links_are_estimated(n_seeds: u64, most: f64) {
     let robot = titan();
     for joint in 1..robot.n_seen_joints() {
@@ -122,12 +122,12 @@ fn wrong_links_are_estimated(n_seeds: u64, most: f64) {
     }
 }
 
-/// In millimetres and milliradians.
+/// Size of a correction: shift, mm, plus turn, mrad.
 fn size(link: &LinkCorrection) -> f64 {
     1e3 * (link.shift_m.norm() + link.turn_rad.norm())
 }
 
-/// `robot` with every seen link drawn about its place: shifts of 2 mm, turns of 5 mrad.
+/// Draws errors for all observable links of `robot`: shifts of 2 mm, turns of 5 mrad.
 fn drawn_links(robot: &Robot, seed: u64) -> JointParameters {
     let mut rng = rng(seed, "links");
     let mut at = JointParameters { reference: reference(), ..JointParameters::default() };
@@ -152,7 +152,7 @@ fn links_that_are_all_a_little_off_cost_little_more_than_their_bound() {
         let first = estimate(&wider).expect("solved");
         Drawing::default().better(&wider, &first, 0.0).expect("revised").apply(&mut wider);
         let found = estimate(&wider).expect("solved");
-        // The bound: the same views under the sizes that the links' errors really have.
+        // The bound: the same views under the true sigmas of the links' errors.
         let mut known = wider.clone();
         known.evidence = HyperparameterMode::Given;
         known.scales.link_std = [[0.002, 0.005]; 8];

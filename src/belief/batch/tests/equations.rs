@@ -1,4 +1,4 @@
-//! Gradient and curvature against differences of the cost.
+//! Gradient and curvature compared with differences of the cost.
 
 use nalgebra::DVector;
 use rand::RngExt;
@@ -30,7 +30,7 @@ struct Case {
     scales: Hyperparameters,
 }
 
-/// A little of everything: corners, positions, poses, gripper tag, lens, clock.
+/// A case with all kinds of terms: corners, positions, poses, gripper tag, lens, clock.
 fn case(robot: Robot, seed: u64) -> Case {
     let mut rng = rng(seed, "equations");
     let mut scales = Hyperparameters::datasheet(&robot);
@@ -81,7 +81,7 @@ fn problem(case: &Case) -> BundleProblem<'_> {
     BundleProblem::new(&input, input.prior())
 }
 
-/// A state a little off the prior's means, the views' own parameters settled.
+/// A state near the prior's means, with the views' own parameters converged.
 fn settled(problem: &BundleProblem<'_>, seed: u64) -> State {
     let mut rng = rng(seed, "state");
     let guess = JointParameters { reference: reference(), ..JointParameters::default() };
@@ -97,7 +97,7 @@ fn settled(problem: &BundleProblem<'_>, seed: u64) -> State {
     state
 }
 
-/// Nothing but the priors is left, whose least cost is zero: a share of it stops no search.
+/// Only the priors are left, whose least cost is zero: no search may stop at a share of it.
 #[test]
 fn where_every_observation_is_rejected_the_search_ends_at_the_priors() {
     let case = case(titan_with_gripper_tag(), 0);
@@ -138,7 +138,7 @@ fn the_gradient_is_that_of_the_cost_with_taped_distances() {
 }
 
 fn has_the_costs_gradient(robot: fn() -> Robot) {
-    /// In units of a column's sigma with all others held; the difference quotient's own error is far below.
+    /// Step in units of a column's sigma with all others held; the difference quotient's own error is far smaller.
     const STEP: f64 = 1e-3;
     const TOLERANCE: f64 = 2e-3;
     for seed in 0..3 {
@@ -170,7 +170,7 @@ fn has_the_costs_gradient(robot: fn() -> Robot) {
 
 #[test]
 fn the_curvature_is_that_of_the_cost_where_nothing_is_off() {
-    /// Residuals at the minimum bend the cost a little beside Gauss and Newton's matrix.
+    /// Tolerance: residuals at the minimum add a little curvature to the Gauss-Newton matrix.
     const TOLERANCE: f64 = 0.03;
     let case = case(titan_with_gripper_tag(), 7);
     let problem = problem(&case);
@@ -181,7 +181,7 @@ fn the_curvature_is_that_of_the_cost_where_nothing_is_off() {
     let full = nalgebra::DMatrix::from_fn(n, n, |i, k| solved.normal.matrix[(i.max(k), i.min(k))]);
     let mut rng = rng(7, "directions");
     for _ in 0..60 {
-        // A few columns at a time, so that each block matters somewhere.
+        // A few columns at a time, so that each block matters in some step.
         let columns: Vec<usize> = (0..3).map(|_| rng.random_range(0..n)).collect();
         let step =
             DVector::from_fn(
@@ -198,7 +198,7 @@ fn the_curvature_is_that_of_the_cost_where_nothing_is_off() {
     }
 }
 
-/// Each cell of the matrix, by how the gradient changes: sensors, links, sag, mounts, clock, lens and tags, all by all.
+/// Compares each cell with the change of the gradient: sensors, links, sag, mounts, clock, lens and tags, all by all.
 #[test]
 fn every_cell_of_the_curvature_is_that_of_the_gradient() {
     for robot in [titan_with_gripper_tag, watched_titan, titan_with_two_cameras, titan_with_taped_tags] {
@@ -209,9 +209,9 @@ fn every_cell_of_the_curvature_is_that_of_the_gradient() {
 }
 
 fn has_the_gradients_curvature(robot: Robot, camera_error_std: Option<[f64; 2]>) {
-    /// In units of a column's sigma with all others held.
+    /// Step in units of a column's sigma with all others held.
     const STEP: f64 = 1e-3;
-    /// Over the roots of both diagonals: residuals bend the cost a little beside Gauss and Newton's matrix.
+    /// Tolerance over the roots of both diagonals: residuals add a little curvature to the Gauss-Newton matrix.
     const TOLERANCE: f64 = 0.01;
     let mut case = case(robot, 7);
     (case.scales.camera_error_std, case.scales.time_jitter_std_s) = (camera_error_std, 0.02);
@@ -222,7 +222,7 @@ fn has_the_gradients_curvature(robot: Robot, camera_error_std: Option<[f64; 2]>)
     let sigma = DVector::from_fn(n, |k, _| solved.normal.matrix[(k, k)].sqrt().recip());
     let mut normal = NormalEquations::new(&problem);
     let mut worst = (0.0, 0, 0);
-    // A load times a compliance: what that bends the cost is in no Gauss-Newton matrix.
+    // Load times compliance adds curvature that the Gauss-Newton matrix does not have.
     let sag = problem.layout.sag.clone();
     let is_product = |row: usize, column: usize| row != column && row + 1 == sag.end && sag.contains(&column);
     for column in 0..n {
@@ -243,8 +243,8 @@ fn has_the_gradients_curvature(robot: Robot, camera_error_std: Option<[f64; 2]>)
     assert!(worst.0 < TOLERANCE, "{worst:?} of {n} columns");
 }
 
-/// Linearizing again takes the memory of two vectors, how far the state is from the prior's means and how hard that
-/// pulls, however many views and tags there are.
+/// Linearizing again allocates only two vectors, regardless of the number of views and tags. They hold the distance of
+/// the state from the prior's means, and the force of the prior.
 #[test]
 fn linearizing_again_takes_two_vectors_and_no_more() {
     let case = case(titan_with_gripper_tag(), 3);

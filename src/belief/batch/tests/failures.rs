@@ -1,4 +1,5 @@
-//! Sensors that fail in views of the estimator's own model: found, named, and the rest calibrated as well as it can be.
+//! Sensors that fail in views of the estimator's own model: the failure is found and named, and the other joints are
+//! calibrated.
 
 use nalgebra::{Isometry3, Vector3};
 use rand::RngExt;
@@ -40,7 +41,7 @@ impl Case {
         self.calibrated_with(None)
     }
 
-    /// With this stated noise of positions and poses.
+    /// Calibrates with this stated noise of positions and poses.
     pub(crate) fn calibrated_with(self, tag_noise: Option<TagNoise>) -> Calibration {
         calibrated_by(self.robot, CaptureData { fit: self.views, tag_noise, ..CaptureData::default() })
     }
@@ -68,12 +69,12 @@ fn calibrated_by(robot: Robot, data: CaptureData) -> Calibration {
     calibrate_data(data, CalibrationMethod::Bundle, None).expect("a result")
 }
 
-/// A sound arm; `locked`: a joint that stands still.
+/// An arm without faults; `locked`: a joint that stands still.
 pub(crate) fn case(seed: u64, locked: Option<usize>) -> Case {
     case_with_range(seed, locked.map(|joint| (joint, 1e-12)))
 }
 
-/// A sound arm, one joint of which moves within this half range alone, rad.
+/// An arm without faults, one joint of which moves only within this half range, rad.
 pub(crate) fn case_with_range(seed: u64, narrow: Option<(usize, f64)>) -> Case {
     let robot = titan();
     let mut rng = rng(seed, "failed joints");
@@ -84,7 +85,7 @@ pub(crate) fn case_with_range(seed: u64, narrow: Option<(usize, f64)>) -> Case {
     model.joints = model_for(&robot, &views(&robot, &drawn, &noise, 6, &mut rng)).joints;
     let mut moving = robot.clone();
     if let Some((joint, half_range_rad)) = narrow {
-        // It stands in the middle; its sensor is straight, so that this is one angle.
+        // The joint stands in the middle; its sensor has no nonlinearity, so that this is one angle.
         moving.sensors[joint].half_range_rad = half_range_rad;
         model.joints[joint].retain(|kind| matches!(kind, crate::model::parameters::ParameterKind::Offset));
     }
@@ -100,7 +101,7 @@ fn found_failures(case: &Case, declared: &[Failure]) -> Vec<Failure> {
     search.failures(declared, found.as_ref())
 }
 
-/// What a broken wire reads: noise about zero counts.
+/// Angle that a broken wire reads: noise about zero counts.
 fn zero_counts_rad(robot: &Robot, joint: usize) -> f64 {
     let spec = &robot.sensors[joint];
     let center_counts = spec.offset_counts + spec.counts_per_rad * spec.center_rad;
@@ -108,13 +109,13 @@ fn zero_counts_rad(robot: &Robot, joint: usize) -> f64 {
     ((-center_counts + half).rem_euclid(spec.wrap_counts) - half) / spec.counts_per_rad
 }
 
-/// Offset errors of the joints but `without`, in their own sigma.
+/// Offset errors of all joints except `without`, in their own sigma.
 fn off_sigmas(case: &Case, found: &Estimate<'_>, without: usize) -> Vec<f64> {
     let covariance = found.joint_covariance();
     let parameters = found.parameters();
     let mut out = Vec::new();
     for joint in (0..case.robot.n_seen_joints()).filter(|&joint| joint != without) {
-        // The middle of the range: offset and nonlinearity together.
+        // The error in the middle of the range holds offset and nonlinearity together.
         let columns = found.joint_parameters().iter().enumerate().filter(|(_, p)| p.joint == joint);
         let spec = &case.robot.sensors[joint];
         let by: Vec<(usize, f64)> =
@@ -142,7 +143,7 @@ fn a_sound_arm_has_no_failed_joint() {
     }
 }
 
-/// Breaks, finds, fits; pools the other joints' errors.
+/// Breaks a sensor in each arm and fits; pools the other joints' errors.
 fn check(kind: FailedKind, seeds: std::ops::Range<u64>, break_it: impl Fn(&mut Case, usize, u64) -> Vec<usize>) {
     let (mut sigmas, mut missed) = (Vec::new(), 0);
     for seed in seeds {
@@ -150,8 +151,8 @@ fn check(kind: FailedKind, seeds: std::ops::Range<u64>, break_it: impl Fn(&mut C
         let mut case = case(seed, (kind == FailedKind::Locked).then_some(joint));
         let expected = break_it(&mut case, joint, seed);
         let failures = found_failures(&case, &[]);
-        // A gain near zero imitates a locked joint; the verdict then refuses it, for no sensor is so far from its
-        // datasheet.
+        // A gain near zero imitates a locked joint; the verdict then refuses it, because no sensor departs so far from
+        // its datasheet.
         if kind == FailedKind::Locked && failures.is_empty() {
             missed += 1;
             continue;
@@ -168,7 +169,7 @@ fn check(kind: FailedKind, seeds: std::ops::Range<u64>, break_it: impl Fn(&mut C
     assert!(missed <= 1, "{missed} not found");
     let spread = rms(&sigmas);
     eprintln!("{}: errors of the other joints are {spread:.2} of their sigma", kind.name());
-    // Sixteen to twenty values.
+    // The spread has 16 to 20 values.
     assert!((0.45..1.5).contains(&spread), "errors of the other joints are {spread:.2} of their sigma: {sigmas:.2?}");
 }
 
@@ -222,7 +223,7 @@ fn a_word_that_stays_from_some_view_on_is_stuck() {
 fn a_joint_that_is_left_where_it_is_for_some_views_is_sound() {
     for seed in 0..5 {
         let joint = (seed % 5) as usize;
-        // Its model is that of a joint that stands still: an offset alone.
+        // The joint stands still, so that its model has only an offset.
         let mut case = case(seed, Some(joint));
         let moving = case.robot.clone();
         let noise = Noise { corner_px: 0.3, n_frames: 5, joint_rad: Hyperparameters::datasheet(&moving).joint_std_rad };
@@ -266,7 +267,7 @@ fn single_views_in_which_a_sensor_jumped_are_freed() {
     });
 }
 
-/// The sensor of `joint` is reversed in some views.
+/// Reverses the sensor of `joint` in some views.
 fn reverse_in(case: &mut Case, joint: usize, views: std::ops::Range<usize>) {
     for view in &mut case.views[views] {
         view.travel_rad[joint] *= -1.0;
@@ -284,7 +285,7 @@ fn a_sensor_that_reads_wrongly_up_to_the_end_is_refused() {
         let [Failure { joint: found, kind: FailedKind::Dead, lost_since, .. }] = failures[..] else {
             panic!("seed {seed}: {failures:?}")
         };
-        // Now and then the six wrong readings of twenty look like a sensor that never followed.
+        // In a few arms the six wrong readings of twenty look like a sensor that never followed.
         let is_near = lost_since.is_none_or(|since| (13..17).contains(&since));
         assert!(found == joint && is_near, "seed {seed}: {found} since {lost_since:?}");
         n_since += usize::from(lost_since.is_some());
@@ -319,7 +320,7 @@ fn since_a_lasting_slip_the_sensor_is_calibrated_as_it_is_now() {
         for view in &mut case.views[..9] {
             view.travel_rad[joint] -= 0.03;
         }
-        // All readings are used, those before with another offset.
+        // All readings are used, those before the slip with another offset.
         Vec::new()
     });
 }
@@ -335,8 +336,8 @@ fn what_is_declared_is_believed_and_not_looked_for() {
     assert_eq!(found_failures(&case, &declared), declared);
 }
 
-/// The tool point lies on the last axis before the camera, so that a task of positions does without this joint's
-/// sensor. It does not do without the second joint's.
+/// The tool point lies on the last axis before the camera, so that a task of positions does not need this joint's
+/// sensor. It needs the second joint's.
 #[test]
 fn a_dead_sensor_is_refused_where_the_task_needs_it() {
     for seed in 120..124 {
@@ -386,7 +387,7 @@ fn a_joint_with_the_readings_of_another_one_is_no_dead_sensor() {
     }
 }
 
-/// The sensor of `joint` reads another line.
+/// Scales the readings of `joint`.
 fn rescale(case: &mut Case, joint: usize, factor: f64) {
     for view in &mut case.views {
         view.travel_rad[joint] *= factor;
@@ -435,7 +436,8 @@ fn slopes_are_told(seeds: std::ops::Range<u64>) {
     }
 }
 
-/// One joint in degrees among others in radians. The other way its readings hardly move: that refuses by its gain.
+/// One joint reads degrees among others in radians. In the reverse case its readings hardly change, and its gain is
+/// refused.
 #[test]
 fn readings_in_another_unit_refuse_and_are_named() {
     for (seed, factor) in [(60, 1f64.to_degrees()), (62, 1f64.to_degrees()), (61, 1f64.to_radians())] {
@@ -462,7 +464,7 @@ fn two_failed_sensors_are_told_apart_over_20_arms() {
     assert!(told_apart(80..100) >= 19);
 }
 
-/// The pairs that are worth an estimate are few, and the pair that failed is among them.
+/// Only a few pairs get an estimate, and the pair that failed is among them.
 #[test]
 fn the_pair_that_failed_is_among_the_likely_ones() {
     for seed in 80..90 {

@@ -1,11 +1,11 @@
-//! What more views cost.
+//! Cost of additional views.
 
 use crate::batch::tests::data::titan;
 use crate::batch::tests::statistics::{case, input};
 use crate::solve::estimate::estimate;
 use crate::solve::input::HyperparameterMode;
 
-/// Memory of the whole estimate, and its steps, over views: linear, and hardly more.
+/// Memory of the whole estimate is linear in the number of views; its number of steps hardly grows.
 #[test]
 fn memory_grows_with_the_views_and_the_steps_do_not() {
     let robot = titan();

@@ -34,7 +34,7 @@ fn ported() -> CameraModel {
     CameraModel { port: Some(PORT), ..lens.with_intrinsics([fx / 1.333, fy / 1.333, cx, cy, k1, k2, k3, k4]) }
 }
 
-/// Median tool error over the seeds, m, and mean NEES, where the views are through `real` and the estimate has `known`.
+/// Median tool error over the seeds, m, and mean NEES, with views through `real` and the estimate's lens `known`.
 fn errors(real: CameraModel, known: CameraModel) -> [f64; 2] {
     let (robot, believed) = (with_camera(real), with_camera(known));
     let of_seed = |seed| {
@@ -56,7 +56,7 @@ fn a_pinhole_with_distortion_serves_an_arm() {
     assert!(median_m < 2e-3 && (1.8..4.5).contains(&nees), "{median_m} {nees}");
 }
 
-/// A lens measured in water takes the window's effect for its focal length, which is right near the axis alone.
+/// A lens measured in water attributes the window's effect to its focal length, which is right only near the axis.
 #[test]
 fn a_flat_port_is_no_bias_where_it_is_in_the_model() {
     let without = titan().camera.lens;
@@ -71,7 +71,7 @@ fn a_flat_port_is_no_bias_where_it_is_in_the_model() {
     assert!(without_m > 3.0 * with_m, "{without_m} {with_m}");
 }
 
-/// The centre 30 px from where robot.toml has it: the lens explains it, and no sensor's readings.
+/// The centre is 30 px from robot.toml's: the lens must explain it, not the sensors' readings.
 #[test]
 fn a_centre_that_is_off_is_told_from_sensors_that_are() {
     let real = titan();
@@ -93,8 +93,8 @@ fn a_centre_that_is_off_is_told_from_sensors_that_are() {
     }
 }
 
-/// Encoders whose datasheet leaves them next to no error: a centre that is less far off makes them vary from view to
-/// view by more than they do, and by less than what looks like readings that are off.
+/// The encoders' datasheet allows almost no error. A centre with a small error makes them vary from view to view by
+/// more than that, but by less than wrong readings would.
 #[test]
 fn a_centre_that_makes_good_encoders_vary_is_told_from_them() {
     let mut real = titan();
@@ -115,8 +115,8 @@ fn a_centre_that_makes_good_encoders_vary_is_told_from_them() {
     }
 }
 
-/// A pinhole that robot.toml calls equidistant, with its own numbers, and the other way round; a lens of the right
-/// model whose centre is off is none.
+/// A pinhole that robot.toml calls equidistant, with its own numbers, and the reverse. A lens of the stated model with
+/// a wrong centre must not count as one.
 #[test]
 fn a_lens_of_the_other_model_is_told_from_one_that_is_off() {
     let fisheye = titan().camera.lens;
@@ -144,7 +144,7 @@ fn a_lens_of_the_other_model_is_told_from_one_that_is_off() {
     }
 }
 
-/// The farthest corner of all views lies a little beyond the edge of the field of view as robot.toml has it.
+/// The outermost corner of all views lies a little beyond the edge of robot.toml's field of view.
 #[test]
 fn a_corner_at_the_edge_of_the_field_of_view_is_no_wall() {
     for seed in 4000..4010 {

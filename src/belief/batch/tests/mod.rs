@@ -1,4 +1,4 @@
-//! On data of the estimator's own model: the equations against differences, the estimate against its bound.
+//! Tests on data of the estimator's own model: equations against differences, the estimate against its bound.
 
 mod arms;
 mod baseline;

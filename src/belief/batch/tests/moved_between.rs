@@ -1,4 +1,4 @@
-//! Camera, base or tags that moved while the views were captured: named with the gap, and nothing else is.
+//! Camera, base or tags that moved while the views were captured: only they are named, with the gap.
 
 use nalgebra::{Isometry3, Vector6};
 
@@ -14,7 +14,7 @@ use armcal_core::spatial::exp;
 
 const N_VIEWS: usize = 32;
 
-/// Views of an arm to which `happens` befalls before the view of that index.
+/// Views of an arm that `happens` changes before the view of that index.
 fn views_until(robot: &Robot, seed: u64, at: usize, happens: impl Fn(&mut Truth)) -> Vec<View> {
     let mut truth = statistics::case(robot, seed, 10).truth;
     let noise = Noise { corner_px: 0.3, n_frames: 5, joint_rad: Hyperparameters::datasheet(robot).joint_std_rad };
@@ -44,7 +44,7 @@ fn assert_named(seed: u64, refusals: &[Refusal], expected: MovedBody, at: usize,
     assert!((least_m..most_m).contains(shift_m), "seed {seed}: {shift_m}");
 }
 
-/// By 27 mm and 61 mrad, early, in the middle and late.
+/// The camera moves by 27 mm and 61 mrad, early, in the middle and late.
 #[test]
 fn a_camera_that_moves_on_its_mount_is_named_with_the_gap() {
     let robot = titan();
@@ -63,7 +63,7 @@ fn a_standing_camera_that_moves_is_named() {
     }
 }
 
-/// All tags go the same way in the base's frame.
+/// All tags move alike in the base's frame.
 #[test]
 fn a_base_that_moves_is_named_and_the_camera_is_not() {
     let robot = titan();
@@ -74,7 +74,7 @@ fn a_base_that_moves_is_named_and_the_camera_is_not() {
     }
 }
 
-/// What looks a little like a motion: nothing at all, a slip, one tag that was knocked aside.
+/// Faults that resemble a motion: none at all, a slip, one displaced tag.
 #[test]
 fn nothing_else_is_called_a_motion() {
     for seed in 10..14 {

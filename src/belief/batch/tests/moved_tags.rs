@@ -1,4 +1,4 @@
-//! A tag that was knocked aside is found, named and measured; good surveys and wrong links are left to others.
+//! A displaced tag is found, named and measured; correct surveys and wrong links are not blamed on tags.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -59,7 +59,7 @@ fn a_good_survey_and_a_wrong_link_are_left_alone() {
     assert!(suspected[0] == 0 && suspected[1] <= 2, "{suspected:?} of {SEEDS}");
 }
 
-/// Tags that were moved, those that the drawing has moved together, and how many the first estimate has elsewhere.
+/// Moved tags, tags that the model moved together, and the number of displaced tags in the first estimate.
 fn moved_together(seed: u64, moved_m: f64, n: usize) -> (Vec<usize>, Vec<usize>, usize) {
     let robot = titan();
     let n_tags = robot.tags.len();
@@ -90,10 +90,10 @@ fn tags_that_were_moved_together_are_named_over_16_seeds() {
     groups_are_named(16, &[(0.01, 2), (0.01, 3), (0.04, 3)]);
 }
 
-/// Displacement, m, and number of tags for each kind.
+/// Checks groups of tags; `kinds` has the displacement, m, and the number of tags.
 fn groups_are_named(n_seeds: u64, kinds: &[(f64, usize)]) {
     for &(moved_m, n) in kinds {
-        // Where no tag departs, base and joints take all of it up.
+        // Where no tag departs, base and joints absorb the whole motion.
         let seen: Vec<bool> = (0..n_seeds)
             .map(|seed| moved_together(seed, moved_m, n))
             .filter_map(|(moved, named, n_departed)| (n_departed > 1).then_some(moved == named))
@@ -108,7 +108,7 @@ fn groups_are_named(n_seeds: u64, kinds: &[(f64, usize)]) {
     }
 }
 
-/// Three of eight, where no tag by itself is suspect or a base that is off explains them nearly as well.
+/// Three of eight tags, where no single tag is suspect or a displaced base explains them nearly as well.
 #[test]
 fn three_tags_a_little_aside_are_named_and_not_the_base() {
     let named: Vec<bool> = (0..16)
@@ -123,7 +123,7 @@ fn three_tags_a_little_aside_are_named_and_not_the_base() {
     assert!(n >= 13, "{n} of {}", named.len());
 }
 
-/// So far aside that the estimate leaves all its observations out.
+/// The tag is displaced so far that the estimate rejects all its observations.
 #[test]
 fn a_tag_that_is_rejected_altogether_is_freed_where_the_observations_have_it() {
     let robot = titan();
@@ -152,7 +152,7 @@ fn a_tag_that_is_rejected_altogether_is_freed_where_the_observations_have_it() {
     assert!(n_rejected >= 5 && n_freed == n_rejected && worst_m < 0.02, "{n_freed} of {n_rejected}, {worst_m} m");
 }
 
-/// Turned where it hangs, so that it is not elsewhere: it is left out, and the result says so.
+/// The tag is turned in place, so that it is not displaced: it is rejected, and the result reports it.
 #[test]
 fn a_tag_of_which_no_observation_fits_is_named() {
     let mut case = case(3, None);
@@ -183,8 +183,8 @@ fn a_size_is_repaired_up_to_twice_the_stated_one() {
     }
 }
 
-/// So little that its observations are not rejected, and seen from so many sides that it stays where it is; of sound
-/// arms none is named.
+/// The size error is too small for a rejection, and the tag is seen from so many sides that it keeps its place. No tag
+/// of a correct arm is named.
 #[test]
 fn a_size_that_is_off_by_little_is_named_with_its_tag() {
     let mut n_named = 0;
@@ -227,14 +227,14 @@ fn tags_with_exchanged_ids_are_no_group() {
     assert!(named * 8 >= all * 7, "{named} of {all}");
 }
 
-/// Ids of three to five of eight tags, exchanged in a ring, as the revised survey names them.
+/// The revised survey names ids of three to five of eight tags, exchanged in a ring.
 #[test]
 fn ids_exchanged_in_a_ring_are_named() {
     let robot = titan();
     let (mut named, mut all) = (0, 0);
     for seed in 0..9 {
         let n = 3 + seed as usize % 3;
-        // Each hangs where the one before it is surveyed.
+        // Each tag is at the surveyed place of the one before it.
         let ring: Vec<usize> = (0..n).map(|k| (seed as usize + k) % robot.tags.len()).collect();
         let (views, model) = views_of_changed(&robot, &robot, seed, |truth| {
             let places = ring.clone().into_iter().map(|tag| truth.tags[tag]).collect::<Vec<_>>();

@@ -1,4 +1,4 @@
-//! Joint readings that mean something else than robot.toml says: named, with the joints concerned.
+//! Joint readings that do not mean what robot.toml says: the error is named, with the joints concerned.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::Path;
@@ -15,7 +15,7 @@ use armcal_core::robot::Robot;
 use armcal_core::spatial::Pose;
 use armcal_core::streams::JointAngles;
 
-/// Changes what robot.toml reads as angles, view by view.
+/// Changes the angles that robot.toml yields, view by view.
 fn changed(case: &mut Case, change: impl Fn(&Robot, &JointAngles, &mut JointAngles)) {
     for view in &mut case.views {
         let center = |joint: usize| case.robot.sensors[joint].center_rad;
@@ -73,7 +73,7 @@ fn three_columns_in_a_circle_are_named_with_the_names_that_put_them_right() {
     for (seed, joints, from) in [(70, [0, 1, 2], [1, 2, 0]), (71, [0, 2, 4], [4, 0, 2]), (72, [1, 3, 4], [3, 4, 1])] {
         let mut case = case(seed, None);
         changed(&mut case, |robot, angles, read| {
-            // The column that is put right with the name `from` has that joint's angles.
+            // The column with the corrected name `from` has that joint's angles.
             for (joint, from) in joints.into_iter().zip(from) {
                 read[from] = counts_as(robot, from, joint, angles[joint]);
             }
@@ -84,7 +84,7 @@ fn three_columns_in_a_circle_are_named_with_the_names_that_put_them_right() {
     }
 }
 
-/// Angles against the base over two joints, of the other sign, and of a joint that is no neighbour.
+/// Sums relative to the base over two joints, with the other sign, and of a joint that is no neighbour.
 #[test]
 fn a_reading_that_is_a_sum_of_angles_is_named_with_its_terms() {
     let sums = [
@@ -105,7 +105,7 @@ fn a_reading_that_is_a_sum_of_angles_is_named_with_its_terms() {
     }
 }
 
-/// Rows of a table that were sorted apart, so that no joint's readings belong to the tags beside them.
+/// Rows of a table that were sorted separately, so that no joint's readings belong to the tags of their row.
 #[test]
 fn readings_in_another_order_than_the_tags_are_named() {
     let mut n_named = 0;
@@ -155,7 +155,7 @@ fn map_of_degrees(keys: &[String]) -> InputMap {
     parse_input_map(Path::new("map.toml"), &text).expect("the keys are of an input map")
 }
 
-/// The keys of the input map in an advice.
+/// The keys of the input map in a remedy.
 fn keys_in(advice: &str) -> Vec<String> {
     let words: Vec<&str> = advice.split_whitespace().collect();
     let lines = words.windows(3).filter(|three| three[1] == "=");
@@ -163,8 +163,8 @@ fn keys_in(advice: &str) -> Vec<String> {
     of_map.map(|three| three.join(" ").trim_end_matches([',', ';']).to_owned()).collect()
 }
 
-/// Reads angles of joint `joint` that are recorded as `recorded` says, and applies the advice of the refusal: the
-/// largest error of the angles that the corrected map reads.
+/// Records the angles of `joint` by `recorded_rad`, and applies the remedy of the refusal. Returns the largest error of
+/// the angles that the corrected map reads, rad.
 fn left_by_advice(seed: u64, joint: usize, recorded_rad: impl Fn(f64) -> f64) -> f64 {
     let mut case = case(seed, None);
     let map = map_of_degrees(&[]);
@@ -181,7 +181,7 @@ fn left_by_advice(seed: u64, joint: usize, recorded_rad: impl Fn(f64) -> f64) ->
     angles_rad.into_iter().map(|angle_rad| error_rad(angle_rad).abs()).fold(0.0, f64::max)
 }
 
-/// The sensor's own gain and offset are part of what is found.
+/// The keys found include the sensor's own gain and offset.
 #[test]
 fn the_keys_that_are_advised_for_stated_angles_put_them_right() {
     for (seed, joint, slope) in [(60, 0, -1.0), (62, 2, 0.5), (63, 3, 1.5), (62, 2, 1f64.to_degrees())] {
@@ -194,7 +194,7 @@ fn the_keys_that_are_advised_for_stated_angles_put_them_right() {
     }
 }
 
-/// Stated angles are exchanged as they are: the scales of the two sensors in robot.toml do not matter.
+/// Stated angles are exchanged unscaled: the scales of the two sensors in robot.toml do not matter.
 #[test]
 fn exchanged_angles_are_named() {
     for (seed, [a, b]) in [(0, [0, 1]), (2, [3, 4])] {
@@ -210,7 +210,7 @@ fn exchanged_angles_are_named() {
     }
 }
 
-/// The camera cannot tell turns apart: an offset of one would explain all views.
+/// The camera cannot distinguish whole turns: an offset of one would explain all views.
 #[test]
 fn angles_a_turn_beyond_the_limits_are_not_accepted() {
     for (seed, joint, turn_rad) in [(18, 0, 2.0 * PI), (19, 3, -2.0 * PI), (33, 4, 2.0 * PI)] {
@@ -225,7 +225,7 @@ fn angles_a_turn_beyond_the_limits_are_not_accepted() {
     }
 }
 
-/// So far off that nothing fits, and the sensor's line is not found.
+/// The scale error is so large that nothing fits, and the search finds no line for the sensor.
 #[test]
 fn a_scale_that_is_far_off_is_named_with_its_size() {
     for (seed, joint, scale) in [(23, 1, 0.01), (24, 3, 0.004), (25, 2, 0.02), (26, 0, 70.0)] {
@@ -253,7 +253,7 @@ fn readings_of_the_next_or_the_previous_view_are_named() {
         let read: Vec<JointAngles> = case.views.iter().map(|view| view.travel_rad).collect();
         let n = read.len() as isize;
         for (k, view) in case.views.iter_mut().enumerate() {
-            // Put right, the readings are those of the view `by` later.
+            // After correction, the readings are those of the view `by` later.
             view.travel_rad = read[(k as isize - by).rem_euclid(n) as usize];
         }
         assert_eq!(found(case), ReadingError::Shifted { views: by as i32 }, "seed {seed}");
@@ -277,7 +277,7 @@ fn a_camera_on_another_link_or_with_other_axes_is_named() {
     }
 }
 
-/// All tags of the case's map, moved as one.
+/// Moves all tags of the case's map as one.
 fn with_map_in(case: &mut Case, map_from_base: &Isometry3<f64>) {
     for tag in &mut case.robot.tags {
         tag.base_from_tag = Pose::from_isometry(map_from_base * tag.base_from_tag.isometry());
@@ -311,7 +311,7 @@ fn a_tag_map_in_another_frame_is_named_with_shift_and_turn() {
     }
 }
 
-/// No view tells a turn of all tags about the first joint's axis from that joint's zero.
+/// No view distinguishes a turn of all tags about the first joint's axis from that joint's zero.
 #[test]
 fn a_map_that_is_turned_about_the_first_joint_is_named_beside_its_zero() {
     for (seed, by_rad) in [(37, FRAC_PI_2), (38, -0.6)] {
@@ -347,7 +347,7 @@ fn readings_of_0_to_360_deg_are_named() {
     }
 }
 
-/// A lens measured in air and used in water, one used in air that was measured in water, and another lens.
+/// A lens measured in air and used in water, one measured in water and used in air, and another lens.
 #[test]
 fn a_lens_of_another_focal_length_is_named() {
     for (seed, ratio) in [(20, 1.333), (21, 0.75), (22, 1.1)] {
@@ -366,7 +366,7 @@ fn a_lens_of_another_focal_length_is_named() {
     }
 }
 
-/// Arms that are read as they should be, with faults that have other names.
+/// Readings are correct; the arms have faults with other names.
 #[test]
 fn other_faults_are_not_called_misread() {
     for seed in 11..17 {

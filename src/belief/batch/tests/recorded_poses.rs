@@ -9,10 +9,10 @@ use armcal_core::input::TagNoise;
 use armcal_core::joints::JointAngles;
 use armcal_core::optics::solve_square_both;
 
-/// Noise of positions that is stated, m.
+/// Stated noise of positions, m.
 const POSITION_STD_M: f64 = 0.003;
 
-/// The case with the poses that a detector finds by its corners; of the two that a square has the one near the survey.
+/// The case with poses that a detector computes from its corners: of a square's two solutions, the one near the survey.
 fn with_poses(mut case: Case) -> Case {
     let robot = &case.robot;
     for view in &mut case.views {
@@ -33,7 +33,7 @@ fn with_poses(mut case: Case) -> Case {
     case
 }
 
-/// Returns true where the rotations are refused for their noise.
+/// Returns true if the rotations are refused for their noise.
 fn has_rotation_noise(seed: u64, rotation_std_rad: Option<f64>) -> bool {
     let noise = TagNoise { position_std_m: POSITION_STD_M, rotation_std_rad };
     let calibration = with_poses(case(seed, None)).calibrated_with(Some(noise));
@@ -45,6 +45,6 @@ fn a_noise_of_rotations_that_is_not_stated_is_not_tested_as_none() {
     for seed in 40..44 {
         assert!(!has_rotation_noise(seed, None), "seed {seed}");
     }
-    // What is stated is tested.
+    // A stated noise is tested.
     assert!(has_rotation_noise(40, Some(1e-6)));
 }

@@ -1,4 +1,4 @@
-//! What no view shows moves the tool by as much as its reservation says.
+//! Unobservable parameters move the tool by as much as their reservations predict.
 
 use nalgebra::{Isometry3, Vector3};
 
@@ -19,7 +19,7 @@ use armcal_core::sensor::ArmSensors;
 const N_VIEWS: usize = 25;
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// One change of the drawing, within a sigma of its prior.
+/// One change of the nominal model, within a sigma of its prior.
 #[derive(Clone, Copy, Debug)]
 enum Change {
     MountShift,
@@ -33,7 +33,7 @@ const SHIFT_M: f64 = 5e-4;
 const TURN_RAD: f64 = 5e-4;
 
 impl Change {
-    /// As a reservation names it.
+    /// Name of the change in a reservation.
     fn name(self, robot: &Robot, axis: usize) -> String {
         let joint = |joint: usize| &robot.chain.joints()[joint].name;
         match self {
@@ -57,7 +57,7 @@ impl Change {
         }
     }
 
-    /// The arm as it really is, and its camera's mount.
+    /// The true arm, and its camera's mount.
     fn apply(self, robot: &Robot, axis: usize) -> (Robot, Isometry3<f64>) {
         let mut real = robot.clone();
         let mut mount = robot.camera.mount.link_from_frame;
@@ -82,7 +82,7 @@ fn task(robot: &Robot) -> Vec<JointAngles> {
     (0..6).map(at).collect()
 }
 
-/// Views of the arm `real`, and the estimate by the drawing `robot`.
+/// Runs `of` on the estimate by the nominal model `robot` from views of the arm `real`.
 fn with_estimate<T>(robot: &Robot, real: &Robot, mount: Isometry3<f64>, of: impl FnOnce(&Estimate<'_>) -> T) -> T {
     let mut rng = rng(3, "reservations");
     let scales = Hyperparameters::datasheet(robot);
@@ -105,7 +105,7 @@ fn with_estimate<T>(robot: &Robot, real: &Robot, mount: Isometry3<f64>, of: impl
     of(&estimate(&input).expect("solved"))
 }
 
-/// Believed less true tool position, base frame, m.
+/// Estimated minus true tool position, base frame, m.
 fn tool_errors(robot: &Robot, real: &Robot, found: &Estimate<'_>) -> Vec<Vector3<f64>> {
     let (nominal, sensors) = (ArmSensors::nominal(robot), found.parameters().sensors(robot));
     let tool_m =
@@ -143,7 +143,7 @@ fn an_unseen_change_moves_the_tool_as_its_reservation_says() {
         });
         let Some(per_unit) = expected else { continue };
         let expected_m = per_unit * change.size();
-        // What the joints follow altogether leaves nothing to compare.
+        // If the joints absorb the whole change, there is nothing to compare.
         if expected_m < 2e-5 {
             continue;
         }
@@ -157,7 +157,7 @@ fn an_unseen_change_moves_the_tool_as_its_reservation_says() {
     assert!(n_checked >= 8, "only {n_checked} changes were unseen");
 }
 
-/// The last joint before the camera and a turn of the camera about its axis look alike.
+/// A turn of the last joint before the camera and a turn of the camera about its axis look alike.
 #[test]
 fn a_gripper_tag_shows_the_turn_that_nothing_else_shows() {
     let turns = |robot: &Robot| {
@@ -170,7 +170,7 @@ fn a_gripper_tag_shows_the_turn_that_nothing_else_shows() {
     assert!(without > 5e-4 && with < 0.3 * without, "{without} m without, {with} m with");
 }
 
-/// Views tell the lens, so that its prior is made narrow for it to be unseen.
+/// Views determine the lens, so that only a narrow prior makes it unobservable.
 #[test]
 fn a_lens_that_is_off_moves_the_tool_as_its_reservation_says() {
     const LONGER: f64 = 1e-3;
@@ -190,7 +190,7 @@ fn a_lens_that_is_off_moves_the_tool_as_its_reservation_says() {
     assert!((moved_m / expected_m - 1.0).abs() < 0.1, "{moved_m} m, expected {expected_m} m");
 }
 
-/// At robot.toml's sigmas good views leave little of the lens to its priors.
+/// With robot.toml's sigmas, good views leave little of the lens to its priors.
 #[test]
 fn views_that_tell_the_lens_have_no_reservation_about_it() {
     let (reservations, _) = all_reservations(&titan());
@@ -198,7 +198,7 @@ fn views_that_tell_the_lens_have_no_reservation_about_it() {
     assert!(of_lens.iter().all(|r| r.what.contains(", k")), "{of_lens:?}");
 }
 
-/// A camera that stands anywhere tells nothing of the first joint's zero: both turn the arm about one axis.
+/// A camera at any fixed place does not determine the first joint's zero: both turn the arm about one axis.
 #[test]
 fn the_keys_that_hold_the_tool_are_those_of_the_standing_camera() {
     for seed in 0..4 {

@@ -24,7 +24,7 @@ use armcal_core::robot::Robot;
 use armcal_core::sensor::{ArmSensors, ConditionChange};
 use armcal_core::stats::quantile;
 
-/// The drawing that explains the views best, step by step, and the estimate under it.
+/// The model that explains the views best, found step by step, and the estimate under it.
 pub(crate) fn revised<'a>(input: &BundleInput<'a>) -> (Drawing, Estimate<'a>) {
     revised_from(input, (Drawing::default(), estimate(input).expect("solved")), 4)
 }
@@ -46,8 +46,8 @@ fn revised_from<'a>(
     (drawing, found)
 }
 
-/// Each joint before the camera, and the base about its horizontal axes, gives by as much as `rad_per_nm`, half to one
-/// and a half of it.
+/// Compliance of each joint before the camera, and of the base about its horizontal axes: `rad_per_nm` times 0.5 to
+/// 1.5, drawn at random.
 fn soft(robot: &Robot, rad_per_nm: f64, tool_load_n: f64, seed: u64) -> Sag {
     let mut rng = rng(seed, "soft");
     let mut draw = || rad_per_nm * (1.0 + 0.25 * normal(&mut rng)).clamp(0.5, 1.5);
@@ -63,7 +63,7 @@ fn soft_case(robot: &Robot, sag: Sag, seed: u64) -> Case {
 
 #[derive(Default)]
 struct Errors {
-    /// Tool errors, m: the stiff arm's, the soft one's without and with sag columns.
+    /// Tool errors, m, of the stiff arm; `plain` and `bent`: of the soft arm without and with sag columns.
     stiff: Vec<f64>,
     plain: Vec<f64>,
     bent: Vec<f64>,
@@ -99,8 +99,8 @@ fn a_soft_arm_is_as_good_as_a_stiff_one_over_20_seeds() {
     soft_arms_are_as_good(20, &[(1e-5, 0.0), (3e-6, 500.0)], [1.3, 1.5]);
 }
 
-/// Compliance, rad/(N m), and load, N, for each kind. Errors of soft arms are at most `most` times those of stiff ones,
-/// and as drawn at least `least` times.
+/// Checks each kind: compliance, rad/(N m), and load, N. Errors of soft arms are at most `most` times those of stiff
+/// ones, and by the nominal model at least `least` times.
 fn soft_arms_are_as_good(n_seeds: u64, kinds: &[(f64, f64)], [most, least]: [f64; 2]) {
     let robot = titan();
     for &(rad_per_nm, load_n) in kinds {
@@ -119,7 +119,7 @@ fn soft_arms_are_as_good(n_seeds: u64, kinds: &[(f64, f64)], [most, least]: [f64
     }
 }
 
-/// A compliance times an unknown load bends the cost by as much as the linear problem does: whole steps go to and fro.
+/// A compliance times an unknown load adds as much curvature as the linear problem has: whole steps oscillate.
 #[test]
 fn steps_that_overshoot_are_shortened() {
     let robot = titan();
@@ -136,7 +136,7 @@ fn steps_that_overshoot_are_shortened() {
         assert!(fine.outcome == Outcome::Converged && (-1e-12..1e-9).contains(&beyond), "seed {seed}: {beyond:.1e}");
         n_steps += rough.iterations;
     }
-    // 213; 441 with whole steps.
+    // Measured: 213 steps; 441 with whole steps.
     assert!(n_steps < 300, "{n_steps} steps");
 }
 
@@ -152,7 +152,7 @@ fn a_link_that_is_off_is_no_sag_over_24_arms() {
     assert!(n_links >= 23 && n_sag <= 1, "links {n_links}, sag {n_sag} of 24");
 }
 
-/// Counts, over four arms a seed with one wrong link each, those reported with wrong links and with compliance.
+/// Counts the arms reported with wrong links and with compliance, over four arms per seed with one wrong link each.
 fn links_and_sag(n_seeds: u64) -> [usize; 2] {
     let robot = titan();
     let [mut n_sag, mut n_links] = [0; 2];
@@ -182,7 +182,7 @@ fn data(robot: &Robot, views: &[View]) -> CalibrationData {
     }
 }
 
-/// From views to a file and back: accepted like a stiff one, the cause first, the tool within its predicted error.
+/// From views to a file and back: accepted like a stiff arm, the cause first, the tool within its predicted error.
 #[test]
 fn a_soft_arm_is_accepted_and_said_to_bend() {
     soft_arms_are_accepted(2, 0);
@@ -230,7 +230,7 @@ fn soft_arms_are_accepted(n_seeds: usize, most_unnamed: usize) {
         }
     }
     println!("accepted {n_accepted} (stiff {n_stiff}), named first {n_named} of {n_seeds}; NEES {:.2}", nees / n);
-    // Thirty views at random are few: a stiff arm's are refused as overfitted now and then, too.
+    // Thirty random views are few: some stiff arms are also refused as overfitted.
     assert!(
         n_accepted + 2 >= n_stiff && n_named + most_unnamed >= n_seeds,
         "accepted {n_accepted}, named {n_named} of {n_seeds}"
@@ -239,7 +239,7 @@ fn soft_arms_are_accepted(n_seeds: usize, most_unnamed: usize) {
     assert!((1.5..3.6).contains(&(nees / n)), "{}", nees / n);
 }
 
-/// A later calibration starts from the compliances that were found.
+/// A later calibration starts from the estimated compliances.
 #[test]
 fn a_warm_start_knows_the_sag() {
     let robot = titan();
@@ -255,7 +255,7 @@ fn a_warm_start_knows_the_sag() {
     assert!(warm.std_rad_per_nm <= first.std_rad_per_nm);
 }
 
-/// A vehicle that leans by 0.2 rad turns the weight: the attitude at each view says so.
+/// A vehicle that leans by 0.2 rad turns the direction of weight: the attitude at each view states it.
 #[test]
 fn attitudes_of_a_leaning_base_are_used() {
     attitudes_are_used(2, 1.6);

@@ -1,4 +1,4 @@
-//! Arms that are not as drawn, and views that were left out.
+//! Arms that differ from the nominal model, and held-out views.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -35,12 +35,12 @@ pub(crate) fn with_link(robot: &Robot, joint: usize, longer_m: f64, twist: Vecto
     Robot { chain: Chain::new(joints), ..robot.clone() }
 }
 
-/// Views of the arm `real` with sensors drawn from what is believed of `robot`.
+/// Views of the arm `real` with sensors drawn from the priors of `robot`.
 pub(crate) fn views_of(robot: &Robot, real: &Robot, seed: u64) -> (Vec<View>, Model) {
     views_of_changed(robot, real, seed, |_| {})
 }
 
-/// The same, with the drawn truth changed.
+/// Views as [`views_of`] makes them, after `change` of the drawn truth.
 pub(crate) fn views_of_changed(
     robot: &Robot,
     real: &Robot,
@@ -93,7 +93,7 @@ fn a_good_arm_is_suspected_no_more_often_than_by_chance() {
     }
     println!("good arms: {alarms} of 50 alarms; of {all} tests {low} below 0.1, {high} above 0.9");
     assert!(alarms <= 1, "{alarms} of 50 good arms are suspected");
-    // Tests of one arm go together; a test that is never or always sure would be far outside.
+    // Tests of one arm are correlated; a test that is never or always certain would be far outside.
     assert!((0.04..0.18).contains(&(low as f64 / all as f64)), "{low} of {all}");
     assert!((0.04..0.18).contains(&(high as f64 / all as f64)), "{high} of {all}");
 }
@@ -122,7 +122,7 @@ fn a_link_one_centimetre_longer_is_found_named_and_measured() {
     }
 }
 
-/// Along the axis of the last joint that moves the camera a link's shift does the same in all views.
+/// A shift of a link along the axis of the last joint that moves the camera has the same effect in all views.
 #[test]
 fn a_mount_that_is_off_along_the_last_axis_is_named_before_a_link() {
     let robot = titan();
@@ -140,7 +140,7 @@ fn a_mount_that_is_off_along_the_last_axis_is_named_before_a_link() {
 fn a_link_twisted_by_one_degree_is_found() {
     let robot = titan();
     for joint in 1..4 {
-        // Across the joint's axis: about it a twist would be an offset.
+        // The twist is across the joint's axis: about the axis it would be an offset.
         let place = &robot.chain.joints()[joint];
         let axis = place.parent_from_joint.rotation * place.axis.into_inner();
         let across = axis.cross(&if axis.x.abs() < 0.7 { Vector3::x() } else { Vector3::y() }).normalize();
@@ -201,7 +201,7 @@ fn views_that_were_left_out_are_as_far_off_as_foretold() {
     assert!(beyond <= 8, "{beyond} of 100 folds are beyond their 99 % quantile");
 }
 
-/// A joint without a sensor takes one number of each view, which no innovation counts.
+/// A joint without a sensor uses one number of each view, which no innovation counts.
 #[test]
 fn views_that_were_left_out_do_not_tell_of_a_freed_joint() {
     let robot = titan();
@@ -234,7 +234,7 @@ fn views_that_were_left_out_do_not_tell_of_a_freed_joint() {
     assert!((0.9..1.1).contains(&ratio), "{ratio}");
 }
 
-/// What `believed` can learn from views of an arm drawn from `real`.
+/// Observability under the model `believed` of views of an arm drawn from `real`.
 fn observed(believed: &Robot, real: &Robot) -> Observability {
     let (views, model) = views_of(real, real, 3);
     observability(&input(believed, &views, &model)).expect("columns")
@@ -265,7 +265,7 @@ fn a_joint_that_did_not_move_has_no_gain_and_indices_order() {
     let robot = titan();
     let moved = observed(&robot, &robot);
     let mut real = robot.clone();
-    // Views are drawn over the range that the sensor has.
+    // Views are drawn over the range of the sensor.
     real.sensors[2].half_range_rad = 1e-3;
     let still = observed(&robot, &real);
     assert!(speaks_of(&still, &["forearm_pitch gain"]), "{:?}", still.null_space);

@@ -48,20 +48,20 @@ fn case(seed: u64, n_views: usize) -> Case {
     Case { robot, truth, views }
 }
 
-/// The sensor of `joint` turns by `by_rad` on its shaft before view `since`; the truth is that of the sensor since
-/// then.
+/// Turns the sensor of `joint` by `by_rad` on its shaft before view `since`; the truth is that of the sensor after the
+/// slip.
 fn slip(case: &mut Case, joint: usize, since: usize, by_rad: f64) {
     let sensors = case.truth.parameters.sensors(&case.robot);
     case.views[..since].iter_mut().for_each(|view| read_more(view, joint, &sensors, -by_rad));
 }
 
-/// The same slip of a sensor whose truth is that before it, as the datasheet has it.
+/// Slip as in [`slip`], but the truth is that of the sensor before it, near the datasheet.
 fn slip_from_datasheet(case: &mut Case, joint: usize, since: usize, by_rad: f64) {
     let sensors = case.truth.parameters.sensors(&case.robot);
     case.views[since..].iter_mut().for_each(|view| read_more(view, joint, &sensors, by_rad));
 }
 
-/// The reading becomes that of an angle larger by `by_rad`.
+/// Changes the reading to that of an angle larger by `by_rad`.
 fn read_more(view: &mut View, joint: usize, sensors: &ArmSensors, by_rad: f64) {
     let sensor = &sensors.models[joint];
     let change = view.conditions.departure_from(&sensors.reference);
@@ -69,7 +69,7 @@ fn read_more(view: &mut View, joint: usize, sensors: &ArmSensors, by_rad: f64) {
     view.travel_rad[joint] = sensor.travel_under_rad(angle_rad + by_rad, &change);
 }
 
-/// Of the step, under the true scales at the fit.
+/// Noncentrality of the step, under the true scales at the fit.
 fn noncentrality(case: &Case, joint: usize, since: usize) -> f64 {
     let known = [Failure::slip((joint, armcal_core::units::Unit::Radians), 0.0, &case.views, since)];
     let applied = FailureAdjusted::new(&case.robot, &case.views, &known, &JointParameters::default());
@@ -85,7 +85,7 @@ fn found_failures(case: &Case) -> Vec<Failure> {
         .failures(&[], found.as_ref())
 }
 
-/// Root mean square of the tool's error over the range of the views, m.
+/// Tool error over the range of the views, root mean square, m.
 fn tool_error_m(case: &Case, found: &Estimate<'_>) -> f64 {
     const N: usize = 40;
     let mut rng = rng(0, "targets");
@@ -109,7 +109,7 @@ fn tool_error_m(case: &Case, found: &Estimate<'_>) -> f64 {
     (squares / N as f64).sqrt()
 }
 
-/// An estimate of all views under `known` failures.
+/// Runs `then` on an estimate of all views under `known` failures.
 fn with_estimate<T>(case: &Case, known: &[Failure], then: impl FnOnce(&Estimate<'_>) -> T) -> T {
     let applied = FailureAdjusted::new(&case.robot, &case.views, known, &JointParameters::default());
     then(&applied.estimate(HyperparameterMode::Fitted).expect("solved"))
@@ -175,7 +175,7 @@ fn slips_are_found(n_seeds: u64, sizes_deg: &[f64], sigma_limits: Range<f64>) {
     assert!(all_named as f64 >= 0.95 * all_strong as f64, "{all_named} of {all_strong}");
 }
 
-/// Slips far beyond what the datasheet says of an offset: as large ones they are slips, and turn no link.
+/// Slips far beyond the datasheet's sigma of an offset: they are reported as slips, not as a turned link.
 #[test]
 fn a_large_slip_is_no_turn_of_a_link() {
     for (seed, size_deg) in [(0, 20.0), (1, -25.0), (2, 12.0), (3, 30.0)] {
@@ -204,7 +204,7 @@ fn a_large_slip_is_no_turn_of_a_link() {
     }
 }
 
-/// Joints for whose slip an accepted calibration by positions of these views is refused.
+/// Joints for whose slips an accepted calibration by positions of these views is refused.
 fn refused_for(Case { robot, views, .. }: Case) -> Vec<String> {
     let data = CalibrationData {
         name: "synthetic".to_owned(),
@@ -238,7 +238,7 @@ fn a_calibration_by_positions_is_refused_for_a_slip_and_for_nothing_else() {
     }
 }
 
-/// Which of so many good arms are said to have slipped.
+/// Seeds of arms without a slip for which one is reported.
 fn false_alarms(n_seeds: u64) -> Vec<u64> {
     let slipped = |seed: &u64| !found_failures(&case(1000 + seed, 14 + (*seed as usize * 7) % 25)).is_empty();
     let alarms: Vec<u64> = (0..n_seeds).filter(slipped).collect();

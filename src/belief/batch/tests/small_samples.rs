@@ -1,4 +1,4 @@
-//! Few views: how far the covariance is from the errors where the scales are fitted to the same data.
+//! Few views: covariance against errors where the scales are fitted to the same data.
 
 use nalgebra::Matrix3;
 
@@ -20,7 +20,7 @@ use rand::RngExt;
 
 const N_TARGETS: usize = 12;
 
-/// Views of an arm whose sensors are `worse` times what the datasheet says: error of a view, nonlinearity.
+/// Views of an arm whose sensors are `worse` times their datasheet's sigmas: error of a view, nonlinearity.
 fn case(robot: &Robot, seed: u64, n_views: usize, worse: [f64; 2]) -> (Truth, Vec<View>, Model) {
     let mut rng = rng(seed, "small samples");
     let mut scales = Hyperparameters::datasheet(robot);
@@ -36,7 +36,7 @@ fn case(robot: &Robot, seed: u64, n_views: usize, worse: [f64; 2]) -> (Truth, Ve
     (truth, views, model)
 }
 
-/// NEES of the tool over the targets, and its rms error over the predicted one.
+/// NEES of the tool over the targets, and rms error over the predicted one.
 fn figures(robot: &Robot, truth: &Truth, found: &Estimate<'_>, seed: u64) -> [f64; 2] {
     let mut rng = rng(seed, "targets");
     let covariance = found.joint_covariance();
@@ -68,7 +68,7 @@ fn innovations(input: &BundleInput<'_>, all: &Estimate<'_>) -> Vec<Innovations> 
     (0..FOLDS).filter_map(of_fold).collect()
 }
 
-/// Mean NEES; 95 % and largest of the error over the predicted one; with the scales taken for known and without.
+/// Mean NEES, 95 % and largest of the error over the predicted one; first with the scales as known, then widened.
 fn measured(n_seeds: u64, n_views: usize, worse: [f64; 2]) -> [[f64; 3]; 2] {
     let robot = titan();
     let mut all = [Vec::new(), Vec::new()];
@@ -95,7 +95,7 @@ fn measured(n_seeds: u64, n_views: usize, worse: [f64; 2]) -> [[f64; 3]; 2] {
     })
 }
 
-/// Copied rows are no further views: what is left are the recorded ones, among fitted and held-out views alike.
+/// Copied rows are not additional views: only recorded ones stay, among fitted and held-out views.
 #[test]
 fn views_that_repeat_another_to_the_bit_are_left_out() {
     let robot = titan();

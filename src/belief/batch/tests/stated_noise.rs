@@ -1,4 +1,4 @@
-//! A corner noise that robot.toml states far too small is named, and not the arm or the map.
+//! A corner noise that robot.toml states far too small is named, not the arm or the map.
 
 use crate::batch::tests::failures::{Case, case};
 use crate::say::refusal::Refusal;
@@ -7,7 +7,7 @@ use crate::views::view::{TagMeasurement, View};
 /// Error of a case's corners, averaged over its five frames, px.
 const CORNER_PX: f64 = 0.3 / 2.236;
 
-/// The case as single frames, whose noise robot.toml alone tells.
+/// The case as single frames, whose noise only robot.toml states.
 fn of_single_frames(seed: u64, stated_px: f64) -> Case {
     let mut case = case(seed, None);
     case.robot.camera.corner_std_px = stated_px;

@@ -1,4 +1,4 @@
-//! Over many seeds: the estimate against its bound, its covariance against its errors, and data that do not belong.
+//! Statistics over many seeds: the estimate against its bound, its covariance against its errors, and wrong data.
 
 use nalgebra::{DMatrix, DVector, Matrix3};
 use rand::RngExt;
@@ -26,7 +26,7 @@ use armcal_core::spatial::log;
 
 const N_FRAMES: usize = 8;
 
-/// An arm, views of it, and what is believed of it.
+/// An arm, its views, and the assumptions about it.
 pub(crate) struct Case<'a> {
     pub robot: &'a Robot,
     pub truth: Truth,
@@ -42,7 +42,7 @@ fn scales(robot: &Robot) -> Hyperparameters {
 pub(crate) fn case(robot: &Robot, seed: u64, n_views: usize) -> Case<'_> {
     let mut rng = rng(seed, "statistics");
     let scales = scales(robot);
-    // A first look tells which terms are excited; the truth is then drawn with them.
+    // A first fit finds the excited terms; the truth is then drawn with them.
     let blocks = Block::all(robot).filter(|block| match block {
         Block::Mount(_) | Block::Tag(_) => true,
         Block::Clock | Block::Lens(_) => false,
@@ -72,7 +72,7 @@ pub(crate) fn input<'a>(case: &'a Case<'_>, views: &'a [View], evidence: Hyperpa
     }
 }
 
-/// Travels at which tools are compared: the range that the views were taken in.
+/// Travels for tool comparisons, from the range of the captured views.
 pub(crate) fn task(robot: &Robot, rng: &mut ChaCha8Rng) -> Vec<JointAngles> {
     let travel =
         |j: usize, rng: &mut ChaCha8Rng| rng.random_range(-0.8..0.8) * robot.sensors[j].half_range_rad.min(1.3);
@@ -87,7 +87,7 @@ pub(crate) fn tool(robot: &Robot, parameters: &JointParameters, travel: &JointAn
     robot.chain.link_poses(&angles).frame(&robot.tool.mount).translation.vector
 }
 
-/// d(tool)/d(joint parameter), at the truth.
+/// Jacobian d(tool)/d(joint parameter) at the truth.
 pub(crate) fn tool_jacobian(
     robot: &Robot,
     truth: &Truth,
@@ -206,7 +206,7 @@ pub(crate) fn assert_honest(tally: &Tally, what: &str) {
     let mean_nees = tally.nees.iter().sum::<f64>() / tally.nees.len() as f64;
     let coverage = tally.inside as f64 / tally.intervals as f64;
     println!("{what}: NEES {mean_nees:.2} of 3, {:.1} % of {} intervals", 100.0 * coverage, tally.intervals);
-    // Errors of one seed go together: 1.7 is the sigma of its NEES, 0.05 that of its coverage.
+    // Errors of one seed are correlated: 1.7 is the sigma of its NEES, 0.05 that of its coverage.
     let sigmas = 2.7 / (tally.nees.len() as f64).sqrt();
     assert!((mean_nees - 3.0).abs() < f64::max(0.6, 1.7 * sigmas), "{what}: {mean_nees}");
     assert!((coverage - 0.95).abs() < f64::max(0.02, 0.05 * sigmas), "{what}: {coverage}");
@@ -289,7 +289,7 @@ fn rms_error(case: &Case<'_>, found: &Estimate<'_>, seed: u64) -> f64 {
     (errors.sum::<f64>() / travels.len() as f64).sqrt()
 }
 
-/// One in twenty observations under another tag's id, or with a corner far off.
+/// One in twenty observations has another tag's id, or a corner with a gross error.
 #[test]
 fn gross_errors_are_named_and_cost_little() {
     let robot = titan();

@@ -1,4 +1,4 @@
-//! Taped distances between tags: what they make of the map, and those that are wrong.
+//! Measured distances between tags: their effect on the map, and wrong ones.
 
 use nalgebra::DVector;
 
@@ -11,7 +11,7 @@ use crate::solve::input::HyperparameterMode;
 use armcal_core::robot::Robot;
 use armcal_core::robot::geometry::TagDistance;
 
-/// Few views, so that a tape measures better than they do.
+/// Number of views: few, so that a tape measures better than they do.
 const N_VIEWS: usize = 6;
 const SEEDS: std::ops::Range<u64> = 7100..7140;
 const STD_M: f64 = 5e-4;
@@ -26,7 +26,7 @@ fn roughly_surveyed() -> Robot {
     robot
 }
 
-/// Indices of two tags of the first view, and how far they are from each other, m.
+/// Indices of two tags of the first view, and the distance between them, m.
 fn two_tags(case: &Case<'_>) -> ([usize; 2], f64) {
     let seen = &case.views[0].tags;
     let between = [seen[0].tag_idx, seen[seen.len() - 1].tag_idx];
@@ -86,7 +86,7 @@ fn a_taped_distance_is_recovered_within_its_sigma() {
         "{n} seeds: distance {without_mm:.2} mm off rms (sigma {std_without_mm:.2}), taped {with_mm:.2} (sigma \
          {std_with_mm:.2}), {within} within one sigma; mean squared innovation {mean:.2}"
     );
-    // 27 of 40 are expected. Fewer than 18 or more than 36 happen by chance once in a thousand times.
+    // Expected: 27 of 40. Fewer than 18 or more than 36 happen by chance once in a thousand times.
     assert!((18..=36).contains(&within), "{within} of {n}");
     assert!(with_mm < 0.7 * without_mm, "{with_mm} {without_mm}");
     assert!(innovations.len() == n && (0.4..2.0).contains(&mean), "{mean} of {}", innovations.len());

@@ -1,4 +1,4 @@
-//! Touches of arms that are as drawn within their priors, and of arms that are not.
+//! Touches by arms within the priors of their nominal models, and by arms beyond them.
 
 use nalgebra::{Matrix3, Translation3, UnitQuaternion, Vector3};
 use rand_chacha::ChaCha8Rng;
@@ -35,7 +35,7 @@ struct Case {
     touches: Vec<Touch>,
 }
 
-/// `robot` with the errors that its drawing allows for.
+/// `robot` with errors drawn from the priors of its nominal model.
 fn built(robot: &Robot, rng: &mut ChaCha8Rng) -> Robot {
     let priors = &robot.geometry;
     let mut drawn = |std: f64| Vector3::from_fn(|_, _| std * normal(rng));
@@ -60,7 +60,7 @@ fn case(robot: &Robot, seed: u64, change: impl FnOnce(&mut Robot, &mut Truth)) -
     let first = Truth::draw(robot, &model, &scales, &mut rng);
     model.joints = model_for(robot, &views(robot, &first, &noise, 10, &mut rng)).joints;
     let mut truth = Truth::draw(robot, &model, &scales, &mut rng);
-    // No view tells of the last joint.
+    // No view constrains the last joint.
     for kind in [ParameterKind::Gain, ParameterKind::Offset] {
         let parameter = Parameter { joint: LAST, kind };
         let value = truth.parameters.get(parameter) + parameter.prior_std(robot) * normal(&mut rng);
@@ -100,7 +100,7 @@ fn task(robot: &Robot) -> Vec<JointAngles> {
     (0..6).map(at).collect()
 }
 
-/// True tool position less the believed one at readings that an arm as drawn has at `at`, base frame, m.
+/// True minus estimated tool position at readings that a nominal arm has at `at`, base frame, m.
 fn tool_error(robot: &Robot, case: &Case, found: &JointParameters, at: &JointAngles) -> Vector3<f64> {
     let still = ConditionChange::default();
     let tool_m = |robot: &Robot, parameters: &JointParameters| {
@@ -113,7 +113,7 @@ fn tool_error(robot: &Robot, case: &Case, found: &JointParameters, at: &JointAng
     tool_m(&case.real, &case.truth.parameters) - tool_m(robot, found)
 }
 
-/// Covariance of the tool by what is estimated and the drawing, without what joints do anew at each pose, m^2.
+/// Covariance of the tool from the estimate and the geometry priors, without the joint errors of each pose, m^2.
 fn predicted_m2(found: &Estimate<'_>, beside: &[Matrix3<f64>], at: &[JointAngles]) -> Vec<Matrix3<f64>> {
     let n = found.joint_parameters().len();
     let covariance = found.joint_covariance();
@@ -158,7 +158,7 @@ fn touches_of_a_good_arm_are_as_foretold_and_the_tool_is_better_known() {
     assert!(after < before, "{before} m before, {after} m after");
 }
 
-/// The causes that an update names which does not hold, and where the tool point would explain it.
+/// Causes that a rejected update names, and the tool point that would explain it; `None` if it is not rejected.
 fn refused_for(robot: &Robot, found: &Estimate<'_>, touches: &[Touch]) -> Option<(Vec<String>, Vector3<f64>)> {
     let update = found.touch_update(touches)?;
     (update.chi2 > update.limit).then(|| {
@@ -188,7 +188,7 @@ fn a_tool_point_two_centimetres_off_is_refused_and_measured() {
     assert!(worst_m < 0.01, "{worst_m} m");
 }
 
-/// Whatever a tool point is off by: accepted only where the predicted error says so.
+/// A wrong tool point is accepted only where the predicted error covers it.
 #[test]
 fn no_tool_point_is_accepted_far_beyond_its_prediction() {
     let robot = titan();
@@ -225,7 +225,7 @@ fn a_camera_turned_about_the_last_joint_before_it_is_refused() {
     let (mut refused, mut named) = (0, 0);
     for seed in 0..SEEDS {
         let case = case(&robot, seed, |real, truth| {
-            // In the frame of the link that carries it.
+            // The turn is in the frame of the link that carries the camera.
             let axis = real.chain.joints()[n - 1].axis;
             let turn = UnitQuaternion::from_scaled_axis(axis.into_inner() * 5f64.to_radians());
             truth.mount = Translation3::identity() * turn * truth.mount;
@@ -239,7 +239,7 @@ fn a_camera_turned_about_the_last_joint_before_it_is_refused() {
     assert!(refused == SEEDS && u64::from(named) >= SEEDS - 1, "{refused}, {named} of {SEEDS}");
 }
 
-/// The views follow by the first joint's offset, and only the touches know where the base is.
+/// The first joint's offset compensates in the views; only the touches show the base's place.
 #[test]
 fn a_survey_turned_about_the_first_axis_is_refused_with_that_among_the_causes() {
     let robot = titan();

@@ -1,4 +1,5 @@
-//! A gain that is farther from its datasheet than nearly all are: named, and what the views do not tell is less sure.
+//! A gain that departs from its datasheet more than nearly all do: it is named. Parameters that views do not determine
+//! get larger sigmas.
 
 use crate::batch::tests::failures::{Case, case_with_range};
 use crate::explain::failures::FailureAdjusted;
@@ -15,7 +16,8 @@ fn with_estimate<T>(case: &Case, then: impl FnOnce(&mut Estimate<'_>) -> T) -> T
     then(&mut applied.estimate(HyperparameterMode::Given).expect("solved"))
 }
 
-/// A sound arm whose sensors' gains are stated so closely that the largest is `sigmas` off; joint 3 hardly moves.
+/// An arm without faults, whose gains are stated with sigmas so small that the largest departs by `sigmas`; joint 3
+/// hardly moves.
 fn stated_closely(seed: u64, sigmas: f64) -> Case {
     let mut case = case_with_range(seed, Some((3, 0.05)));
     for _ in 0..3 {

@@ -1,4 +1,4 @@
-//! Offsets that walk at random during a capture of the estimator's own model, and go on to walk after it.
+//! Offsets that walk at random during a capture of the estimator's own model, and after it.
 
 use crate::batch::tests::data::{Noise, Truth, normal, rng, titan, views};
 use crate::explain::failures::FailureAdjusted;
@@ -22,7 +22,7 @@ struct Case {
     robot: Robot,
     truth: Truth,
     views: Vec<View>,
-    /// By how much each joint's angle is more at the same reading when as much time has gone by again.
+    /// Change of each joint's angle at the same reading after the capture's duration has passed again, rad.
     later_rad: [f64; MAX_JOINTS],
     rng: ChaCha8Rng,
 }
@@ -44,7 +44,7 @@ fn case(seed: u64, n_views: usize, walk_rad: f64) -> Case {
     for joint in 0..robot.n_seen_joints() {
         let sensor = &sensors.models[joint];
         let mut off_rad = 0.0;
-        // Back from the last view, whose sensors are the truth's.
+        // The loop runs back from the last view, whose sensors are the truth's.
         for view in views.iter_mut().rev() {
             let change = view.conditions.departure_from(&sensors.reference);
             let angle_rad = sensor.correction.angle_rad(&sensor.spec, view.travel_rad[joint], &change, 0.0);
@@ -56,7 +56,7 @@ fn case(seed: u64, n_views: usize, walk_rad: f64) -> Case {
     Case { robot, truth, views, later_rad, rng }
 }
 
-/// Root mean squares over the targets, m: the tool's error when as much time has gone by again, and what is predicted.
+/// Root mean squares over the targets, m: tool error after the capture's duration has passed again, and its prediction.
 fn errors_m(case: &mut Case, found: &Estimate<'_>) -> [f64; 2] {
     let robot = &case.robot;
     let all = ParameterCovariance {
@@ -65,7 +65,7 @@ fn errors_m(case: &mut Case, found: &Estimate<'_>) -> [f64; 2] {
         residual_std_rad: Some(std::array::from_fn(|joint| found.residual_std_rad(joint))),
     };
     let covariance = all.without(|parameter| parameter.is_past());
-    // The last joint is beyond the camera.
+    // The last joint is distal to the camera.
     let n = robot.n_seen_joints();
     let (parameters, truth) = (found.parameters(), case.truth.parameters);
     let (then, change) = (truth.reference.departure_from(&parameters.reference), ConditionChange::default());
@@ -91,7 +91,7 @@ fn errors_m(case: &mut Case, found: &Estimate<'_>) -> [f64; 2] {
     [error_m2, predicted_m2].map(|sum| (sum / N_TARGETS as f64).sqrt())
 }
 
-/// Error over prediction with and without walks, seed by seed, and in how many walks came in.
+/// Error over prediction with and without walks for each seed, and the number of seeds whose model has walks.
 fn study(seeds: u64, n_views: usize, walk_rad: f64) -> ([Vec<f64>; 2], u64) {
     let (mut ratios, mut n_in) = ([Vec::new(), Vec::new()], 0);
     for seed in 0..seeds {
@@ -122,8 +122,8 @@ fn offsets_that_walk_are_found_over_40_seeds() {
     walks_are_found(40, &[(14, 5e-3, 30, 4.5), (14, 1e-2, 37, 3.29), (30, 5e-3, 40, 2.6)]);
 }
 
-/// Views, size of the walk for each kind, rad, arms of which walks must be found, and error over predicted, 95 % of the
-/// arms.
+/// Checks each kind: views, size of the walk, rad, least number of arms with walks found, and 95 % limit of error over
+/// prediction.
 fn walks_are_found(n_seeds: u64, kinds: &[(usize, f64, u64, f64)]) {
     for &(n_views, walk_rad, least_in, most) in kinds {
         let ([with, without], n_in) = study(n_seeds, n_views, walk_rad);

@@ -1,4 +1,5 @@
-//! Arms that are off their drawing by as much as robot.toml says: the error that is predicted with priors is the error.
+//! Arms that depart from their nominal model within robot.toml's sigmas: the error predicted with priors is the true
+//! error.
 
 use std::ops::Range;
 
@@ -17,7 +18,7 @@ use armcal_core::sensor::ConditionChange;
 use armcal_core::spatial::exp;
 use armcal_core::stats::quantile;
 
-/// The arm as it is: another tool point and another lens; its links and the frame of the survey are of [`truth`].
+/// The true arm, with another tool point and another lens; its links and the frame of the survey come from [`truth`].
 fn real_arm(robot: &Robot, seed: u64) -> Robot {
     let mut rng = rng(seed, "within sigmas: arm");
     let mut real = robot.clone();
@@ -49,14 +50,14 @@ fn change_truth(robot: &Robot, truth: &mut Truth, seed: u64) {
     truth.tags.iter_mut().for_each(|tag| *tag = frame * *tag);
 }
 
-/// Readings at which the tool matters.
+/// Travels at which the tool error is evaluated.
 fn task(robot: &Robot, seed: u64) -> Vec<JointAngles> {
     let mut rng = rng(seed, "within sigmas: task");
     let half = |j: usize| robot.sensors[j].half_range_rad.min(1.3);
     (0..12).map(|_| JointAngles::from_fn(robot.n_joints(), |j| 0.25 * half(j) * normal(&mut rng))).collect()
 }
 
-/// Angles at readings.
+/// Joint angles at these readings.
 fn angles(robot: &Robot, sensors: &JointParameters, travel_rad: &JointAngles) -> JointAngles {
     let still = ConditionChange::default();
     JointAngles::from_fn(robot.n_joints(), |j| {
@@ -72,7 +73,7 @@ fn tool_m(robot: &Robot, sensors: &JointParameters, travel_rad: &JointAngles) ->
 struct Errors {
     /// Squared distances of the tool over the task, m^2.
     squares_m2: Vec<f64>,
-    /// Normalized estimation error squared: by the data alone, and with priors.
+    /// Normalized estimation error squared: with only the data, and with priors.
     nees: [f64; 2],
     is_revised: bool,
 }
@@ -90,7 +91,7 @@ fn errors(robot: &Robot, seed: u64) -> Errors {
     let at: Vec<JointAngles> = task.iter().map(|travel_rad| angles(robot, &believed, travel_rad)).collect();
     let known = believed.with_links(robot.clone());
     let of_sensors = believed.sensors(&known);
-    // The tool is where the sensors' curves have it: what they are off beside from view to view is no part of it.
+    // The reference for the tool is the sensors' curves, without the errors from view to view.
     let by_data = ParameterCovariance {
         parameters: found.joint_parameters().to_vec(),
         matrix: found.joint_covariance(),

@@ -157,7 +157,7 @@ fn of_stated_angles() -> Vec<Refusal> {
     ]
 }
 
-/// One of each kind that says something measured.
+/// One refusal of each kind that states a measured value.
 fn measured() -> Vec<Refusal> {
     [measured_of_the_fit(), misread_inputs(), measured_of_repairs()].concat()
 }

@@ -1,4 +1,4 @@
-//! What a refusal says: cause and evidence.
+//! Words of a refusal: cause and evidence.
 
 use std::fmt;
 
@@ -202,7 +202,7 @@ impl Refusal {
         }
     }
 
-    /// Estimates that differ from their stated sizes by more than is repaired.
+    /// Causes where an estimate differs from its stated size by more than a repair may.
     fn fmt_of_size(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Lens { camera, ratio, std, stated_std, most_sigmas, .. } => {
@@ -307,7 +307,7 @@ impl Refusal {
         }
     }
 
-    /// Contradictions to what the fit or the prior predicts.
+    /// Causes that contradict predictions of the fit or the prior.
     fn fmt_of_prediction(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Innovations { quantity, per_dof, limit, expected: [low, high] } => write!(
@@ -397,7 +397,7 @@ fn percent(probability: f64) -> String {
     format!("{:.digits$} %", 100.0 * probability)
 }
 
-/// All reasons in one line, the first one first; `None` where there is none.
+/// All reasons in one line, the first one first; `None` if there is no reason.
 #[must_use]
 pub fn in_words(refusals: &[Refusal]) -> Option<String> {
     let advised = with_advice(refusals).len();

@@ -1,4 +1,4 @@
-//! cameras.yaml of TagSLAM, camchain.yaml of Kalibr, and the camera's file of ROS (camera_calibration).
+//! Camera files: cameras.yaml of TagSLAM, camchain.yaml of Kalibr, and that of ROS (camera_calibration).
 
 use armcal_core::codes::Code;
 use std::collections::BTreeMap;
@@ -13,16 +13,16 @@ use armcal_core::log::ros::CameraInfo;
 use armcal_core::optics::{CameraModel, Fisheye, LensModel, Radtan, check_image_size};
 use armcal_core::robot::{FileIssue, RobotError, read_text};
 
-/// A camera as files name it.
+/// A camera as files describe it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedCamera {
     /// Key of the camera in the file, such as `cam0`.
     pub name: String,
     /// Lens and resolution.
     pub model: CameraModel,
-    /// Topic of its images.
+    /// Topic of the camera's images.
     pub image_topic: Option<String>,
-    /// Topic of the tags detected in them.
+    /// Topic of the tags detected in the images.
     pub tag_topic: Option<String>,
 }
 
@@ -38,8 +38,8 @@ struct CameraYaml {
     tagtopic: Option<String>,
 }
 
-/// Camera file of ROS, as `camera_calibration` and `camera_info_manager` write it, and that of OpenCV's
-/// samples/cpp/calibration.cpp, which has the same keys without the model.
+/// Camera file of ROS, written by `camera_calibration` and `camera_info_manager`. OpenCV's samples/cpp/calibration.cpp
+/// writes the same keys without the model.
 #[derive(Debug, Deserialize)]
 struct RosCameraYaml {
     image_width: Option<u32>,
@@ -66,10 +66,10 @@ pub fn read_cameras(file: &Path) -> Result<Vec<NamedCamera>, RobotError> {
     parse_cameras(file, &read_text(file)?)
 }
 
-/// The same from a text; `file` names it in errors.
+/// Parses all cameras of a text; `file` names it in errors.
 ///
 /// # Errors
-/// As [`read_cameras`].
+/// Fails as [`read_cameras`] does.
 pub fn parse_cameras(file: &Path, text: &str) -> Result<Vec<NamedCamera>, RobotError> {
     if text.lines().any(|line| line.starts_with("camera_matrix:")) {
         return Ok(vec![ros_camera(file, yaml::parse(file, text)?)?]);
@@ -80,12 +80,12 @@ pub fn parse_cameras(file: &Path, text: &str) -> Result<Vec<NamedCamera>, RobotE
     }
     let mut cameras: Vec<NamedCamera> =
         raw.iter().map(|(name, raw)| camera(file, name, raw)).collect::<Result<_, _>>()?;
-    // cam10 after cam9.
+    // The order has cam10 after cam9.
     cameras.sort_by_key(|camera| (camera.name.len(), camera.name.clone()));
     Ok(cameras)
 }
 
-/// As the same lens in a message.
+/// Converts the camera as if its lens were stated in a message.
 fn ros_camera(file: &Path, raw: RosCameraYaml) -> Result<NamedCamera, RobotError> {
     let issue = |key: &str, problem: String| FileIssue::new(Code::ValueInvalid, file, key, problem);
     let n = raw.camera_matrix.data.len();
@@ -95,7 +95,7 @@ fn ros_camera(file: &Path, raw: RosCameraYaml) -> Result<NamedCamera, RobotError
         RobotError::from(FileIssue::new(Code::KeyMissing, file, key, format!("is missing; add the line {key}: {what}")))
     };
     let size = |key, side: Option<u32>| side.ok_or_else(|| missing(key, "the image's size, px"));
-    // Only OpenCV's own model has five coefficients; four are that of a fisheye, too.
+    // Only OpenCV's own model has five coefficients; a fisheye has four, too.
     let usual = (raw.distortion_coefficients.data.len() == 5).then(|| "plumb_bob".to_owned());
     let model = raw.distortion_model.or(usual);
     let info = CameraInfo {
@@ -167,7 +167,7 @@ fn camera(file: &Path, name: &str, raw: &CameraYaml) -> Result<NamedCamera, Robo
     Ok(NamedCamera { name: name.to_owned(), model, image_topic: raw.rostopic.clone(), tag_topic: raw.tagtopic.clone() })
 }
 
-/// The cameras as cameras.yaml; Kalibr reads it too.
+/// Formats the cameras as cameras.yaml, which Kalibr also reads.
 #[must_use]
 pub fn cameras_to_yaml(cameras: &[NamedCamera]) -> String {
     let mut out = String::new();

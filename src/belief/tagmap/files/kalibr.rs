@@ -1,4 +1,4 @@
-//! Kalibr's target: an aprilgrid is a board of tags of known places.
+//! Target file of Kalibr: an aprilgrid is a board of tags with known places.
 
 use armcal_core::codes::Code;
 use std::path::Path;
@@ -12,7 +12,7 @@ use crate::tagmap::files::yaml;
 use crate::tagmap::types::{Body, TagPrior};
 use armcal_core::robot::{FileIssue, RobotError};
 
-/// As Kalibr documents it: `tagSpacing` is the gap between tags over their size.
+/// Target file as Kalibr documents it: `tagSpacing` is the gap between tags over their size.
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct TargetYaml {
@@ -28,8 +28,8 @@ pub(super) fn is_target(text: &str) -> bool {
     text.lines().any(|line| line.trim_start().starts_with("target_type"))
 }
 
-/// Tags are numbered from the lower left by rows; the board's frame has its origin at the first tag's lower left
-/// corner, x right, y up, z out of it.
+/// Parses a target. Tags are numbered from the lower left by rows. The board's frame has its origin at the first tag's
+/// lower left corner, x right, y up, z out of the board.
 pub(super) fn parse(file: &Path, text: &str) -> Result<TagFile, RobotError> {
     let raw: TargetYaml = yaml::parse(file, text)?;
     if raw.target_type != "aprilgrid" {

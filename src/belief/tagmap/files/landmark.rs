@@ -1,7 +1,7 @@
-//! Landmarks of a tag map, and the survey that joints are calibrated by.
+//! Landmarks of a tag map, and the survey for a calibration of joints.
 //!
-//! A landmark may be less than an AprilTag: without size, without rotation, with a name instead of a number. The use of
-//! the detections decides whether that is enough.
+//! A landmark may have less data than an AprilTag: no size, no rotation, or a name instead of a number. The use of the
+//! detections decides if that is enough.
 
 pub use crate::tagmap::constants::files_landmark::FIRST_NAMED_ID;
 use armcal_core::codes::Code;
@@ -16,11 +16,11 @@ use armcal_core::optics::Chessboard;
 use armcal_core::robot::{FileIssue, Robot, SurveyedTag, TagSurvey};
 use armcal_core::spatial::{Base, Pose, Tag};
 
-/// One sigma of a rotation of which nothing is known, rad: half a turn.
+/// One sigma of an unknown rotation, rad: half a turn.
 pub const UNKNOWN_ROTATION_STD_RAD: f64 = std::f64::consts::PI;
 
-/// What people call the tag of number `id` among those of `ids`: `tag 3`; one that has a name and no number is a board,
-/// `board`, or `board 2` where there are several.
+/// Everyday name of the tag with number `id` among `ids`: `tag 3`. A landmark with a name but no number is `board`, or
+/// `board 2` if there are several.
 #[must_use]
 pub fn spoken_name(id: u32, ids: impl IntoIterator<Item = u32>) -> String {
     let Some(place) = id.checked_sub(FIRST_NAMED_ID) else { return format!("tag {id}") };
@@ -30,37 +30,37 @@ pub fn spoken_name(id: u32, ids: impl IntoIterator<Item = u32>) -> String {
     }
 }
 
-/// A landmark as a tag map has it, in the frame of the file.
+/// A landmark of a tag map, in the frame of the file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Landmark {
-    /// Number of the tag, or [`FIRST_NAMED_ID`] plus its place for a landmark with a name alone.
+    /// Number of the tag, or [`FIRST_NAMED_ID`] plus its place in the file for a landmark with only a name.
     pub id: u32,
-    /// `None` where the file gives a number alone.
+    /// Name of the landmark; `None` if the file has only a number.
     pub name: Option<String>,
     /// Side of the black square; `None` where unknown.
     pub size_m: Option<f64>,
-    /// In the file's frame; `None` where unknown.
+    /// Position in the file's frame; `None` if unknown.
     pub position_m: Option<[f64; 3]>,
-    /// frame_from_tag; `None` where unknown.
+    /// Rotation frame_from_tag; `None` if unknown.
     pub quaternion_wxyz: Option<[f64; 4]>,
-    /// Zero where the file says nothing: exact.
+    /// Standard deviation of the position, m; zero (exact) if the file states none.
     pub position_std_m: f64,
-    /// Largest of the three axes; zero where the file says nothing.
+    /// Largest standard deviation of the rotation over the three axes; zero if the file states none.
     pub rotation_std_rad: f64,
-    /// Its squares, where it is a chessboard with corners of its own.
+    /// Squares of the landmark, if it is a chessboard with its own corners.
     pub board: Option<Chessboard>,
 }
 
-/// What a tag map says of landmarks in its frame.
+/// Landmarks of a tag map, and their frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LandmarkFile {
-    /// Name of the frame in which the landmarks are.
+    /// Name of the landmarks' frame.
     pub frame: String,
-    /// `None` where the file names none.
+    /// Number of the base tag; `None` if the file names none.
     pub base_tag: Option<u32>,
     /// The tag whose error all others share ([`TagSurvey::anchor_tag`]).
     pub anchor_tag: Option<u32>,
-    /// In the order of the file; each id once.
+    /// Landmarks in the order of the file, each id once.
     pub landmarks: Vec<Landmark>,
 }
 
@@ -76,10 +76,10 @@ pub struct NamedSurvey {
 }
 
 impl LandmarkFile {
-    /// The survey around `robot` for tags that are used so.
+    /// Returns the survey around `robot` for this use of the tags.
     ///
-    /// Of a landmark that is used by its position alone the rotation may be unknown (half a turn of sigma) and the size
-    /// too (NaN). A tag without any place can be used by its corners: its place is found from the views.
+    /// A landmark that is used by its position only may have an unknown rotation (half a turn of sigma) and an unknown
+    /// size (NaN). A tag without a place can be used by its corners: the views determine its place.
     ///
     /// # Errors
     /// [`FileIssue`] naming `file`, the landmark and the key.
@@ -101,7 +101,7 @@ impl LandmarkFile {
 }
 
 impl LandmarkFile {
-    /// The file's frame: the base's, or that of a link that moves before a camera that stands still.
+    /// Attachment of the file's frame: the base, or a link that moves in front of a fixed camera.
     fn on_arm(&self, file: &Path, robot: &Robot) -> Result<Attachment, FileIssue> {
         let issue = |problem: String| {
             Err(FileIssue::new(Code::ValueInvalid, file, "frame", format!("is `{}`; {problem}", self.frame)))

@@ -11,7 +11,7 @@ use crate::tagmap::files::tag_file::{TagFile, check_number};
 use armcal_core::robot::{FileIssue, RobotError, read_text};
 use armcal_core::spatial::{Base, Pose, Tag};
 
-/// Reads a tag map of ours (.toml), a tagslam.yaml or a Kalibr target (.yaml, .yml).
+/// Reads our tag map (.toml), a tagslam.yaml or a Kalibr target (.yaml, .yml).
 ///
 /// # Errors
 /// [`RobotError`] with file, key and allowed range.

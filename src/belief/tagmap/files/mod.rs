@@ -1,8 +1,8 @@
 //! Files about cameras and tags: TagSLAM's, Kalibr's and our own.
 //!
 //! `cameras` reads and writes cameras.yaml and camchain.yaml, which have one format. `tagslam` (tagslam.yaml), `kalibr`
-//! (a target's yaml) and `own` (our TOML) read tags into a [`TagFile`]. `landmarks` reads the survey that joints are
-//! calibrated by. `read` and `write` choose the format by the extension.
+//! (a target's yaml) and `own` (our TOML) read tags into a [`TagFile`]. `landmarks` reads the survey for a calibration
+//! of joints. `read` and `write` choose the format by the extension.
 
 mod cameras;
 mod kalibr;

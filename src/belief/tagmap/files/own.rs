@@ -146,7 +146,7 @@ pub(super) fn parse_landmarks(file: &Path, text: &str) -> Result<LandmarkFile, R
     Ok(LandmarkFile { frame: raw.frame, base_tag: raw.base_tag, anchor_tag: raw.anchor_tag, landmarks })
 }
 
-/// `None` where the file says nothing of squares.
+/// Returns the chessboard of an entry; `None` if it states no squares.
 fn board(file: &Path, tag: &TagToml, key: &impl Fn(&str) -> String) -> Result<Option<Chessboard>, FileIssue> {
     let missing = |of: &str| {
         Err(FileIssue::new(Code::KeyMissing, file, key(of), "is missing; a board has `squares` and `square_m`"))
@@ -208,8 +208,8 @@ pub(super) fn parse(file: &Path, text: &str) -> Result<TagFile, RobotError> {
     Ok(out)
 }
 
-/// Gives the tags of a frame standard deviations under which they count as independent, although the error of
-/// `anchor_tag` is in all of them.
+/// Gives the tags of a frame standard deviations under which they count as independent, although all of them share the
+/// error of `anchor_tag`.
 fn count_shared_error(tags: &mut [TagPrior], anchor_tag: Option<u32>) {
     let Some(anchor) = tags.iter().find(|tag| Some(tag.id) == anchor_tag) else { return };
     let (Some((place, std)), body) = (anchor.pose.zip(anchor.std), anchor.body) else { return };
@@ -232,8 +232,8 @@ fn pose(file: &Path, key: &str, position: [f64; 3], wxyz: [f64; 4]) -> Result<Is
         .isometry())
 }
 
-/// Exact where all are zero or absent. The position's are along the frame's axes, so the largest counts for all of
-/// them.
+/// Standard deviations of a tag; `None` (exact) if all are zero or absent. Those of the position are along the frame's
+/// axes, so the largest counts for all of them.
 fn std(file: &Path, tag: &TagToml, key: &impl Fn(&str) -> String) -> Result<Option<[f64; 6]>, RobotError> {
     let (position, rotation) = (tag.position_std_m.unwrap_or_default(), tag.rotation_std_rad.unwrap_or_default());
     for (name, values) in [("position_std_m", position), ("rotation_std_rad", rotation)] {

@@ -9,7 +9,7 @@ use crate::tagmap::files::tag_file::{TagFile, check_number};
 use crate::tagmap::files::{kalibr, own, tagslam};
 use armcal_core::robot::{FileIssue, RobotError, read_text};
 
-/// Reads a tag map of ours (.toml), a tagslam.yaml or a Kalibr target (.yaml, .yml).
+/// Reads our tag map (.toml), a tagslam.yaml or a Kalibr target (.yaml, .yml).
 ///
 /// # Errors
 /// [`RobotError`] with file, key and allowed range.
@@ -18,10 +18,10 @@ pub fn read_tags(file: &Path) -> Result<TagFile, RobotError> {
     parse_tags(file, &text)
 }
 
-/// Parses the text of a file about tags; `file` gives the format by its extension and is named in errors.
+/// Parses the text of a file about tags; the extension of `file` selects the format, and errors name `file`.
 ///
 /// # Errors
-/// As [`read_tags`].
+/// Fails as [`read_tags`] does.
 pub fn parse_tags(file: &Path, text: &str) -> Result<TagFile, RobotError> {
     let tags = match extension(file).as_str() {
         "toml" => own::parse(file, text)?,

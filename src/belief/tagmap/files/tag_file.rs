@@ -8,47 +8,47 @@ use crate::tagmap::types::{Body, TagPrior};
 use armcal_core::robot::{FileIssue, MAX_TAGS};
 use armcal_core::time::Stamp;
 
-/// Detections of one tag that stand for another, in a span of time: a tag number that was hung up twice.
+/// Detections of one tag that stand for another in a span of time: two tags with one number.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Remap {
     /// Id as detected.
     pub id: u32,
-    /// Id of the tag that it is.
+    /// Id of the true tag.
     pub as_id: u32,
-    /// `None`: of every camera.
+    /// Name of the camera; `None` for every camera.
     pub camera: Option<String>,
     /// First instant.
     pub from: Stamp,
-    /// Last instant, itself included.
+    /// Last instant, inclusive.
     pub to: Stamp,
 }
 
-/// What a file says of tags.
+/// Contents of a file about tags.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TagFile {
-    /// The frame that the poses are in, as the file names it.
+    /// Name of the poses' frame in the file.
     pub frame: String,
     /// Bodies that carry tags, by first appearance in the file.
     pub bodies: Vec<Body>,
-    /// In the order of the file.
+    /// Tags in the order of the file.
     pub tags: Vec<TagPrior>,
-    /// Size (m) and body of tags that are not named.
+    /// Size (m) and body of tags without an entry.
     pub default_tag: Option<(f64, usize)>,
-    /// `None` where the file names none.
+    /// Number of the base tag; `None` if the file names none.
     pub base_tag: Option<u32>,
     /// Ids whose detections are not used.
     pub ignored: BTreeSet<u32>,
-    /// Detections with more corrected bits are not used.
+    /// Largest number of corrected bits of a detection in use.
     pub max_hamming: Option<i32>,
-    /// Single detections that shall not be used.
+    /// Single detections to ignore.
     pub squashed: Vec<(Stamp, BTreeSet<u32>)>,
-    /// The first one that fits a detection holds.
+    /// Replacements of ids; the first one that matches a detection applies.
     pub remaps: Vec<Remap>,
-    /// What the file asks for that has no effect here.
+    /// Keys of the file that have no effect here.
     pub ignored_keys: Vec<String>,
 }
 
-/// Many tags make a map slow long before they fill the memory.
+/// Limits the number of tags: many make a map slow long before they fill the memory.
 pub(super) fn check_number(file: &Path, n_tags: usize) -> Result<(), FileIssue> {
     if n_tags <= MAX_TAGS {
         return Ok(());

@@ -27,7 +27,7 @@ struct TagslamYaml {
     squash: Vec<SquashYaml>,
     #[serde(default)]
     tag_id_remap: Vec<RemapYaml>,
-    // What TagSLAM measures besides tags; only named.
+    // Other measurements of TagSLAM; they are only reported.
     plane_measurements: Option<serde::de::IgnoredAny>,
     distance_measurements: Option<serde::de::IgnoredAny>,
     coordinate_measurements: Option<serde::de::IgnoredAny>,
@@ -49,7 +49,7 @@ struct BodyYaml {
     max_hamming_distance: Option<i32>,
     #[serde(default)]
     ignore_tags: Vec<u32>,
-    /// In place of the noise of each tag's pose, m and rad; both or none.
+    /// Noise that replaces that of each tag's pose, m and rad; both or none.
     override_tag_position_noise: Option<f64>,
     override_tag_rotation_noise: Option<f64>,
     pose: Option<PoseYaml>,
@@ -202,14 +202,14 @@ fn add_body(file: &Path, out: &mut TagFile, name: &str, raw: &BodyYaml, noise: (
 }
 
 impl BodyYaml {
-    /// What TagSLAM gives every tag of the body whose pose is known, where both are above zero.
+    /// Standard deviations that TagSLAM assigns to every tag of the body with a known pose, if both are above zero.
     fn overriding_std(&self, file: &Path, key: &dyn Fn(&str) -> String) -> Result<Option<[f64; 6]>, RobotError> {
         let noises = [
             ("override_tag_position_noise", self.override_tag_position_noise),
             ("override_tag_rotation_noise", self.override_tag_rotation_noise),
         ];
         for (name, noise) in noises {
-            // -1 is TagSLAM's own word for none.
+            // TagSLAM writes -1 for none.
             FileIssue::check_range(file, &key(name), noise.unwrap_or(-1.0), -1.0..=1e6)?;
         }
         let [position, rotation] = noises.map(|(_, noise)| noise.filter(|noise| *noise > 0.0));
@@ -256,7 +256,7 @@ fn board_tags(file: &Path, body: usize, key: &str, raw: &BoardYaml, rows: Rows) 
     Ok(tags)
 }
 
-/// Seconds with a fraction, kept to the nanosecond.
+/// Parses seconds with a fraction, to the nanosecond.
 fn stamp(file: &Path, key: &str, text: &str) -> Result<Stamp, RobotError> {
     let wrong = || FileIssue::new(Code::ValueInvalid, file, key, format!("`{text}` is no time in seconds"));
     let (whole, fraction) = text.trim().split_once('.').unwrap_or((text.trim(), ""));
@@ -267,7 +267,7 @@ fn stamp(file: &Path, key: &str, text: &str) -> Result<Stamp, RobotError> {
     Ok(Stamp { nanos: total })
 }
 
-/// A map as tagslam.yaml: one body for each group.
+/// Formats a map as tagslam.yaml: one body for each group.
 pub(super) fn to_text(groups: &[WrittenGroup]) -> String {
     let mut out = String::new();
     if let Some(first) = groups.first() {

@@ -1,4 +1,4 @@
-//! Files as others write them, and back.
+//! Files of other programs, read and written.
 
 use std::path::Path;
 
@@ -94,7 +94,7 @@ fn a_tagslam_file_is_read_with_bodies_boards_and_rules() {
     assert_eq!(pose.translation.vector, Vector3::new(0.0, 1.0, 2.5));
     assert_eq!(tag(2).std, Some([0.001, 0.002, 0.003, 0.01, 0.01, 0.01]));
     assert_eq!((tag(3).size_m, tag(3).pose), (0.2, None));
-    // Boards: by rows upwards, and staggered by rows downwards with every other place empty.
+    // Boards have rows upwards; staggered ones have rows downwards with every other place empty.
     let place = |id: u32| tag(id).pose.unwrap().translation.vector;
     assert!((place(24) - Vector3::new(0.075, 0.075, 0.0)).norm() < 1e-12 && tag(24).body == 1);
     assert!((place(42) - Vector3::new(0.2, -0.2, 0.0)).norm() < 1e-12 && tag(42).body == 2);
@@ -106,7 +106,7 @@ fn a_tagslam_file_is_read_with_bodies_boards_and_rules() {
     assert_eq!(file.ignored_keys, ["bodies.rig.odom_topic", "plane_measurements"]);
 }
 
-/// As TagSLAM has it: both above zero, and tags without a pose stay without one.
+/// TagSLAM's rule: both are above zero, and tags without a pose stay without one.
 #[test]
 fn a_body_of_a_tagslam_file_may_replace_the_noise_of_its_tags() {
     let stds = |keys: &str| {
@@ -151,7 +151,7 @@ fn what_is_wrong_with_a_tag_file_is_said_with_file_key_and_range() {
     insta::assert_snapshot!("tag_files", words.join("\n"));
 }
 
-/// A few lines stand for millions of tags.
+/// A few lines of a file describe millions of tags.
 #[test]
 fn boards_of_many_tags_are_refused_before_they_are_laid_out() {
     let board = |k: u32, rows: u32| {
@@ -163,7 +163,7 @@ fn boards_of_many_tags_are_refused_before_they_are_laid_out() {
     };
     let file = |n: u32, rows: u32| format!("bodies:\n{}", (0..n).map(|k| board(k, rows)).collect::<String>());
     assert_eq!(tags("a.yaml", &file(1, 50)).tags.len(), 5000);
-    // The second board already is too much: no more of the thousand is laid out.
+    // The second board already exceeds the limit: none of the thousand others is laid out.
     let words = [file(1, 51), file(1000, 50)].map(|text| refusal("a.yaml", &text));
     insta::assert_snapshot!("many_tags", words.join("\n"));
 }
@@ -308,7 +308,7 @@ fn maps_that_are_written_read_back_the_same() {
     }
 }
 
-/// Of two tags the anchor has half the weight; those of another frame do not share its error.
+/// The anchor has half the weight of two tags; tags of another frame do not share its error.
 #[test]
 fn the_error_of_an_anchor_counts_in_every_tag_of_its_frame() {
     let groups = [group("base_link", [2, 5]), group("seafloor", [11, 12])];
@@ -327,7 +327,7 @@ fn the_error_of_an_anchor_counts_in_every_tag_of_its_frame() {
 
 #[test]
 fn the_widest_view_of_a_fisheye_ends_where_bearings_are_no_longer_unique() {
-    // theta - 0.1 theta^3 turns round at 1.826.
+    // The function theta - 0.1 theta^3 has its maximum at 1.826.
     let lens = Fisheye::with_widest_view([200.0; 2], [600.0; 2], [-0.1, 0.0, 0.0, 0.0], [1200, 1200]);
     assert!((1.80..1.826).contains(&lens.max_view_angle_rad), "{}", lens.max_view_angle_rad);
 }

@@ -13,7 +13,7 @@ use crate::tagmap::types::MapInput;
 use armcal_core::robot::FileIssue;
 use armcal_core::spatial::adjoint;
 
-/// The text of a map in the form of the extension: our TOML, or a tagslam.yaml.
+/// Formats a map in the format of the extension: our TOML, or a tagslam.yaml.
 ///
 /// # Errors
 /// [`FileIssue`] for another extension.
@@ -34,13 +34,13 @@ pub fn map_to_text(file: &Path, map: &TagMap, input: &MapInput<'_>) -> Result<St
 struct Anchor {
     id: u32,
     place: Isometry3<f64>,
-    /// Of the place that the solver held it at, on the right; zero where the map's covariances have it.
+    /// Covariance of the place at which the solver held it, on the right; zero if the map's covariances include it.
     held: Matrix6<f64>,
 }
 
 impl Anchor {
-    /// Returns the tag that was held or, of several known ones, the surest; `None` for a map in the frame of a tag, or
-    /// where places were held as exact.
+    /// Returns the held tag or, of several known ones, the one with the least variance. `None` for a map in the frame
+    /// of a tag, or with several held tags, whose places are exact.
     fn of(map: &TagMap, input: &MapInput<'_>) -> Option<Self> {
         let group = map.groups.first().filter(|group| matches!(group.frame, GroupFrame::Body(_)))?;
         let tags: Vec<&MappedTag> = group.tags.iter().filter_map(|id| map.tag(*id)).collect();
@@ -58,7 +58,7 @@ impl Anchor {
         Some(Self { id: anchor.id, place: anchor.frame_from_tag, held })
     }
 
-    /// What an anchor that was held adds to the covariance of a tag of its group.
+    /// Contribution of a held anchor to the covariance of a tag of its group.
     fn shared(&self, tag: &MappedTag) -> Matrix6<f64> {
         let by_anchor = adjoint(&tag.frame_from_tag.inv_mul(&self.place));
         by_anchor * self.held * by_anchor.transpose()

@@ -1,4 +1,4 @@
-//! What the YAML forms share.
+//! Common parts of the YAML formats.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use armcal_core::robot::{FileIssue, RobotError, syntax_code};
 use armcal_core::text::with_nearest;
 
 pub(super) fn parse<T: DeserializeOwned>(file: &Path, text: &str) -> Result<T, RobotError> {
-    // Some editors leave tabs at the ends of lines and comments, which other parsers take.
+    // Some editors leave tabs at the ends of lines and comments, which other parsers accept.
     let trimmed: Vec<&str> = text.lines().map(str::trim_end).collect();
     serde_saphyr::from_str(&trimmed.join("\n")).map_err(|error| {
         let message = with_nearest(&error.to_string());
@@ -18,7 +18,7 @@ pub(super) fn parse<T: DeserializeOwned>(file: &Path, text: &str) -> Result<T, R
     })
 }
 
-/// `x: .. y: .. z: ..`.
+/// Three coordinates: `x: .. y: .. z: ..`.
 #[derive(Clone, Copy, Debug, Deserialize)]
 pub(super) struct Xyz {
     x: f64,
@@ -32,7 +32,7 @@ impl Xyz {
     }
 }
 
-/// A pose as TagSLAM writes it: the rotation is axis times angle, rad.
+/// A pose in TagSLAM's form: the rotation is axis times angle, rad.
 #[derive(Clone, Copy, Debug, Deserialize)]
 pub(super) struct PoseYaml {
     position: Xyz,
@@ -53,7 +53,7 @@ impl PoseYaml {
         Ok(Isometry3::from_parts(Translation3::from(Vector3::from(position)), turn))
     }
 
-    /// Standard deviations, translation and rotation; the defaults where there is none.
+    /// Standard deviations of translation and rotation; the defaults if none are stated.
     pub(super) fn std(&self, file: &Path, key: &str, defaults: (f64, f64)) -> Result<[f64; 6], RobotError> {
         let of = |noise: Option<Xyz>, default: f64| noise.map_or([default; 3], Xyz::array);
         let position = of(self.position_noise, defaults.0);

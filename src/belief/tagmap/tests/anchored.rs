@@ -1,4 +1,4 @@
-//! A map in a file is as sure as its anchor is.
+//! Sigmas of a map in a file include those of its anchor.
 
 use std::path::Path;
 
@@ -44,7 +44,7 @@ fn the_error_of_the_anchor_is_in_the_file_for_every_tag() {
             let found = errors_in_sigmas(seed, mode);
             all.iter_mut().zip(found).for_each(|(all, found)| all.extend(found));
         }
-        // The anchor's are 90 independent numbers; those of the others of a scene go together.
+        // The anchor's errors are 90 independent numbers; those of the other tags of a scene are correlated.
         for (sigmas, bounds) in all.iter().zip([0.75..1.3, 0.65..1.4]) {
             let rms = (sigmas.iter().map(|sigma| sigma * sigma).sum::<f64>() / sigmas.len() as f64).sqrt();
             assert!(bounds.contains(&rms), "{mode:?}: {rms}");

@@ -13,13 +13,13 @@ const ATTITUDE_STD_RAD: f64 = 0.002;
 
 struct Dive {
     scene: Scene,
-    /// vehicle_from_seafloor in each view.
+    /// Pose vehicle_from_seafloor in each view.
     relative: Vec<Isometry3<f64>>,
-    /// In the frame of tag 10.
+    /// Poses of the seafloor's tags in the frame of tag 10.
     floor: Vec<Isometry3<f64>>,
 }
 
-/// Four tags on the vehicle (0 to 3) and four on the seafloor (10 to 13); the vehicle stands elsewhere in each view.
+/// Four tags on the vehicle (0 to 3) and four on the seafloor (10 to 13); the vehicle has another place in each view.
 fn dive(seed: u64) -> Dive {
     let mut rng = stream_rng(seed, "dive");
     let mut patch = |z: f64| -> Vec<Isometry3<f64>> {
@@ -116,7 +116,7 @@ fn a_moving_vehicle_and_the_seafloor_are_two_maps_with_a_pose_between_them_in_ea
 fn a_vehicle_that_stands_still_makes_one_map() {
     let mut dive = dive(3);
     dive.scene.bodies[0] = Body { is_static: true, ..dive.scene.bodies[0].clone() };
-    // The relative pose of the first view in all of them.
+    // Scene with the relative pose of the first view in all views.
     let tags: Vec<(u32, f64, Isometry3<f64>)> = (0_u32..)
         .zip(&dive.scene.truth)
         .map(|(id, pose)| (id, 0.15, *pose))

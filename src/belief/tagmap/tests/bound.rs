@@ -1,4 +1,4 @@
-//! The Cramer-Rao bound by another way: dense, by central differences of the projection at the truth.
+//! The Cramer-Rao bound by an independent method: dense, by central differences of the projection at the truth.
 
 use nalgebra::{DMatrix, Isometry3, Matrix3, Vector6};
 
@@ -8,7 +8,7 @@ use armcal_core::spatial::exp;
 
 const STEP: f64 = 1e-6;
 
-/// Covariance of each tag's position (m^2, base frame) that no unbiased estimator beats; tag 0 is held.
+/// Lower bound of each tag's position covariance for unbiased estimators, m^2, base frame; tag 0 is held.
 pub(super) fn cramer_rao(scene: &Scene, ids: &[u32], noise_px: f64) -> Vec<Matrix3<f64>> {
     let free: Vec<u32> = ids.iter().copied().filter(|id| *id != 0).collect();
     let views: Vec<usize> = (0..scene.views.len()).filter(|view| !scene.views[*view].tags.is_empty()).collect();

@@ -1,4 +1,4 @@
-//! Maps of files that are wrong are refused, and those of right ones are not.
+//! Maps from wrong files are refused, and those from correct files are not.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -36,7 +36,7 @@ fn with_focal(lens: &CameraModel, ratio: f64) -> CameraModel {
     lens.with_intrinsics([fx * ratio, fy * ratio, cx, cy, a, b, c, d])
 }
 
-/// All places known, as `written` makes them of the true ones.
+/// The scene with all places known, as `written` changes the true ones.
 fn surveyed(mut scene: Scene, written: impl Fn(&Isometry3<f64>) -> Isometry3<f64>) -> Scene {
     for (prior, truth) in scene.priors.iter_mut().zip(&scene.truth) {
         (prior.pose, prior.std) = (Some(written(truth)), Some([1e-3, 1e-3, 1e-3, 3e-3, 3e-3, 3e-3]));
@@ -90,7 +90,7 @@ fn a_lens_that_is_a_little_off_is_estimated_with_the_map() {
     assert!(within > 0.95, "{within}");
 }
 
-/// A fisheye's distortion can make up a pinhole: then it is estimated, and the map is right.
+/// A fisheye's distortion can imitate a pinhole: then it is estimated, and the map is correct.
 #[test]
 fn a_lens_of_another_model_or_image_size_does_not_pass() {
     for seed in SEEDS {
@@ -134,7 +134,7 @@ fn known_places_that_are_read_otherwise_are_refused_by_their_cause() {
     }
 }
 
-/// Places of long ago, from which no reading follows, are no reason to refuse a map that does not believe them.
+/// Outdated places that do not have another reading are no reason to refuse a map that does not use them.
 #[test]
 fn old_places_do_not_refuse_a_new_map() {
     for seed in SEEDS {
@@ -157,7 +157,7 @@ fn corners_of_a_mirror_are_told_before_anything_is_solved() {
     assert_eq!(checked(&scene, MapMode::Unknown).map(|_| ()).unwrap_err(), TagMapError::CornerOrder { n, of: n });
 }
 
-/// The images of view `from` on made anew, with tag 3 as `change` makes it.
+/// Makes the images from view `from` on again, with tag 3 after `change`.
 fn changed(seed: u64, from: usize, change: impl Fn(f64, Isometry3<f64>) -> (f64, Isometry3<f64>)) -> Scene {
     let mut scene = scene(fisheye(), seed);
     let mut tags: Vec<_> = (0_u32..).zip(&scene.truth).map(|(id, pose)| (id, size_of(id), *pose)).collect();
@@ -200,7 +200,7 @@ fn a_tag_that_moves_meanwhile_is_named() {
     }
 }
 
-/// Each column's information against the sum of squares with the unknown freed by hand.
+/// Checks that the found size has the least sum of squares: maps with sizes 0.4 % off fit worse.
 #[test]
 fn a_size_found_is_the_one_that_fits_best() {
     for seed in SEEDS {

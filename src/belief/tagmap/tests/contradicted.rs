@@ -1,4 +1,4 @@
-//! Sizes and ids that no map has are named, and such a map is not sound.
+//! Sizes and ids that contradict any map are named, and such a map is not accepted.
 
 use crate::say::map_refusal::{MapRefusalCause, WrongSizes};
 use crate::tagmap::blind::Blind;
@@ -8,7 +8,7 @@ use crate::tagmap::{TagMapError, checked_map, solve};
 use armcal_core::codes::{Code, Coded};
 
 const SEEDS: std::ops::Range<u64> = 60..64;
-/// Stated over true size.
+/// Ratio of stated to true size.
 const STATED: f64 = 2.0;
 
 fn with_sizes(seed: u64, is_wrong: impl Fn(u32) -> bool) -> Scene {

@@ -1,4 +1,4 @@
-//! A corridor of tags on two walls, seen piece by piece: how far off is its end?
+//! A corridor of tags on two walls, seen piece by piece: error of its far end.
 
 use crate::tagmap::tests::distances;
 use crate::tagmap::tests::fixture::{Scene, body, fisheye, look, looking, normal, settings};
@@ -28,7 +28,7 @@ fn corridor(seed: u64) -> Scene {
     for k in 0..N_VIEWS {
         let x = PITCH_M * f64::from(N_TAGS) * k as f64 / N_VIEWS as f64 - 1.5;
         let at = Vector3::new(x, 0.1 * normal(&mut rng), 0.1 * normal(&mut rng));
-        // From wall to wall as it goes.
+        // The camera looks from wall to wall as it moves.
         let pose = looking(at, at + Vector3::new(1.0, 0.5 * (4.0 * x).sin(), 0.0), 0.1 * normal(&mut rng));
         let near: Vec<_> = tags.iter().filter(|tag| (0.0..2.5).contains(&(tag.2.translation.x - x))).copied().collect();
         let tags = look(&fisheye(), &pose, &near, NOISE_PX, &mut rng);
@@ -43,7 +43,8 @@ fn corridor(seed: u64) -> Scene {
     Scene { cameras: vec![fisheye()], bodies: vec![body("base")], priors, truth, views, cameras_at }
 }
 
-/// Of the last tag, over seeds: chi-square of three numbers each. Beyond 99.9 % of both sides it is another model.
+/// Sum over seeds of the last tag's chi-square, three numbers each. Beyond the 99.9 % limits of both sides the model is
+/// wrong.
 #[test]
 fn the_far_end_of_a_corridor_is_off_by_what_is_predicted() {
     let seeds = 0..10;

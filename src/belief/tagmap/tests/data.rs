@@ -21,7 +21,7 @@ fn a_tag_seen_twice_in_one_image_is_not_used_there() {
     assert!(map.rejected.iter().all(|rejected| (rejected.view, rejected.id) == (view, twice.id)));
 }
 
-/// Wrong ids, and corners that are far off; which detections these are, by view and id.
+/// Adds wrong ids and corners with gross errors; returns the spoilt detections by view and id.
 fn spoil(scene: &mut Scene, share: f64, seed: u64) -> Vec<(usize, u32)> {
     let mut rng = stream_rng(seed, "outliers");
     let n_tags = scene.truth.len() as u32;
@@ -53,7 +53,7 @@ fn five_percent_of_outliers_are_found_and_do_no_harm() {
         all.extend(distances(&scene, &map));
         let mut rejected: Vec<(usize, u32)> = map.rejected.iter().map(|r| (r.view, r.id)).collect();
         rejected.dedup();
-        // With two tags in an image nobody can tell which of them is wrong.
+        // With two tags in an image nothing shows which of them is wrong.
         let is_judged = |(view, _): &&(usize, u32)| scene.views[*view].tags.len() > 2;
         n_spoilt += spoilt.iter().filter(is_judged).count();
         n_found += spoilt.iter().filter(is_judged).filter(|one| rejected.contains(one)).count();
@@ -68,7 +68,7 @@ fn five_percent_of_outliers_are_found_and_do_no_harm() {
     assert!(within >= 0.96, "{within}");
 }
 
-/// An image full of noise: quadrilaterals at random, of tags that there are.
+/// An image full of noise: random quadrilaterals with ids of existing tags.
 #[test]
 fn an_image_full_of_noise_is_rejected() {
     let mut scene = wall(fisheye(), 6, 14, 0.3, 2);
@@ -113,7 +113,7 @@ fn groups_that_nothing_connects_are_maps_of_their_own() {
     }
 }
 
-/// Images in a long corridor: each shows its neighbours only.
+/// Images in a long corridor: each shows only its neighbours.
 #[test]
 fn a_long_chain_of_tags_holds_together() {
     let camera = pinhole();
@@ -150,7 +150,7 @@ fn a_long_chain_of_tags_holds_together() {
     assert_eq!((map.groups.len(), map.tags.len()), (1, 60));
     let d2 = distances(&scene, &map);
     assert!(d2.iter().all(|d2| *d2 < 25.0), "{d2:?}");
-    // What is far from the base is less sure.
+    // A tag far from the base has a larger standard deviation.
     assert!(map.tag(59).unwrap().position_std_m()[1] > 5.0 * map.tag(5).unwrap().position_std_m()[1]);
 }
 
@@ -195,7 +195,7 @@ fn a_known_map_is_held_and_locates_the_cameras() {
     for (view, truth) in map.views.iter().zip(&scene.cameras_at).filter(|(view, _)| !view.is_empty()) {
         assert!((view[&0].translation.vector - truth.translation.vector).norm() < 0.01);
     }
-    // A tag that is not where it should be shows.
+    // A tag at a wrong place is reported.
     scene.priors[2].pose = Some(Translation3::new(0.05, 0.0, 0.0) * scene.truth[2]);
     let map = solve(&scene.input(), &MapSettings { mode: MapMode::Known, ..settings() }).unwrap();
     let off = map.rejected.iter().filter(|rejected| rejected.id == 2).count();
@@ -218,7 +218,7 @@ fn a_known_place_that_the_views_contradict_is_named() {
     insta::assert_snapshot!("contradicted_place", warnings[0]);
 }
 
-/// A wall of 300 tags, 30 m long: neighbours are connected by many ways, some of them long.
+/// A wall of 300 tags, 30 m long: many chains connect neighbours, some of them long.
 #[test]
 fn a_long_wall_of_tags_holds_together() {
     let camera = fisheye();
@@ -262,7 +262,7 @@ fn a_long_wall_of_tags_holds_together() {
     assert!(distances(&scene, &map).iter().all(|d2| *d2 < 30.0));
 }
 
-/// Squares at random, of random tags.
+/// Random squares with random tags.
 fn nonsense(n_tags: u32, n_views: usize, seed: u64) -> Scene {
     let mut scene = wall(pinhole(), n_tags, n_views, 0.3, seed);
     let mut rng = stream_rng(seed, "nonsense");
@@ -289,7 +289,7 @@ fn nonsense(n_tags: u32, n_views: usize, seed: u64) -> Scene {
     scene
 }
 
-/// An end by a count of steps, the same on every machine, with the reason.
+/// The search ends by a number of steps, the same on every machine, and states the reason.
 #[test]
 fn views_that_contradict_each_other_end_by_the_budget() {
     let scene = nonsense(40, 100, 0);

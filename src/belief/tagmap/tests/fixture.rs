@@ -14,10 +14,10 @@ pub(super) struct Scene {
     pub(super) cameras: Vec<CameraModel>,
     pub(super) bodies: Vec<Body>,
     pub(super) priors: Vec<TagPrior>,
-    /// base_from_tag, as built.
+    /// True poses, base_from_tag.
     pub(super) truth: Vec<Isometry3<f64>>,
     pub(super) views: Vec<MapView>,
-    /// base_from_camera.
+    /// True poses, base_from_camera.
     pub(super) cameras_at: Vec<Isometry3<f64>>,
 }
 
@@ -27,7 +27,7 @@ impl Scene {
     }
 }
 
-/// Corners with noise of 0.3 px, as known.
+/// Settings for corners with a known noise of 0.3 px.
 pub(super) fn settings() -> MapSettings {
     MapSettings { base_tag: Some(0), noise: NoiseScale::Given, ..MapSettings::default() }
 }
@@ -36,7 +36,7 @@ pub(super) fn body(name: &str) -> Body {
     Body { name: name.to_owned(), is_static: true, pose: None }
 }
 
-/// A pose whose z axis points from `at` to `target`, turned about it.
+/// A pose whose z axis points from `at` to `target`, turned about this axis by `spin_rad`.
 pub(super) fn looking(at: Vector3<f64>, target: Vector3<f64>, spin_rad: f64) -> Isometry3<f64> {
     let forward = (target - at).normalize();
     let facing = UnitQuaternion::rotation_between(&Vector3::z(), &forward)
@@ -44,7 +44,7 @@ pub(super) fn looking(at: Vector3<f64>, target: Vector3<f64>, spin_rad: f64) -> 
     Isometry3::from_parts(Translation3::from(at), facing * UnitQuaternion::from_scaled_axis(Vector3::z() * spin_rad))
 }
 
-/// What a camera sees of the tags, with noise; tags that are cut off or seen from behind are left out.
+/// Detections of the tags in a camera, with noise; tags that are cut off or seen from behind are omitted.
 pub(super) fn look(
     camera: &CameraModel,
     base_from_camera: &Isometry3<f64>,

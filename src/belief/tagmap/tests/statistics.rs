@@ -1,4 +1,4 @@
-//! Over many seeds: as good as possible, and as sure as said.
+//! Statistics over many seeds: errors as small as the bound, and covariances that match them.
 
 use crate::tagmap::tests::bound::cramer_rao;
 use crate::tagmap::tests::fixture::{Scene, body, fisheye, look, looking, pinhole, settings, wall};
@@ -16,9 +16,9 @@ const CHI_SQUARE_3_99: f64 = 11.34;
 
 struct Figures {
     share_within: f64,
-    /// Rms position error over the bound's, all in one.
+    /// Rms position error over the bound's, all tags together.
     efficiency: f64,
-    /// The same with each tag's error over its own bound first, so that the worst determined ones do not decide.
+    /// Rms of each tag's error over its own bound, so that the worst determined tags do not dominate.
     each: f64,
     n: usize,
 }
@@ -48,9 +48,9 @@ fn over_seeds(camera: CameraModel, seeds: std::ops::Range<u64>, settings: &MapSe
     }
 }
 
-/// 99 +- 2 % of 500 cases, and no more than 1.1 times the Cramer-Rao bound; the sample's own scatter is 3 % of the
-/// bound. The narrower pinhole sees some tags in one or two images, and these few decide its sum; there each tag counts
-/// alike.
+/// Checks that 99 +- 2 % of 500 cases are within the 99 % quantile. Errors are at most 1.1 times the Cramer-Rao bound;
+/// the sample's own scatter is 3 % of the bound. The narrower pinhole sees some tags in one or two images, and these
+/// few dominate its sum; there each tag counts alike.
 #[test]
 fn errors_are_as_small_as_possible_and_as_large_as_said() {
     for (camera, seeds) in [(fisheye(), 0..100), (pinhole(), 0..40)] {
@@ -65,7 +65,7 @@ fn errors_are_as_small_as_possible_and_as_large_as_said() {
     }
 }
 
-/// The same when the noise is not known, but estimated from the residuals.
+/// Checks the covariances if the noise is not known, but estimated from the residuals.
 #[test]
 fn estimated_noise_gives_honest_covariances() {
     let unsure = MapSettings { corner_std_px: 1.0, noise: NoiseScale::Estimated, ..settings() };
@@ -77,7 +77,7 @@ fn estimated_noise_gives_honest_covariances() {
     assert!((map.noise_scale / NOISE_PX - 1.0).abs() < 0.1, "{}", map.noise_scale);
 }
 
-/// Small tags, far away and nearly head-on: single images cannot tell which way they lean.
+/// Small tags, far away and nearly head-on: single images cannot show which way they lean.
 #[test]
 fn tags_seen_head_on_do_not_end_up_mirrored() {
     let camera = fisheye();
@@ -130,7 +130,7 @@ fn tags_seen_head_on_do_not_end_up_mirrored() {
     assert!(n_mirrored * 5 > n_seen, "the scene is a hard one: {n_mirrored} of {n_seen}");
 }
 
-/// Known places with errors, known to within their standard deviations: the map is better than what was given.
+/// Known places have errors within their standard deviations: the map must be better than the given places.
 #[test]
 fn known_places_help_and_are_not_believed_too_much() {
     let (mut given, mut found, mut all) = (0.0, 0.0, Vec::new());

@@ -374,7 +374,8 @@ fn csv_that_is_of_no_use_is_refused_with_the_remedy() {
     insta::assert_snapshot!("no_utf8", told.join("\n"));
 }
 
-/// One entry per pose, with the camera's measurements of the tags in a list; the same with an entry in each line.
+/// One entry per pose, with the camera's measurements of the tags in a list: as a JSON array, and as one line per
+/// entry.
 #[test]
 fn lists_of_tags_make_a_row_each() {
     let map = "version = 1\n[table]\n[joint_sensors]\n[tags]\nuse = \"position\"\n[tags.columns]\n\
