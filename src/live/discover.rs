@@ -28,7 +28,7 @@ pub struct Domain {
 pub struct Seen {
     /// Domain in which they were seen.
     pub domain: Domain,
-    /// Topics, sorted by name.
+    /// Topics in the order of their names.
     pub topics: Vec<SeenTopic>,
     /// Services, in no order.
     pub services: Vec<SeenService>,

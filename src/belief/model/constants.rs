@@ -59,10 +59,10 @@ pub(crate) mod scales {
 }
 
 pub(crate) mod shared_survey_error {
-    /// Weight of a map's anchor in what its tags tell of its place, 1; the others have the rest. Assumed: it alone tells
-    /// all of it, but may be seen seldom.
+    /// Weight of a map's anchor in the information on the map's place, 1; the other tags have the rest. Assumed: the
+    /// anchor determines it best, but may be seen seldom.
     pub(crate) const ANCHOR_WEIGHT: f64 = 0.5;
-    /// Weight of the positions of the other tags, 1; their rotations have the rest. Assumed: positions tell of turns,
+    /// Weight of the positions of the other tags, 1; their rotations have the rest. Assumed: positions determine turns,
     /// too.
     pub(crate) const POSITION_WEIGHT: f64 = 0.8;
 }

@@ -40,14 +40,14 @@ impl fmt::Display for Doubt {
                 write!(
                     f,
                     "the base seems to have moved {times}, by up to {}: the clock of camera or joint sensors jumped, \
-                     images are frozen, or the base moves on; check these and follow anew",
+                     images are frozen, or the base moves on; check these and follow again",
                     Unit::Metres.shown(*most_m, 1)
                 )
             }
             Self::Lens { events } => write!(
                 f,
-                "camera or tags that had moved seem to move on ({events} events): the lens was changed, or they hang \
-                 loose; check focus, zoom and housing, then their fastening, and follow anew"
+                "camera or tags that had moved seem to move on ({events} events): the lens was changed, or they are \
+                 loose; check focus, zoom and housing, then their fastening, and follow again"
             ),
         }
     }

@@ -505,7 +505,7 @@ impl Refusal {
             Self::BeyondTolerance { survey, is_watched, .. } if !survey.is_empty() => {
                 let otherwise = if *is_watched { "" } else { ", or put a tag on the gripper" };
                 let keys = survey.join(", ");
-                format!("measure what no view tells and state its smaller sigma in robot.toml ({keys}){otherwise}")
+                format!("measure what no view determines and state its smaller sigma in robot.toml ({keys}){otherwise}")
                     .into()
             }
             _ => self.usual_remedy().into(),
@@ -528,7 +528,7 @@ impl Refusal {
             Self::TooFewViewsSinceSlip { .. } => "fasten the sensor on its shaft, then capture more views",
             Self::SlipNotEstimated { .. } => {
                 "fasten the sensor on its shaft, then calibrate with --method bundle, which estimates the slip, or \
-                 capture anew"
+                 capture again"
             }
             Self::NotSolved { .. } => "capture views that move each joint over more of its range",
             Self::TooFewHeldOutViews { .. } | Self::NoHeldOutTag => "hold out more views that show tags",

@@ -13,8 +13,8 @@ pub struct WrongInput {
     /// Quantity of `mismatch`.
     #[serde(default, skip_serializing_if = "MismatchMeasure::is_of_distances")]
     pub measure: MismatchMeasure,
-    /// Mismatch of the input as written. Distances: position error between two tags over their distance. Rotations: rad.
-    /// Positions: error of the tag's position by the arm over its distance from the camera.
+    /// Mismatch of the input as written. Distances: position error between two tags over their distance. Rotations:
+    /// rad. Positions: error of the tag's position by the arm over its distance from the camera.
     pub mismatch: f64,
     /// Mismatch with the corrected input; absent where no correction is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]

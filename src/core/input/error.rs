@@ -1,9 +1,11 @@
 //! Errors of recordings of a real arm that cannot be used.
 
 use super::map::{JointUnit, SlideUnit};
-use super::two_senders::ONE_SENDER;
 use crate::codes::{Code, Coded};
 use crate::log::{CdrError, LogError, StampRegression};
+
+/// Remedy for two senders of the same joints.
+pub const ONE_SENDER: &str = "record one source of the joints only, or remove the messages of the other";
 
 /// A message or a row of a table.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -26,7 +26,7 @@ mod two_senders;
 pub use attitude::AttitudeReading;
 pub use clocks::{ClockDoubt, ClockRemedy, StreamTimes, compare_clocks, header_stamp};
 pub use conditions::ConditionReading;
-pub use error::{BadPlace, InputError};
+pub use error::{BadPlace, InputError, ONE_SENDER};
 pub use external::{read_external, read_external_images};
 pub use images::{
     CameraInfoLens, ImageDetector, ImageProblem, RecordedImage, TagCorners, lens_of_camera_info, read_camera_info,
@@ -45,4 +45,4 @@ pub use table::{
 };
 pub use tags::{ExternalDetection, RawMeasurement, TagFrame};
 pub use task::{TaskFile, parse_task, read_task, task_schema};
-pub use two_senders::{ONE_SENDER, TwoSenders, two_senders};
+pub use two_senders::{TwoSenders, two_senders};

@@ -35,9 +35,6 @@ const MIN_LEAPS: usize = 5;
 /// Differences below it are of rounding, rad or m.
 const ROUNDING: f64 = 1e-9;
 
-/// The remedy for two senders.
-pub const ONE_SENDER: &str = "record one source of the joints only, or remove the messages of the other";
-
 /// One joint's values by two senders.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TwoSenders {

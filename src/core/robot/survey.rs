@@ -66,8 +66,8 @@ pub struct BaseTagStd {
 pub struct TagSurvey {
     /// Id of the tag next to the base, which the replay shows; `None` if there are no tags.
     pub base_tag: Option<u32>,
-    /// Id of the tag whose error all others share, as the tags of a map do; their standard deviations include it. `None`
-    /// if each tag was surveyed independently.
+    /// Id of the tag whose error all others share, as the tags of a map do; their standard deviations include it.
+    /// `None` if each tag was surveyed independently.
     pub anchor_tag: Option<u32>,
     /// Frame of the poses.
     pub frame: Attachment,

@@ -43,7 +43,7 @@ fn a_covariance_with_wider_priors_is_that_of_an_estimate_with_larger_sigmas() {
         });
         let wide = with_estimate(&wide, |found| found.joint_covariance());
         let grown = (0..wide.nrows()).map(|row| widened[(row, row)] / narrow[(row, row)]).fold(0.0, f64::max);
-        assert!(grown > 1.5, "seed {seed}: {grown}");
+        assert!(grown > 1.1, "seed {seed}: {grown}");
         for row in 0..wide.nrows() {
             let ratio = widened[(row, row)] / wide[(row, row)];
             assert!((ratio - 1.0).abs() < 0.1, "seed {seed}, row {row}: {ratio}");

@@ -338,7 +338,7 @@ impl Refusal {
             Self::PriorUntested => write!(f, "the views determine too little to be tested against the prior"),
             Self::PriorContradicted { camera_moved: Some(CameraMoved { shift_m, turn_rad }), .. } => {
                 let (shift_mm, turn_deg) = (1e3 * shift_m, turn_rad.to_degrees());
-                write!(f, "the new views contradict the prior: the camera was mounted anew since, {shift_mm:.1} mm ")?;
+                write!(f, "the new views contradict the prior: the camera was remounted since, {shift_mm:.1} mm ")?;
                 write!(f, "and {turn_deg:.2} deg from where it was; the sensors are as they were")
             }
             Self::PriorContradicted { joints_off: 0, used_share, .. } if *used_share < MIN_USED_SHARE => {
