@@ -644,13 +644,14 @@ impl<'a> BundleCalibration<'a> {
         let most = calibration.reservations.first().map(|reservation| reservation.what.clone());
         calibration.refuse_for(refusal_by_priors(&by_data_alone, &calibration.u95, most));
         calibration.restate_risk();
-        calibration.advise_survey(diagnosis.robot.is_watched(), |index| {
+        let keys_at = |index| {
             let target = by_data.targets.iter().find(|target| target.target_idx == index);
             let keys = |target: &TargetPrediction| {
                 estimated.by_views().keys_that_hold(&target.angles, target.covariance_m2.trace())
             };
             target.map_or_else(Vec::new, keys)
-        });
+        };
+        calibration.advise_survey(keys_at, &diagnosis.robot);
     }
 
     /// Returns the consistency of the views with the prior, and the refusals for it.

@@ -301,7 +301,7 @@ impl VerdictInput<'_> {
     /// is another. Reports one that is unusual but not refused.
     fn beyond_datasheet(&self, calibration: &mut Calibration, table: &mut VerdictTable) -> Option<Refusal> {
         let robot = self.input.robot;
-        let apart = self.found.from_datasheet();
+        let apart = self.found.apart_from_datasheet();
         let FromDatasheet { parameter, sigmas, off } =
             apart.into_iter().max_by(|a, b| a.sigmas.total_cmp(&b.sigmas))?;
         let name = parameter.name(robot);

@@ -59,7 +59,7 @@ impl Estimate<'_> {
 
     /// Deviations of gains and offsets from their datasheets, where these state a standard deviation; each as it was
     /// before its sensor slipped.
-    pub(crate) fn from_datasheet(&self) -> Vec<FromDatasheet> {
+    pub(crate) fn apart_from_datasheet(&self) -> Vec<FromDatasheet> {
         let (robot, sound) = (self.problem.robot, JointParameters::default());
         let linear = |kind| matches!(kind, ParameterKind::Gain | ParameterKind::Offset);
         let stated = self.joint_parameters().iter().filter(|p| linear(p.kind) && p.prior_std(robot) > 0.0);
@@ -76,7 +76,7 @@ impl Estimate<'_> {
         if !self.has_own_priors {
             return;
         }
-        let apart = self.from_datasheet();
+        let apart = self.apart_from_datasheet();
         for kind in [ParameterKind::Gain, ParameterKind::Offset] {
             let alike: Vec<Parameter> =
                 apart.iter().map(|of| of.parameter).filter(|parameter| parameter.kind == kind).collect();

@@ -53,6 +53,11 @@ struct Motion {
     moved: Isometry3<f64>,
 }
 
+/// Reads evidence and motion from an estimate.
+type ReadMotion<'a> = dyn Fn(&Estimate<'_>) -> Option<(f64, Isometry3<f64>)> + 'a;
+/// Vector of two poses: before and after.
+type OfTwoPoses<'a> = dyn Fn(&Isometry3<f64>, &Isometry3<f64>) -> Vector3<f64> + 'a;
+
 impl MotionSearch<'_> {
     /// Refusal that names the motion, if the views in two parts are much likelier than in one. `refusals`: those of the
     /// views so far.
@@ -151,7 +156,7 @@ impl MotionSearch<'_> {
 
     /// Evidence for the views in two parts, nats, and the motion between them; `None` if they still do not fit.
     fn fitted(&self, mover: Mover, robot: &Robot, views: &[View], drawing: &Drawing) -> Option<(f64, Isometry3<f64>)> {
-        let fit = |robot: &Robot, read: &dyn Fn(&Estimate<'_>) -> Option<(f64, Isometry3<f64>)>| {
+        let fit = |robot: &Robot, read: &ReadMotion<'_>| {
             let setup = BundleSetup::new(robot, views, &declared(robot, views), None);
             let setup = setup.with_drawing(drawing).with_clocks(self.clocks);
             let (found, _) = setup.estimate()?;
@@ -289,7 +294,7 @@ fn motion_of_tags(found: &Estimate<'_>, n: usize) -> Option<Isometry3<f64>> {
             Some((found.tag(tag).0, after, weights))
         })
         .collect();
-    let mean = |of: &dyn Fn(&Isometry3<f64>, &Isometry3<f64>) -> Vector3<f64>, kind: usize| {
+    let mean = |of: &OfTwoPoses<'_>, kind: usize| {
         let sum: f64 = pairs.iter().map(|(.., weights)| weights[kind]).sum();
         let all = pairs.iter().map(|(before, after, weights)| of(before, after) * weights[kind]);
         all.sum::<Vector3<f64>>() / sum

@@ -2,6 +2,7 @@
 
 use armcal_core::kind::Kind;
 use armcal_core::kinematics::JointKind;
+use armcal_core::robot::Robot;
 use armcal_core::routine::Method;
 use armcal_core::schema::schema_of;
 use armcal_core::stats::Summary;
@@ -208,10 +209,10 @@ impl Calibration {
     }
 
     /// Says where the sigmas are stated that the decision rule refuses for; `keys`: those at the target of that index.
-    pub(crate) fn advise_survey(&mut self, of_watched: bool, keys: impl Fn(usize) -> Vec<String>) {
+    pub(crate) fn advise_survey(&mut self, keys: impl Fn(usize) -> Vec<String>, robot: &Robot) {
         for refusal in &mut self.refusals {
             if let Refusal::BeyondTolerance { target, survey, is_watched, .. } = refusal {
-                (*survey, *is_watched) = (keys(*target - 1), of_watched);
+                (*survey, *is_watched) = (keys(*target - 1), robot.is_watched());
             }
         }
         self.state_refusals();

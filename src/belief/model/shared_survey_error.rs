@@ -66,10 +66,10 @@ pub(crate) struct Weights {
 }
 
 impl Weights {
-    /// Returns the weights for the anchor, if there is one, and for `n_others` other tags.
-    pub(crate) fn of(has_anchor: bool, n_others: usize) -> Self {
+    /// Returns the weights for `n_anchors` (none or one) and for `n_others` other tags.
+    pub(crate) fn of(n_anchors: usize, n_others: usize) -> Self {
         let anchor = if n_others == 0 { 1.0 } else { ANCHOR_WEIGHT };
-        let left = if has_anchor { 1.0 - ANCHOR_WEIGHT } else { 1.0 };
+        let left = if n_anchors > 0 { 1.0 - ANCHOR_WEIGHT } else { 1.0 };
         let other = left / n_others.max(1) as f64;
         // An anchor's own position and rotation are independent.
         Self { anchor: [anchor; 2], other: [POSITION_WEIGHT, 1.0 - POSITION_WEIGHT].map(|weight| weight * other) }
@@ -94,7 +94,7 @@ pub(crate) fn count_as_independent(robot: &mut Robot, is_seen: impl Fn(usize) ->
     let is_anchor = |tag: &SurveyedTag| Some(tag.id) == anchor_tag;
     let seen = || robot.tags.iter().enumerate().filter(|(idx, tag)| is_seen(*idx) && tag.is_known());
     let n_others = seen().filter(|(_, tag)| !is_anchor(tag)).count();
-    let weights = Weights::of(seen().any(|(_, tag)| is_anchor(tag)), n_others);
+    let weights = Weights::of(seen().count() - n_others, n_others);
     for tag in robot.tags.iter_mut().filter(|tag| tag.is_known()) {
         let (m, rad) = (tag.position_std_m, tag.rotation_std_rad);
         let place = (tag.base_from_tag.isometry(), is_anchor(tag));

@@ -536,19 +536,7 @@ impl Refusal {
                 "keep the datasheet values, or check tag map, camera mount and time stamps"
             }
             Self::Overfitted { .. } => "capture more views at other configurations",
-            Self::PriorsBeyondTolerance { most: Some(most), .. } if most.starts_with("tag survey") => {
-                "measure the frame of the tags in the arm's base and state its sigmas in [geometry] of robot.toml, or \
-                 touch three surveyed surfaces (step `touch`)"
-            }
-            Self::PriorsBeyondTolerance { most: Some(most), .. } if most.starts_with("camera mount") => {
-                "measure where the camera is and state its smaller sigmas in [camera] of robot.toml (mount_std_m, \
-                 mount_std_rad), or touch three surveyed surfaces (step `touch`)"
-            }
-            Self::PriorsBeyondTolerance { .. } => {
-                "put a tag on the gripper, touch three surveyed surfaces (step `touch`), or measure the arm and state \
-                 its sigmas in [geometry] of robot.toml"
-            }
-            Self::BeyondTolerance { .. } => "capture more views, or put a tag on the gripper",
+            Self::PriorsBeyondTolerance { .. } | Self::BeyondTolerance { .. } => self.remedy_of_tolerance(),
             Self::TargetsNotJudged { .. } => "remove these targets from the task, or free the joints that they need",
             Self::TargetsNotCovered { .. } => "capture views that move these joints as far as the targets need",
             Self::HeldOutError { .. } => {
@@ -580,12 +568,38 @@ impl Refusal {
                 "write this length in metres"
             }
             Self::Length { .. } => "measure again, and correct this length or the tags' size_m in robot.toml",
+            Self::PriorReused | Self::PriorSingular | Self::PriorContradicted { .. } => self.remedy_of_prior(),
+        }
+    }
+
+    /// Advice for a result beyond the tolerance.
+    fn remedy_of_tolerance(&self) -> &'static str {
+        match self {
+            Self::PriorsBeyondTolerance { most: Some(most), .. } if most.starts_with("tag survey") => {
+                "measure the frame of the tags in the arm's base and state its sigmas in [geometry] of robot.toml, or \
+                 touch three surveyed surfaces (step `touch`)"
+            }
+            Self::PriorsBeyondTolerance { most: Some(most), .. } if most.starts_with("camera mount") => {
+                "measure where the camera is and state its smaller sigmas in [camera] of robot.toml (mount_std_m, \
+                 mount_std_rad), or touch three surveyed surfaces (step `touch`)"
+            }
+            Self::PriorsBeyondTolerance { .. } => {
+                "put a tag on the gripper, touch three surveyed surfaces (step `touch`), or measure the arm and state \
+                 its sigmas in [geometry] of robot.toml"
+            }
+            _ => "capture more views, or put a tag on the gripper",
+        }
+    }
+
+    /// Advice for a prior that cannot be used.
+    fn remedy_of_prior(&self) -> &'static str {
+        match self {
             Self::PriorReused => "give a prior that was made from other views",
             Self::PriorSingular => "make the prior again",
             Self::PriorContradicted { camera_moved: Some(_), .. } => {
                 "put the camera back, or calibrate without --prior from as many views as the first time"
             }
-            Self::PriorContradicted { .. } => "calibrate without --prior",
+            _ => "calibrate without --prior",
         }
     }
 }

@@ -80,9 +80,8 @@ fn own_factor(solved: &Solved<'_>, id: u32) -> Option<f64> {
         return None;
     }
     let n = seen.len() as f64;
-    let mean =
-        |of: &dyn Fn(&(Vector3<f64>, Vector3<f64>)) -> Vector3<f64>| seen.iter().map(of).sum::<Vector3<f64>>() / n;
-    let (ray, from) = (mean(&|seen| seen.0), mean(&|seen| seen.1));
+    let ray = seen.iter().map(|seen| seen.0).sum::<Vector3<f64>>() / n;
+    let from = seen.iter().map(|seen| seen.1).sum::<Vector3<f64>>() / n;
     let along: f64 = seen.iter().map(|seen| (seen.0 - ray).dot(&(seen.1 - from))).sum();
     let spread: f64 = seen.iter().map(|seen| (seen.0 - ray).norm_squared()).sum();
     Some(-along / spread)

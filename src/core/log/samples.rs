@@ -60,6 +60,7 @@ pub fn one_of_each() -> Vec<Message> {
         position_std_m: 0.001,
         rotation_std_rad: 0.0035,
     };
+    let targets_m = vec![[1.0, 0.2, -0.3], [0.9, 0.0, 0.1]];
     let mut messages = vec![
         Message::JointSensors(JointSensorSample { stamp, counts: JointCounts::from_slice(&[1.0, 2047.5, 4095.0]) }),
         Message::JointCommand(JointCommand { stamp, counts: JointCounts::from_slice(&[-1.0, 0.1, 4095.0]) }),
@@ -82,12 +83,7 @@ pub fn one_of_each() -> Vec<Message> {
         }),
         Message::Gripper(GripperSample { stamp, opening_m: 0.0985 }),
         Message::GripperCommand(GripperCommand { stamp, opening_m: 0.1 }),
-        Message::Task(ReachTask {
-            stamp,
-            targets_m: vec![[1.0, 0.2, -0.3], [0.9, 0.0, 0.1]],
-            tolerance_m: 0.01,
-            poses: Vec::new(),
-        }),
+        Message::Task(ReachTask { stamp, targets_m, tolerance_m: 0.01, poses: Vec::new() }),
         Message::Touch(ToolTouch {
             stamp,
             duration_s: 0.5,

@@ -245,7 +245,6 @@ fn robot_of(folder: &Path, raw: RobotFile, urdf: UrdfModel, meshes: Meshes) -> R
         displacement_l_per_rad: displacements_l_per_rad(&file, &raw.joint_sensor, &arm)?,
         motion: raw.motion.check(&file)?,
     };
-    let stowed = stowed_or_middle(&file, raw.stowed_rad.as_deref(), &sensors)?;
     let mut tool = arm.attachment(&raw.tool.link)?;
     raw.tool.check(&file)?;
     let gripper = raw.gripper.map(|gripper| gripper.check(&file, &arm, &tool)).transpose()?;
@@ -269,7 +268,7 @@ fn robot_of(folder: &Path, raw: RobotFile, urdf: UrdfModel, meshes: Meshes) -> R
         urdf_name: file_name(&raw.urdf),
         urdf_text: urdf.text,
         base_link: raw.base_link,
-        stowed,
+        stowed: stowed_or_middle(&file, raw.stowed_rad.as_deref(), &sensors)?,
         planning_issues,
         buoyancy_fraction,
         tool: ToolSpec { mount: tool, tip_radius_m: raw.tool.tip_radius_m },

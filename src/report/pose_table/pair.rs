@@ -153,7 +153,7 @@ fn keys_as(
 /// Says which image names would join the tables but are ambiguous without folder and extension.
 fn ambiguous(tables: [&LookedAt; 2], roles: [&Roles; 2]) -> Option<String> {
     let found = keys_as(tables, roles, (plain_key, 0.0));
-    let [of_joint, of_tag] = found.into_iter().find(|names| names.iter().all(is_image))?;
+    let [of_joint, of_tag] = found.into_iter().find(|names| names.iter().all(|name| is_image(name)))?;
     let cells: Vec<&str> = tables[0].contents.first_cells(&of_joint).collect();
     let again = |k: &usize| cells[..*k].iter().find(|cell| plain_key(cell) == plain_key(cells[*k]));
     let (first, second) = (0..cells.len()).find_map(|k| Some((*again(&k)?, cells[k])))?;
@@ -163,7 +163,7 @@ fn ambiguous(tables: [&LookedAt; 2], roles: [&Roles; 2]) -> Option<String> {
     ))
 }
 
-fn is_image(name: &String) -> bool {
+fn is_image(name: &str) -> bool {
     IMAGES.iter().any(|word| name.to_lowercase().contains(word))
 }
 

@@ -22,9 +22,8 @@ struct Candidate {
 
 /// The topic and the text of `[tags]`; `None` where the recording has none.
 pub(super) fn choose_tags(contents: &Contents, robot: Option<&Robot>) -> Option<(String, String)> {
-    let needs_lens = robot.is_some_and(|robot| !robot.camera.lens.is_known());
-    let chosen = of_detections(contents, needs_lens).or_else(|| of_transforms(contents));
-    let chosen = chosen.or_else(|| of_images(contents, needs_lens));
+    let chosen = of_detections(contents, robot).or_else(|| of_transforms(contents));
+    let chosen = chosen.or_else(|| of_images(contents, robot));
     let (topic, chosen) = chosen?;
     let mut text = format!("\n[tags]\n{chosen}");
     let topics = |kind| contents.of_kind(kind).map(|(topic, _)| topic);
@@ -34,10 +33,10 @@ pub(super) fn choose_tags(contents: &Contents, robot: Option<&Robot>) -> Option<
     Some((topic, text))
 }
 
-fn of_detections(contents: &Contents, needs_lens: bool) -> Option<(String, String)> {
+fn of_detections(contents: &Contents, robot: Option<&Robot>) -> Option<(String, String)> {
     let (name, topic) = contents.of_kind(Kind::Detections).max_by_key(|(_, topic)| topic.messages)?;
     let ids: Vec<String> = topic.ids.iter().map(i32::to_string).collect();
-    let lens = camera_info(contents, (name, topic), needs_lens);
+    let lens = camera_info(contents, (name, topic), robot);
     let text = if topic.has_board_corners() {
         format!(
             "topic = {}   # {} messages; detections without an outline: the corners of a board\nuse = \
@@ -57,7 +56,7 @@ fn of_detections(contents: &Contents, needs_lens: bool) -> Option<(String, Strin
 /// The line that names a camera's lens for the detections or images on that topic. It prefers the camera_info with the
 /// same frame, all corners in its image and the most similar name. A comment where none is usable, and the line too if
 /// the robot needs a lens, so that `calibrate` gives the reason.
-fn camera_info(contents: &Contents, (name, topic): (&str, &Topic), needs_lens: bool) -> String {
+fn camera_info(contents: &Contents, (name, topic): (&str, &Topic), robot: Option<&Robot>) -> String {
     let shared = |other: &str| other.chars().zip(name.chars()).take_while(|(a, b)| a == b).count();
     let rank = |(of, info): &(&String, &Topic)| {
         let size = info.lens.as_ref().and_then(|lens| lens.as_ref().ok());
@@ -70,7 +69,7 @@ fn camera_info(contents: &Contents, (name, topic): (&str, &Topic), needs_lens: b
         Some(Ok([width, height])) => {
             format!("camera_info = {}   # {width} x {height} px; used where robot.toml has no lens\n", quoted(chosen))
         }
-        Some(Err(problem)) if needs_lens => {
+        Some(Err(problem)) if robot.is_some_and(|robot| !robot.camera.lens.is_known()) => {
             let why = comment(&format!("# the lens there {problem}"));
             format!("camera_info = {}\n{why}\n", quoted(chosen))
         }
@@ -118,7 +117,7 @@ fn of_transforms(contents: &Contents) -> Option<(String, String)> {
     Some((topic.clone(), text))
 }
 
-fn of_images(contents: &Contents, needs_lens: bool) -> Option<(String, String)> {
+fn of_images(contents: &Contents, robot: Option<&Robot>) -> Option<(String, String)> {
     let (name, topic) = contents.of_kind(Kind::Images).max_by_key(|(_, topic)| topic.messages)?;
     let text = format!(
         "topic = {}   # {} images; armcal looks for tags in them\nuse = \"corners\"\n\
@@ -126,7 +125,7 @@ fn of_images(contents: &Contents, needs_lens: bool) -> Option<(String, String)> 
          # image_period_s = 0.2   # looks at one image in so many seconds\n{}",
         quoted(name),
         topic.messages,
-        camera_info(contents, (name, topic), needs_lens)
+        camera_info(contents, (name, topic), robot)
     );
     Some((name.clone(), text))
 }

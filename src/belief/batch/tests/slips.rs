@@ -233,7 +233,7 @@ fn a_calibration_by_positions_is_refused_for_a_slip_and_for_nothing_else() {
         let mut slipped = sound.clone();
         slip(&mut slipped, joint, 12, 0.012);
         let name = sound.robot.sensors[joint].joint.clone();
-        assert_eq!(refused_for(sound), [String::new(); 0], "seed {seed}");
+        assert_eq!(refused_for(sound), Vec::<String>::new(), "seed {seed}");
         assert_eq!(refused_for(slipped), [name], "seed {seed}");
     }
 }

@@ -22,7 +22,7 @@ fn stated_closely(seed: u64, sigmas: f64) -> Case {
     let mut case = case_with_range(seed, Some((3, 0.05)));
     for _ in 0..3 {
         let largest = with_estimate(&case, |found| {
-            let gains = found.from_datasheet().into_iter().filter(|of| of.parameter.kind == ParameterKind::Gain);
+            let gains = found.apart_from_datasheet().into_iter().filter(|of| of.parameter.kind == ParameterKind::Gain);
             gains.map(|of| of.off.abs()).fold(0.0, f64::max)
         });
         case.robot.sensors.iter_mut().for_each(|spec| spec.gain_std = largest / sigmas);

@@ -162,7 +162,9 @@ fn measured() -> Vec<Refusal> {
     [measured_of_the_fit(), misread_inputs(), measured_of_repairs()].concat()
 }
 
-fn beyond_tolerance(survey: Vec<String>, is_watched: bool) -> Refusal {
+/// A result beyond the tolerance: of an arm that is watched if a survey would help.
+fn beyond_tolerance(survey: Vec<String>) -> Refusal {
+    let is_watched = !survey.is_empty();
     Refusal::BeyondTolerance { target: 3, probability: 0.31, u95_m: 0.03, tolerance_m: 0.02, survey, is_watched }
 }
 
@@ -176,8 +178,8 @@ fn measured_of_the_fit() -> Vec<Refusal> {
         Refusal::NoBetterThanDatasheet { held_out_m: 0.02, datasheet_m: 0.019 },
         Refusal::NoBetterThanBaseline { held_out_m: 0.0201, baseline_m: 0.0203, p_value: 0.4 },
         Refusal::Overfitted { held_out_m: 0.011, fit_m: 0.004 },
-        beyond_tolerance(Vec::new(), false),
-        beyond_tolerance(vec!["offset_std_rad of turn".to_owned(), "mount_std_rad".to_owned()], true),
+        beyond_tolerance(Vec::new()),
+        beyond_tolerance(vec!["offset_std_rad of turn".to_owned(), "mount_std_rad".to_owned()]),
         Refusal::PriorsBeyondTolerance { target: 3, probability: 0.08, u95_m: 0.03, tolerance_m: 0.02, most: None },
         Refusal::TargetsNotJudged { targets: vec![2, 5] },
         Refusal::HeldOutError { held_out_m: 0.3, limit_m: 0.019, source: HeldOutLimitSource::Reach },

@@ -284,13 +284,7 @@ impl Refusal {
                 write!(f, "{joint}: {evidence}; this method takes its offset as the same in all views")
             }
             Self::Length { what, key, measured_m, by_views_m, std_m } => {
-                let sigmas = (measured_m - by_views_m).abs() / std_m;
-                let [measured, by_views, std] = [measured_m, by_views_m, std_m].map(|m| 1e3 * m);
-                write!(f, "{what} is {measured:.1} mm by {key} and {by_views:.1} mm by the views: ")?;
-                match unit_of(measured_m / by_views_m) {
-                    Some(unit) => write!(f, "it is written in {unit}, not in metres"),
-                    None => write!(f, "{sigmas:.0} sigmas of {std:.1} mm apart"),
-                }
+                fmt_length(f, [what, key], [*measured_m, *by_views_m, *std_m])
             }
             Self::Touch { off_m, surface, chi2, limit, causes, link, tool_point_m: [x, y, z] } => write!(
                 f,
@@ -405,4 +399,14 @@ pub fn in_words(refusals: &[Refusal]) -> Option<String> {
     let causes = causes.iter().map(|refusal| format!("{} [{}]", refusal.cause(), refusal.code()));
     let words: Vec<String> = full.iter().map(ToString::to_string).chain(causes).collect();
     (!words.is_empty()).then(|| words.join("; also: "))
+}
+
+/// A length that the views contradict: `[what, key]`, and `[measured, by the views, standard deviation]`, m.
+fn fmt_length(f: &mut fmt::Formatter<'_>, [what, key]: [&str; 2], lengths_m: [f64; 3]) -> fmt::Result {
+    let [measured, by_views, std] = lengths_m.map(|m| 1e3 * m);
+    write!(f, "{what} is {measured:.1} mm by {key} and {by_views:.1} mm by the views: ")?;
+    match unit_of(measured / by_views) {
+        Some(unit) => write!(f, "it is written in {unit}, not in metres"),
+        None => write!(f, "{:.0} sigmas of {std:.1} mm apart", (measured - by_views).abs() / std),
+    }
 }

@@ -217,7 +217,7 @@ fn count_shared_error(tags: &mut [TagPrior], anchor_tag: Option<u32>) {
     let (position_std_m, rotation_std_rad) = (largest(&std[..3]), largest(&std[3..]));
     let shared = SharedSurveyError { anchor: place, position_std_m, rotation_std_rad };
     let n_known = tags.iter().filter(|tag| tag.body == body && tag.pose.is_some()).count();
-    let weights = Weights::of(true, n_known - 1);
+    let weights = Weights::of(1, n_known - 1);
     for tag in tags.iter_mut().filter(|tag| tag.body == body) {
         if let (Some(pose), Some(std)) = (&tag.pose, &mut tag.std) {
             *std = weights.independent(&shared, (pose, Some(tag.id) == anchor_tag), std);
