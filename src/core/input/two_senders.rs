@@ -197,7 +197,7 @@ mod tests {
             for (late_s, bias_rad) in [(0.001, 0.02), (0.01, 0.012), (0.01, -0.3)] {
                 let other = one.iter().map(|&(t, x)| (t + late_s, x + bias_rad));
                 let found = told(one.iter().copied().chain(other).collect()).expect("two senders");
-                assert!((found.apart - f64::abs(bias_rad)).abs() < 1e-3, "{seed}: {found:?}");
+                assert!((found.apart - f64::abs(bias_rad)).abs() < 5e-3, "{seed}: {found:?}");
                 assert!(found.within_s <= late_s + 1e-6, "{seed}: {found:?}");
             }
             let zeros = |every: usize, late_s: f64| one.iter().step_by(every).map(move |&(t, _)| (t + late_s, 0.0));
