@@ -25,7 +25,7 @@ pub fn sample() -> Calibration {
     Calibration::read(&file).expect("the sample reads")
 }
 
-/// What an estimator of all terms of `n` joints could have found: nonlinearity up to some `nonlinearity` of the range.
+/// Parameters of all terms of `n` joints as an estimator could find them; nonlinearity up to about `nonlinearity` of the range.
 pub fn estimate(
     robot: &Robot,
     n: usize,

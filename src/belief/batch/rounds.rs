@@ -1,5 +1,7 @@
 //! One calibration by `bundle`: rounds of an estimate and its stages, which the lists in `BundleCalibration` name.
 
+mod wrong_inputs;
+
 use crate::batch::constants::rounds::MIN_VIEWS_FOR_EVIDENCE;
 use crate::batch::failure_impact::FailureImpact;
 use crate::batch::tables::{
@@ -14,17 +16,13 @@ use crate::checks::innovations::Innovations;
 use crate::checks::touch_term::TouchUpdate;
 use crate::explain::calibration_prior::PriorConsistency;
 use crate::explain::drawing::Drawing;
-use crate::explain::failure_detection::{FailureSearch, is_suspicious};
+use crate::explain::failure_detection::FailureSearch;
 use crate::explain::failures::Failure;
 use crate::explain::model_selection::{OptionalTerm, Selection};
-use crate::explain::moved_between::MotionSearch;
 use crate::explain::other_lens::{lens_that_fits, of_better_model};
-use crate::explain::reading_search::ReadingSearch;
 use crate::explain::setup::{BundleSetup, Clocks, declared};
 use crate::explain::tags::freed::MovedTags;
-use crate::explain::unpaired::unpaired;
-use crate::explain::wrong_input::wrong_input;
-use crate::file::calibration::{Calibration, Status};
+use crate::file::calibration::Calibration;
 use crate::file::map_table::MapResult;
 use crate::file::metrics::HeldOutMetrics;
 use crate::judge::{TargetError, U95Table};
@@ -33,9 +31,7 @@ use crate::model::shared_survey_error::count_as_independent;
 use crate::positions::position_problem::PositionProblem;
 use crate::positions::solution::Solution;
 use crate::positions::unobservable::grouped_names;
-use crate::say::reading_error::MisreadReadings;
 use crate::say::refusal::Refusal;
-use crate::say::wrong_input::WrongInput;
 use crate::solve::covariance::ParameterCovariance;
 use crate::solve::details::TargetPrediction;
 use crate::solve::estimate::{Estimate, estimate};
@@ -45,7 +41,7 @@ use crate::tagmap::tag_mapping::map_unknown_tags;
 use crate::views::calibration_data::CalibrationData;
 use crate::views::error::CalibError;
 use crate::views::view::{ObservationRejection, View};
-use armcal_core::codes::{Code, Coded};
+use armcal_core::codes::Code;
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::{Robot, SurveyedTag};
 use armcal_core::routine::Method;
@@ -343,68 +339,6 @@ impl<'a> BundleCalibration<'a> {
         let of_better_model = |&camera: &usize| Some((camera, of_better_model(&input, camera)?));
         let models: Vec<_> = self.drawing.lenses.iter().filter_map(of_better_model).collect();
         found.report_drawing(&self.drawing, &models, &at, calibration);
-    }
-
-    /// Puts a wrong input first among the refusals: the images contradict a file, or the readings do not mean what the
-    /// input map says. Several repaired tags are refused, too, where one other reading of the whole map or lens
-    /// explains them.
-    fn blame_input(&self, estimated: &Estimated<'_>, _: &Diagnosis, calibration: &mut Calibration) {
-        let failures = estimated.failures;
-        if calibration.status != Status::Refused {
-            let has_moved_tags = self.moved.n_moved() > 1;
-            let wrong =
-                has_moved_tags.then(|| wrong_input(&self.data.data, &self.surveyed, &self.data.robot)).flatten();
-            if let Some(wrong) = wrong.filter(WrongInput::is_of_all_tags) {
-                calibration.refuse_first_for([Refusal::WrongInput(wrong)]);
-                return;
-            }
-            let (robot, views, drawing) = (&self.data.robot, &self.as_read[..], &self.drawing);
-            let search = ReadingSearch { robot, views, failures, drawing, map: None };
-            calibration.refuse_first_for(search.find_other_turns().map(Refusal::MisreadReadings));
-            return;
-        }
-        let is_of_lens = calibration.refusals.iter().any(|refusal| matches!(refusal, Refusal::Lens { .. }));
-        if is_of_lens {
-            return;
-        }
-        if let Some(wrong) = wrong_input(&self.data.data, &self.surveyed, &self.data.robot) {
-            calibration.refuse_first_for([Refusal::WrongInput(wrong)]);
-            return;
-        }
-        if calibration.refusals.iter().any(|refusal| refusal.code() == Code::JointsAlike) {
-            return;
-        }
-        // A named scale or unit explains all refusals.
-        let is_of_line = |refusal: &Refusal| matches!(refusal, Refusal::SensorLine { .. } | Refusal::SensorUnit { .. });
-        let is_of_scale = |refusal: &Refusal| is_of_line(refusal) || matches!(refusal, Refusal::BeyondDatasheet { .. });
-        if calibration.refusals.iter().any(is_of_line) && calibration.refusals.iter().all(is_of_scale) {
-            return;
-        }
-        let (robot, views, drawing, clocks) = (&self.data.robot, &self.as_read[..], &self.drawing, self.clocks());
-        let motion = MotionSearch { robot, views, failures, drawing, clocks }.find(&calibration.refusals);
-        if motion.is_some() {
-            calibration.refuse_first_for(motion);
-            return;
-        }
-        // A repair beyond its bound explains nothing.
-        let is_unbounded = |refusal: &Refusal| matches!(refusal, Refusal::RepairTooLarge { .. });
-        let nominal = Drawing::default();
-        let drawing = if calibration.refusals.iter().any(is_unbounded) { &nominal } else { &self.drawing };
-        let map = self.map.is_none().then_some(&self.surveyed[..]);
-        let search = ReadingSearch { robot: &self.data.robot, views: &self.as_read, failures, drawing, map };
-        calibration.refuse_first_for(search.find().or_else(|| self.unpaired(estimated)).map(Refusal::MisreadReadings));
-    }
-
-    /// Searches for readings in a wrong order, with the tags as surveyed, where no model explains the views.
-    fn unpaired(&self, estimated: &Estimated<'_>) -> Option<MisreadReadings> {
-        if !is_suspicious(estimated.by_views()) {
-            return None;
-        }
-        let mut robot = self.data.robot.clone();
-        if self.map.is_none() {
-            robot.tags.clone_from(&self.surveyed);
-        }
-        unpaired(&robot, &self.as_read)
     }
 
     fn lens_that_fits(&self, input: &BundleInput<'_>, found: &Estimate<'_>) -> Option<Drawing> {

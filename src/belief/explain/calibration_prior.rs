@@ -10,7 +10,7 @@
 //! freedom as S has eigenvalues above `TOLD_SHARE` in units of P0.
 
 use crate::explain::constants::calibration_prior::{
-    LEAST_SLIP_STD_RAD, MAX_ROUNDING, MOUNTED_ANEW_STD, ROUNDING, USUAL_DRIFT_STD_RAD_PER_SQRT_H, Z_999, Z_OF_JOINTS,
+    LEAST_SLIP_STD_RAD, MAX_ROUNDING, REMOUNTED_STD, ROUNDING, USUAL_DRIFT_STD_RAD_PER_SQRT_H, Z_999, Z_OF_JOINTS,
 };
 use crate::explain::constants::tags_departure::TOLD_SHARE;
 use nalgebra::{Cholesky, DMatrix, DVector, Isometry3, SymmetricEigen, Vector6};
@@ -215,7 +215,7 @@ impl CalibrationPrior {
         if self.with_slip_of(off.joint, off.off_rad).tested(views).as_ref().is_some_and(agrees) {
             return None;
         }
-        let (_, mount) = self.with_camera_anew().tested(views).filter(agrees)?;
+        let (_, mount) = self.with_remounted_camera().tested(views).filter(agrees)?;
         let moved = self.robot.camera.mount.link_from_frame.inv_mul(&mount);
         Some([moved.translation.vector.norm(), moved.rotation.angle()])
     }
@@ -231,17 +231,17 @@ impl CalibrationPrior {
     }
 
     /// Returns this prior of the sensors only, with the camera mounted again.
-    fn with_camera_anew(&self) -> Self {
+    fn with_remounted_camera(&self) -> Self {
         let n = self.model.parameters().len();
         let of_sensors = |matrix: &DMatrix<f64>| matrix.view((0, 0), (n, n)).into_owned();
-        let mut anew = self.clone();
-        let camera = &mut anew.robot.camera;
-        camera.mount_std_m = camera.mount_std_m.max(MOUNTED_ANEW_STD[0]);
-        camera.mount_std_rad = camera.mount_std_rad.max(MOUNTED_ANEW_STD[1]);
-        anew.model.blocks.insert(Block::Mount(0));
-        anew.mean = self.mean.rows(0, n).into_owned();
-        (anew.covariance, anew.widened) = (of_sensors(&self.covariance), of_sensors(&self.widened));
-        anew
+        let mut remounted = self.clone();
+        let camera = &mut remounted.robot.camera;
+        camera.mount_std_m = camera.mount_std_m.max(REMOUNTED_STD[0]);
+        camera.mount_std_rad = camera.mount_std_rad.max(REMOUNTED_STD[1]);
+        remounted.model.blocks.insert(Block::Mount(0));
+        remounted.mean = self.mean.rows(0, n).into_owned();
+        (remounted.covariance, remounted.widened) = (of_sensors(&self.covariance), of_sensors(&self.widened));
+        remounted
     }
 
     /// Test of agreement, and the mount as `views` determine it.

@@ -33,7 +33,7 @@ pub(crate) mod calibration_prior {
     pub(crate) const Z_999: f64 = 3.090;
     pub(crate) const Z_OF_JOINTS: f64 = 3.9;
     /// Standard deviation of the pose of a camera that was mounted again, m and rad. Assumed.
-    pub(crate) const MOUNTED_ANEW_STD: [f64; 2] = [0.05, 0.2];
+    pub(crate) const REMOUNTED_STD: [f64; 2] = [0.05, 0.2];
     /// Share, reached in tenfold steps, from which no more is added and the matrix has no inverse. Assumed.
     pub(crate) const MAX_ROUNDING: f64 = 0.1;
 }

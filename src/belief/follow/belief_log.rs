@@ -34,7 +34,7 @@ pub struct BeliefLog {
     pub lines: Vec<BeliefLine>,
     first: Option<Stamp>,
     last: Option<Stamp>,
-    /// Code of the doubt that was told last.
+    /// Code of the last reported doubt.
     doubt: Option<Code>,
 }
 

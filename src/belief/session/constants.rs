@@ -12,7 +12,7 @@ pub(crate) mod annotations {
 pub(crate) mod approval {
     /// Time that a held arm waits before it asks again, s.
     pub(crate) const HOLD_S: f64 = 5.0;
-    /// Least joint motion that an operator is told, rad: the displayed digits hide smaller ones.
+    /// Least joint motion that is displayed to an operator, rad: the displayed digits hide smaller ones.
     pub(crate) const TOLD_RAD: f64 = 5e-4;
 }
 

@@ -34,7 +34,7 @@ pub(crate) fn body_twists(problem: &BundleProblem<'_>, group: &Group<'_>, correc
     twists
 }
 
-/// Returns the twist of the camera by turns of the group's joints and of the base.
+/// Returns the camera's twist caused by rotations of the group's joints and of the base.
 pub(crate) fn sag_twist(group: &Group<'_>, turns: &AboutAxes) -> Vector6<f64> {
     let center = group.base_from_camera.translation.vector;
     let to_camera = group.base_from_camera.rotation.inverse();

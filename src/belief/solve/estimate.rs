@@ -80,7 +80,7 @@ pub(crate) fn estimate_with_lengths<'a>(input: &BundleInput<'a>, lengths: &[Bloc
     let mut posterior;
     let mut round = 0;
     loop {
-        // What fits little is no explanation; how well it could fit is not worth the steps.
+        // An estimate that leaves out most observations cannot win, so that it may stop at a loose tolerance.
         let is_loose = round == 0 || input.evidence == HyperparameterMode::Given && fits_little(&problem);
         solved = solve(&problem, solved.state, Loss::Square, if is_loose { LOOSE } else { TIGHT });
         iterations += solved.iterations;

@@ -70,7 +70,7 @@ mod tests {
         Table { names: vec![Metric::MinClearance.name().to_owned()], rows: rows.collect() }
     }
 
-    /// Of 200 comparisons, the number with worse nearest runs, and the number with a worse typical run.
+    /// Counts among 200 comparisons: those with worse nearest runs, and those with a worse typical run.
     fn found(floor_m: f64) -> [usize; 2] {
         let mut found = [0; 2];
         for trial in 0..200 {

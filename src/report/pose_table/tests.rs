@@ -84,7 +84,7 @@ fn tags_side_by_side_are_refused_and_numbered_columns_are_proposed() {
         format!("a1,a2,a3,a4,a5,a6,tag3_x,tag3_y,tag3_z,{second}_x,{second}_y,{second}_z\n{rows}")
     };
     assert!(matches!(proposed(&[&wide("tag5")], &robot), Err(ProposalError::Joints { .. })));
-    // The arm's own pose beside one tag.
+    // The arm's own pose and one tag in one row.
     assert!(proposed(&[&wide("tool0")], &robot).is_ok());
     let columns = "target.translation.0,target.translation.1,target.translation.2,target.quaternion.0,\
         target.quaternion.1,target.quaternion.2,target.quaternion.3,id";

@@ -13,7 +13,7 @@ use armcal_core::codes::{Code, Coded};
 
 const REACH_M: f64 = 2.0;
 
-/// Views with the image of an earlier one are not taken in and are told of; a fresh image ends that.
+/// Views that repeat an earlier image are left out and raise a doubt; a new image ends it.
 #[test]
 fn views_of_a_frozen_stream_do_not_count() {
     let robot = titan();
@@ -94,12 +94,12 @@ fn what_moves_again_and_again_is_a_lens_and_what_moves_once_is_not() {
     let lens = [mount(28), tags(29, "20, 22, 23 and 24"), mount(33), tags(36, "15, 22 and 25")];
     assert_eq!(doubt(&lens), Some(Code::LensChanged));
     assert_eq!(doubt(&lens[..3]), None);
-    // A moved base is told in three parts at times.
+    // A moved base may be reported in three parts.
     assert_eq!(doubt(&[tags(27, "11, 12 and 13"), tags(28, "15 and 19"), tags(29, "23, 24 and 25")]), None);
     assert_eq!(doubt(&[mount(28), mount(33)]), None);
     // A loose tag.
     let loose = |n_views| (n_views, TagMoved, "5", 0.02);
     assert_eq!(doubt(&[loose(26), loose(29), loose(33), loose(36)]), None);
-    // The same over a long dive.
+    // The three parts are spread over a long dive.
     assert_eq!(doubt(&[mount(28), mount(80), mount(150), mount(220)]), None);
 }

@@ -94,7 +94,7 @@ fn sensors_with_terms_are_used_under_what_was_heard_last() {
     assert!((at_rest[3] - robot.stowed[3]).abs() > 1e-4);
     assert!(driver.set_point().max_abs_difference(&at_rest) < 1e-9);
 
-    // The same readings mean other angles when the oil is warmer, the arm deeper and the time later.
+    // Warmer oil, greater depth and a later time change the angle that belongs to a reading.
     let ends = Path::at_full_speed(vec![at_rest, at_rest]);
     driver.arm.command(&counts).expect("taken");
     drop(driver);
@@ -108,7 +108,7 @@ fn sensors_with_terms_are_used_under_what_was_heard_last() {
     for (joint, expected) in [15.0 * per_k, 3.0 * per_mpa, hours * per_h, 0.0, 0.0, 0.0].into_iter().enumerate() {
         assert!((warm[joint] - at_rest[joint] - expected).abs() < 1e-9, "{joint}: {}", warm[joint] - at_rest[joint]);
     }
-    // The same angles require other readings, and the arm believes to be at its set-point.
+    // Other readings then belong to the same angles, and the estimate is at the set-point.
     assert_eq!(driver.follow(&ends).expect("it moves"), MotionOutcome::Arrived);
     for _ in 0..3 {
         driver.step().expect("it steps");

@@ -151,7 +151,7 @@ fn what_was_heard_after_the_calibration_does_not_matter() {
     assert_eq!(associate(&finished, &robot).fit[0].conditions.oil_c, Some(40.0));
 }
 
-/// The same messages in any order give the same result.
+/// The result does not depend on the order of the messages.
 #[test]
 fn the_order_of_messages_does_not_matter() {
     let robot = titan();
