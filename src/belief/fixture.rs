@@ -25,7 +25,8 @@ pub fn sample() -> Calibration {
     Calibration::read(&file).expect("the sample reads")
 }
 
-/// Parameters of all terms of `n` joints as an estimator could find them; nonlinearity up to about `nonlinearity` of the range.
+/// Parameters of all terms of `n` joints as an estimator could find them; nonlinearity up to about `nonlinearity` of
+/// the range.
 pub fn estimate(
     robot: &Robot,
     n: usize,

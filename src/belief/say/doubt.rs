@@ -32,21 +32,21 @@ impl fmt::Display for Doubt {
         match self {
             Self::FrozenImages { views } => write!(
                 f,
-                "the images of {views} views repeat an earlier one to the last bit although joints moved: the stream \
-                 of images stands still, and these views are not used; restart camera and detector"
+                "the images of {views} views repeat an earlier one although joints moved: the stream of images is \
+                 frozen, and these views are not used; restart camera and detector"
             ),
             Self::Base { times, most_m } => {
                 let times = if *times == 1 { "once".to_owned() } else { format!("{times} times") };
                 write!(
                     f,
                     "the base seems to have moved {times}, by up to {}: the clock of camera or joint sensors jumped, \
-                     images are frozen, or the base moves on; check these and follow again",
+                     images are frozen, or the base keeps moving; check these and follow again",
                     Unit::Metres.shown(*most_m, 1)
                 )
             }
             Self::Lens { events } => write!(
                 f,
-                "camera or tags that had moved seem to move on ({events} events): the lens was changed, or they are \
+                "camera or tags seem to move again and again ({events} events): the lens was changed, or they are \
                  loose; check focus, zoom and housing, then their fastening, and follow again"
             ),
         }

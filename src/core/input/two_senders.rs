@@ -80,7 +80,9 @@ pub(super) fn check_senders(
         let spec = &robot.sensors[joint];
         let angles: Vec<f64> = readings.iter().map(|reading| reading.counts[joint] / spec.counts_per_rad).collect();
         let least = OVER_NOISE * (spec.noise_std_counts / spec.counts_per_rad).abs();
-        let turn = (!spec.moves.is_slide()).then_some(std::f64::consts::TAU);
+        // Counts jump by this much where the sensor wraps.
+        let wrap_rad = (spec.wrap_counts / spec.counts_per_rad).abs();
+        let turn = (!spec.moves.is_slide()).then_some(wrap_rad.min(std::f64::consts::TAU));
         Some((joint, two_senders(&stamps, &angles, least, turn)?))
     };
     let found = (0..super::joints::n_needed(robot)).filter_map(of_joint);
