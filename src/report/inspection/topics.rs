@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 
+use crate::report::proposed_map::joint_units::MAX_RAD;
 use armcal_core::input::{ONE_SENDER, TwoSenders, two_senders};
 use armcal_core::log::ros::{JointState, TfMessage, decode_detections};
 use armcal_core::log::{RawMessage, decode};
@@ -38,8 +39,6 @@ pub struct TopicContents {
 
 /// Number of a topic's messages that are decoded, here and for an input map.
 pub(in crate::report) const MAX_SAMPLES: u64 = 1000;
-/// Largest angle in rad: no joint of an arm turns more than two turns either way.
-const MAX_RAD: f64 = 4.0 * std::f64::consts::PI;
 /// Number of names that are listed per topic.
 const MAX_NAMES: usize = 12;
 
