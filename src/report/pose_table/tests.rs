@@ -57,7 +57,7 @@ fn a_column_of_times_out_of_order_is_used_where_its_rows_are_poses() {
     };
     assert!(has_time([10.0, 10.0, 12.0, 12.0]));
     // Other joints at one time, and rows too near to each other to be poses.
-    assert!(!has_time([10.0, 12.0, 10.0, 12.0]));
+    assert!(!has_time([12.0, 10.0, 10.0, 12.0]));
     assert!(!has_time([10.0, 10.1, 10.2, 10.3]));
 }
 
