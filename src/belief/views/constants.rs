@@ -48,6 +48,31 @@ pub(crate) mod external_board {
     pub(crate) const MAX_LEFT_OUT: f64 = 0.25;
 }
 
+pub(crate) mod clock_shift {
+    /// Motion of joints or tags between two images below which both stand still, rad: beyond noise and pixels.
+    pub(crate) const STILL_RAD: f64 = 0.02;
+    /// Offsets that are compared, s, and the distance between them: shorter than the rest of an arm for one image.
+    pub(crate) const LONGEST_S: f64 = 60.0;
+    pub(crate) const STEP_S: f64 = 0.05;
+    /// Offset up to which the estimate finds it, s: four sigmas of the clocks of one vehicle.
+    pub(crate) const MIN_SHIFT_S: f64 = 0.2;
+    /// Offsets so near to the best count as the same, s: the longest motion between two poses. Assumed.
+    pub(crate) const NEIGHBOUR_S: f64 = 2.0;
+    /// Correlation of the motions as stamped above which no other offset is searched for. Assumed: that of good
+    /// recordings is 0.8 to 1.
+    pub(crate) const MAX_AS_STAMPED: f64 = 0.6;
+    /// Least correlation that proves an offset: chance alone gives less than 0.5 over all offsets (a test).
+    pub(crate) const MIN_CORRELATION: f64 = 0.8;
+    /// Share of the best correlation that other offsets stay below.
+    pub(crate) const UNRIVALLED: f64 = 0.9;
+    /// Least number of pairs in which the tags moved, and the joints: chance alone does not align so many.
+    pub(crate) const MIN_MOVED: usize = 8;
+    /// Share of the pairs that need readings at an offset.
+    pub(crate) const MIN_SHARE: f64 = 0.5;
+    /// Pairs that are compared at most: of longer recordings, every second or third one and so on.
+    pub(crate) const MAX_PAIRS: usize = 1000;
+}
+
 pub(crate) mod external_landmarks {
     /// Distance up to which a position is never rejected, m: the best accuracy of positions from tags. Assumed.
     pub(crate) const NEVER_APART_M: f64 = 2e-3;

@@ -5,7 +5,9 @@ use std::collections::BTreeMap;
 use crate::views::calibration_data::{CalibrationData, HeldOut};
 use crate::views::data_checks::{check_corner_order, no_views};
 use crate::views::error::CalibError;
+use crate::views::external::clock_shift::clock_shift;
 use crate::views::external::landmarks::PlainLandmark;
+use crate::views::external::pairing::TravelSeries;
 use crate::views::external::views::RecordingViews;
 use crate::views::view::{CaptureData, View};
 use armcal_core::input::{ExternalRecording, InputMap, RawMeasurement};
@@ -26,8 +28,8 @@ pub struct ExternalContext {
 /// Returns the views of recordings of one arm; `robot` has the landmarks around it.
 ///
 /// # Errors
-/// [`CalibError::Twice`] for a recording that is given twice. Without any view, [`CalibError::Clocks`] if the clocks
-/// cause it, else [`CalibError::NoTags`] or [`CalibError::AllRejected`].
+/// [`CalibError::Twice`] for a recording that is given twice, [`CalibError::Clocks`] where camera and joints moved at
+/// different times. Without any view, [`CalibError::Clocks`] if the clocks cause it, else [`CalibError::NoTags`] or [`CalibError::AllRejected`].
 pub fn prepare_external(
     recordings: &[ExternalRecording],
     map: &InputMap,
@@ -50,6 +52,11 @@ pub fn prepare_external(
                 RawMeasurement::BoardCorner { pixel, .. } => data.note_corners(&[*pixel]),
                 RawMeasurement::Position(_) | RawMeasurement::Pose(_) => {}
             }
+        }
+        let travels = TravelSeries::new(recording, robot, map.max_gap_s);
+        if let Some(shift) = clock_shift(&travels, &recording.frames, robot) {
+            let recording = recording.path.display().to_string();
+            return Err(CalibError::Clocks { recording, problem: shift.to_string() });
         }
         let made = RecordingViews::of(recording, map, robot, context.plain);
         if made.views.iter().any(|made| views.iter().any(|(_, other)| *other == made.first)) {
