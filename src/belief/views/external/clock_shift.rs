@@ -31,9 +31,9 @@ impl fmt::Display for ClockShift {
         let side = if self.offset_s > 0.0 { "behind" } else { "ahead of" };
         write!(
             f,
-            "the camera's clock is {:.1} s {side} the joints': between {} pairs of images the tags move when the \
-             joints do only if the tags' stamps are corrected by it (correlation {:.2}; {:.2} as stamped). Add {:.2} to \
-             clock_offset_s in [tags] of the input map, which is 0 where it is absent, or synchronize the clocks",
+            "the camera's clock is {:.1} s {side} the joints': only with stamps corrected by it do the tags move when \
+             the joints do, in {} pairs of images (correlation {:.2}; {:.2} as stamped). Add {:.2} to clock_offset_s \
+             in [tags] of the input map, which is 0 where it is absent, or synchronize the clocks",
             self.offset_s.abs(),
             self.n_pairs,
             self.correlation,

@@ -29,7 +29,8 @@ pub struct ExternalContext {
 ///
 /// # Errors
 /// [`CalibError::Twice`] for a recording that is given twice, [`CalibError::Clocks`] where camera and joints moved at
-/// different times. Without any view, [`CalibError::Clocks`] if the clocks cause it, else [`CalibError::NoTags`] or [`CalibError::AllRejected`].
+/// different times. Without any view, [`CalibError::Clocks`] if the clocks cause it, else [`CalibError::NoTags`] or
+/// [`CalibError::AllRejected`].
 pub fn prepare_external(
     recordings: &[ExternalRecording],
     map: &InputMap,
