@@ -212,6 +212,21 @@ pub(crate) mod reading_search_map_frame {
     pub(crate) const LEAST_RAD: f64 = 0.05;
 }
 
+pub(crate) mod reading_search_map_scale {
+    /// Logarithm of the least factor that is not a survey's error: maps are scaled by less than 3 %. Assumed.
+    pub(crate) const LEAST: f64 = 0.03;
+    /// Least number of positions of the camera for a line, and their least correlation.
+    pub(crate) const MIN_POSITIONS: usize = 6;
+    pub(crate) const MIN_CORRELATION: f64 = 0.8;
+    /// Number of rounds of weights and lines.
+    pub(crate) const ROUNDS: usize = 20;
+    /// Farthest factor from the line's, as a logarithm: the datasheet's arm is within it. The steps between the factors
+    /// begin with `FIRST_STEP`, and end before `LAST_STEP`: tags 2 m away are then within 1 mm.
+    pub(crate) const FARTHEST: f64 = 0.12;
+    pub(crate) const FIRST_STEP: f64 = 0.02;
+    pub(crate) const LAST_STEP: f64 = 5e-4;
+}
+
 pub(crate) mod reading_search {
     /// Evidence that a reading error needs, twice the logarithm of the odds: e^30, as about 500 are tried.
     pub(crate) const MARGIN: f64 = 60.0;

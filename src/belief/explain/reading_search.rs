@@ -8,6 +8,7 @@
 
 mod hypothesis;
 mod map_frame;
+mod map_scale;
 
 use crate::explain::constants::reading_search::{
     ALTERNATIVE, MARGIN, MAX_ALTERNATIVES, MAX_COMPOSITE, MAX_ESTIMATED, MAX_OF_CAMERA, MAX_VIEWS, MIN_SIGMAS,
@@ -20,12 +21,14 @@ use crate::explain::drawing::Drawing;
 use crate::explain::failure_detection::{is_suspicious, score};
 use crate::explain::failures::{Failure, FailureAdjusted};
 use crate::explain::reading_search::hypothesis::{Hypothesis, SCALE_STD, ZERO_STD_RAD};
+use crate::explain::reading_search::map_scale::MapScale;
+use crate::explain::wrong_input::map::margin_hint;
 use crate::model::parameters::JointParameters;
 use crate::positions::position_problem::PositionProblem;
 use crate::say::reading_error::{JointZero, MisreadReadings, ReadingError, SignedJoint};
 use crate::solve::estimate::{Estimate, estimate};
 use crate::solve::input::HyperparameterMode;
-use crate::views::view::View;
+use crate::views::view::{TagObservation, View};
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::{JointSensorSpec, Robot, SurveyedTag};
 use armcal_core::sensor::wrap_symmetric;
@@ -92,8 +95,9 @@ impl ReadingSearch<'_> {
         // In the wrong frame tags seem to have moved or to have other sizes: findings on them are invalid.
         let given = frame.as_ref().and(self.map).map(|map| map_frame::as_given(self.robot, map, self.views));
         let search = given.as_ref().map_or(*self, |(robot, views)| ReadingSearch { robot, views, ..*self });
+        let scale = self.attempt_map_scale(&views).filter(is_good);
         let tried = search.likely().into_iter().filter_map(|hypothesis| search.attempt(hypothesis));
-        let mut tried: Vec<Tried> = tried.filter(is_good).chain(frame).collect();
+        let mut tried: Vec<Tried> = tried.filter(is_good).chain(frame).chain(scale).collect();
         tried.sort_by(|a, b| a.score.total_cmp(&b.score));
         let best = tried.first()?;
         let found = self.named(best);
@@ -222,6 +226,23 @@ impl ReadingSearch<'_> {
         Some(Tried::of(Hypothesis::MapFrame(base_from_map), &found, &views))
     }
 
+    /// Estimates with sizes and distances of all tags scaled alike, where the arm shows another scale than the map.
+    fn attempt_map_scale(&self, views: &[View]) -> Option<Tried> {
+        if self.robot.is_watched() {
+            return None;
+        }
+        let (robot, views) = map_frame::as_given(self.robot, self.map.unwrap_or(&self.robot.tags), views);
+        let attempt = |scale: MapScale| {
+            let (robot, views) = (scale.of_robot(&robot), scale.of_views(&views));
+            let adjusted = FailureAdjusted::new(&robot, &views, &[], &JointParameters::default());
+            let mut input = adjusted.input(HyperparameterMode::Given);
+            map_frame::free(&mut input);
+            Some(Tried::of(Hypothesis::MapScale(scale.factor), &estimate(&input)?, &views))
+        };
+        let scale = MapScale::by_arm(&robot, &views)?.refined(|scale| Some(attempt(scale)?.score))?;
+        attempt(scale).filter(|_| scale.is_large())
+    }
+
     /// Returns true if an estimated zero exceeds the sensor's stated error, or a frame exceeds a base's. Other errors
     /// have no size.
     fn is_large(&self, tried: &Tried) -> bool {
@@ -289,6 +310,11 @@ impl ReadingSearch<'_> {
                     turn: [turn.w, turn.i, turn.j, turn.k],
                 }
             }
+            Hypothesis::MapScale(factor) => {
+                let is_in_pixels = self.views.iter().flat_map(|view| &view.tags).any(TagObservation::is_in_pixels);
+                let hint = margin_hint(self.robot.tag_family, *factor).filter(|_| is_in_pixels);
+                ReadingError::MapScale { factor: *factor, is_in_pixels, hint }
+            }
             Hypothesis::Camera { n_joints, turn } => {
                 let is_here = *n_joints == self.robot.camera.mount.n_joints;
                 let link = || self.robot.chain.joints()[n_joints - 1].child_link.clone();
@@ -338,7 +364,8 @@ fn concerns_same(a: &ReadingError, b: &ReadingError) -> bool {
         ReadingError::Shifted { .. }
         | ReadingError::Unpaired { .. }
         | ReadingError::Camera { .. }
-        | ReadingError::MapFrame { .. } => Vec::new(),
+        | ReadingError::MapFrame { .. }
+        | ReadingError::MapScale { .. } => Vec::new(),
     };
     std::mem::discriminant(a) == std::mem::discriminant(b) && joints(a) == joints(b)
 }

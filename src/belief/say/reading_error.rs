@@ -7,6 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::say::constants::reading_error::UNTURNED;
+use crate::say::length_unit::unit_of;
 use crate::say::sensor_keys::Rescaled;
 use crate::say::wrong_input_words::turn_in_words;
 use armcal_core::codes::{Code, Coded};
@@ -127,6 +128,17 @@ pub enum ReadingError {
         /// Rotation of the map's frame in the base frame: w, x, y, z.
         turn: [f64; 4],
     },
+    /// Sizes and distances of all tags differ from the stated ones by one factor.
+    MapScale {
+        /// True size or distance over the stated one.
+        factor: f64,
+        /// True for tags that are recorded as corners in pixels; false for positions and poses.
+        is_in_pixels: bool,
+        /// Dimension of the tags that was measured instead of their size, in words; absent where their print does not
+        /// show it.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        hint: Option<String>,
+    },
     /// The camera is not where robot.toml says.
     Camera {
         /// The link that carries the camera; absent where it is the stated one.
@@ -200,6 +212,8 @@ impl fmt::Display for ReadingError {
                 write!(f, "the frame of the tag map is not the base's: it lies at ({x:.3}, {y:.3}, {z:.3}) m in it, ")?;
                 write!(f, "turned by {}", any_turn_in_words(turn))
             }
+            Self::MapScale { factor, is_in_pixels: true, hint } => fmt_size(f, *factor, hint.as_deref()),
+            Self::MapScale { factor, .. } => fmt_unit(f, *factor),
             Self::Camera { link, turn } => {
                 f.write_str("the camera is not as robot.toml says: ")?;
                 match link {
@@ -211,6 +225,21 @@ impl fmt::Display for ReadingError {
                 }
             }
         }
+    }
+}
+
+const BY_ARM: &str = "by the way that the arm moves the camera, ";
+
+fn fmt_size(f: &mut fmt::Formatter<'_>, factor: f64, hint: Option<&str>) -> fmt::Result {
+    write!(f, "{BY_ARM}the tags are {factor:.3} times as large and as far apart as size_m and the tag map say")?;
+    hint.map_or(Ok(()), |hint| write!(f, ", {hint}"))
+}
+
+fn fmt_unit(f: &mut fmt::Formatter<'_>, factor: f64) -> fmt::Result {
+    write!(f, "{BY_ARM}the distances of tags, as recorded and in the tag map, ")?;
+    match unit_of(1.0 / factor) {
+        Some(unit) => write!(f, "are in {unit}, not in metres"),
+        None => write!(f, "are {:.3} times the true ones", 1.0 / factor),
     }
 }
 
@@ -352,6 +381,14 @@ impl MisreadReadings {
                  the rows, and how joints and tags were put together"
                     .to_owned()
             }
+            ReadingError::MapScale { is_in_pixels: true, .. } => {
+                "measure the border square of one tag (of tag36h11 the black one), correct size_m, and make the tag \
+                 map again"
+                    .to_owned()
+            }
+            ReadingError::MapScale { factor, .. } => {
+                format!("multiply the recorded positions of tags and position_m of the tag map by {factor:.5}")
+            }
             ReadingError::Camera { link, turn } => {
                 let link = link.as_ref().map(|link| format!("link = \"{link}\""));
                 let [w, x, y, z] = turn.map(|value| format!("{value:.4}"));
@@ -378,6 +415,7 @@ impl Coded for MisreadReadings {
             ReadingError::Shifted { .. } | ReadingError::Unpaired { .. } => Code::ReadingsShifted,
             ReadingError::Camera { .. } => Code::InputCamera,
             ReadingError::MapFrame { .. } => Code::MapFrame,
+            ReadingError::MapScale { .. } => Code::InputTagSize,
         }
     }
 }

@@ -243,8 +243,8 @@ impl ScriptRunner<'_, '_> {
     /// Logs why there are no more views. Returns an error if there are too few for any calibration.
     fn end_capture(&mut self, views: &CaptureRun<'_>, why: String) -> Result<(), SessionError> {
         let CaptureRun { tried, blocked, met, restless, .. } = *views;
-        let why = match self.driver.flow.weak_pump() {
-            Some(pump) if met + restless > 0 => format!("{why}; {pump}"),
+        let why = match self.driver.unmoved_joint().or_else(|| self.driver.flow.weak_pump()) {
+            Some(cause) if met + restless > 0 => format!("{why}; {cause}"),
             _ => why,
         };
         self.driver.log(LogLevel::Info, &format!("no more views: {why}"))?;

@@ -79,6 +79,9 @@ pub(crate) mod following {
     /// Set-point travel, rad, and multiple of the noise range, after which a joint that has not moved counts as locked.
     pub(crate) const DECISIVE_RAD: f64 = 0.1;
     pub(crate) const DECISIVE_OVER_NOISE: f64 = 3.0;
+    /// Time for which a reading stands still, with its set-point that far away, before it is named as the cause of a
+    /// failed capture, s. Assumed: longer than the wait for a rest.
+    pub(crate) const LONG_STILL_S: f64 = 20.0;
     /// Least change of a set-point per period that counts as motion, counts.
     pub(crate) const SET_STANDS_COUNTS: f64 = 1e-6;
 }

@@ -7,13 +7,24 @@
 //! set-point. At the third the joint is probed: the contact is ignored until it moves or has not.
 
 use crate::session::constants::following::{
-    DECISIVE_OVER_NOISE, DECISIVE_RAD, FLICKERS, LEAPT_S, LEFT_RAD, NOISE_SIGMAS, NOISY_COUNTS, REACHABLE, REST_S,
-    SAME_S, SET_STANDS_COUNTS, SUSPECTED,
+    DECISIVE_OVER_NOISE, DECISIVE_RAD, FLICKERS, LEAPT_S, LEFT_RAD, LONG_STILL_S, NOISE_SIGMAS, NOISY_COUNTS,
+    REACHABLE, REST_S, SAME_S, SET_STANDS_COUNTS, SUSPECTED,
 };
 use crate::session::constants::settling::NEAR_RAD;
 use armcal_core::robot::{FailedKind, Robot};
 use armcal_core::sensor::wrap_symmetric;
 use armcal_core::streams::JointCounts;
+
+/// A joint whose reading stands still although it was commanded to move.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Unmoved {
+    /// Index, base first.
+    pub joint: usize,
+    /// Time since the reading last moved, s.
+    pub still_s: f64,
+    /// Farthest that the set-point was from the reading since, rad; m for a slide.
+    pub asked_rad: f64,
+}
 
 /// Follows set-points and raw readings, one pair per control period.
 pub(crate) struct FollowWatch {
@@ -31,6 +42,8 @@ struct JointFollow {
     counts_per_rad: f64,
     /// Reading and set-point of the period before, counts.
     last: Option<(f64, f64)>,
+    /// Farthest that the set-point was from the reading while it stands still, counts.
+    asked_counts: f64,
     same_s: f64,
     /// Set-point when the reading began to stay the same, counts.
     set_at_same: f64,
@@ -60,6 +73,7 @@ impl FollowWatch {
                     + NOISE_SIGMAS * spec.noise_std_counts,
                 counts_per_rad,
                 last: None,
+                asked_counts: 0.0,
                 same_s: 0.0,
                 set_at_same: 0.0,
                 anchor: 0.0,
@@ -89,6 +103,15 @@ impl FollowWatch {
     #[cfg(test)]
     pub(crate) fn has_not_moved(&self, joint: usize) -> bool {
         self.joints[joint].has_rested
+    }
+
+    /// Returns a joint whose reading has long stood still although its set-point went far.
+    pub(crate) fn unmoved(&self) -> Option<Unmoved> {
+        let asked = |watch: &JointFollow| watch.asked_counts / watch.counts_per_rad;
+        let stands = |watch: &JointFollow| watch.still_s > LONG_STILL_S && asked(watch) > DECISIVE_RAD;
+        let joint = self.joints.iter().position(stands)?;
+        let watch = &self.joints[joint];
+        Some(Unmoved { joint, still_s: watch.still_s, asked_rad: asked(watch) })
     }
 
     /// True if `joint` stands still because it is locked.
@@ -132,7 +155,9 @@ impl JointFollow {
         self.set_still_s = if set_stands { self.set_still_s + period_s } else { 0.0 };
         if moved_counts > self.rest_counts {
             (self.anchor, self.still_s, self.has_rested, self.n_suspected) = (word, 0.0, false, 0);
+            self.asked_counts = 0.0;
         }
+        self.asked_counts = self.asked_counts.max(off_counts);
         self.still_s += period_s;
         self.has_leapt = (self.has_leapt || leap_counts > self.leap_counts) && off_counts > self.leap_counts;
         self.n_flickers += u32::from(self.set_still_s > REST_S && word != last_word);
@@ -207,6 +232,23 @@ mod tests {
             assert_eq!(told(seed, spikes).0, None);
             let slip = |t_s: f64, word: f64| if t_s > 1.5 { word + 300.0 * (1.5 - t_s).exp() } else { word };
             assert_eq!(told(seed, slip).0, None);
+        }
+    }
+
+    #[test]
+    fn a_joint_whose_reading_has_long_stood_still_is_named_and_no_other() {
+        let robot = crate::fixture::titan();
+        for stands in [true, false] {
+            let mut watch = FollowWatch::new(&robot, PERIOD_S);
+            for k in 0..4000 {
+                // To and fro, with a reading that stops within the first second or follows.
+                let ramp = |k: i32| robot.sensors[JOINT].counts_per_rad * 0.3 * (0.002 * f64::from(k)).sin();
+                let with = |value: f64| JointCounts::from_fn(6, |j| if j == JOINT { 2000.0 + value } else { 2000.0 });
+                let word = with(if stands { ramp(k.min(40)) + f64::from(k % 2) } else { ramp(k - 10) });
+                assert_eq!(watch.update(&with(ramp(k)), &word), None, "noise was not seen at rest");
+            }
+            let unmoved = watch.unmoved().map(|found| (found.joint, (10.0 * found.asked_rad).round()));
+            assert_eq!(unmoved, stands.then_some((JOINT, 3.0)));
         }
     }
 

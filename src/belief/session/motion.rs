@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use crate::plan::{Edge, Path, Timing};
 use crate::session::contact::{ContactDetector, ContactEvent};
 use crate::session::flow::FlowWatch;
-use crate::session::following::FollowWatch;
+use crate::session::following::{FollowWatch, Unmoved};
 use crate::session::held_joint::{HeldJoint, holding_counts, holding_sensors, with_held};
 use crate::session::settling::{NEAR_RAD, SettlingDetector};
 use crate::session::{MotionAhead, Progress, Recorder, SessionError};
@@ -18,6 +18,7 @@ use armcal_core::streams::{
     MarkKind, Message, Phase, ReachTask, RecordedSurvey, Sink,
 };
 use armcal_core::time::Stamp;
+use armcal_core::units::Unit;
 
 /// The arm, its recorder, and the presently believed sensors.
 pub(crate) struct Driver<'b> {
@@ -111,6 +112,19 @@ impl<'b> Driver<'b> {
         };
         driver.command()?;
         Ok(driver)
+    }
+
+    /// Returns the message about a joint whose reading stands still although it was commanded to move, if there is one.
+    pub fn unmoved_joint(&self) -> Option<String> {
+        let Unmoved { joint, still_s, asked_rad } = self.following.unmoved()?;
+        let spec = &self.robot.sensors[joint];
+        let unit = if spec.moves.is_slide() { Unit::Metres } else { Unit::Radians };
+        Some(format!(
+            "the reading of {} has not moved for {still_s:.0} s, though it was commanded {} away: its sensor is stuck \
+             or not connected, or the joint is blocked",
+            spec.joint,
+            unit.shown(asked_rad, 0)
+        ))
     }
 
     pub fn elapsed_s(&self) -> f64 {

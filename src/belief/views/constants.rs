@@ -49,28 +49,34 @@ pub(crate) mod external_board {
 }
 
 pub(crate) mod clock_shift {
-    /// Motion of joints or tags between two images below which both stand still, rad: beyond noise and pixels.
+    /// Motion of a tag over its distance, between two images, below which it stands still: beyond the noise.
     pub(crate) const STILL_RAD: f64 = 0.02;
+    /// Distance of tags that are seen in pixels, as if: only their directions are compared.
+    pub(crate) const DISTANCE_M: f64 = 1.0;
     /// Offsets that are compared, s, and the distance between them: shorter than the rest of an arm for one image.
     pub(crate) const LONGEST_S: f64 = 60.0;
-    pub(crate) const STEP_S: f64 = 0.05;
+    pub(crate) const STEP_S: f64 = 0.1;
     /// Offset up to which the estimate finds it, s: four sigmas of the clocks of one vehicle.
     pub(crate) const MIN_SHIFT_S: f64 = 0.2;
-    /// Offsets so near to the best count as the same, s: the longest motion between two poses. Assumed.
-    pub(crate) const NEIGHBOUR_S: f64 = 2.0;
+    /// Offsets so near to the best count as the same, s: shorter than the time between two poses. Assumed.
+    pub(crate) const NEIGHBOUR_S: f64 = 1.0;
     /// Correlation of the motions as stamped above which no other offset is searched for. Assumed: that of good
     /// recordings is 0.8 to 1.
     pub(crate) const MAX_AS_STAMPED: f64 = 0.6;
-    /// Least correlation that proves an offset: chance alone gives less than 0.5 over all offsets (a test).
+    /// Least correlation that proves an offset: chance alone gives less over all offsets (a test).
     pub(crate) const MIN_CORRELATION: f64 = 0.8;
-    /// Share of the best correlation that other offsets stay below.
-    pub(crate) const UNRIVALLED: f64 = 0.9;
+    /// Share of the best correlation above which an offset is as good by when the arm moved.
+    pub(crate) const AS_GOOD: f64 = 0.9;
+    /// Standard deviations by which the sizes of the motions must prefer an offset to the others.
+    pub(crate) const SURE: f64 = 3.0;
+    /// Largest correlation of sizes that counts: no camera's motion predicts a tag's better.
+    pub(crate) const MOST: f64 = 0.99;
     /// Least number of pairs in which the tags moved, and the joints: chance alone does not align so many.
     pub(crate) const MIN_MOVED: usize = 8;
     /// Share of the pairs that need readings at an offset.
     pub(crate) const MIN_SHARE: f64 = 0.5;
     /// Pairs that are compared at most: of longer recordings, every second or third one and so on.
-    pub(crate) const MAX_PAIRS: usize = 1000;
+    pub(crate) const MAX_PAIRS: usize = 500;
 }
 
 pub(crate) mod external_landmarks {

@@ -311,6 +311,30 @@ fn a_tag_map_in_another_frame_is_named_with_shift_and_turn() {
     }
 }
 
+/// Tags of another size than stated, in a map that was made with the stated one and hangs on its first tag.
+#[test]
+fn sizes_and_distances_that_are_wrong_by_one_factor_are_named() {
+    for (seed, factor) in [(40, 1.25), (41, 0.8), (42, 1.08), (43, 0.7)] {
+        let mut case = case(seed, None);
+        let first_m = case.robot.tags[0].base_from_tag.origin().vector();
+        for tag in &mut case.robot.tags {
+            let mut pose = *tag.base_from_tag.isometry();
+            pose.translation.vector = first_m + (pose.translation.vector - first_m) / factor;
+            (tag.base_from_tag, tag.size_m) = (Pose::from_isometry(pose), tag.size_m / factor);
+        }
+        for seen in case.views.iter_mut().flat_map(|view| &mut view.tags) {
+            seen.center_in_camera_m /= factor;
+        }
+        match found(case) {
+            ReadingError::MapScale { factor: found, is_in_pixels: true, hint } => {
+                assert!((found / factor - 1.0).abs() < 0.01, "seed {seed}: {found}");
+                assert_eq!(hint.is_some(), [0.8, 1.25].contains(&factor), "seed {seed}: {hint:?}");
+            }
+            other => panic!("seed {seed}: {other:?}"),
+        }
+    }
+}
+
 /// No view distinguishes a turn of all tags about the first joint's axis from that joint's zero.
 #[test]
 fn a_map_that_is_turned_about_the_first_joint_is_named_beside_its_zero() {

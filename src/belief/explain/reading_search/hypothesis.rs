@@ -47,6 +47,8 @@ pub(crate) enum Hypothesis {
     Shifted(isize),
     /// The tag map's frame has this pose in the base frame.
     MapFrame(Isometry3<f64>),
+    /// Sizes and distances of all tags are this many times the stated ones.
+    MapScale(f64),
     /// The camera is mounted after `n_joints` joints, and its frame is turned.
     Camera {
         n_joints: usize,
@@ -162,7 +164,7 @@ impl Hypothesis {
     pub(crate) fn handicap(&self) -> f64 {
         match self {
             Self::Camera { .. } => CAMERA_HANDICAP,
-            Self::MapFrame(_) => FRAME_HANDICAP,
+            Self::MapFrame(_) | Self::MapScale(_) => FRAME_HANDICAP,
             Self::Sum { .. } => SUM_HANDICAP,
             _ => 0.0,
         }
@@ -247,7 +249,7 @@ impl Hypothesis {
                 changed.travel_rad[*joint] = wrapped(robot, *joint, angle_rad - center_rad);
                 changed.rate_rad_s[*joint] *= factor;
             }
-            Self::Shifted(_) | Self::Camera { .. } | Self::MapFrame(_) => {}
+            Self::Shifted(_) | Self::Camera { .. } | Self::MapFrame(_) | Self::MapScale(_) => {}
         }
         changed
     }

@@ -51,10 +51,14 @@ pub(crate) fn map_from_base(robot: &Robot, views: &[View]) -> Option<Isometry3<f
     Some(found)
 }
 
-fn places(robot: &Robot, view: &View) -> Vec<Places> {
+/// Returns the angles of a view by the datasheet.
+pub(crate) fn angles_by_nominal(robot: &Robot, view: &View) -> JointAngles {
     let angle_rad = |joint: usize| robot.sensors[joint].center_rad + view.travel_rad[joint];
-    let angles = JointAngles::from_fn(view.travel_rad.len(), angle_rad);
-    let base_from_camera = robot.tags_from(robot.camera_at(view.camera), &angles);
+    JointAngles::from_fn(view.travel_rad.len(), angle_rad)
+}
+
+fn places(robot: &Robot, view: &View) -> Vec<Places> {
+    let base_from_camera = robot.tags_from(robot.camera_at(view.camera), &angles_by_nominal(robot, view));
     let known = view.tags.iter().filter(|seen| robot.tags[seen.tag_idx].is_known());
     let of_tag = |seen: &crate::views::view::TagObservation| {
         let place_m = (base_from_camera * Point3::from(seen.center_in_camera_m)).coords;

@@ -224,6 +224,8 @@ fn misread_inputs() -> Vec<Refusal> {
         zeros(None),
         misread(ReadingError::Shifted { views: 1 }),
         misread(map_frame()),
+        misread(ReadingError::MapScale { factor: 1.25, is_in_pixels: true, hint: None }),
+        misread(ReadingError::MapScale { factor: 0.001, is_in_pixels: false, hint: None }),
         Refusal::MisreadReadings(MisreadReadings {
             found: ReadingError::Zeros {
                 joints: vec![JointZero {

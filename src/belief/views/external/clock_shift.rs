@@ -4,14 +4,15 @@
 //! the clocks: their correlation is high at the right one, whatever the readings, the mount and the tags are.
 
 use crate::views::constants::clock_shift::{
-    LONGEST_S, MAX_AS_STAMPED, MAX_PAIRS, MIN_CORRELATION, MIN_MOVED, MIN_SHARE, MIN_SHIFT_S, NEIGHBOUR_S, STEP_S,
-    STILL_RAD, UNRIVALLED,
+    AS_GOOD, DISTANCE_M, LONGEST_S, MAX_AS_STAMPED, MAX_PAIRS, MIN_CORRELATION, MIN_MOVED, MIN_SHARE, MIN_SHIFT_S,
+    MOST, NEIGHBOUR_S, STEP_S, STILL_RAD, SURE,
 };
 use crate::views::external::pairing::TravelSeries;
 use armcal_core::input::{ExternalDetection, RawMeasurement, TagFrame};
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::Robot;
 use armcal_core::time::Stamp;
+use nalgebra::{Point3, Vector3};
 use std::fmt;
 
 /// Offset between the clocks of camera and joints, and the evidence for it.
@@ -47,72 +48,84 @@ impl fmt::Display for ClockShift {
 struct Pair {
     from: Stamp,
     to: Stamp,
-    /// Motion of the tags as a logarithm.
+    /// Points of the tags in the camera frame of the first image, m: those that both images show, if there are any.
+    points_m: Vec<Point3<f64>>,
+    /// Mean motion of the tags over their distance, as a logarithm.
     tags: f64,
+    /// False where the images show no tag in common: then it moved, but how far is unknown.
+    is_measured: bool,
+}
+
+/// How the motions of tags and joints agree under one offset.
+#[derive(Clone, Copy, Debug)]
+struct Agreement {
+    shift_s: f64,
+    /// Correlation of all motions, which shows when they moved.
+    correlation: f64,
+    /// Correlation of the sizes where both moved, as Fisher's z in its standard deviations.
+    sizes: f64,
 }
 
 /// Returns the offset between the clocks where the motions prove one that no estimate can absorb.
+///
+/// Poses at equal times agree with each other's motions by when they moved; how far they moved then decides.
 pub(crate) fn clock_shift(travels: &TravelSeries<'_>, frames: &[TagFrame], robot: &Robot) -> Option<ClockShift> {
     let pairs = pairs(frames, robot);
-    let at = |shift_s: f64| correlation(travels, &pairs, shift_s, robot.n_joints_seen_by(&robot.camera));
-    let steps =
-        |from_s: f64, to_s: f64| (0..=((to_s - from_s) / STEP_S) as usize).map(move |k| from_s + STEP_S * k as f64);
-    let best_of = |shifts: &mut dyn Iterator<Item = f64>| {
-        shifts.filter_map(|shift_s| Some((shift_s, at(shift_s)?))).max_by(|a, b| a.1.total_cmp(&b.1))
+    let all = |longest_s: f64| {
+        let n = (longest_s / STEP_S).round() as i32;
+        let at = |k: i32| agreement(travels, &pairs, STEP_S * f64::from(k), robot);
+        (-n..=n).filter_map(at).collect::<Vec<Agreement>>()
     };
-    let (_, as_stamped) = best_of(&mut steps(-MIN_SHIFT_S, MIN_SHIFT_S))?;
+    let most = |all: &[Agreement]| all.iter().map(|one| one.correlation).reduce(f64::max);
+    let as_stamped = most(&all(MIN_SHIFT_S))?;
     if as_stamped > MAX_AS_STAMPED {
         return None;
     }
-    let all: Vec<(f64, f64)> =
-        steps(-LONGEST_S, LONGEST_S).filter_map(|shift_s| Some((shift_s, at(shift_s)?))).collect();
-    let (best_s, best) = all.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let is_far = |(shift_s, _): &&(f64, f64)| (shift_s - best_s).abs() > NEIGHBOUR_S;
-    let rival = all.iter().filter(is_far).map(|(_, found)| *found).fold(0.0, f64::max);
+    let mut all = all(LONGEST_S);
+    let best = most(&all)?;
+    all.retain(|one| one.correlation > AS_GOOD * best);
+    let surest = all.iter().copied().max_by(|a, b| a.sizes.total_cmp(&b.sizes))?;
+    let (near, far): (Vec<_>, Vec<_>) =
+        all.into_iter().partition(|one| (one.shift_s - surest.shift_s).abs() <= NEIGHBOUR_S);
+    let rival = far.iter().map(|one| one.sizes).fold(f64::NEG_INFINITY, f64::max);
     // Of an arm that rests for each image, a range of offsets is as good: its middle is farthest from a motion.
-    let as_good: Vec<f64> =
-        all.iter().filter(|found| !is_far(found) && found.1 > UNRIVALLED * best).map(|(s, _)| *s).collect();
-    let offset_s = as_good.iter().sum::<f64>() / as_good.len().max(1) as f64;
-    let is_proven = best >= MIN_CORRELATION && rival < UNRIVALLED * best && offset_s.abs() > MIN_SHIFT_S;
-    is_proven.then_some(ClockShift { offset_s, correlation: best, as_stamped, n_pairs: pairs.len() })
+    let offset_s = near.iter().map(|one| one.shift_s).sum::<f64>() / near.len() as f64;
+    let is_proven = best >= MIN_CORRELATION && surest.sizes > rival + SURE && offset_s.abs() > MIN_SHIFT_S;
+    is_proven.then_some(ClockShift { offset_s, correlation: surest.correlation, as_stamped, n_pairs: pairs.len() })
 }
 
 /// Returns successive images, at most [`MAX_PAIRS`] pairs, spread over the recording.
 fn pairs(frames: &[TagFrame], robot: &Robot) -> Vec<Pair> {
     let every = frames.len().div_ceil(MAX_PAIRS).max(1);
-    let pair = |two: &[TagFrame]| Pair { from: two[0].stamp, to: two[1].stamp, tags: moved(&two[0], &two[1], robot) };
-    frames.windows(2).step_by(every).map(pair).collect()
+    frames.windows(2).step_by(every).filter_map(|two| pair(&two[0], &two[1], robot)).collect()
 }
 
-/// Returns how far the tags moved in the camera, as a logarithm: the mean change of direction or, of other tags, 1 rad.
-fn moved(from: &TagFrame, to: &TagFrame, robot: &Robot) -> f64 {
-    let is_same = |a: &ExternalDetection, b: &ExternalDetection| a.key() == b.key();
-    let change = |a: &ExternalDetection| {
-        let changes = to.tags.iter().filter(|b| is_same(a, b)).filter_map(|b| change_rad(&a.seen, &b.seen, robot));
-        changes.min_by(f64::total_cmp)
-    };
-    let changes: Vec<f64> = from.tags.iter().filter_map(change).collect();
-    let mean = changes.iter().sum::<f64>() / changes.len().max(1) as f64;
-    size(if changes.is_empty() { 1.0 } else { mean })
+fn pair(from: &TagFrame, to: &TagFrame, robot: &Robot) -> Option<Pair> {
+    let point = |seen: &ExternalDetection| point_m(&seen.seen, robot);
+    let both = |a: &ExternalDetection| Some((point(a)?, point(to.tags.iter().find(|b| a.key() == b.key())?)?));
+    let (mut points_m, others_m): (Vec<_>, Vec<_>) = from.tags.iter().filter_map(both).unzip();
+    let is_measured = !points_m.is_empty();
+    let moved = points_m.iter().zip(&others_m).map(|(a, b)| (b - a).norm() / a.coords.norm());
+    let moved = moved.sum::<f64>() / points_m.len() as f64;
+    if !is_measured {
+        points_m = from.tags.iter().filter_map(point).collect();
+    }
+    let tags = size(if is_measured { moved } else { 1.0 });
+    (!points_m.is_empty()).then_some(Pair { from: from.stamp, to: to.stamp, points_m, tags, is_measured })
 }
 
-/// Returns the change of direction of a landmark, rad; a change of distance counts as one.
-fn change_rad(from: &RawMeasurement, to: &RawMeasurement, robot: &Robot) -> Option<f64> {
-    let focal_px = robot.camera.lens.focal_px()[0];
-    let of_pixels = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]) / focal_px;
-    match (from, to) {
-        (RawMeasurement::Corners(a), RawMeasurement::Corners(b)) => {
-            Some(a.iter().zip(b).map(|(a, b)| of_pixels(*a, *b)).sum::<f64>() / 4.0)
+/// Returns a point of a landmark in the camera frame, m; those seen in pixels count as [`DISTANCE_M`] away.
+fn point_m(seen: &RawMeasurement, robot: &Robot) -> Option<Point3<f64>> {
+    let along = |pixel: [f64; 2]| robot.camera.lens.unproject(&pixel.into());
+    match seen {
+        RawMeasurement::Corners(corners) => {
+            let rays = corners.iter().map(|corner| Some(along(*corner)?.into_inner()));
+            let sum = rays.sum::<Option<Vector3<f64>>>()?;
+            Some(Point3::from(sum.normalize() * DISTANCE_M))
         }
-        (RawMeasurement::BoardCorner { number, pixel }, RawMeasurement::BoardCorner { number: other, pixel: to }) => {
-            (number == other).then(|| of_pixels(*pixel, *to))
-        }
-        (RawMeasurement::Position(a), RawMeasurement::Position(b)) => Some((a - b).norm() / a.norm()),
-        (RawMeasurement::Pose(a), RawMeasurement::Pose(b)) => {
-            let [a, b] = [a, b].map(|pose| pose.translation.vector);
-            Some((a - b).norm() / a.norm())
-        }
-        _ => None,
+        RawMeasurement::BoardCorner { pixel, .. } => Some(Point3::from(along(*pixel)?.into_inner() * DISTANCE_M)),
+        RawMeasurement::Position(position_m) => Some(Point3::from(*position_m)),
+        RawMeasurement::Pose(pose) => Some(pose.translation.vector.into()),
     }
 }
 
@@ -121,33 +134,57 @@ fn size(moved_rad: f64) -> f64 {
     (moved_rad / STILL_RAD).ln_1p()
 }
 
-/// Returns the correlation of the motions of tags and joints, with `shift_s` added to the stamps of the tags; `None`
-/// where too few pairs have readings or moved.
-fn correlation(travels: &TravelSeries<'_>, pairs: &[Pair], shift_s: f64, n_joints: usize) -> Option<f64> {
-    let travel = |at: Stamp| travels.at(at.plus_s(shift_s)).filter(|found| found.is_continuous);
-    let joints = |to: &JointAngles, from: &JointAngles| {
-        (0..n_joints).map(|joint| travels.difference(to, from, joint).abs()).fold(0.0, f64::max)
+/// Returns how the motions agree with `shift_s` added to the stamps of the tags; `None` where too few pairs have
+/// readings or moved.
+fn agreement(travels: &TravelSeries<'_>, pairs: &[Pair], shift_s: f64, robot: &Robot) -> Option<Agreement> {
+    let camera_at = |at: Stamp| {
+        let found = travels.at(at.plus_s(shift_s)).filter(|found| found.is_continuous)?;
+        let angle_rad = |joint: usize| robot.sensors[joint].center_rad + found.travel_rad[joint];
+        Some(robot.tags_from_camera(&JointAngles::from_fn(found.travel_rad.len(), angle_rad)))
     };
-    let both = pairs.iter().filter_map(|pair| {
-        let (from, to) = (travel(pair.from)?, travel(pair.to)?);
-        Some((pair.tags, size(joints(&to.travel_rad, &from.travel_rad))))
-    });
-    let (mut n, mut n_moved, mut sum, mut products) = (0_usize, [0_usize; 2], [0.0; 2], [0.0; 3]);
-    for (tags, joints) in both {
-        n += 1;
-        for (k, moved) in [tags, joints].into_iter().enumerate() {
-            n_moved[k] += usize::from(moved > size(STILL_RAD));
-            sum[k] += moved;
+    let (mut of_all, mut of_sizes, mut n_moved) = (Sums::default(), Sums::default(), [0_usize; 2]);
+    for pair in pairs {
+        let (Some(from), Some(to)) = (camera_at(pair.from), camera_at(pair.to)) else { continue };
+        let motion = to.inv_mul(&from);
+        let moved = pair.points_m.iter().map(|point| (motion * point - point).norm() / point.coords.norm());
+        let joints = size(moved.sum::<f64>() / pair.points_m.len() as f64);
+        of_all.add(pair.tags, joints);
+        let have_moved = [pair.tags, joints].map(|moved| moved > size(STILL_RAD));
+        n_moved = [0, 1].map(|k| n_moved[k] + usize::from(have_moved[k]));
+        if have_moved == [true; 2] && pair.is_measured {
+            of_sizes.add(pair.tags, joints);
         }
-        products = [products[0] + tags * tags, products[1] + joints * joints, products[2] + tags * joints];
     }
-    if n_moved.iter().any(|n| *n < MIN_MOVED) || (n as f64) < MIN_SHARE * pairs.len() as f64 {
+    if n_moved.iter().any(|n| *n < MIN_MOVED) || of_all.n < MIN_SHARE * pairs.len() as f64 {
         return None;
     }
-    let n = n as f64;
-    let variance = |k: usize| products[k] - sum[k] * sum[k] / n;
-    let covariance = products[2] - sum[0] * sum[1] / n;
-    Some(covariance / (variance(0) * variance(1)).sqrt()).filter(|found| found.is_finite())
+    let sizes = of_sizes.correlation().filter(|_| of_sizes.n > 3.0);
+    let sizes = sizes.map_or(0.0, |found| found.clamp(-MOST, MOST).atanh() * (of_sizes.n - 3.0).sqrt());
+    Some(Agreement { shift_s, correlation: of_all.correlation()?, sizes })
+}
+
+/// Sums for the correlation of two series.
+#[derive(Default)]
+struct Sums {
+    n: f64,
+    sum: [f64; 2],
+    squares: [f64; 2],
+    products: f64,
+}
+
+impl Sums {
+    fn add(&mut self, a: f64, b: f64) {
+        self.n += 1.0;
+        self.sum = [self.sum[0] + a, self.sum[1] + b];
+        self.squares = [self.squares[0] + a * a, self.squares[1] + b * b];
+        self.products += a * b;
+    }
+
+    fn correlation(&self) -> Option<f64> {
+        let variance = |k: usize| self.squares[k] - self.sum[k] * self.sum[k] / self.n;
+        let covariance = self.products - self.sum[0] * self.sum[1] / self.n;
+        Some(covariance / (variance(0) * variance(1)).sqrt()).filter(|found| found.is_finite())
+    }
 }
 
 #[cfg(test)]
