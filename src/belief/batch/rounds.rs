@@ -16,7 +16,7 @@ use crate::checks::innovations::Innovations;
 use crate::checks::touch_term::TouchUpdate;
 use crate::explain::calibration_prior::PriorConsistency;
 use crate::explain::drawing::Drawing;
-use crate::explain::failure_detection::FailureSearch;
+use crate::explain::failure_detection::{FailureSearch, is_suspicious};
 use crate::explain::failures::Failure;
 use crate::explain::model_selection::{OptionalTerm, Selection};
 use crate::explain::other_lens::{lens_that_fits, of_better_model};
@@ -31,6 +31,7 @@ use crate::model::shared_survey_error::count_as_independent;
 use crate::positions::position_problem::PositionProblem;
 use crate::positions::solution::Solution;
 use crate::positions::unobservable::grouped_names;
+use crate::say::reading_error::MisreadReadings;
 use crate::say::refusal::Refusal;
 use crate::solve::covariance::ParameterCovariance;
 use crate::solve::details::TargetPrediction;
@@ -77,6 +78,8 @@ pub(crate) struct BundleCalibration<'a> {
     listener: Option<&'a mut EstimateListener<'a>>,
     /// The views with the readings as they were read.
     as_read: Vec<View>,
+    /// Readings of other instants than the tags: then no lens or link is searched for.
+    unpaired: Option<MisreadReadings>,
 }
 
 /// Result of a round of the calibration.
@@ -166,6 +169,7 @@ impl<'a> BundleCalibration<'a> {
             clock: None,
             listener: None,
             as_read: Vec::new(),
+            unpaired: None,
         })
     }
 
@@ -193,12 +197,14 @@ impl<'a> BundleCalibration<'a> {
         let first = setup(&declared);
         self.check_observable(&first, &declared)?;
         let estimated = self.first_estimate(&first);
-        let lens = estimated.as_ref().and_then(|(found, _)| self.lens_that_fits(&first.input(), found));
-        if let Some(drawing) = lens {
+        let found = estimated.as_ref().map(|(estimate, _)| estimate);
+        let unpaired = found.and_then(|found| self.find_unpaired(found, &views));
+        let searched = found.filter(|_| unpaired.is_none());
+        if let Some(drawing) = searched.and_then(|found| self.lens_that_fits(&first.input(), found)) {
             self.drawing = drawing;
             return Ok(Round::Revised(views));
         }
-        let failures = self.failures(&views, &declared, estimated.as_ref().map(|(estimate, _)| estimate));
+        let failures = self.failures(&views, &declared, found);
         let second;
         let (setup, estimated) = if failures == declared {
             (&first, estimated)
@@ -207,10 +213,13 @@ impl<'a> BundleCalibration<'a> {
             (&second, second.estimate())
         };
         let (estimate, selections) = estimated.ok_or_else(|| self.nothing_observable())?;
+        // A dead sensor explains readings without any relation to the camera, too.
+        let unpaired = unpaired.filter(|_| is_suspicious(&estimate));
         let mut estimated =
             Estimated { setup, failures: &failures, estimate, selections, lengths: Vec::new(), touches: None };
         if self.purpose == EstimatePurpose::Final {
-            if let Some(otherwise) = Self::REVISIONS.iter().find_map(|revise| revise(self, &estimated)) {
+            let revisions: &[_] = if unpaired.is_none() { &Self::REVISIONS } else { &[] };
+            if let Some(otherwise) = revisions.iter().find_map(|revise| revise(self, &estimated)) {
                 drop(estimated);
                 otherwise.take(&mut views, &sizes_m, &self.data.robot);
                 return Ok(Round::Revised(views));
@@ -219,7 +228,7 @@ impl<'a> BundleCalibration<'a> {
                 estimated = refine(self, estimated);
             }
         }
-        self.as_read = views;
+        (self.as_read, self.unpaired) = (views, unpaired);
         self.finish(estimated).map(|calibration| Round::Done(Box::new(calibration)))
     }
 

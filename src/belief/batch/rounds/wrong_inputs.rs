@@ -1,8 +1,9 @@
 //! The last of a round's statements: wrong inputs and motions that explain a refusal better than the arm does.
 
-use crate::batch::rounds::{BundleCalibration, Diagnosis, Estimated};
+use crate::batch::rounds::{BundleCalibration, Diagnosis, EstimatePurpose, Estimated};
 use crate::explain::drawing::Drawing;
 use crate::explain::failure_detection::is_suspicious;
+use crate::explain::failures::Failure;
 use crate::explain::moved_between::MotionSearch;
 use crate::explain::reading_search::ReadingSearch;
 use crate::explain::unpaired::unpaired;
@@ -11,6 +12,8 @@ use crate::file::calibration::{Calibration, Status};
 use crate::say::reading_error::MisreadReadings;
 use crate::say::refusal::Refusal;
 use crate::say::wrong_input::WrongInput;
+use crate::solve::estimate::Estimate;
+use crate::views::view::View;
 use armcal_core::codes::{Code, Coded};
 
 impl BundleCalibration<'_> {
@@ -49,6 +52,12 @@ impl BundleCalibration<'_> {
         if calibration.refusals.iter().any(is_of_line) && calibration.refusals.iter().all(is_of_scale) {
             return;
         }
+        if let Some(unpaired) = &self.unpaired {
+            let shifted = self.reading_search(failures, &self.drawing).find();
+            let found = shifted.unwrap_or_else(|| unpaired.clone());
+            calibration.refuse_first_for([Refusal::MisreadReadings(found)]);
+            return;
+        }
         let (robot, views, drawing, clocks) = (&self.data.robot, &self.as_read[..], &self.drawing, self.clocks());
         let motion = MotionSearch { robot, views, failures, drawing, clocks }.find(&calibration.refusals);
         if motion.is_some() {
@@ -59,20 +68,23 @@ impl BundleCalibration<'_> {
         let is_unbounded = |refusal: &Refusal| matches!(refusal, Refusal::RepairTooLarge { .. });
         let nominal = Drawing::default();
         let drawing = if calibration.refusals.iter().any(is_unbounded) { &nominal } else { &self.drawing };
+        calibration.refuse_first_for(self.reading_search(failures, drawing).find().map(Refusal::MisreadReadings));
+    }
+
+    fn reading_search<'b>(&'b self, failures: &'b [Failure], drawing: &'b Drawing) -> ReadingSearch<'b> {
         let map = self.map.is_none().then_some(&self.surveyed[..]);
-        let search = ReadingSearch { robot: &self.data.robot, views: &self.as_read, failures, drawing, map };
-        calibration.refuse_first_for(search.find().or_else(|| self.unpaired(estimated)).map(Refusal::MisreadReadings));
+        ReadingSearch { robot: &self.data.robot, views: &self.as_read, failures, drawing, map }
     }
 
     /// Searches for readings in a wrong order, with the tags as surveyed, where no model explains the views.
-    fn unpaired(&self, estimated: &Estimated<'_>) -> Option<MisreadReadings> {
-        if !is_suspicious(estimated.by_views()) {
+    pub(super) fn find_unpaired(&self, found: &Estimate<'_>, views: &[View]) -> Option<MisreadReadings> {
+        if self.purpose != EstimatePurpose::Final || !is_suspicious(found) {
             return None;
         }
         let mut robot = self.data.robot.clone();
         if self.map.is_none() {
             robot.tags.clone_from(&self.surveyed);
         }
-        unpaired(&robot, &self.as_read)
+        unpaired(&robot, views)
     }
 }
