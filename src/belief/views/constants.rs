@@ -67,6 +67,8 @@ pub(crate) mod clock_shift {
     pub(crate) const MIN_CORRELATION: f64 = 0.8;
     /// Share of the best correlation above which an offset is as good by when the arm moved.
     pub(crate) const AS_GOOD: f64 = 0.9;
+    /// Ratio of the angles between tags as seen and as the nominal arm predicts them, best offset over any other.
+    pub(crate) const NEARER: f64 = 0.5;
     /// Standard deviations by which the sizes of the motions must prefer an offset to the others.
     pub(crate) const SURE: f64 = 3.0;
     /// Largest correlation of sizes that counts: no camera's motion predicts a tag's better.

@@ -5,14 +5,15 @@
 
 use crate::views::constants::clock_shift::{
     AS_GOOD, DISTANCE_M, LONGEST_S, MAX_AS_STAMPED, MAX_PAIRS, MIN_CORRELATION, MIN_MOVED, MIN_SHARE, MIN_SHIFT_S,
-    MOST, NEIGHBOUR_S, STEP_S, STILL_RAD, SURE,
+    MOST, NEARER, NEIGHBOUR_S, STEP_S, STILL_RAD, SURE,
 };
 use crate::views::external::pairing::TravelSeries;
 use armcal_core::input::{ExternalDetection, RawMeasurement, TagFrame};
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::Robot;
+use armcal_core::stats::quantile;
 use armcal_core::time::Stamp;
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 use std::fmt;
 
 /// Offset between the clocks of camera and joints, and the evidence for it.
@@ -54,6 +55,8 @@ struct Pair {
     tags: f64,
     /// False where the images show no tag in common: then it moved, but how far is unknown.
     is_measured: bool,
+    /// Places of the tags in the map, and the points at which the first image shows them, m.
+    mapped_m: Vec<(Point3<f64>, Point3<f64>)>,
 }
 
 /// How the motions of tags and joints agree under one offset.
@@ -68,7 +71,8 @@ struct Agreement {
 
 /// Returns the offset between the clocks where the motions prove one that no estimate can absorb.
 ///
-/// Poses at equal times agree with each other's motions by when they moved; how far they moved then decides.
+/// Poses at equal times agree with one another's motions by when they moved. The directions of the tags by the map and
+/// the nominal arm then decide, or how far they moved.
 pub(crate) fn clock_shift(travels: &TravelSeries<'_>, frames: &[TagFrame], robot: &Robot) -> Option<ClockShift> {
     let pairs = pairs(frames, robot);
     let all = |longest_s: f64| {
@@ -83,15 +87,46 @@ pub(crate) fn clock_shift(travels: &TravelSeries<'_>, frames: &[TagFrame], robot
     }
     let mut all = all(LONGEST_S);
     let best = most(&all)?;
+    if best < MIN_CORRELATION {
+        return None;
+    }
     all.retain(|one| one.correlation > AS_GOOD * best);
-    let surest = all.iter().copied().max_by(|a, b| a.sizes.total_cmp(&b.sizes))?;
+    let off: Vec<(Agreement, f64)> =
+        all.iter().map(|one| (*one, -off_rad(travels, &pairs, one.shift_s, robot).ln())).collect();
+    let by_sizes: Vec<(Agreement, f64)> = all.iter().map(|one| (*one, one.sizes)).collect();
+    let (offset_s, correlation) = unrivalled(&off, -NEARER.ln()).or_else(|| unrivalled(&by_sizes, SURE))?;
+    let is_large = offset_s.abs() > MIN_SHIFT_S;
+    is_large.then_some(ClockShift { offset_s, correlation, as_stamped, n_pairs: pairs.len() })
+}
+
+/// Returns offset and correlation of the highest score, if all others but its neighbours are lower by `margin`.
+///
+/// Of an arm that rests for each image, a range of offsets is as good: its middle is farthest from a motion.
+fn unrivalled(scored: &[(Agreement, f64)], margin: f64) -> Option<(f64, f64)> {
+    let (surest, most) = scored.iter().filter(|(_, score)| score.is_finite()).max_by(|a, b| a.1.total_cmp(&b.1))?;
     let (near, far): (Vec<_>, Vec<_>) =
-        all.into_iter().partition(|one| (one.shift_s - surest.shift_s).abs() <= NEIGHBOUR_S);
-    let rival = far.iter().map(|one| one.sizes).fold(f64::NEG_INFINITY, f64::max);
-    // Of an arm that rests for each image, a range of offsets is as good: its middle is farthest from a motion.
-    let offset_s = near.iter().map(|one| one.shift_s).sum::<f64>() / near.len() as f64;
-    let is_proven = best >= MIN_CORRELATION && surest.sizes > rival + SURE && offset_s.abs() > MIN_SHIFT_S;
-    is_proven.then_some(ClockShift { offset_s, correlation: surest.correlation, as_stamped, n_pairs: pairs.len() })
+        scored.iter().partition(|(one, _)| (one.shift_s - surest.shift_s).abs() <= NEIGHBOUR_S);
+    let is_lower = |(_, score): &(Agreement, f64)| score + margin < *most;
+    let offset_s = near.iter().map(|(one, _)| one.shift_s).sum::<f64>() / near.len() as f64;
+    far.iter().all(is_lower).then_some((offset_s, surest.correlation))
+}
+
+/// Returns the median angle between the tags as seen, with `shift_s` added to their stamps, and by map and nominal arm.
+fn off_rad(travels: &TravelSeries<'_>, pairs: &[Pair], shift_s: f64, robot: &Robot) -> f64 {
+    let of_pair = |pair: &Pair| {
+        let camera_from_map = camera_at(travels, pair.from.plus_s(shift_s), robot)?.inverse();
+        let off = |(place, seen): &(Point3<f64>, Point3<f64>)| (camera_from_map * place).coords.angle(&seen.coords);
+        Some(pair.mapped_m.iter().map(off).collect::<Vec<f64>>())
+    };
+    let all: Vec<f64> = pairs.iter().filter_map(of_pair).flatten().collect();
+    quantile(&all, 0.5).unwrap_or(f64::NAN)
+}
+
+/// Returns the camera's pose by the nominal arm, in the tags' frame; `None` outside of continuous readings.
+fn camera_at(travels: &TravelSeries<'_>, at: Stamp, robot: &Robot) -> Option<Isometry3<f64>> {
+    let found = travels.at(at).filter(|found| found.is_continuous)?;
+    let angle_rad = |joint: usize| robot.sensors[joint].center_rad + found.travel_rad[joint];
+    Some(robot.tags_from_camera(&JointAngles::from_fn(found.travel_rad.len(), angle_rad)))
 }
 
 /// Returns successive images, at most [`MAX_PAIRS`] pairs, spread over the recording.
@@ -111,7 +146,13 @@ fn pair(from: &TagFrame, to: &TagFrame, robot: &Robot) -> Option<Pair> {
         points_m = from.tags.iter().filter_map(point).collect();
     }
     let tags = size(if is_measured { moved } else { 1.0 });
-    (!points_m.is_empty()).then_some(Pair { from: from.stamp, to: to.stamp, points_m, tags, is_measured })
+    let mapped = |seen: &ExternalDetection| {
+        let tag = robot.tags.iter().find(|tag| Some(tag.id) == seen.id && tag.is_known())?;
+        Some((Point3::from(tag.base_from_tag.origin().vector()), point(seen)?))
+    };
+    let mapped_m = from.tags.iter().filter_map(mapped).collect();
+    let (from, to) = (from.stamp, to.stamp);
+    (!points_m.is_empty()).then_some(Pair { from, to, points_m, tags, is_measured, mapped_m })
 }
 
 /// Returns a point of a landmark in the camera frame, m; those seen in pixels count as [`DISTANCE_M`] away.
@@ -137,11 +178,7 @@ fn size(moved_rad: f64) -> f64 {
 /// Returns how the motions agree with `shift_s` added to the stamps of the tags; `None` where too few pairs have
 /// readings or moved.
 fn agreement(travels: &TravelSeries<'_>, pairs: &[Pair], shift_s: f64, robot: &Robot) -> Option<Agreement> {
-    let camera_at = |at: Stamp| {
-        let found = travels.at(at.plus_s(shift_s)).filter(|found| found.is_continuous)?;
-        let angle_rad = |joint: usize| robot.sensors[joint].center_rad + found.travel_rad[joint];
-        Some(robot.tags_from_camera(&JointAngles::from_fn(found.travel_rad.len(), angle_rad)))
-    };
+    let camera_at = |at: Stamp| camera_at(travels, at.plus_s(shift_s), robot);
     let (mut of_all, mut of_sizes, mut n_moved) = (Sums::default(), Sums::default(), [0_usize; 2]);
     for pair in pairs {
         let (Some(from), Some(to)) = (camera_at(pair.from), camera_at(pair.to)) else { continue };

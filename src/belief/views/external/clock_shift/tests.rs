@@ -2,8 +2,10 @@ use super::*;
 use crate::batch::tests::data::titan;
 use armcal_core::input::{ExternalRecording, Reading};
 use armcal_core::joints::JointCounts;
+use armcal_core::robot::SurveyedTag;
+use armcal_core::spatial::Pose;
 use armcal_core::stats::stream_rng;
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 use rand::RngExt;
 
 /// An arm that rests at random poses, with smooth motions between them.
@@ -87,6 +89,31 @@ fn clocks_that_differ_are_found_by_the_motions() {
             let found = shift(&readings, &arm.frames(late_s, at_rest, seed), &arm.robot).expect("a shift");
             assert!((found.offset_s - late_s).abs() < 0.2, "{} of {late_s}", found.offset_s);
         }
+    }
+}
+
+/// Each pose sees a tag of its own: the map decides among the poses.
+#[test]
+fn tags_that_no_two_poses_share_show_the_offset_by_the_map() {
+    for (seed, late_s) in [(5, 3.2), (6, -4.7)] {
+        let mut arm = Arm::new(seed, 40);
+        let mut rng = stream_rng(seed, "places");
+        let mut tag = |k: usize| {
+            let place = Vector3::new(1.3, 0.0, 0.0) + Vector3::from_fn(|_, _| rng.random_range(-0.6..0.6));
+            let base_from_tag = Pose::from_isometry(Isometry3::translation(place.x, place.y, place.z));
+            SurveyedTag { id: k as u32, base_from_tag, ..arm.robot.tags[0].clone() }
+        };
+        arm.robot.tags = (0..40).map(&mut tag).collect();
+        let frames = arm.frames(0.0, true, seed).into_iter().map(|frame| {
+            let time_s = frame.stamp.since_s(Stamp::default());
+            let tag = &arm.robot.tags[(time_s / PERIOD_S) as usize];
+            let camera_from_tags = arm.robot.tags_from_camera(&arm.angles_at(time_s)).inverse();
+            let seen = RawMeasurement::Position((camera_from_tags * tag.base_from_tag.isometry()).translation.vector);
+            let tags = vec![ExternalDetection { id: Some(tag.id), seen }];
+            TagFrame { stamp: frame.stamp.plus_s(-late_s), tags, ..frame }
+        });
+        let found = shift(&arm.readings(None), &frames.collect::<Vec<_>>(), &arm.robot).expect("a shift");
+        assert!((found.offset_s - late_s).abs() < 0.2, "{} of {late_s}", found.offset_s);
     }
 }
 
