@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 
 use crate::calib::{
-    Calibration, CalibrationData, CalibrationFileError, Status, View, calibrate_data, check_joints, prepare_pooled,
+    Calibration, CalibrationData, Status, View, calibrate_data, check_joints, prepare_pooled,
     read_marked,
 };
 use crate::cli::exit::UsageError;
@@ -402,11 +402,7 @@ pub(super) fn read_prior(file: &Path, robot: &Robot) -> Result<Calibration> {
         )
         .into());
     }
-    prior.sensors(robot).map_err(|error| match error {
-        CalibrationFileError::OtherRobot { found, found_joints, expected, .. } => {
-            CalibrationFileError::OtherRobot { file: file.display().to_string(), found, found_joints, expected }
-        }
-        other => other,
-    })?;
+    prior.check_robot(file, robot)?;
+    prior.sensors(robot)?;
     Ok(prior)
 }

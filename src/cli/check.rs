@@ -59,7 +59,7 @@ pub(super) fn check(args: &CheckArgs) -> Result<Exit> {
     })
 }
 
-/// Settings for all files, and the robot that the tasks among them are for.
+/// Settings for all files, and the robot that the tasks and calibrations among them are for.
 struct Context {
     overrides: Overrides,
     robot: Option<Robot>,
@@ -159,7 +159,7 @@ fn check_kind(file: &Path, kind: Kind, text: &str, context: &Context) -> Result<
     let folder = file.parent().unwrap_or(Path::new("."));
     match kind {
         Kind::Routine => check_routine(file, &context.overrides),
-        Kind::Calibration => describe_calibration(file, text),
+        Kind::Calibration => describe_calibration(file, text, context.robot.as_ref()),
         Kind::Task => describe_task(file, context.robot.as_ref()),
         Kind::Robot if !is_robot_toml(file) => {
             let problem = format!(
@@ -234,8 +234,8 @@ fn describe_task(file: &Path, robot: Option<&Robot>) -> Result<Found> {
 }
 
 /// Describes a calibration. Without its covariance it can still move an arm; with another calibration's covariance it
-/// is an error.
-fn describe_calibration(file: &Path, text: &str) -> Result<Found> {
+/// is an error, and with a robot folder that it was not made with.
+fn describe_calibration(file: &Path, text: &str, robot: Option<&Robot>) -> Result<Found> {
     let (calibration, without) = match Calibration::read(file) {
         Ok(calibration) => (calibration, String::new()),
         Err(CalibrationFileError::NoCovariance { file: covariance, .. }) => (
@@ -244,6 +244,7 @@ fn describe_calibration(file: &Path, text: &str) -> Result<Found> {
         ),
         Err(error) => return Err(error.into()),
     };
+    robot.map_or(Ok(()), |robot| calibration.check_robot(file, robot))?;
     let (joints, valid) = (calibration.joint.len(), calibration.valid_for().join(", "));
     let text = format!("calibration of `{}`, {joints} joints; valid for {valid}{without}", calibration.robot);
     let refusal = calibration.refusals.first().map(|first| (first.cause(), first.code()));

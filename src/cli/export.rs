@@ -131,6 +131,7 @@ pub(super) fn export(args: &ExportArgs) -> Result<Exit> {
     let text = match input {
         Input::Full(calibration) => {
             if let Some(robot) = &robot {
+                calibration.check_robot(&args.file, robot)?;
                 calibration.sensors(robot)?;
             }
             of_full(&calibration, robot.as_ref(), args, &mut left_out)?
@@ -157,8 +158,9 @@ pub fn export_text(
     let form = Form::from_str(form, false).map_err(|_| {
         UsageError::new(Code::UsageInvalid, format!("`{form}` is no form of a calibration; it is one of {}", known()))
     })?;
-    calibration.sensors(robot)?;
     let file = PathBuf::from("calibration");
+    calibration.check_robot(&file, robot)?;
+    calibration.sensors(robot)?;
     let args = ExportArgs { file, form, robot: None, points: None, input: input.map(Path::to_owned), refused: true };
     let mut left_out = Vec::new();
     let text = of_full(calibration, Some(robot), &args, &mut left_out)?;

@@ -82,6 +82,7 @@ impl<'a> Calibrator<'a> {
     /// [`CalibrateError`]: tags or measurements of another arm, or too few for a fit.
     pub fn calibrate(&self, measurements: &Measurements) -> Result<Calibration, CalibrateError> {
         if let Some(prior) = self.prior {
+            prior.check_robot(Path::new("calibration.toml"), self.robot)?;
             prior.sensors(self.robot)?;
         }
         match measurements {

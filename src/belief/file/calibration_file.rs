@@ -52,24 +52,13 @@ const TERMS_HEAD: &str = "\
 ";
 
 impl Calibration {
-    /// Returns the sensors of `robot` under this calibration.
+    /// Returns the sensors of `robot` under this calibration. `robot` may have a measured scale, so that its datasheet
+    /// is not compared: see [`check_robot`](Self::check_robot).
     ///
     /// # Errors
     /// [`CalibrationFileError::OtherRobot`] if the calibration was made for another arm.
     pub fn sensors(&self, robot: &Robot) -> Result<ArmSensors, CalibrationFileError> {
-        let names: Vec<String> = self.joint.iter().map(|joint| joint.name.clone()).collect();
-        let moves_as = |(joint, spec): (&JointResult, &JointSensorSpec)| joint.moves == spec.moves;
-        if self.robot != robot.name
-            || names != robot.joint_names()
-            || !self.joint.iter().zip(&robot.sensors).all(moves_as)
-        {
-            return Err(CalibrationFileError::OtherRobot {
-                file: "calibration.toml".to_owned(),
-                found: self.robot.clone(),
-                found_joints: names,
-                expected: robot.name.clone(),
-            });
-        }
+        self.check_joints(Path::new("calibration.toml"), robot)?;
         let mut sensors = ArmSensors::nominal(robot);
         sensors.reference = self.reference.map(|table| table.conditions()).unwrap_or_default();
         for (model, joint) in sensors.models.iter_mut().zip(&self.joint) {

@@ -61,6 +61,12 @@ pub(crate) mod lookup {
     pub(crate) const POINTS: usize = 65;
 }
 
+pub(crate) mod robot_match {
+    /// Difference of a datasheet's value from the one that a calibration was made with that is only rounding: relative
+    /// for scales, rad or m for zeros and centres. It moves the tool of a 5 m arm by less than 0.01 mm.
+    pub(crate) const SAME_DATASHEET: f64 = 1e-6;
+}
+
 pub(crate) mod valid_range {
     /// Excess that is not reported: oil (K), pressure (Pa), age (h). Assumed.
     pub(crate) const MARGIN_K: f64 = 2.0;

@@ -21,6 +21,7 @@ pub(crate) mod lookup;
 pub(crate) mod map_table;
 pub(crate) mod metrics;
 pub(crate) mod model_table;
+pub(crate) mod robot_match;
 pub(crate) mod sag_table;
 pub(crate) mod slide_keys;
 pub(crate) mod terms_table;
