@@ -9,8 +9,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 
 use crate::calib::{
-    Calibration, CalibrationData, Status, View, calibrate_data, check_joints, prepare_pooled,
-    read_marked,
+    Calibration, CalibrationData, Status, View, calibrate_data, check_joints, prepare_pooled, read_marked,
 };
 use crate::cli::exit::UsageError;
 use crate::cli::file_kind::{FileKind, expect_kind, expect_option, expect_recording};

@@ -8,9 +8,7 @@ use rand::RngExt;
 
 use super::{apart, arm_in, as_calibrated, calibration, calibration_file, export, exported, folder_with, frames};
 use crate::support::texts::Texts;
-use crate::support::{
-    answer, edit, program, read, robot_copy, robot_folder, root, shared_run, temp, titan, write,
-};
+use crate::support::{answer, edit, program, read, robot_copy, robot_folder, root, shared_run, temp, titan, write};
 
 /// Rounding errors of a chain, m and rad.
 const ROUNDING: f64 = 1e-12;

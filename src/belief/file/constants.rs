@@ -7,6 +7,11 @@ pub(crate) mod calibration_file {
     pub(crate) const LEAST_SLOPE: f64 = 0.2;
 }
 
+pub(crate) mod camera_mount {
+    /// Length of a quaternion that is one by the digits of its file, 1.
+    pub(crate) const UNIT_LENGTH: std::ops::RangeInclusive<f64> = 0.999..=1.001;
+}
+
 pub(crate) mod compact_precision {
     /// The text must be shorter than this, bytes.
     pub const MAX_COMPACT_BYTES: usize = 512;
@@ -54,6 +59,15 @@ pub(crate) mod compact_text {
 pub(crate) mod covariance_file {
     /// Number of rows above which a covariance is written with seven significant digits.
     pub(crate) const FULL_DIGITS_ROWS: usize = 24;
+}
+
+pub(crate) mod joint_check {
+    /// Relative difference below which a gain is the one that its ratio to the datasheet gives, 1: only rounding.
+    pub(crate) const SAME_GAIN: f64 = 1e-6;
+    /// The largest ratio of a gain or a scale to the datasheet's, 1; scales of robot.toml span this much.
+    pub(crate) const LARGEST_RATIO: f64 = 1e12;
+    /// The largest scale or zero, counts per radian or counts: robot.toml allows 1e9 per degree or millimetre.
+    pub(crate) const LARGEST_SCALE: f64 = 1e12;
 }
 
 pub(crate) mod lookup {

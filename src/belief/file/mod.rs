@@ -15,6 +15,7 @@ pub(crate) mod constants;
 pub(crate) mod covariance_file;
 pub(crate) mod failed_joint;
 pub(crate) mod file_error;
+pub(crate) mod joint_check;
 pub(crate) mod lens_table;
 pub(crate) mod link_table;
 pub(crate) mod lookup;
