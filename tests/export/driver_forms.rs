@@ -246,6 +246,13 @@ fn refused_calibrations_are_exported_on_demand_only() {
         command.arg("export").arg(&refused).args(["--as", form, "--refused", "--robot"]).arg(robot_folder());
         assert!(answer(&mut command).code == 0);
     }
+    for form in ["urdf", "ros2-control", "ros2-control-offset", "table", "csv", "kalibr"] {
+        let mut command = program();
+        command.arg("export").arg(&refused).args(["--as", form, "--refused", "--robot"]).arg(robot_folder());
+        let told = answer(&mut command);
+        let first = told.stdout.lines().find(|line| !line.starts_with("<?xml")).unwrap_or_default();
+        assert!(first.contains("REFUSED"), "{form}: {first}");
+    }
     export(&refused, None, "yaml").expect("yaml", 4, &["--refused"]);
     let mut command = program();
     answer(command.arg("export").arg(&refused).args(["--as", "yaml", "--refused"])).expect(
