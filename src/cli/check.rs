@@ -201,7 +201,8 @@ fn expect_readable(file: &Path) -> Result<()> {
     }
     let file = file.display();
     let problem = format!(
-        "{file}: is a .{ending} file, which `check` does not read; give a TOML file, such as calibration.toml or plan.toml"
+        "{file}: is a .{ending} file, which `check` does not read; give a TOML file, such as calibration.toml or \
+         plan.toml"
     );
     Err(UsageError::new(Code::FileKind, problem).into())
 }

@@ -212,7 +212,7 @@ fn left_out(drafted: &DraftedRobot) -> String {
             "\nassumed: left out as a gripper's or a carriage's joints: {joints}. Name --base and --tip to keep them"
         ),
         (false, false) => format!(
-            "\nassumed: left out with {}, which moves in several ways, so that no chain goes on over it: {joints}. \
+            "\nassumed: left out with {}, which moves in several ways, so that no chain continues over it: {joints}. \
              Where they are the arm's, draw it as joints that turn or slide",
             cut_at.join(", ")
         ),

@@ -85,7 +85,7 @@ impl JointResult {
                 FileIssue::check_range(file, &self.key(key), std, 0.0..=1e3)?;
             }
             if std == 0.0 && is_estimated && status == Status::Accepted {
-                let problem = "0 is outside (0 .. 1000]: no estimate is exact, so it was edited; calibrate again";
+                let problem = "is 0, and must be above 0, because no estimate is exact: it was edited; calibrate again";
                 return Err(FileIssue::new(Code::ValueOutOfRange, file, self.key(key), problem));
             }
         }

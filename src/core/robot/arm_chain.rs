@@ -33,7 +33,7 @@ pub(super) struct FoundArm {
     pub camera: Option<String>,
     /// Joints on the same path that were taken for those of a gripper or of the arm's carrier.
     pub left_out: Vec<String>,
-    /// Those of them that move in several ways, each with its type: no chain goes on over them.
+    /// Joints among them that move in several ways, each with its type: no chain continues over them.
     pub cut_at: Vec<String>,
 }
 

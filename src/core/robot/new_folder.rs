@@ -65,7 +65,7 @@ pub struct DraftedRobot {
     pub files: Vec<NewFile>,
     /// Joints that were left out because they seem to belong to a gripper or to the arm's carrier.
     pub left_out: Vec<String>,
-    /// Those of them that move in several ways, such as planar ones: no chain goes on over them.
+    /// Joints among them that move in several ways, such as planar ones: no chain continues over them.
     pub cut_at: Vec<String>,
     /// Joints whose origin is turned by more than a turn, as degrees would be.
     pub turned: Vec<String>,
