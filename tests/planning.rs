@@ -86,6 +86,24 @@ fn counts_belong_to_their_angles() {
 }
 
 #[test]
+fn totals_that_contradict_their_poses_are_refused() {
+    let folder = temp();
+    let file = folder.path().join("plan.toml");
+    let good = read(&crate::support::root().join("fuzz/corpus/plan/plan.toml"));
+    let totals = PlanFile::read(&crate::support::root().join("fuzz/corpus/plan/plan.toml")).expect("it reads").totals;
+    for (key, value, edited) in [
+        ("least_clearance_m", totals.least_clearance_m.to_string(), "0.35"),
+        ("poses", totals.poses.to_string(), "31"),
+        ("left_out", totals.left_out.to_string(), "2"),
+    ] {
+        let (from, to) = (format!("\n{key} = {value}\n"), format!("\n{key} = {edited}\n"));
+        assert!(good.contains(&from), "{key}");
+        write(&file, &good.replacen(&from, &to, 1));
+        answer(program().arg("check").arg(&file)).expect(key, 2, &["[keys_conflict]", "plan.toml", key]);
+    }
+}
+
+#[test]
 fn a_prior_narrows_the_bounds_and_renames_the_angles() {
     let folder = temp();
     let routine = short(folder.path(), "");

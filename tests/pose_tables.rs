@@ -190,7 +190,7 @@ fn what_a_table_lacks_is_named() {
     let names = "joint_names: [j1, j2]\njoint_values:\n  - [0.1, -0.5]\n  - [0.2, -0.4]\n  - [0.3, 0.4]\n";
     let (said, proposed) = given("joints.yaml", names);
     said.expect("joints alone", 0, &["YAML", "3 rows", "j1, j2", "missing "]);
-    proposed.expect("joints alone", 2, &["joints_mismatch"]);
+    proposed.expect("joints alone", 2, &["table_invalid"]);
     let samples = "samples:\n- tracking: {translation: {x: 0.1, y: 0.2, z: 0.5}, rotation: {x: 0, y: 0, z: 0, w: 1}}\n\
                    - tracking: {translation: {x: 0.2, y: 0.1, z: 0.6}, rotation: {x: 0, y: 1, z: 0, w: 0}}\n";
     let (said, proposed) = given("samples.yaml", samples);

@@ -378,6 +378,16 @@ fn bad_data_is_refused_by_name() {
 }
 
 #[test]
+fn a_landmark_without_a_tag_map_is_told_the_option() {
+    let given = Given::new(&RealTitan::new(&titan(), 6, AS_IN_2018, 8));
+    write(&given.file("map.toml"), &INPUT_MAP.replace(TAG_NOISE, "").replacen("tag36h11:{id}", "board", 1));
+    let mut command = program();
+    command.arg("calibrate").arg(given.file("arm.mcap")).arg("--robot").arg(robot_folder());
+    command.arg("--input").arg(given.file("map.toml")).arg("--out").arg(given.file("out"));
+    answer(&mut command).expect("no tag map", 2, &["map.toml", "tags.child_frame", "`board`", "--tag-map"]);
+}
+
+#[test]
 fn stamps_that_go_backwards_are_refused_in_recordings_of_our_own() {
     let folder = temp();
     let path = folder.path().join("own.mcap");

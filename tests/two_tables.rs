@@ -228,7 +228,7 @@ fn rows_without_their_other_half_are_counted_and_none_is_taken_twice() {
     rig.calibrate("joints.csv").expect("no match", 2, &["shot0", "img_0003", "joints_key", "[table_invalid]"]);
     std::fs::remove_file(rig.file("map.toml")).expect("removed");
     let both = ["joints.csv", "corners.csv"];
-    rig.inspect(&both).expect("nothing joins them", 2, &["[joints_mismatch]"]);
+    rig.inspect(&both).expect("nothing joins them", 2, &["[table_invalid]"]);
     assert!(!rig.file("map.toml").exists());
     // With several candidates the user must choose.
     rig.write_tags("corners.csv", ("frame", &image), OPENCV);

@@ -441,6 +441,21 @@ fn fingers_are_left_out_and_named() {
     }
 }
 
+/// A joint that moves in several ways is named as the reason, and so are origins that are turned by degrees.
+#[test]
+fn a_planar_joint_and_angles_in_degrees_are_named() {
+    for kind in ["planar", "floating"] {
+        let bench = Bench::new(&arm(6, &Parts { kind: kind.into(), ..Parts::default() }));
+        bench.new_robot(&[]).expect(kind, 0, &["`j2`", kind, "j1"]);
+    }
+    for (origin, is_named) in [("<origin rpy=\"90 0 0\"/>", true), ("<origin rpy=\"0 6.2832 -6.2832\"/>", false)] {
+        let bench = Bench::new(&arm(6, &Parts { origin: origin.into(), ..Parts::default() }));
+        let answer = bench.new_robot(&[]);
+        answer.expect(origin, 0, &[]);
+        assert_eq!(answer.stdout.contains("rpy"), is_named, "{}", answer.stdout);
+    }
+}
+
 #[test]
 fn options_are_obeyed_or_refused() {
     let text = arm(6, &Parts::default());

@@ -114,7 +114,10 @@ fn counts_twice_as_fine_halve_the_gains_and_change_nothing_else() {
     assert_ne!(doubled.messages_hash, expected.messages_hash);
     expected.messages_hash.clone_from(&doubled.messages_hash);
     assert_eq!(doubled.covariance_hash, expected.covariance_hash);
+    let doubled_of = |value: Option<f64>| value.map(|value| 2.0 * value);
     for joint in &mut expected.joint {
+        (joint.offset_counts, joint.counts_per_rad) =
+            (doubled_of(joint.offset_counts), doubled_of(joint.counts_per_rad));
         joint.gain_rad_per_count *= 0.5;
         joint.gain_std_rad_per_count *= 0.5;
     }

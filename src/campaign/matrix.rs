@@ -56,7 +56,7 @@ pub fn settings(
         let mut longer = Vec::with_capacity(points.len() * values.len());
         for (point, weight) in &points {
             for (k, value) in values.iter().enumerate() {
-                let one = Override::new(key, value.clone()).map_err(CampaignError::Usage)?;
+                let one = Override::new(key, value.clone()).map_err(CampaignError::Usage)?.of_matrix();
                 let its = of_key.and_then(|weights| weights.get(k)).copied().unwrap_or(1.0);
                 longer.push((point.iter().cloned().chain([one]).collect(), weight * its));
             }

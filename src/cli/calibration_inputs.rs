@@ -9,11 +9,10 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 
 use crate::calib::{
-    Calibration, CalibrationData, CalibrationFileError, Status, View, calibrate_data, check_joints, prepare_pooled,
-    read_marked,
+    Calibration, CalibrationData, Status, View, calibrate_data, check_joints, prepare_pooled, read_marked,
 };
 use crate::cli::exit::UsageError;
-use crate::cli::file_kind::{FileKind, expect_kind, expect_option, expect_recording};
+use crate::cli::file_kind::{FileKind, expect_kind, expect_no_truth, expect_option, expect_recording};
 use crate::cli::losses::{warn_of_external, warn_of_losses};
 use crate::cli::stdout::warn;
 use crate::cli::waiting::Waiting;
@@ -220,15 +219,20 @@ impl CalibrationInputs<'_> {
 
     /// Recordings that armcal made, and true if one had lost data.
     fn marked(&self) -> Result<(Vec<Recording>, bool)> {
-        self.robot.require_lens()?;
         let mut recordings = Vec::new();
         let mut lost = false;
         for path in self.recordings {
             let recording = read_marked(path)?;
+            if recording.joint_names.is_empty() {
+                expect_no_truth(path)?;
+            }
+            // A missing input map comes before a missing lens: the map may name the lens.
+            check_joints(&recording, self.robot)?;
             tracing::info!("{}: {} messages about its marks", path.display(), recording.messages.len());
             lost |= warn_of_losses(&recording);
             recordings.push(recording);
         }
+        self.robot.require_lens()?;
         Ok((recordings, lost))
     }
 
@@ -402,11 +406,7 @@ pub(super) fn read_prior(file: &Path, robot: &Robot) -> Result<Calibration> {
         )
         .into());
     }
-    prior.sensors(robot).map_err(|error| match error {
-        CalibrationFileError::OtherRobot { found, found_joints, expected, .. } => {
-            CalibrationFileError::OtherRobot { file: file.display().to_string(), found, found_joints, expected }
-        }
-        other => other,
-    })?;
+    prior.check_robot(file, robot)?;
+    prior.sensors(robot)?;
     Ok(prior)
 }

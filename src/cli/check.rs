@@ -59,7 +59,7 @@ pub(super) fn check(args: &CheckArgs) -> Result<Exit> {
     })
 }
 
-/// Settings for all files, and the robot that the tasks among them are for.
+/// Settings for all files, and the robot that the tasks and calibrations among them are for.
 struct Context {
     overrides: Overrides,
     robot: Option<Robot>,
@@ -136,9 +136,11 @@ impl Found {
 
 fn check_one(file: &Path, context: &Context) -> Result<Found> {
     if file.is_dir() {
+        expect_robot_folder(file)?;
         return check_robot(file);
     }
     expect_toml(file)?;
+    expect_readable(file)?;
     let text = robot::read_text(file)?;
     let table: toml::Table = robot::parse_toml(file, &text)?;
     let kind = stated_kind(file, &table, is_robot_toml(file).then_some(Kind::Robot))?;
@@ -159,7 +161,7 @@ fn check_kind(file: &Path, kind: Kind, text: &str, context: &Context) -> Result<
     let folder = file.parent().unwrap_or(Path::new("."));
     match kind {
         Kind::Routine => check_routine(file, &context.overrides),
-        Kind::Calibration => describe_calibration(file, text),
+        Kind::Calibration => describe_calibration(file, text, context.robot.as_ref()),
         Kind::Task => describe_task(file, context.robot.as_ref()),
         Kind::Robot if !is_robot_toml(file) => {
             let problem = format!(
@@ -171,6 +173,38 @@ fn check_kind(file: &Path, kind: Kind, text: &str, context: &Context) -> Result<
         Kind::Robot | Kind::SelfCollision => check_robot(folder),
         kind => Ok(Found::whole(describe(file, kind)?)),
     }
+}
+
+/// Files of results that `check` reads, in the order in which a folder's are named.
+const RESULTS: [&str; 3] = ["calibration.toml", "plan.toml", "tagmap.toml"];
+/// Extensions of results and tables that `check` does not read.
+const UNREAD: [&str; 8] = ["json", "jsonl", "csv", "html", "md", "xml", "svg", "parquet"];
+
+/// Refuses the folder of a result, and names the file in it that `check` reads.
+fn expect_robot_folder(folder: &Path) -> Result<()> {
+    let is_there = |name: &&&str| folder.join(name).is_file();
+    match RESULTS.iter().find(is_there).filter(|_| !folder.join("robot.toml").exists()) {
+        Some(name) => {
+            let (folder, file) = (folder.display(), folder.join(name));
+            let problem = format!("{folder}: is a folder of results, not a robot folder; give {}", file.display());
+            Err(UsageError::new(Code::FileKind, problem).into())
+        }
+        None => Ok(()),
+    }
+}
+
+/// Refuses files of results that are no TOML.
+fn expect_readable(file: &Path) -> Result<()> {
+    let ending = file.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
+    if !UNREAD.contains(&ending.as_str()) || !file.is_file() {
+        return Ok(());
+    }
+    let file = file.display();
+    let problem = format!(
+        "{file}: is a .{ending} file, which `check` does not read; give a TOML file, such as calibration.toml or \
+         plan.toml"
+    );
+    Err(UsageError::new(Code::FileKind, problem).into())
 }
 
 /// Refuses recordings and URDFs, and names the commands for them.
@@ -234,8 +268,8 @@ fn describe_task(file: &Path, robot: Option<&Robot>) -> Result<Found> {
 }
 
 /// Describes a calibration. Without its covariance it can still move an arm; with another calibration's covariance it
-/// is an error.
-fn describe_calibration(file: &Path, text: &str) -> Result<Found> {
+/// is an error, and with a robot folder that it was not made with.
+fn describe_calibration(file: &Path, text: &str, robot: Option<&Robot>) -> Result<Found> {
     let (calibration, without) = match Calibration::read(file) {
         Ok(calibration) => (calibration, String::new()),
         Err(CalibrationFileError::NoCovariance { file: covariance, .. }) => (
@@ -244,6 +278,7 @@ fn describe_calibration(file: &Path, text: &str) -> Result<Found> {
         ),
         Err(error) => return Err(error.into()),
     };
+    robot.map_or(Ok(()), |robot| calibration.check_robot(file, robot))?;
     let (joints, valid) = (calibration.joint.len(), calibration.valid_for().join(", "));
     let text = format!("calibration of `{}`, {joints} joints; valid for {valid}{without}", calibration.robot);
     let refusal = calibration.refusals.first().map(|first| (first.cause(), first.code()));

@@ -1,6 +1,6 @@
 //! `armcal export`: a calibration in another form, on stdout.
 
-use armcal_core::codes::Code;
+use armcal_core::codes::{Code, Coded};
 use armcal_core::kind::Kind;
 use std::path::{Path, PathBuf};
 
@@ -15,8 +15,9 @@ use crate::cli::file_kind::{FileKind, expect_kind};
 use crate::cli::named;
 use crate::cli::stdout::{complain, say, warn};
 use crate::export::{
-    LinkPoseForm, MAX_POINTS, MIN_POINTS, SensorTable, calibrated_link_poses, calibrated_urdf, camchain, csv_rows,
-    joints_with_terms, lerobot_homings, ros_parameters, ros2_control, ros2_control_offsets, tagslam_map,
+    Comments, LinkPoseForm, MAX_POINTS, MIN_POINTS, SensorTable, calibrated_link_poses, calibrated_urdf, camchain,
+    csv_rows, joints_with_terms, lerobot_homings, marked_as_refused, ros_parameters, ros2_control,
+    ros2_control_offsets, tagslam_map,
 };
 use armcal_belief::calib::{
     Calibration, CalibrationFileError, CompactCalibration, CovarianceTable, LookupTable, Status, metric,
@@ -87,6 +88,15 @@ impl Form {
         if self == Self::Ur { LinkPoseForm::Ur } else { LinkPoseForm::Franka }
     }
 
+    /// Comments of the form; `None` for JSON, and for forms with the calibration's status among their keys.
+    fn comments(self) -> Option<Comments> {
+        match self {
+            Self::Urdf | Self::Ros2Control | Self::Ros2ControlOffset => Some(Comments::Xml),
+            Self::Table | Self::Csv | Self::Kalibr | Self::Tagslam | Self::Ur | Self::Franka => Some(Comments::Hash),
+            Self::Yaml | Self::Toml | Self::Compact | Self::RosParameters | Self::Json | Self::Lerobot => None,
+        }
+    }
+
     fn name(self) -> String {
         self.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
     }
@@ -106,6 +116,38 @@ impl Input {
         };
         let why = || why.clone().unwrap_or_else(|| "no reason given".to_owned());
         (status == Status::Refused).then(why)
+    }
+
+    /// Code of the first reason; `None` for an accepted calibration.
+    fn refusal_code(&self) -> Option<String> {
+        match self {
+            Self::Full(calibration) => refusal_code(calibration),
+            Self::Compact(compact) => {
+                let code = || compact.refusal_code.clone().unwrap_or_else(|| UNNAMED.to_owned());
+                (compact.status == Status::Refused).then(code)
+            }
+        }
+    }
+}
+
+/// Code of a reason that a file holds only as a sentence.
+const UNNAMED: &str = "other";
+
+fn refusal_code(calibration: &Calibration) -> Option<String> {
+    let code = calibration.refusals.first().map_or(UNNAMED, |refusal| refusal.code().as_str());
+    (calibration.status == Status::Refused).then(|| code.to_owned())
+}
+
+/// Text with a note that its calibration was refused, if it was; adds the note to `left_out` for a form that can hold
+/// none.
+fn noted(form: Form, text: String, code: Option<&str>, left_out: &mut Vec<String>) -> String {
+    match (form.comments(), code) {
+        (Some(comments), Some(code)) => marked_as_refused(&text, comments, code),
+        (None, Some(code)) if form == Form::Lerobot => {
+            lacking("LeRobot's JSON", &[format!("that the calibration was REFUSED, {code}")], left_out);
+            text
+        }
+        _ => text,
     }
 }
 
@@ -128,15 +170,18 @@ pub(super) fn export(args: &ExportArgs) -> Result<Exit> {
         return Ok(Exit::Refused);
     }
     let mut left_out = Vec::new();
+    let refusal = input.refusal_code();
     let text = match input {
         Input::Full(calibration) => {
             if let Some(robot) = &robot {
+                calibration.check_robot(&args.file, robot)?;
                 calibration.sensors(robot)?;
             }
             of_full(&calibration, robot.as_ref(), args, &mut left_out)?
         }
         Input::Compact(compact) => of_compact(&compact, robot.as_ref(), args, &mut left_out)?,
     };
+    let text = noted(args.form, text, refusal.as_deref(), &mut left_out);
     left_out.iter().for_each(|sentence| warn(Code::ExportIncomplete, sentence));
     say(text.trim_end())?;
     Ok(Exit::Ok)
@@ -157,11 +202,13 @@ pub fn export_text(
     let form = Form::from_str(form, false).map_err(|_| {
         UsageError::new(Code::UsageInvalid, format!("`{form}` is no form of a calibration; it is one of {}", known()))
     })?;
-    calibration.sensors(robot)?;
     let file = PathBuf::from("calibration");
+    calibration.check_robot(&file, robot)?;
+    calibration.sensors(robot)?;
     let args = ExportArgs { file, form, robot: None, points: None, input: input.map(Path::to_owned), refused: true };
     let mut left_out = Vec::new();
     let text = of_full(calibration, Some(robot), &args, &mut left_out)?;
+    let text = noted(form, text, refusal_code(calibration).as_deref(), &mut left_out);
     Ok((text, left_out))
 }
 

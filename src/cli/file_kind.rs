@@ -10,6 +10,7 @@ use crate::cli::exit::UsageError;
 use armcal_core::document::stated_kind;
 use armcal_core::files::{self, FileKind as Size};
 use armcal_core::kind::Kind;
+use armcal_core::log::for_each_raw;
 use armcal_core::robot::parse_toml;
 
 /// Kind of a file or folder that armcal reads or writes.
@@ -105,6 +106,21 @@ pub fn expect_routine(path: &Path) -> Result<()> {
 /// Refuses a file that is known to be no recording, of armcal or of other programs.
 pub(super) fn expect_recording(path: &Path) -> Result<()> {
     expect_kind(path, &[FileKind::Recording, FileKind::Bag])
+}
+
+/// Refuses the truth of a simulation, and names the recording of the same run. It reads the whole file, so that it is
+/// for files without readings.
+pub(super) fn expect_no_truth(path: &Path) -> Result<()> {
+    let mut is_truth = false;
+    for_each_raw(path, |raw| is_truth |= raw.topic().starts_with("/truth/"))?;
+    if !is_truth {
+        return Ok(());
+    }
+    let name = path.file_name().and_then(|name| name.to_str()?.strip_prefix("truth"));
+    let recording = path.with_file_name(name.map_or_else(|| "run.mcap".to_owned(), |rest| format!("run{rest}")));
+    let (file, recording) = (path.display(), recording.display());
+    let problem = format!("{file}: is the truth of a simulation, which holds no readings of an arm; give {recording}");
+    Err(UsageError::new(Code::FileKind, problem).into())
 }
 
 /// Refuses a file that an option names if it is known to be of another kind.

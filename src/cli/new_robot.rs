@@ -96,8 +96,9 @@ fn new_folder(args: &NewRobotArgs, urdf: &Path, out: &Path) -> Result<Exit> {
         touching: &[],
         clear_rad: None,
     };
-    let DraftedRobot { files, left_out } = draft_robot(&wanted, DraftedMeshes::Read)?;
-    let (files, robot) = match trial(&files, out)? {
+    let drafted = draft_robot(&wanted, DraftedMeshes::Read)?;
+    let DraftedRobot { files, .. } = &drafted;
+    let (files, robot) = match trial(files, out)? {
         Ok(robot) => with_shapes(&wanted, robot, out)?,
         Err(why) => {
             let without = draft_robot(&wanted, DraftedMeshes::Ignored(&why.to_string()))?.files;
@@ -109,7 +110,7 @@ fn new_folder(args: &NewRobotArgs, urdf: &Path, out: &Path) -> Result<Exit> {
         }
     };
     write(&files, out)?;
-    say_wrapped(&described(&files, &robot, &left_out, out))?;
+    say_wrapped(&described(&files, &robot, &drafted, out))?;
     Ok(Exit::Ok)
 }
 
@@ -201,7 +202,24 @@ fn is_beyond_arms(reach_m: f64) -> bool {
     reach_m > MAX_REACH_M
 }
 
-fn described(files: &[NewFile], robot: &Robot, left_out: &[String], out: &Path) -> String {
+/// Line about the joints on the arm's path that are not the arm's; empty without any.
+fn left_out(drafted: &DraftedRobot) -> String {
+    let DraftedRobot { left_out, cut_at, .. } = drafted;
+    let joints = left_out.join(", ");
+    match (left_out.is_empty(), cut_at.is_empty()) {
+        (true, _) => String::new(),
+        (false, true) => format!(
+            "\nassumed: left out as a gripper's or a carriage's joints: {joints}. Name --base and --tip to keep them"
+        ),
+        (false, false) => format!(
+            "\nassumed: left out with {}, which moves in several ways, so that no chain continues over it: {joints}. \
+             Where they are the arm's, draw it as joints that turn or slide",
+            cut_at.join(", ")
+        ),
+    }
+}
+
+fn described(files: &[NewFile], robot: &Robot, drafted: &DraftedRobot, out: &Path) -> String {
     let camera = &robot.camera.name;
     let mut text = format!(
         "{}: robot `{}`, {} joints from `{}`: {}; camera `{camera}`; {} files",
@@ -212,17 +230,19 @@ fn described(files: &[NewFile], robot: &Robot, left_out: &[String], out: &Path) 
         robot.joint_names().join(", "),
         files.len()
     );
-    if !left_out.is_empty() {
-        let joints = left_out.join(", ");
-        text.push_str(&format!(
-            "\nassumed: left out as a gripper's or a carriage's joints: {joints}. Name --base and --tip to keep them"
-        ));
-    }
+    text.push_str(&left_out(drafted));
     let reach_m = robot.chain.joints().iter().map(|joint| joint.parent_from_joint.translation.vector.norm()).sum();
     if is_beyond_arms(reach_m) {
         text.push_str(&format!(
             "\nwarning: the joints lie {reach_m:.0} m apart in all, and lengths of a URDF are metres; divide them by \
              1000 where they are millimetres"
+        ));
+    }
+    if !drafted.turned.is_empty() {
+        let joints = drafted.turned.join(", ");
+        text.push_str(&format!(
+            "\nwarning: the rpy of {joints} is more than a turn, and angles of a URDF are radians; multiply them by \
+             pi / 180 where they are degrees"
         ));
     }
     for warning in &robot.urdf_warnings {

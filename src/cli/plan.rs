@@ -94,6 +94,9 @@ fn read(path: &Path) -> Result<Vec<u8>> {
 pub fn plan_routine(routine_file: &Path, prior: Option<Calibration>) -> Result<PlanFile> {
     let routine = routine::load(routine_file)?;
     let (robot, vehicle) = routine.load_arm()?;
+    if let Some(prior) = &prior {
+        prior.check_robot(Path::new("calibration.toml"), &robot)?;
+    }
     let prior = prior.map(|prior| {
         let text = prior.to_toml().into_bytes();
         (prior, text)

@@ -1,6 +1,7 @@
 //! `armcal regress`: comparison of a routine's runs with a baseline.
 
 use armcal_core::codes::Code;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -99,7 +100,7 @@ pub(super) fn regress(args: &RegressArgs) -> Result<Exit> {
     }
     let jobs = match &baseline {
         Some(baseline) => jobs_of(baseline, args, &prepared)?,
-        None => jobs(&prepared, range_of(args.seeds, &prepared)?, None, &std::collections::BTreeSet::new()),
+        None => jobs(&prepared, range_of(args.seeds, &prepared)?, None, &BTreeSet::new()),
     };
     note(foretold(baseline.as_ref(), jobs.len(), n_threads(args)));
     let Some(now) = run(args, &prepared, &jobs)? else {
@@ -198,8 +199,20 @@ fn jobs_of(baseline: &Table, args: &RegressArgs, prepared: &Prepared) -> Result<
         Ok(prepared.job(setting.ok_or_else(problem)?, row.seed))
     };
     let jobs = baseline.rows.iter().filter(wanted).map(job).collect::<Result<Vec<Job>>>()?;
+    let there: BTreeSet<u64> = jobs.iter().map(|job| job.seed).collect();
+    // A baseline has few seeds, so that few of a long range are visited.
+    if let Some((seeds, first)) =
+        args.seeds.and_then(|seeds| Some((seeds, seeds.seeds().find(|s| !there.contains(s))?)))
+    {
+        let problem = format!(
+            "{file}: has {} of the seeds {seeds}, and lacks seed {first}: give seeds that the baseline has, or write a \
+             baseline of more",
+            there.len()
+        );
+        return Err(UsageError::new(Code::UsageInvalid, problem).into());
+    }
     if jobs.is_empty() {
-        return Err(UsageError::new(Code::UsageInvalid, format!("{file}: has none of the seeds asked for")).into());
+        return Err(UsageError::new(Code::UsageInvalid, format!("{file}: has no runs")).into());
     }
     Ok(jobs)
 }

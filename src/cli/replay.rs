@@ -7,14 +7,14 @@ use anyhow::{Context, Result};
 use clap::Args;
 
 use crate::cli::exit::{Exit, UsageError};
-use crate::cli::file_kind::{FileKind, expect_kind};
+use crate::cli::file_kind::{FileKind, expect_kind, expect_no_truth};
 use crate::cli::live_view::LiveViewArgs;
 use crate::cli::losses::warn_of_losses;
 use crate::cli::named;
 use crate::cli::stdout::{say, warn};
 use crate::output;
 use armcal_belief::calib::online::BeliefLog;
-use armcal_belief::calib::{Calibration, Status, surveyed};
+use armcal_belief::calib::{Calibration, Status, check_joints, surveyed};
 use armcal_belief::session::ToolBelief;
 use armcal_core::files::{self, FileKind as Size};
 use armcal_core::log::{Recording, Stream, read_attachments};
@@ -40,6 +40,9 @@ pub(super) struct ReplayArgs {
 pub(super) fn replay(args: &ReplayArgs) -> Result<Exit> {
     expect_kind(&args.recording, &[FileKind::Recording])?;
     let recording = read_for_replay(&args.recording)?;
+    if recording.joint_names.is_empty() {
+        expect_no_truth(&args.recording)?;
+    }
     let lost = warn_of_losses(&recording);
     say_what_is_left_out(&recording);
     let drawings = Drawings::find(args, &recording)?;
@@ -173,7 +176,13 @@ impl Drawings {
         let file = args.recording.display();
         let attached = || format!("{file}: an attached file does not read; replay it with the armcal that recorded it");
         let robot = match &args.robot {
-            Some(robot) => robot::load(robot)?,
+            Some(folder) => {
+                let robot = robot::load(folder)?;
+                if !recording.joint_names.is_empty() {
+                    check_joints(recording, &robot)?;
+                }
+                robot
+            }
             None if has("robot.toml") => robot::load_attached(folder.path()).with_context(attached)?,
             None => {
                 let problem = "carries no drawings of its robot (attachment robot.toml); name its folder with --robot";

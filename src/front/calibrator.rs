@@ -82,6 +82,7 @@ impl<'a> Calibrator<'a> {
     /// [`CalibrateError`]: tags or measurements of another arm, or too few for a fit.
     pub fn calibrate(&self, measurements: &Measurements) -> Result<Calibration, CalibrateError> {
         if let Some(prior) = self.prior {
+            prior.check_robot(Path::new("calibration.toml"), self.robot)?;
             prior.sensors(self.robot)?;
         }
         match measurements {
@@ -141,6 +142,12 @@ impl<'a> Calibrator<'a> {
                 NamedSurvey { survey: self.robot.survey(), names, boards }
             }
         };
+        if let (None, Some(ChildFrame::Plain(name))) = (&self.tags, &map.child_frame)
+            && (named.survey.tags.len() != 1 || map.tag_use == TagUse::BoardCorners)
+        {
+            let problem = format!("is the landmark `{name}`: name the tag map that has it with --tag-map");
+            return Err(FileIssue::new(Code::NameUnknown, map_file, "tags.child_frame", problem).into());
+        }
         let plain = plain_landmark(map_file, map, &named)?;
         let robot = robot.with_survey(named.survey);
         if robot.tags.is_empty() {

@@ -33,6 +33,8 @@ pub enum ProposalError {
     Missing { file: String, what: &'static str, topics: Vec<String>, remedy: &'static str },
     #[error("{file}: {problem}")]
     Joints { file: String, problem: String },
+    #[error("{file}: {problem}")]
+    Columns { file: String, problem: String },
     #[error("the proposed input map does not read; rename what the message says: {0}")]
     Unreadable(#[from] RobotError),
 }
@@ -150,6 +152,7 @@ impl Coded for ProposalError {
             Self::Log(error) => error.code(),
             Self::Missing { .. } => Code::TopicMissing,
             Self::Joints { .. } => Code::JointsMismatch,
+            Self::Columns { .. } => Code::TableInvalid,
             Self::Unreadable(error) => error.code(),
         }
     }

@@ -223,6 +223,8 @@ fn a_regression_is_found() {
     // Noise is half as much again in each pixel; the poses differ, because detections affect their choice.
     noise.expect("noise", 4, &["┆ x 1.4", "--seed 1 --set world.camera.corner_noise_px=0.45"]);
     gate.regress(&["--seeds", "3", "--baseline"]).expect("no such seed", 2, &["baseline.csv", "seeds"]);
+    let beyond = gate.regress(&["--seeds", "1..9", "--baseline"]);
+    beyond.expect("seeds beyond the baseline", 2, &["[usage_invalid]", "baseline.csv", "1..9"]);
 }
 
 #[test]

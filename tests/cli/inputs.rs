@@ -323,6 +323,17 @@ fn check_looks_at_every_file() {
     found.expect("bad files", 2, &["bad.toml", "other.toml", "broken.toml", "ok: "]);
 }
 
+/// A folder of results is not a robot folder, and its other files are no TOML.
+#[test]
+fn check_names_the_file_of_a_result_that_it_reads() {
+    let file = |name: &str| crate::support::shared_run().file(name);
+    let folder = file("calibration.toml").parent().expect("a folder").to_owned();
+    check(&folder).expect("a folder", 2, &["[file_kind]", "calibration.toml"]);
+    for name in ["summary.json", "report.html"] {
+        check(&file(name)).expect(name, 2, &["[file_kind]", name, "calibration.toml"]);
+    }
+}
+
 #[test]
 fn check_refuses_a_spoilt_calibration() {
     let _texts = Texts::of("check_refuses_a_spoilt_calibration");

@@ -53,6 +53,22 @@ fn the_sample_is_described() {
     assert!((rate_hz - 100.0).abs() < 0.5, "{rate_hz}");
 }
 
+/// Readings of another arm have no tracking error by this one's joints, and no replay by its drawing.
+#[test]
+fn a_recording_of_another_robot_is_neither_compared_nor_drawn() {
+    let other = root().join("robots/kraft-predator");
+    let told = inspect(&sample(), &["--json", "--robot", other.to_str().expect("UTF-8")]);
+    let json: serde_json::Value = serde_json::from_str(&told.stdout).expect("JSON");
+    assert!(json["tracking_error"].is_null(), "{json:#}");
+    let own = inspect(&sample(), &["--json"]);
+    let json: serde_json::Value = serde_json::from_str(&own.stdout).expect("JSON");
+    assert!(json["tracking_error"].is_object(), "its own robot was driven");
+    let folder = temp();
+    let mut replay = program();
+    replay.arg("replay").arg(sample()).arg("--robot").arg(&other).arg("--save").arg(folder.path().join("a.rrd"));
+    answer(&mut replay).expect("replay", 2, &["[joints_mismatch]", "run.mcap"]);
+}
+
 /// The parameters in the output are those that the estimator then estimates.
 #[test]
 fn the_parameters_named_are_those_that_calibrate_estimates() {

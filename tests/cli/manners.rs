@@ -145,6 +145,37 @@ fn a_forgotten_input_map_is_told_and_how_to_get_one() {
     answer(&mut command).expect("no map", 2, &words);
 }
 
+/// The map may name the lens, so that a missing lens is no reason before it.
+#[test]
+fn a_forgotten_input_map_comes_before_a_missing_lens() {
+    let folder = temp();
+    let file = folder.path().join("field.mcap");
+    recording_of_others(&file);
+    let robot = robot_copy(folder.path());
+    for key in ["model = \"equidistant\"\n", "resolution_px = [1224, 1024]\n", "focal_px = [387.33, 387.06]\n"] {
+        edit(&robot.join("robot.toml"), key, "");
+    }
+    for key in ["center_px = [633.605, 510.9]\n", "distortion = [0.02268, -0.01345, 0.01296, -0.00418]\n"] {
+        edit(&robot.join("robot.toml"), key, "");
+    }
+    let mut command = program();
+    command.arg("calibrate").arg(&file).arg("--robot").arg(&robot).arg("--out").arg(folder.path().join("out"));
+    answer(&mut command).expect("no map", 2, &["--input", "[joints_mismatch]"]);
+}
+
+#[test]
+fn the_truth_is_no_recording_and_the_recording_is_named() {
+    let folder = temp();
+    let (truth, recording) = (shared_run().file("truth.mcap"), shared_run().file("run.mcap").display().to_string());
+    let mut calibrate = program();
+    calibrate.arg("calibrate").arg(&truth).arg("--robot").arg(robot_folder()).arg("--out").arg(folder.path());
+    let mut replay = program();
+    replay.arg("replay").arg(&truth).arg("--save").arg(folder.path().join("a.rrd"));
+    for command in [&mut calibrate, &mut replay] {
+        answer(command).expect("truth", 2, &["[file_kind]", "truth.mcap", &recording]);
+    }
+}
+
 #[test]
 fn missing_keys_are_told_at_once_and_unknown_ones_with_the_nearest() {
     let _texts = Texts::of("missing_keys_are_told_at_once_and_unknown_ones_with_the_nearest");

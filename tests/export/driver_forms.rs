@@ -8,7 +8,7 @@ use rand::RngExt;
 
 use super::{apart, arm_in, as_calibrated, calibration, calibration_file, export, exported, folder_with, frames};
 use crate::support::texts::Texts;
-use crate::support::{answer, program, read, robot_folder, root, temp, titan, write};
+use crate::support::{answer, edit, program, read, robot_copy, robot_folder, root, shared_run, temp, titan, write};
 
 /// Rounding errors of a chain, m and rad.
 const ROUNDING: f64 = 1e-12;
@@ -39,6 +39,30 @@ fn the_exported_urdf_is_the_calibrated_arm() {
         let limits = |robot: &armcal::Robot| robot.chain.joints().iter().map(|joint| joint.limits).collect::<Vec<_>>();
         assert_eq!(limits(&read_back), limits(&titan()), "angles are the calibrated ones");
     }
+}
+
+/// Exported readings of a sensor that was set to another zero since would be metres off.
+#[test]
+fn a_robot_whose_sensors_changed_since_is_refused_by_export_check_and_prior() {
+    let folder = temp();
+    let file = shared_run().file("calibration.toml");
+    let robot = robot_copy(folder.path());
+    let expect = |words: &[&str], code: i32| {
+        for form in ["table", "ros-parameters", "ros2-control"] {
+            export(&file, Some(&robot), form).expect(form, code, words);
+        }
+        answer(program().arg("check").arg(&file).arg(&robot)).expect("check", code, words);
+    };
+    expect(&[], 0);
+    let zero = titan().sensors[0].offset_counts;
+    edit(&robot.join("robot.toml"), &format!("offset_counts = {zero:?}"), "offset_counts = 60000.0");
+    let file_name = file.display().to_string();
+    let words = ["[robot_mismatch]", "shoulder_yaw", "offset_counts", "60000", &file_name];
+    expect(&words, 2);
+    let recording = shared_run().file("run.mcap");
+    let mut calibrate = program();
+    calibrate.arg("calibrate").arg(&recording).arg("--robot").arg(&robot).arg("--prior").arg(&file);
+    answer(calibrate.arg("--out").arg(folder.path().join("out"))).expect("prior", 2, &words);
 }
 
 #[test]
@@ -221,6 +245,13 @@ fn refused_calibrations_are_exported_on_demand_only() {
         let mut command = program();
         command.arg("export").arg(&refused).args(["--as", form, "--refused", "--robot"]).arg(robot_folder());
         assert!(answer(&mut command).code == 0);
+    }
+    for form in ["urdf", "ros2-control", "ros2-control-offset", "table", "csv", "kalibr"] {
+        let mut command = program();
+        command.arg("export").arg(&refused).args(["--as", form, "--refused", "--robot"]).arg(robot_folder());
+        let told = answer(&mut command);
+        let first = told.stdout.lines().find(|line| !line.starts_with("<?xml")).unwrap_or_default();
+        assert!(first.contains("REFUSED"), "{form}: {first}");
     }
     export(&refused, None, "yaml").expect("yaml", 4, &["--refused"]);
     let mut command = program();

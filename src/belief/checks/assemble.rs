@@ -268,6 +268,7 @@ fn joint_result(source: &Provenance<'_>, fit: &Fit<'_>, joint: usize, model: &Se
     let (gain_std, offset_std) = (std(ParameterKind::Gain), std(ParameterKind::Offset));
     // A parameter that the new views do not determine keeps its earlier standard deviation.
     let before = source.prior.map(|prior| &prior.joint[joint]);
+    let datasheet = spec.with_scale(1.0 / ratio_of(source, joint));
     let gain_std_before = before.map_or(spec.gain_std / spec.counts_per_rad.abs(), |j| j.gain_std_rad_per_count);
     JointResult {
         name: spec.joint.clone(),
@@ -280,6 +281,8 @@ fn joint_result(source: &Provenance<'_>, fit: &Fit<'_>, joint: usize, model: &Se
         gain_estimated: gain_std.is_some() || before.is_some_and(|j| j.gain_estimated),
         offset_estimated: offset_std.is_some() || before.is_some_and(|j| j.offset_estimated),
         covered_rad: covered_rad(source, joint, model),
+        offset_counts: Some(datasheet.offset_counts),
+        counts_per_rad: Some(datasheet.counts_per_rad),
         gain_over_datasheet: Some(model.correction.gain / ratio_of(source, joint)),
         identified_ratio: source.identified.iter().find(|scale| scale.joint == joint).map(|scale| scale.ratio),
         residual_std_rad: fit.covariance.residual_std_rad.map(|std_rad| std_rad[joint]),

@@ -250,6 +250,12 @@ pub struct JointResult {
     pub offset_estimated: bool,
     /// Angles at both ends of the range that the captured views covered.
     pub covered_rad: [f64; 2],
+    /// Reading at angle zero by the datasheet that the calibration was made with; absent in older files.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub offset_counts: Option<f64>,
+    /// Counts per radian by that datasheet; absent in older files.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub counts_per_rad: Option<f64>,
     /// Ratio of the gain to the datasheet's; negative where the counts run the other way.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gain_over_datasheet: Option<f64>,

@@ -52,24 +52,13 @@ const TERMS_HEAD: &str = "\
 ";
 
 impl Calibration {
-    /// Returns the sensors of `robot` under this calibration.
+    /// Returns the sensors of `robot` under this calibration. `robot` may have a measured scale, so that its datasheet
+    /// is not compared: see [`check_robot`](Self::check_robot).
     ///
     /// # Errors
     /// [`CalibrationFileError::OtherRobot`] if the calibration was made for another arm.
     pub fn sensors(&self, robot: &Robot) -> Result<ArmSensors, CalibrationFileError> {
-        let names: Vec<String> = self.joint.iter().map(|joint| joint.name.clone()).collect();
-        let moves_as = |(joint, spec): (&JointResult, &JointSensorSpec)| joint.moves == spec.moves;
-        if self.robot != robot.name
-            || names != robot.joint_names()
-            || !self.joint.iter().zip(&robot.sensors).all(moves_as)
-        {
-            return Err(CalibrationFileError::OtherRobot {
-                file: "calibration.toml".to_owned(),
-                found: self.robot.clone(),
-                found_joints: names,
-                expected: robot.name.clone(),
-            });
-        }
+        self.check_joints(Path::new("calibration.toml"), robot)?;
         let mut sensors = ArmSensors::nominal(robot);
         sensors.reference = self.reference.map(|table| table.conditions()).unwrap_or_default();
         for (model, joint) in sensors.models.iter_mut().zip(&self.joint) {
@@ -278,14 +267,10 @@ impl Calibration {
 
     fn check(&self, file: &Path) -> Result<(), FileIssue> {
         self.check_status(file)?;
+        self.check_joint_tables(file)?;
+        self.camera_mount.as_ref().map_or(Ok(()), |mount| mount.check(file))?;
+        self.further_camera.iter().try_for_each(|camera| camera.check(file))?;
         for joint in &self.joint {
-            let check = |key: &str, value: f64, range| {
-                FileIssue::check_range(file, &format!("joint `{}`: {key}", joint.name), value, range)
-            };
-            check("gain_rad_per_count (size)", joint.gain_rad_per_count.abs(), 1e-12..=1e3)?;
-            check("offset_rad", joint.offset_rad, -10.0..=10.0)?;
-            check("center_rad", joint.center_rad, -100.0..=100.0)?;
-            joint.residual_std_rad.map_or(Ok(0.0), |std_rad| check("residual_std_rad", std_rad, 0.0..=10.0))?;
             let Some(terms) = &joint.terms else { continue };
             terms.check(file, &joint.name)?;
             if self.reference.is_none() {

@@ -1,11 +1,14 @@
 //! `[camera_mount]` and `[[further_camera]]` of calibration.toml.
 
+use std::path::Path;
+
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::file::constants::camera_mount::UNIT_LENGTH;
 use crate::positions::mount_estimate::MountEstimate;
-use armcal_core::robot::Robot;
+use armcal_core::robot::{FileIssue, Robot};
 use armcal_core::spatial::{Camera, Link, Pose};
 
 /// Camera mount, estimated from the tag on the gripper; the nominal mount if that tag was not used.
@@ -48,7 +51,30 @@ pub struct FurtherCamera {
     pub views: usize,
 }
 
+/// Refuses a quaternion that is no rotation, and negative deviations, in the table of this name.
+fn check_pose(
+    file: &Path,
+    table: &str,
+    quaternion: &[f64; 4],
+    deviations: [(&str, &[f64; 3]); 2],
+) -> Result<(), FileIssue> {
+    let length = quaternion.iter().map(|part| part * part).sum::<f64>().sqrt();
+    FileIssue::check_range(file, &format!("{table}: quaternion_wxyz (length)"), length, UNIT_LENGTH)?;
+    for (key, deviation) in deviations {
+        if let Some(&negative) = deviation.iter().find(|std| **std < 0.0) {
+            FileIssue::check_range(file, &format!("{table}: {key}"), negative, 0.0..=1e3)?;
+        }
+    }
+    Ok(())
+}
+
 impl FurtherCamera {
+    pub(crate) fn check(&self, file: &Path) -> Result<(), FileIssue> {
+        let table = format!("further_camera `{}`", self.name);
+        let deviations = [("position_std_m", &self.position_std_m), ("rotation_std_rad", &self.rotation_std_rad)];
+        check_pose(file, &table, &self.quaternion_wxyz, deviations)
+    }
+
     /// Returns the camera mount; `None` if the quaternion has no valid length.
     pub(crate) fn link_from_camera(&self) -> Option<Isometry3<f64>> {
         isometry(&self.position_m, &self.quaternion_wxyz)
@@ -61,6 +87,11 @@ fn isometry(position_m: &[f64; 3], [w, x, y, z]: &[f64; 4]) -> Option<Isometry3<
 }
 
 impl CameraMount {
+    pub(crate) fn check(&self, file: &Path) -> Result<(), FileIssue> {
+        let deviations = [("position_std_m", &self.position_std_m), ("rotation_std_rad", &self.rotation_std_rad)];
+        check_pose(file, "camera_mount", &self.quaternion_wxyz, deviations)
+    }
+
     /// Returns the camera mount; `None` if the quaternion has no valid length.
     pub(crate) fn link_from_camera(&self) -> Option<Isometry3<f64>> {
         isometry(&self.position_m, &self.quaternion_wxyz)

@@ -7,6 +7,11 @@ pub(crate) mod calibration_file {
     pub(crate) const LEAST_SLOPE: f64 = 0.2;
 }
 
+pub(crate) mod camera_mount {
+    /// Length of a quaternion that is one by the digits of its file, 1.
+    pub(crate) const UNIT_LENGTH: std::ops::RangeInclusive<f64> = 0.999..=1.001;
+}
+
 pub(crate) mod compact_precision {
     /// The text must be shorter than this, bytes.
     pub const MAX_COMPACT_BYTES: usize = 512;
@@ -56,9 +61,24 @@ pub(crate) mod covariance_file {
     pub(crate) const FULL_DIGITS_ROWS: usize = 24;
 }
 
+pub(crate) mod joint_check {
+    /// Relative difference below which a gain is the one that its ratio to the datasheet gives, 1: only rounding.
+    pub(crate) const SAME_GAIN: f64 = 1e-6;
+    /// The largest ratio of a gain or a scale to the datasheet's, 1; scales of robot.toml span this much.
+    pub(crate) const LARGEST_RATIO: f64 = 1e12;
+    /// The largest scale or zero, counts per radian or counts: robot.toml allows 1e9 per degree or millimetre.
+    pub(crate) const LARGEST_SCALE: f64 = 1e12;
+}
+
 pub(crate) mod lookup {
     /// Number of points of a table; the error of straight lines between them is about 1 % of the nonlinearity.
     pub(crate) const POINTS: usize = 65;
+}
+
+pub(crate) mod robot_match {
+    /// Difference of a datasheet's value from the one that a calibration was made with that is only rounding: relative
+    /// for scales, rad or m for zeros and centres. It moves the tool of a 5 m arm by less than 0.01 mm.
+    pub(crate) const SAME_DATASHEET: f64 = 1e-6;
 }
 
 pub(crate) mod valid_range {

@@ -14,6 +14,11 @@ pub enum CalibrationFileError {
     #[error("{file}: is for robot `{found}` with joints {found_joints:?}, not for `{expected}`")]
     OtherRobot { file: String, found: String, found_joints: Vec<String>, expected: String },
     #[error(
+        "{file}: joint `{joint}`: was calibrated with {key} = {found}, and {} has {expected}: give the robot folder \
+         that the calibration was made with, or calibrate again", robot_file.display()
+    )]
+    OtherDatasheet { file: String, robot_file: PathBuf, joint: String, key: &'static str, found: f64, expected: f64 },
+    #[error(
         "{file}: joint `{joint}`: terms.nonlinearity_rad bends the sensor to {least:.2} .. {most:.2} times its gain, \
          so that readings have no certain angle; allowed is 0.2 .. 1.8"
     )]
@@ -34,7 +39,7 @@ impl Coded for CalibrationFileError {
     fn code(&self) -> Code {
         match self {
             Self::File(error) => error.code(),
-            Self::OtherRobot { .. } => Code::RobotMismatch,
+            Self::OtherRobot { .. } | Self::OtherDatasheet { .. } => Code::RobotMismatch,
             Self::Bent { .. } => Code::ValueOutOfRange,
             Self::NoCovariance { .. } | Self::ForeignCovariance { .. } => Code::CovarianceMismatch,
         }

@@ -238,7 +238,25 @@ impl PlanFile {
     pub fn read(file: &FilePath) -> Result<Self, RobotError> {
         let plan: Self = parse_file(Kind::Plan, file, &read_text(file)?)?;
         plan.check(file)?;
+        plan.check_totals(file)?;
         Ok(plan)
+    }
+
+    /// Refuses totals that contradict the poses and paths below them.
+    fn check_totals(&self, file: &FilePath) -> Result<(), FileIssue> {
+        let least_m = self.path.iter().map(|path| path.proven_clearance_m).fold(1.0, f64::min);
+        let totals = &self.totals;
+        for (key, value, expected) in [
+            ("totals.poses", totals.poses as f64, self.pose.len() as f64),
+            ("totals.left_out", totals.left_out as f64, self.left_out.len() as f64),
+            ("totals.least_clearance_m", totals.least_clearance_m, least_m),
+        ] {
+            if (value - expected).abs() > 0.5 / LENGTH_DIGITS {
+                let problem = format!("is {value}, and the tables below give {expected}: it was edited; plan again");
+                return Err(FileIssue::new(Code::KeysConflict, file, key, problem));
+            }
+        }
+        Ok(())
     }
 
     fn check(&self, file: &FilePath) -> Result<(), FileIssue> {

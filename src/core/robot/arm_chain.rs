@@ -33,6 +33,8 @@ pub(super) struct FoundArm {
     pub camera: Option<String>,
     /// Joints on the same path that were taken for those of a gripper or of the arm's carrier.
     pub left_out: Vec<String>,
+    /// Joints among them that move in several ways, each with its type: no chain continues over them.
+    pub cut_at: Vec<String>,
 }
 
 /// A chain of joints that may be the arm.
@@ -61,7 +63,12 @@ pub(super) fn find_arm(urdf: &UrdfModel, ends: &Ends<'_>) -> Result<FoundArm, Ro
     let best = single_arm(urdf, &candidates, ends)?;
     let camera = ends.camera.map(str::to_owned).or_else(|| camera_link(urdf, best));
     let left_out = best.left_out.iter().map(|&joint| urdf.robot.joints[joint].name.clone()).collect();
-    Ok(FoundArm { base: best.base.clone(), tip: best.tip.clone(), camera, left_out })
+    let several = |&joint: &usize| match &urdf.robot.joints[joint] {
+        UrdfJoint { name, joint_type: JointType::Other(kind), .. } => Some(format!("`{name}` ({kind})")),
+        _ => None,
+    };
+    let cut_at = best.left_out.iter().filter_map(several).collect();
+    Ok(FoundArm { base: best.base.clone(), tip: best.tip.clone(), camera, left_out, cut_at })
 }
 
 fn issue(urdf: &UrdfModel, key: &str, problem: String) -> RobotError {

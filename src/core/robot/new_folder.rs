@@ -11,6 +11,7 @@ use super::arm_chain::{Ends, FoundArm, find_arm};
 use super::error::{FileIssue, RobotError, read_text};
 use super::mesh;
 use super::urdf::{MAX_COLLISION_SHAPES, UrdfChain, UrdfModel};
+use super::urdf_file::UrdfJoint;
 use super::urdf_mesh::places;
 use crate::files::{self, FileKind};
 use crate::kind::Kind;
@@ -64,7 +65,14 @@ pub struct DraftedRobot {
     pub files: Vec<NewFile>,
     /// Joints that were left out because they seem to belong to a gripper or to the arm's carrier.
     pub left_out: Vec<String>,
+    /// Joints among them that move in several ways, such as planar ones: no chain continues over them.
+    pub cut_at: Vec<String>,
+    /// Joints whose origin is turned by more than a turn, as degrees would be.
+    pub turned: Vec<String>,
 }
+
+/// Largest angle of an origin in radians: a turn, and rounding. Larger ones are degrees.
+const MAX_TURN_RAD: f64 = std::f64::consts::TAU + 0.01;
 
 /// Number of folders above the URDF's in which packages are searched for.
 const MAX_ANCESTORS: usize = 8;
@@ -84,7 +92,9 @@ pub fn draft_robot(wanted: &NewRobot<'_>, meshes: DraftedMeshes<'_>) -> Result<D
     let name = &urdf.robot.name;
     let draft = Draft { wanted, urdf: &urdf, urdf_name: &urdf_name, name, arm: &arm, chain: &chain, meshes };
     files.push(NewFile { path: "robot.toml".into(), bytes: draft.text().into_bytes() });
-    Ok(DraftedRobot { files, left_out: arm.left_out })
+    let is_turned = |joint: &&UrdfJoint| joint.origin.rpy_rad.iter().any(|rad| rad.abs() > MAX_TURN_RAD);
+    let turned = urdf.robot.joints.iter().filter(is_turned).map(|joint| joint.name.clone()).collect();
+    Ok(DraftedRobot { files, left_out: arm.left_out, cut_at: arm.cut_at, turned })
 }
 
 /// Returns the URDF, and the arm in it.

@@ -151,8 +151,9 @@ impl RegressSettings {
     }
 }
 
-/// Smallest weight of a setting, relative to the others.
+/// Smallest and largest weight of a setting, relative to the others.
 const MIN_WEIGHT: f64 = 1e-9;
+const MAX_WEIGHT: f64 = 1e9;
 
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -204,10 +205,9 @@ fn weights_of(
         return Err(problem(format!("has {n} weights; the matrix gives the key {wanted} values")));
     }
     let number = |value: &Value| value.as_float().or_else(|| value.as_integer().map(|n| n as f64));
-    let weight = |value| number(value).filter(|weight| (MIN_WEIGHT..=1.0 / MIN_WEIGHT).contains(weight));
+    let weight = |value| number(value).filter(|weight| (MIN_WEIGHT..=MAX_WEIGHT).contains(weight));
     let weights = values.iter().map(weight).collect::<Option<Vec<f64>>>();
-    let weights =
-        weights.ok_or_else(|| problem(format!("must be numbers of {MIN_WEIGHT:e} .. {:e}", 1.0 / MIN_WEIGHT)))?;
+    let weights = weights.ok_or_else(|| problem(format!("must be numbers of {MIN_WEIGHT} .. {MAX_WEIGHT}")))?;
     Ok((key.to_owned(), weights))
 }
 
@@ -276,5 +276,7 @@ mod tests {
         ]
         .map(|bad| format!("{bad:?}\n  {}\n", read(bad).expect_err(bad)));
         insta::assert_snapshot!("campaign", told.concat());
+        let weights = read("[matrix]\na = [1, 2]\n[weights]\na = [1, 0]").expect_err("a weight of none").to_string();
+        assert!(weights.contains("1000000000") && !weights.contains("e8"), "{weights}");
     }
 }

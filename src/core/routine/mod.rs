@@ -25,7 +25,7 @@ pub use definition::{FailedJointEntry, Routine};
 pub use error::RoutineError;
 pub use file::{load, load_with, schema};
 pub use method::Method;
-pub use overrides::{Override, Overrides, effective_table};
+pub use overrides::{Override, OverrideOrigin, Overrides, effective_table};
 pub use scene::{Scene, load_scene, scene_schema};
 pub use settings::{CaptureSettings, Margins, PoseCriterion, TaskSettings};
 pub use step::{

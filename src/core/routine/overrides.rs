@@ -16,6 +16,15 @@ use crate::kind::Kind;
 use crate::robot::{FileIssue, parse_toml, read_text};
 use crate::text::with_nearest;
 
+/// Origin of an override, for messages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OverrideOrigin {
+    /// An option of the command line.
+    CommandLine,
+    /// A value of `[campaign.matrix]`.
+    Matrix,
+}
+
 /// An override: a key and its new value.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Override {
@@ -23,6 +32,8 @@ pub struct Override {
     pub key: String,
     /// New value, which replaces the file's value of any type.
     pub value: Value,
+    /// Origin of the value.
+    pub origin: OverrideOrigin,
 }
 
 /// Overrides of a routine.
@@ -45,7 +56,21 @@ impl Override {
         if !key.split('.').all(is_plain) {
             return Err(format!("`{key}` is not a key: keys are words joined by dots, as world.camera.rate_hz"));
         }
-        Ok(Self { key: key.to_owned(), value })
+        Ok(Self { key: key.to_owned(), value, origin: OverrideOrigin::CommandLine })
+    }
+
+    /// Returns the override as a value of the matrix.
+    #[must_use]
+    pub fn of_matrix(self) -> Self {
+        Self { origin: OverrideOrigin::Matrix, ..self }
+    }
+
+    /// Returns the override with its origin, for messages.
+    fn with_origin(&self) -> String {
+        match self.origin {
+            OverrideOrigin::CommandLine => format!("--set {self}"),
+            OverrideOrigin::Matrix => format!("campaign.matrix.{self}"),
+        }
     }
 
     fn apply(&self, table: &mut Table) -> Result<(), String> {
@@ -123,7 +148,7 @@ pub fn effective_table(file: &Path, set: &[Override]) -> Result<Table, RoutineEr
     check_head(Kind::Routine, file, &table)?;
     for one in set {
         one.apply(&mut table)
-            .map_err(|problem| FileIssue::new(Code::ValueInvalid, file, format!("--set {one}"), problem))?;
+            .map_err(|problem| FileIssue::new(Code::ValueInvalid, file, one.with_origin(), problem))?;
     }
     Ok(table)
 }
@@ -137,7 +162,7 @@ pub(super) fn read_with<T: DeserializeOwned>(file: &Path, set: &[Override]) -> R
     effective_table(file, set)?.try_into().map_err(|error: toml::de::Error| {
         // A problem that exists without the overrides is reported with its line.
         read_alone().err().unwrap_or_else(|| {
-            let given: Vec<String> = set.iter().map(|one| format!("--set {one}")).collect();
+            let given: Vec<String> = set.iter().map(Override::with_origin).collect();
             let problem = with_nearest(&error.to_string().trim().replace('\n', " "));
             FileIssue::new(Code::ValueInvalid, file, given.join(" "), problem).into()
         })
@@ -164,6 +189,18 @@ mod tests {
         for bad in ["a", "=1", "a..b=1", "a=", "a=two words", "a=1\nb=2", "a b=1", "a=[1"] {
             assert!(bad.parse::<Override>().is_err(), "{bad}");
         }
+    }
+
+    #[test]
+    fn a_wrong_value_of_the_matrix_is_not_blamed_on_the_command_line() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("r.toml");
+        std::fs::write(&file, "version = 1\nkind = \"routine\"\nseed = 1\n").expect("written");
+        let one: Override = "seed.a=1".parse().expect("an override");
+        let told = |one: Override| effective_table(&file, &[one]).expect_err("no table").to_string();
+        assert!(told(one.clone()).contains("--set"));
+        let of_matrix = told(one.of_matrix());
+        assert!(of_matrix.contains("campaign.matrix.seed.a=1") && !of_matrix.contains("--set"), "{of_matrix}");
     }
 
     #[test]

@@ -117,6 +117,8 @@ pub fn inspect(path: &Path, robot: Option<&Robot>) -> Result<Inspection, LogErro
     )?;
     let determined = robot.map(|robot| observable_parameters(path, robot, &recording)).transpose()?;
     let time_nanos = topics.time_nanos();
+    // Readings of other joints say nothing about this robot.
+    let tracked = robot.filter(|robot| robot.joint_names() == recording.joint_names);
     let arm = arm.finish(&recording);
     let mut topics = topics.finish();
     if arm.joint_readings == 0 {
@@ -148,7 +150,7 @@ pub fn inspect(path: &Path, robot: Option<&Robot>) -> Result<Inspection, LogErro
         metadata: metadata(&summary.contents),
         arm,
         observable: determined,
-        tracking_error: robot.and_then(|robot| motions.finish(robot)),
+        tracking_error: tracked.and_then(|robot| motions.finish(robot)),
         hints: Vec::new(),
     };
     inspection.hints = hints(&inspection);

@@ -60,7 +60,8 @@ pub(super) fn pair<'a>([a, b]: [&'a LookedAt; 2], robot: Option<&Robot>) -> Resu
         let what = [missing_joints(&roles), missing_seen(&roles)].into_iter().flatten().collect::<Vec<_>>();
         format!("{} lacks {}", of.path.display(), what.join("; "))
     };
-    let refused = |problem: String| ProposalError::Joints { file: a.path.display().to_string(), problem };
+    let file = || a.path.display().to_string();
+    let has_joints = sides.iter().any(|(_, _, of_joints, _)| missing_joints(of_joints).is_none());
     let Some((joints, tags, of_joints, of_tags)) = sides.into_iter().find(fits) else {
         let problem = format!(
             "no input map can be proposed for the two tables: one needs the joints, the other what the camera saw; \
@@ -68,13 +69,16 @@ pub(super) fn pair<'a>([a, b]: [&'a LookedAt; 2], robot: Option<&Robot>) -> Resu
             lacks(a),
             lacks(b)
         );
-        return Err(refused(problem));
+        return Err(match has_joints {
+            true => ProposalError::Columns { file: file(), problem },
+            false => ProposalError::Joints { file: file(), problem },
+        });
     };
     match join([joints, tags], [&of_joints, &of_tags]) {
         Some(join) => Ok(TablePair { joints, tags, roles: [of_joints, of_tags], join }),
         None => {
             if let Some(problem) = ambiguous([joints, tags], [&of_joints, &of_tags]) {
-                return Err(ProposalError::Joints { file: joints.path.display().to_string(), problem });
+                return Err(ProposalError::Columns { file: joints.path.display().to_string(), problem });
             }
             let names = |of: &LookedAt| of.contents.columns.iter().take(20).map(|c| c.name.clone()).collect::<Vec<_>>();
             let problem = format!(
@@ -84,7 +88,7 @@ pub(super) fn pair<'a>([a, b]: [&'a LookedAt; 2], robot: Option<&Robot>) -> Resu
                 names(a),
                 names(b)
             );
-            Err(refused(problem))
+            Err(ProposalError::Columns { file: file(), problem })
         }
     }
 }

@@ -69,7 +69,10 @@ fn of_one(table: &LookedAt, robot: Option<&Robot>) -> Result<String, ProposalErr
             "no input map can be proposed: it lacks {}; its columns are {columns:?}; {remedy}",
             needs.join("; ")
         );
-        return Err(ProposalError::Joints { file, problem });
+        return Err(match missing_joints(&roles) {
+            Some(_) => ProposalError::Joints { file, problem },
+            None => ProposalError::Columns { file, problem },
+        });
     }
     let mut text = head(&comment(&file), &[(contents, &roles)]);
     text += &table_of(contents, &roles);

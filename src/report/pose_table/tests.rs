@@ -73,7 +73,7 @@ fn images_with_the_same_names_in_two_folders_join_by_their_whole_names() {
     };
     assert!(proposed(&[&joints, &tags(&str::to_owned)], &robot).is_ok());
     let without_folder = tags(&|of| of.rsplit('/').next().unwrap_or(of).to_owned());
-    assert!(matches!(proposed(&[&joints, &without_folder], &robot), Err(ProposalError::Joints { .. })));
+    assert!(matches!(proposed(&[&joints, &without_folder], &robot), Err(ProposalError::Columns { .. })));
 }
 
 #[test]
@@ -83,7 +83,7 @@ fn tags_side_by_side_are_refused_and_numbered_columns_are_proposed() {
         let rows = "0.5,2,3,1,2,3,0,0,1,0,0,1\n1.5,2,3,1,2,3,0,0,1,0,0,1\n";
         format!("a1,a2,a3,a4,a5,a6,tag3_x,tag3_y,tag3_z,{second}_x,{second}_y,{second}_z\n{rows}")
     };
-    assert!(matches!(proposed(&[&wide("tag5")], &robot), Err(ProposalError::Joints { .. })));
+    assert!(matches!(proposed(&[&wide("tag5")], &robot), Err(ProposalError::Columns { .. })));
     // The arm's own pose and one tag in one row.
     assert!(proposed(&[&wide("tool0")], &robot).is_ok());
     let columns = "target.translation.0,target.translation.1,target.translation.2,target.quaternion.0,\

@@ -116,6 +116,8 @@ fn calibration(robot: &Robot, found: &Estimate<'_>, views: &[View]) -> Calibrati
         gain_estimated: true,
         offset_estimated: true,
         covered_rad: [-1.0, 1.0],
+        offset_counts: None,
+        counts_per_rad: None,
         gain_over_datasheet: None,
         identified_ratio: None,
         residual_std_rad: covariance.residual_std_rad.map(|std| std[joint]),

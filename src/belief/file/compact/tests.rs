@@ -51,6 +51,8 @@ fn calibration(robot: &str, joints: &[Joint], refusal: Option<Refusal>) -> Calib
             gain_estimated: joint.gain.is_some(),
             offset_estimated: joint.offset.is_some(),
             covered_rad: [-1.0, 1.0],
+            offset_counts: None,
+            counts_per_rad: None,
             identified_ratio: None,
             gain_over_datasheet: None,
             residual_std_rad: None,
