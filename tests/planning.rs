@@ -116,6 +116,26 @@ fn a_prior_narrows_the_bounds_and_renames_the_angles() {
     plan(&routine, folder.path(), &["--prior", other.to_str().expect("UTF-8")]).expect("other arm", 2, &["other.toml"]);
 }
 
+/// A routine of the name of a result, and a prior that is the result of an earlier calibration, stay as they are.
+#[test]
+fn plans_and_calibrations_overwrite_no_file_that_they_read() {
+    let folder = temp();
+    let routine = folder.path().join("plan.toml");
+    std::fs::rename(short(folder.path(), ""), &routine).expect("renamed");
+    let before = read(&routine);
+    plan(&routine, folder.path(), &[]).expect("plan", 2, &["plan.toml", "[file_exists]"]);
+    assert_eq!(read(&routine), before);
+    for name in ["calibration.toml", "calibration.covariance.toml"] {
+        std::fs::copy(shared_run().file(name), folder.path().join(name)).expect("copied");
+    }
+    let prior = folder.path().join("calibration.toml");
+    let mut command = program();
+    command.arg("calibrate").arg(shared_run().file("run.mcap")).arg("--robot").arg(crate::support::robot_folder());
+    command.arg("--prior").arg(&prior).arg("--out").arg(folder.path());
+    answer(&mut command).expect("calibrate", 2, &["calibration.toml", "[file_exists]"]);
+    assert_eq!(read(&prior), read(&shared_run().file("calibration.toml")));
+}
+
 /// Angles of a true arm within the error box about the believed ones. Each joint is at an end of its interval with
 /// probability 1/2, otherwise uniform between the ends.
 fn random_arm(robot: &Robot, bounds: &JointErrorBounds, believed: &JointAngles, rng: &mut impl RngExt) -> JointAngles {
