@@ -12,7 +12,7 @@ use armcal::streams::JointAngles;
 use rand::RngExt;
 
 use crate::support::texts::Texts;
-use crate::support::{Answer, ShortRoutine, answer, edit, program, read, shared_run, temp, write};
+use crate::support::{Answer, ShortRoutine, answer, edit, program, read, robot_copy, shared_run, temp, write};
 
 fn plan(routine: &Path, out: &Path, more: &[&str]) -> Answer {
     answer(program().arg("plan").arg(routine).arg("--out").arg(out).args(more))
@@ -209,6 +209,24 @@ fn what_cannot_be_planned_is_named() {
     refused(&short(folder.path(), &script.replace("-0.3", "1.5")), &[], &["step 1", "shoulder_pitch", "stop"]);
     refused(&short(folder.path(), ""), &["--set", "capture.min_tags=60"], &["60", "tags"]);
     refused(&short(folder.path(), ""), &["--prior", "nowhere.toml"], &["nowhere.toml"]);
+}
+
+/// Without a shape on any link every path would count as clear.
+#[test]
+fn an_arm_without_collision_shapes_is_neither_planned_for_nor_run() {
+    let folder = temp();
+    let robot = robot_copy(folder.path());
+    let urdf = robot.join("titan4.urdf");
+    let text = read(&urdf);
+    let mut parts = text.split("<collision>");
+    let before = parts.next().expect("the text before the first shape").to_owned();
+    let rest = parts.map(|part| part.split_once("</collision>").expect("the end of a shape").1);
+    write(&urdf, &(before + &rest.collect::<String>()));
+    let routine = ShortRoutine { robot: robot.clone(), ..ShortRoutine::default() }.write(folder.path());
+    let words = ["titan4.urdf", "[key_missing]"];
+    plan(&routine, &folder.path().join("plan"), &[]).expect("plan", 2, &words);
+    crate::support::run(&routine, &folder.path().join("run")).expect("run", 2, &words);
+    answer(program().arg("check").arg(&robot)).expect("check", 0, &["[planning_incomplete]"]);
 }
 
 /// One target of five is out of the arm's reach before calibration: a warning, and a plan for the others.
