@@ -229,6 +229,25 @@ fn an_arm_without_collision_shapes_is_neither_planned_for_nor_run() {
     answer(program().arg("check").arg(&robot)).expect("check", 0, &["[planning_incomplete]"]);
 }
 
+/// The plan moves neither a joint that cannot follow nor one that nobody can see follow.
+#[test]
+fn declared_failed_joints_are_held_where_the_arm_is_stowed() {
+    let names = crate::support::titan().joint_names();
+    for (name, kind) in [("wrist_yaw", "locked"), ("wrist_pitch", "dead")] {
+        let folder = temp();
+        let failed = format!("[[failed_joint]]\njoint = \"{name}\"\nkind = \"{kind}\"\n");
+        let file = planned(&short(folder.path(), &failed), folder.path(), &[]);
+        let joint = names.iter().position(|joint| joint == name).expect("a joint of the arm");
+        let held_rad = crate::support::titan().stowed[joint];
+        let waypoints = file.path.iter().flat_map(|path| &path.waypoints_rad);
+        let moved = waypoints.chain(file.pose.iter().map(|pose| &pose.angles_rad));
+        assert!(moved.clone().count() > 16, "{name}");
+        assert!(moved.into_iter().all(|angles| (angles[joint] - held_rad).abs() < 1e-6), "{name}");
+        let of_joint = file.warnings.iter().filter(|warning| warning.code == Code::JointAssumed);
+        assert_eq!(of_joint.filter(|warning| warning.text.contains(name)).count(), 1, "{:?}", file.warnings);
+    }
+}
+
 /// One target of five is out of the arm's reach before calibration: a warning, and a plan for the others.
 #[test]
 fn a_single_target_out_of_reach_is_a_warning() {
