@@ -229,6 +229,24 @@ fn an_arm_without_collision_shapes_is_neither_planned_for_nor_run() {
     answer(program().arg("check").arg(&robot)).expect("check", 0, &["[planning_incomplete]"]);
 }
 
+/// A plan that does not suffice is still a plan: warnings in its files and on the terminal say what it lacks.
+#[test]
+fn too_few_poses_and_too_large_an_error_are_warnings() {
+    let folder = temp();
+    let routine = ShortRoutine { poses: 4, held_out: 0, ..ShortRoutine::default() }.write(folder.path());
+    let told = plan(&routine, folder.path(), &["--set", "task.tolerance_m=0.0002"]);
+    told.expect("a poor plan", 0, &["[too_few_views]", "[beyond_tolerance]"]);
+    let file = PlanFile::read(&folder.path().join("plan.toml")).expect("the plan reads");
+    let codes: Vec<Code> = file.warnings.iter().map(|warning| warning.code).collect();
+    assert_eq!(codes, [Code::TooFewViews, Code::BeyondTolerance]);
+    assert!(file.totals.predicted_tool_error_m.is_some_and(|error_m| error_m > 0.0002), "{:?}", file.totals);
+    let shown = read(&folder.path().join("plan.md"));
+    assert!(codes.iter().all(|code| shown.contains(&format!("[{code}]"))), "{shown}");
+    let enough = planned(&short(folder.path(), ""), folder.path(), &[]);
+    assert_eq!(enough.warnings, []);
+    assert!(!read(&folder.path().join("plan.md")).contains("warning"));
+}
+
 /// The plan moves neither a joint that cannot follow nor one that nobody can see follow.
 #[test]
 fn declared_failed_joints_are_held_where_the_arm_is_stowed() {

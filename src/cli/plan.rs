@@ -279,7 +279,8 @@ fn totals(file: &PlanFile) -> String {
 }
 
 fn markdown(file: &PlanFile) -> String {
-    let lines: Vec<String> = totals(file).lines().map(|line| format!("- {line}")).collect();
+    let warnings = file.warnings.iter().map(|warning| format!("- warning: {warning}"));
+    let lines: Vec<String> = totals(file).lines().map(|line| format!("- {line}")).chain(warnings).collect();
     format!(
         "# Plan of `{}` for `{}`\n\n{}\n\n{}\n",
         file.routine,

@@ -15,6 +15,7 @@ use crate::plan::declared_failures::HeldArm;
 use crate::plan::motion::edge::{Edge, Path};
 use crate::plan::motion::timing::{SETTLE_S, Timing};
 use crate::plan::path::PathPlanner;
+use crate::plan::shortfalls::{KnownBefore, shortfalls};
 use crate::plan::targets::{TargetRequest, plan_targets};
 use crate::plan::view_planning::StopReason;
 use crate::plan::view_planning::{PlannedPose, PoseRequest, choose_poses};
@@ -188,8 +189,11 @@ pub fn plan_itinerary(request: &ItineraryRequest<'_>, rng: &mut ChaCha8Rng) -> R
     let (targets, skipped) = planner.targets(rng)?;
     let poses = planner.poses(&targets, rng)?;
     let itinerary = planner.visit(poses, rng)?;
+    let known = calibration.map_or(KnownBefore::Datasheet, |_| KnownBefore::Calibration);
+    let planned = itinerary.visits.iter().map(|visit| &visit.pose);
     let mut warnings = planner.arm.warnings;
     warnings.extend(skipped);
+    warnings.extend(shortfalls(planned, request.routine, request.robot, known));
     Ok(CapturePlan { warnings, ..itinerary })
 }
 
