@@ -12,7 +12,7 @@ use armcal::streams::JointAngles;
 use rand::RngExt;
 
 use crate::support::texts::Texts;
-use crate::support::{Answer, ShortRoutine, answer, edit, program, read, shared_run, temp, write};
+use crate::support::{Answer, ShortRoutine, answer, edit, program, read, robot_copy, shared_run, temp, write};
 
 fn plan(routine: &Path, out: &Path, more: &[&str]) -> Answer {
     answer(program().arg("plan").arg(routine).arg("--out").arg(out).args(more))
@@ -134,6 +134,26 @@ fn a_prior_narrows_the_bounds_and_renames_the_angles() {
     plan(&routine, folder.path(), &["--prior", other.to_str().expect("UTF-8")]).expect("other arm", 2, &["other.toml"]);
 }
 
+/// A routine of the name of a result, and a prior that is the result of an earlier calibration, stay as they are.
+#[test]
+fn plans_and_calibrations_overwrite_no_file_that_they_read() {
+    let folder = temp();
+    let routine = folder.path().join("plan.toml");
+    std::fs::rename(short(folder.path(), ""), &routine).expect("renamed");
+    let before = read(&routine);
+    plan(&routine, folder.path(), &[]).expect("plan", 2, &["plan.toml", "[file_exists]"]);
+    assert_eq!(read(&routine), before);
+    for name in ["calibration.toml", "calibration.covariance.toml"] {
+        std::fs::copy(shared_run().file(name), folder.path().join(name)).expect("copied");
+    }
+    let prior = folder.path().join("calibration.toml");
+    let mut command = program();
+    command.arg("calibrate").arg(shared_run().file("run.mcap")).arg("--robot").arg(crate::support::robot_folder());
+    command.arg("--prior").arg(&prior).arg("--out").arg(folder.path());
+    answer(&mut command).expect("calibrate", 2, &["calibration.toml", "[file_exists]"]);
+    assert_eq!(read(&prior), read(&shared_run().file("calibration.toml")));
+}
+
 /// Angles of a true arm within the error box about the believed ones. Each joint is at an end of its interval with
 /// probability 1/2, otherwise uniform between the ends.
 fn random_arm(robot: &Robot, bounds: &JointErrorBounds, believed: &JointAngles, rng: &mut impl RngExt) -> JointAngles {
@@ -207,6 +227,61 @@ fn what_cannot_be_planned_is_named() {
     refused(&short(folder.path(), &script.replace("-0.3", "1.5")), &[], &["step 1", "shoulder_pitch", "stop"]);
     refused(&short(folder.path(), ""), &["--set", "capture.min_tags=60"], &["60", "tags"]);
     refused(&short(folder.path(), ""), &["--prior", "nowhere.toml"], &["nowhere.toml"]);
+}
+
+/// Without a shape on any link every path would count as clear.
+#[test]
+fn an_arm_without_collision_shapes_is_neither_planned_for_nor_run() {
+    let folder = temp();
+    let robot = robot_copy(folder.path());
+    let urdf = robot.join("titan4.urdf");
+    let text = read(&urdf);
+    let mut parts = text.split("<collision>");
+    let before = parts.next().expect("the text before the first shape").to_owned();
+    let rest = parts.map(|part| part.split_once("</collision>").expect("the end of a shape").1);
+    write(&urdf, &(before + &rest.collect::<String>()));
+    let routine = ShortRoutine { robot: robot.clone(), ..ShortRoutine::default() }.write(folder.path());
+    let words = ["titan4.urdf", "[key_missing]"];
+    plan(&routine, &folder.path().join("plan"), &[]).expect("plan", 2, &words);
+    crate::support::run(&routine, &folder.path().join("run")).expect("run", 2, &words);
+    answer(program().arg("check").arg(&robot)).expect("check", 0, &["[planning_incomplete]"]);
+}
+
+/// A plan that does not suffice is still a plan: warnings in its files and on the terminal say what it lacks.
+#[test]
+fn too_few_poses_and_too_large_an_error_are_warnings() {
+    let folder = temp();
+    let routine = ShortRoutine { poses: 4, held_out: 0, ..ShortRoutine::default() }.write(folder.path());
+    let told = plan(&routine, folder.path(), &["--set", "task.tolerance_m=0.0002"]);
+    told.expect("a poor plan", 0, &["[too_few_views]", "[beyond_tolerance]"]);
+    let file = PlanFile::read(&folder.path().join("plan.toml")).expect("the plan reads");
+    let codes: Vec<Code> = file.warnings.iter().map(|warning| warning.code).collect();
+    assert_eq!(codes, [Code::TooFewViews, Code::BeyondTolerance]);
+    assert!(file.totals.predicted_tool_error_m.is_some_and(|error_m| error_m > 0.0002), "{:?}", file.totals);
+    let shown = read(&folder.path().join("plan.md"));
+    assert!(codes.iter().all(|code| shown.contains(&format!("[{code}]"))), "{shown}");
+    let enough = planned(&short(folder.path(), ""), folder.path(), &[]);
+    assert_eq!(enough.warnings, []);
+    assert!(!read(&folder.path().join("plan.md")).contains("warning"));
+}
+
+/// The plan moves neither a joint that cannot follow nor one that nobody can see follow.
+#[test]
+fn declared_failed_joints_are_held_where_the_arm_is_stowed() {
+    let names = crate::support::titan().joint_names();
+    for (name, kind) in [("wrist_yaw", "locked"), ("wrist_pitch", "dead")] {
+        let folder = temp();
+        let failed = format!("[[failed_joint]]\njoint = \"{name}\"\nkind = \"{kind}\"\n");
+        let file = planned(&short(folder.path(), &failed), folder.path(), &[]);
+        let joint = names.iter().position(|joint| joint == name).expect("a joint of the arm");
+        let held_rad = crate::support::titan().stowed[joint];
+        let waypoints = file.path.iter().flat_map(|path| &path.waypoints_rad);
+        let moved = waypoints.chain(file.pose.iter().map(|pose| &pose.angles_rad));
+        assert!(moved.clone().count() > 16, "{name}");
+        assert!(moved.into_iter().all(|angles| (angles[joint] - held_rad).abs() < 1e-6), "{name}");
+        let of_joint = file.warnings.iter().filter(|warning| warning.code == Code::JointAssumed);
+        assert_eq!(of_joint.filter(|warning| warning.text.contains(name)).count(), 1, "{:?}", file.warnings);
+    }
 }
 
 /// One target of five is out of the arm's reach before calibration: a warning, and a plan for the others.

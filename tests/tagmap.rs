@@ -204,6 +204,19 @@ fn a_map_that_was_written_serves_as_known() {
 }
 
 #[test]
+fn a_map_does_not_overwrite_the_tags_that_it_starts_from() {
+    let hall = Hall::new();
+    let map = hall.file("map.toml");
+    hall.map(&["--out", map.to_str().expect("text")]).expect("first", 0, &[]);
+    let before = std::fs::read(&map).expect("a map");
+    let mut command = program();
+    command.arg("tagmap").arg(hall.file("hall.mcap")).arg("--camera").arg(hall.file("cameras.yaml"));
+    command.arg("--tags").arg(&map).arg("--out").arg(&map);
+    answer(&mut command).expect("itself", 2, &["map.toml", "[file_exists]"]);
+    assert_eq!(std::fs::read(&map).expect("a map"), before);
+}
+
+#[test]
 fn bad_input_is_refused_with_file_and_key() {
     let _texts = Texts::of("bad_input_is_refused_with_file_and_key");
     let hall = Hall::new();

@@ -215,6 +215,25 @@ fn a_collision_element_may_have_a_material() {
     assert_eq!((robot.bodies[0].collisions.len(), robot.urdf_warnings.len()), (1, 0));
 }
 
+/// An arm without shapes can be calibrated, but each of its paths would count as clear.
+#[test]
+fn links_without_a_collision_shape_are_named() {
+    const BOX: &str = "<geometry><box size=\"0.1 0.1 0.1\"/></geometry>";
+    let lacks_all = |robot: &Robot| robot.planning_issues.iter().any(|issue| issue.key == "links");
+    let bench = Bench::new(&arm(6, &Parts::default()));
+    let robot = bench.made(&[], &["links: "]);
+    answer(program().arg("check").arg(bench.robot_folder())).expect("check", 0, &["links", "[planning_incomplete]"]);
+    assert!(lacks_all(&robot) && robot.require_planning().is_err());
+    let tool = format!("<collision>{BOX}</collision>");
+    let robot = Bench::new(&arm(6, &Parts { tool: tool.clone(), ..Parts::default() })).made(&[], &[]);
+    assert_eq!((lacks_all(&robot), robot.urdf_warnings.len()), (false, 0));
+    // A cover that is drawn on the second link has no shape, while the tool has one.
+    let more = joint("screws", "fixed", ["l2", "cover"], "")
+        + &format!("<link name=\"cover\"><visual>{BOX}</visual></link>\n");
+    let robot = Bench::new(&arm(6, &Parts { tool, more, ..Parts::default() })).made(&[], &["`l2`", "[urdf_skipped]"]);
+    assert_eq!((lacks_all(&robot), robot.urdf_warnings.len()), (false, 1));
+}
+
 #[test]
 fn limits_need_neither_velocity_nor_effort() {
     let edit = |parts: &mut Parts, more: &str| parts.limit = format!("<limit lower=\"-1\" upper=\"1.2\" {more}/>");

@@ -9,8 +9,9 @@ use clap::Args;
 
 use crate::cli::calibration_inputs::{Calibrated, CalibrationInputs, load_robot};
 use crate::cli::closing::ClosingArgs;
-use crate::cli::exit::Exit;
+use crate::cli::exit::{Exit, UsageError};
 use crate::cli::named;
+use crate::cli::own_inputs::spare_inputs;
 use crate::cli::stdout::warn;
 use crate::output::{self, accepted_kept};
 #[cfg(feature = "viewer")]
@@ -54,8 +55,25 @@ pub(super) struct CalibrateArgs {
     closing: ClosingArgs,
 }
 
+/// Files of a calibration, in the output folder.
+const RESULTS: [&str; 6] =
+    ["tagmap.toml", "calibration.covariance.toml", "calibration.toml", "report.html", "summary.json", "replay.rrd"];
+
+impl CalibrateArgs {
+    /// Refuses, before minutes of work, a folder in which a result overwrites an input.
+    fn check_outputs(&self) -> Result<(), UsageError> {
+        let options = [self.input.as_ref(), self.tag_map.as_ref(), self.prior.as_ref(), self.task.as_ref()];
+        for name in RESULTS {
+            let inputs = self.recordings.iter().chain(options.into_iter().flatten());
+            spare_inputs(&self.out.join(name), inputs.map(PathBuf::as_path))?;
+        }
+        Ok(())
+    }
+}
+
 pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
     let robot = load_robot(&args.robot, &args.failed)?;
+    args.check_outputs()?;
     // The lock is taken before minutes of work, not after.
     let _lock = output::FolderLock::take(&args.out)?;
     let given = CalibrationInputs {

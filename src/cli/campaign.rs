@@ -20,6 +20,7 @@ use crate::cli::file_kind::expect_routine;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::named;
 use crate::cli::overrides::OverrideArgs;
+use crate::cli::own_inputs::spare_inputs;
 use crate::cli::stdout::{note, say};
 use crate::output;
 use crate::run::Keep;
@@ -93,6 +94,7 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<Exit> {
 }
 
 fn merged(args: &CampaignArgs, out: &Path) -> Result<Exit> {
+    spare_inputs(out, args.merge.iter().map(PathBuf::as_path))?;
     check_name(out)?;
     let missing = if args.allow_missing { MissingShards::LeaveOut } else { MissingShards::Refuse };
     let (rows, summary) = merge(&args.merge, missing)?;

@@ -15,9 +15,10 @@ use crate::cli::file_kind::expect_routine;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::live_view::{LiveViewArgs, OpenView, ViewOf};
 use crate::cli::overrides::OverrideArgs;
+use crate::cli::own_inputs::spare_inputs;
 use crate::cli::progress::Bar;
 use crate::cli::stdout::warn;
-use crate::output::OutputFolder;
+use crate::output::{OutputFolder, RESULTS};
 use crate::run::{Failure, Finished, Keep, RunInputs, RunOutput};
 use armcal_belief::session::Progress;
 
@@ -60,6 +61,7 @@ impl LoopArgs {
         let out = self.out.clone().unwrap_or_else(|| Path::new("recordings").join(&inputs.routine.name));
         let (routine, robot) = (&inputs.routine.name, &inputs.robot.name);
         tracing::info!("routine {routine}, robot {robot}, results in {}", out.display());
+        RESULTS.iter().try_for_each(|name| spare_inputs(&out.join(name), [inputs.routine.file.as_path()]))?;
         let (folder, left_behind) = OutputFolder::open(&out)?;
         if let Some(kept) = left_behind {
             let text = "an earlier run into this folder did not end; its recording is now";

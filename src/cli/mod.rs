@@ -1,5 +1,4 @@
 //! The command line: parse, dispatch, progress, exit code. The only place with a clock.
-
 #[cfg(feature = "sim")]
 mod batch;
 mod belief_text;
@@ -32,6 +31,7 @@ mod losses;
 mod named;
 mod new_robot;
 mod overrides;
+mod own_inputs;
 mod plan;
 #[cfg(feature = "closed-loop")]
 mod progress;

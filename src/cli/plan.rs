@@ -15,6 +15,7 @@ use crate::cli::exit::Exit;
 use crate::cli::file_kind::{expect_option, expect_routine};
 use crate::cli::named;
 use crate::cli::overrides::OverrideArgs;
+use crate::cli::own_inputs::spare_inputs;
 use crate::cli::stdout::{is_quiet, note, say, warn};
 use crate::output;
 use crate::report::fit_columns;
@@ -48,6 +49,8 @@ pub(super) struct PlanArgs {
     overrides: OverrideArgs,
 }
 
+/// Files of a plan, in the output folder.
+const RESULTS: [&str; 3] = ["plan.rrd", "plan.md", "plan.toml"];
 /// Version of the hash; a new meaning of the file needs a new version.
 const DOMAIN: &[u8] = b"armcal plan 1";
 
@@ -58,6 +61,12 @@ pub(super) fn plan(args: &PlanArgs) -> Result<Exit> {
     let routine = routine::load_with(&args.routine, &overrides)?;
     let (robot, vehicle) = routine.load_arm()?;
     let out = args.out.clone().unwrap_or_else(|| Path::new("recordings").join(format!("{}-plan", routine.name)));
+    for name in RESULTS {
+        spare_inputs(
+            &out.join(name),
+            [Some(&args.routine), args.prior.as_ref()].into_iter().flatten().map(PathBuf::as_path),
+        )?;
+    }
     output::check_takes_files(&out)?;
     let prior = args.prior.as_deref().map(|file| Ok::<_, anyhow::Error>((read_prior(file, &robot)?, read(file)?)));
     let prior = prior.transpose()?;
@@ -273,7 +282,8 @@ fn totals(file: &PlanFile) -> String {
 }
 
 fn markdown(file: &PlanFile) -> String {
-    let lines: Vec<String> = totals(file).lines().map(|line| format!("- {line}")).collect();
+    let warnings = file.warnings.iter().map(|warning| format!("- warning: {warning}"));
+    let lines: Vec<String> = totals(file).lines().map(|line| format!("- {line}")).chain(warnings).collect();
     format!(
         "# Plan of `{}` for `{}`\n\n{}\n\n{}\n",
         file.routine,

@@ -20,6 +20,7 @@ use crate::cli::file_kind::expect_routine;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::named;
 use crate::cli::overrides::OverrideArgs;
+use crate::cli::own_inputs::spare_inputs;
 use crate::cli::stdout::{note, say};
 use crate::output;
 use crate::run::Keep;
@@ -63,6 +64,23 @@ pub(super) struct RegressArgs {
     overrides: OverrideArgs,
 }
 
+impl RegressArgs {
+    /// Refuses, before hours of work, outputs that cannot be written or that overwrite an input.
+    fn check_outputs(&self) -> Result<()> {
+        let inputs = || [Some(&self.routine), self.baseline.as_ref(), self.rows.as_ref()].into_iter().flatten();
+        if let Some(out) = self.write_baseline.as_ref().or(self.out.as_ref()) {
+            spare_inputs(out, inputs().map(PathBuf::as_path))?;
+            check_name(out)?;
+        }
+        for path in &self.report {
+            Form::of(path)?;
+            spare_inputs(path, inputs().map(PathBuf::as_path))?;
+            output::check_writable(path)?;
+        }
+        Ok(())
+    }
+}
+
 /// Form of a report, by the extension of its name.
 enum Form {
     JUnit,
@@ -86,13 +104,7 @@ impl Form {
 
 pub(super) fn regress(args: &RegressArgs) -> Result<Exit> {
     expect_routine(&args.routine)?;
-    if let Some(out) = args.write_baseline.as_ref().or(args.out.as_ref()) {
-        check_name(out)?;
-    }
-    for path in &args.report {
-        Form::of(path)?;
-        output::check_writable(path)?;
-    }
+    args.check_outputs()?;
     let prepared = Prepared::load(Request { routine: args.routine.clone(), overrides: args.overrides.overrides() })?;
     let baseline = args.baseline.as_deref().map(|path| read_baseline(path, &prepared)).transpose()?;
     if let (Some(baseline), Some(rows)) = (&baseline, &args.rows) {

@@ -11,6 +11,7 @@ use crate::cli::file_kind::{FileKind, expect_kind, expect_no_truth};
 use crate::cli::live_view::LiveViewArgs;
 use crate::cli::losses::warn_of_losses;
 use crate::cli::named;
+use crate::cli::own_inputs::spare_inputs;
 use crate::cli::stdout::{say, warn};
 use crate::output;
 use armcal_belief::calib::online::BeliefLog;
@@ -38,6 +39,7 @@ pub(super) struct ReplayArgs {
 }
 
 pub(super) fn replay(args: &ReplayArgs) -> Result<Exit> {
+    args.save.as_deref().map_or(Ok(()), |out| check_name(out, &args.recording))?;
     expect_kind(&args.recording, &[FileKind::Recording])?;
     let recording = read_for_replay(&args.recording)?;
     if recording.joint_names.is_empty() {
@@ -87,6 +89,15 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<Exit> {
         }
     }
     Ok(if lost { Exit::DataLost } else { Exit::Ok })
+}
+
+/// Refuses a name without the ending .rrd, which no file next to the recording has, and the recording itself.
+fn check_name(out: &Path, recording: &Path) -> Result<(), UsageError> {
+    if out.extension().is_none_or(|extension| extension != "rrd") {
+        let problem = format!("{}: the name of a file for the viewer must end in .rrd", out.display());
+        return Err(UsageError::new(Code::FileFormat, problem));
+    }
+    spare_inputs(out, [recording])
 }
 
 /// Warns that a long recording is shown at a lower rate, with the omitted numbers by stream. Images are never among the

@@ -15,6 +15,7 @@ use crate::cli::closing::say_wrapped;
 use crate::cli::exit::Exit;
 use crate::cli::file_kind::{expect_option, expect_recording};
 use crate::cli::named;
+use crate::cli::own_inputs::spare_inputs;
 use crate::cli::stdout::{note, say};
 use crate::output;
 use crate::report::{TAG_COLUMNS, TagMapPage, fit_lines, group_title, tag_map_html, tag_rows};
@@ -56,6 +57,19 @@ pub(super) struct TagmapArgs {
     json: bool,
 }
 
+impl TagmapArgs {
+    /// Refuses, before the work, outputs that cannot be written or that overwrite an input.
+    fn check_outputs(&self) -> Result<()> {
+        let robot_file = self.robot.as_ref().map(|folder| folder.join("robot.toml"));
+        for path in &self.out {
+            let inputs = [Some(&self.recording), robot_file.as_ref(), self.camera.as_ref(), self.tags.as_ref()];
+            spare_inputs(path, inputs.into_iter().flatten().map(PathBuf::as_path))?;
+            output::check_writable(path)?;
+        }
+        Ok(())
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Mode {
     /// Given poses are exact: only cameras are located
@@ -87,7 +101,7 @@ const NOISY: f64 = 2.0;
 pub(super) fn tagmap(args: &TagmapArgs) -> Result<Exit> {
     expect_recording(&args.recording)?;
     expect_option(args.tags.as_deref(), Kind::TagMap)?;
-    args.out.iter().try_for_each(|path| output::check_writable(path))?;
+    args.check_outputs()?;
     let is_page = |path: &&PathBuf| path.extension().is_some_and(|end| end == "html");
     let (cameras, tags, settings) = match (&args.robot, &args.camera, &args.tags) {
         (Some(folder), ..) => of_robot(&args.recording, &load_robot(folder, &[])?)?,

@@ -11,7 +11,7 @@ use crate::output::{FolderLock, OutputError, as_written, check_replaceable, comp
 use armcal_core::log::{LogError, for_each_raw, topics};
 
 /// Result files of a run, in the order in which they are put in place.
-const RESULTS: [&str; 9] = [
+pub(crate) const RESULTS: [&str; 9] = [
     "truth.mcap",
     "run.rrd",
     "tagmap.toml",

@@ -28,4 +28,6 @@ pub(crate) use files::{as_written, check_replaceable, parent, refuse_link};
 pub(crate) use files::{complete, partial};
 #[cfg(feature = "closed-loop")]
 pub use folder::OutputFolder;
+#[cfg(feature = "closed-loop")]
+pub(crate) use folder::RESULTS;
 pub(crate) use lock::FolderLock;

@@ -215,6 +215,22 @@ impl Gate {
 }
 
 /// The comparison fails when the camera is worse; that it passes for the same program is tested in the second tier.
+/// Nothing is run before it is known that the tables to compare with or to merge stay.
+#[test]
+fn a_table_that_is_read_is_not_overwritten() {
+    let folder = temp();
+    let routine = least("").write(folder.path());
+    let table = folder.path().join("baseline.csv");
+    write(&table, "seed\n1\n");
+    let mut compared = program();
+    compared.arg("regress").arg(&routine).arg("--baseline").arg(&table).arg("--out").arg(&table);
+    answer(&mut compared).expect("regress", 2, &["baseline.csv", "[file_exists]"]);
+    let mut merged = program();
+    merged.arg("campaign").arg("--out").arg(&table).arg("--merge").arg(&table);
+    answer(&mut merged).expect("merge", 2, &["baseline.csv", "[file_exists]"]);
+    assert_eq!(read(&table), "seed\n1\n");
+}
+
 #[test]
 fn a_regression_is_found() {
     let _texts = Texts::of("a_regression_is_found");

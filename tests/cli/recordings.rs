@@ -245,6 +245,26 @@ fn replay_writes_a_file_for_the_viewer() {
     assert!(fs::read(&save).expect("written").starts_with(MAGIC));
 }
 
+/// Files next to a recording are shown with it; none of them is replaced by the replay.
+#[test]
+fn replay_overwrites_no_file_that_it_reads() {
+    let folder = temp();
+    let names = ["run.mcap", "calibration.toml", "truth.mcap"];
+    for name in names {
+        fs::copy(shared_run().file(name), folder.path().join(name)).expect("copied");
+    }
+    let recording = folder.path().join("run.mcap");
+    for name in names {
+        replayed(&recording, &folder.path().join(name)).expect(name, 2, &[name, "[file_format]"]);
+        let kept = fs::read(folder.path().join(name)).expect("it is there");
+        assert!(kept == shared_run().bytes(name), "{name}");
+    }
+    let renamed = folder.path().join("run.rrd");
+    fs::copy(&recording, &renamed).expect("copied");
+    replayed(&renamed, &renamed).expect("itself", 2, &["run.rrd", "[file_exists]"]);
+    assert!(fs::read(&renamed).expect("it is there") == shared_run().bytes("run.mcap"));
+}
+
 #[test]
 fn replay_of_what_cannot_be_shown_says_why() {
     let folder = temp();

@@ -11,9 +11,11 @@ use crate::file::calibration::Calibration;
 use crate::file::file_error::CalibrationFileError;
 use crate::plan::bounds::joint_bounds::JointErrorBounds;
 use crate::plan::clearance::{ClearanceModel, ClosestPair};
+use crate::plan::declared_failures::HeldArm;
 use crate::plan::motion::edge::{Edge, Path};
 use crate::plan::motion::timing::{SETTLE_S, Timing};
 use crate::plan::path::PathPlanner;
+use crate::plan::shortfalls::{KnownBefore, shortfalls};
 use crate::plan::targets::{TargetRequest, plan_targets};
 use crate::plan::view_planning::StopReason;
 use crate::plan::view_planning::{PlannedPose, PoseRequest, choose_poses};
@@ -77,7 +79,7 @@ pub struct CapturePlan {
     pub visits: Vec<PlannedVisit>,
     /// Chosen poses that no path leads to.
     pub left_out: Vec<UnreachablePose>,
-    /// Targets of the task that no pose reaches under this belief.
+    /// Targets of the task that no pose reaches under this belief, assumptions, and what does not suffice.
     pub warnings: Vec<Warning>,
     /// Reason why there are no more views.
     pub stop: StopReason,
@@ -175,16 +177,23 @@ pub enum ItineraryError {
 /// plan.
 pub fn plan_itinerary(request: &ItineraryRequest<'_>, rng: &mut ChaCha8Rng) -> Result<CapturePlan, ItineraryError> {
     let capture = first_capture(request.routine);
+    let calibration = request.belief.calibration.as_ref();
+    let arm = HeldArm::new(request.robot, &request.belief.bounds, calibration);
     let bounds = match request.routine.capture.margins {
-        Margins::Belief => request.belief.bounds.clone(),
+        Margins::Belief => arm.bounds.clone(),
         Margins::Off => JointErrorBounds::none(request.robot),
     };
-    let planner = Planner { request, capture, limits: bounds.safe_limits(request.robot), bounds };
+    let planner = Planner { request, capture, limits: bounds.safe_limits(&arm.robot), bounds, arm };
     planner.check_start()?;
     planner.check_moves()?;
-    let (targets, warnings) = planner.targets(rng)?;
+    let (targets, skipped) = planner.targets(rng)?;
     let poses = planner.poses(&targets, rng)?;
     let itinerary = planner.visit(poses, rng)?;
+    let known = calibration.map_or(KnownBefore::Datasheet, |_| KnownBefore::Calibration);
+    let planned = itinerary.visits.iter().map(|visit| &visit.pose);
+    let mut warnings = planner.arm.warnings;
+    warnings.extend(skipped);
+    warnings.extend(shortfalls(planned, request.routine, request.robot, known));
     Ok(CapturePlan { warnings, ..itinerary })
 }
 
@@ -200,6 +209,8 @@ fn first_capture(routine: &Routine) -> &CaptureSettings {
 struct Planner<'a> {
     request: &'a ItineraryRequest<'a>,
     capture: &'a CaptureSettings,
+    /// Arm with its failed joints held, and its error bounds.
+    arm: HeldArm,
     /// Error bounds for which clearance is kept.
     bounds: JointErrorBounds,
     limits: Vec<JointLimits>,
@@ -215,7 +226,7 @@ impl Planner<'_> {
     }
 
     fn start(&self) -> JointAngles {
-        self.request.robot.stowed
+        self.arm.robot.stowed
     }
 
     fn check_start(&self) -> Result<(), PlanError> {
@@ -237,7 +248,7 @@ impl Planner<'_> {
         let steps = &self.request.routine.steps[..until.unwrap_or(self.request.routine.steps.len())];
         for (index, step) in steps.iter().enumerate() {
             let Step::Move(MoveGoal::Angles(angles)) = step else { continue };
-            if let Some(problem) = self.impossible(&JointAngles::from_slice(angles)) {
+            if let Some(problem) = self.impossible(&self.arm.with_held(&JointAngles::from_slice(angles))) {
                 return Err(ItineraryError::Move { step: index + 1, problem });
             }
         }
@@ -246,7 +257,7 @@ impl Planner<'_> {
 
     fn impossible(&self, angles: &JointAngles) -> Option<String> {
         for (joint, limits) in self.limits.iter().enumerate() {
-            let has_stops = self.request.robot.chain.joints()[joint].limits.is_some();
+            let has_stops = self.arm.robot.chain.joints()[joint].limits.is_some();
             if has_stops && !(limits.lower_rad..=limits.upper_rad).contains(&angles[joint]) {
                 return Some(format!(
                     "{} at {:.4} rad may drive into its stop: within the sensors' error {:.4} .. {:.4} rad are safe",
@@ -271,7 +282,7 @@ impl Planner<'_> {
     fn targets(&self, rng: &mut ChaCha8Rng) -> Result<(Vec<JointAngles>, Vec<Warning>), ItineraryError> {
         let targets_m = &self.request.routine.task.targets_m;
         let asked = TargetRequest { targets_m, preferred: None, margin_m: self.margin_m() };
-        let planned = plan_targets(self.request.robot, self.request.clearance_at_targets, self.bounds(), &asked, rng);
+        let planned = plan_targets(&self.arm.robot, self.request.clearance_at_targets, self.bounds(), &asked, rng);
         let (mut reached, mut errors) = (Vec::new(), Vec::new());
         for target in planned {
             match target {
@@ -286,7 +297,7 @@ impl Planner<'_> {
     }
 
     fn poses(&self, targets: &[JointAngles], rng: &mut ChaCha8Rng) -> Result<Vec<PlannedPose>, PlanError> {
-        let robot = self.request.robot;
+        let robot = &self.arm.robot;
         let request = PoseRequest {
             robot,
             clearance: self.request.clearance,
@@ -355,14 +366,14 @@ impl Planner<'_> {
         let angles = pose.angles;
         let (clearance, bounds, margin_m) = (self.request.clearance, self.bounds(), self.margin_m());
         let path_clearance = LeastClearance::along(clearance, bounds, &path, margin_m);
-        let duration_s = Timing::new(self.request.robot).path_duration_s(&path);
+        let duration_s = Timing::new(&self.arm.robot).path_duration_s(&path);
         PlannedVisit {
             path,
             duration_s,
             path_clearance,
             clearance: LeastClearance::on(clearance, bounds, &Edge::at_full_speed(angles, angles), margin_m),
             nearest,
-            error_bound_rad: JointAngles::from_fn(angles.len(), |j| self.request.belief.bounds.error_rad(j, angles[j])),
+            error_bound_rad: JointAngles::from_fn(angles.len(), |j| self.arm.bounds.error_rad(j, angles[j])),
             arm_time_s: since_s + duration_s + SETTLE_S,
             pose,
         }

@@ -48,7 +48,7 @@ pub struct PlanFile {
     pub start_rad: Vec<f64>,
     /// Sensor readings at the start by the estimate, counts.
     pub start_counts: Vec<f64>,
-    /// Targets of the task that cannot be reached under this estimate.
+    /// Targets of the task that cannot be reached under this estimate, assumptions, and what does not suffice.
     pub warnings: Vec<Warning>,
     /// Totals over the plan.
     pub totals: PlanTotals,

@@ -3,18 +3,21 @@
 //! `bounds`: joint error bounds; `motion`: time scaling and tracking error; `clearance`: distances of one arm to its
 //! environment; `certify`: the proof for every arm within the bounds; `path`: RRT-Connect over certified edges;
 //! `visibility`: visible tags; `view_planning`: views to capture; `targets`: the reach task. `capture_plan` combines
-//! them before the first motion, `file` is plan.toml; `scene_check` has the checks of `armcal check`.
+//! them before the first motion, with `declared_failures` held and `shortfalls` named; `file` is plan.toml;
+//! `scene_check` has the checks of `armcal check`.
 
 mod bounds;
 mod capture_plan;
 mod certify;
 mod clearance;
 pub(crate) mod constants;
+mod declared_failures;
 mod error;
 mod file;
 mod motion;
 mod path;
 mod scene_check;
+mod shortfalls;
 mod targets;
 mod view_planning;
 mod visibility;

@@ -1,11 +1,14 @@
 //! The simulated world on its topics, until the user ends it.
 
+use std::path::PathBuf;
+
 use anyhow::{Context, Result};
 
 use super::ServeArgs;
 use crate::cli::drive::watch_memory;
 use crate::cli::exit::Exit;
 use crate::cli::interrupt::Interrupt;
+use crate::cli::own_inputs::spare_inputs;
 use crate::cli::stdout::note;
 use crate::run::RunInputs;
 use armcal_live::{Connection, Pace};
@@ -23,6 +26,7 @@ pub(super) fn serve(args: &ServeArgs) -> Result<Exit> {
         seed: inputs.routine.seed,
     })?;
     if let Some(file) = &args.truth {
+        spare_inputs(file, [Some(&args.routine), args.arm.as_ref()].into_iter().flatten().map(PathBuf::as_path))?;
         world.set_truth_sink(Box::new(TruthRecorder::create(file)?))?;
     }
     let interrupt = Interrupt::install()?;

@@ -210,6 +210,8 @@ fn planning_issues(file: &Path, raw: &RobotFile, camera: &CameraSpec, arm: &Urdf
                        calibrate` works on recordings of it; where it is a lift that stands still, name the link on \
                        it as base_link";
         issues.push(FileIssue::new(Code::UrdfStructure, &arm.urdf.file, format!("joint `{}`", slide.name), problem));
+    } else {
+        issues.extend(urdf_notes::unshaped_issue(arm));
     }
     if camera.mount.n_joints == 0 && raw.tag_link.is_none() {
         let problem = "no joint moves it; run and plan need a camera that the arm carries, or tags that it carries \

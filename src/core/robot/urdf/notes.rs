@@ -2,6 +2,7 @@
 
 use super::{MAX_COLLISION_SHAPES, UrdfChain};
 use crate::codes::{Code, Warning};
+use crate::kinematics::ChainJoint;
 use crate::robot::error::FileIssue;
 use crate::robot::urdf_file::{Range, Skipped, UrdfJoint};
 
@@ -22,9 +23,62 @@ pub fn warnings(arm: &UrdfChain<'_>) -> Vec<Warning> {
     }
     let n_more = groups.len().saturating_sub(MAX_WARNINGS);
     let file = arm.urdf.file.file_name().unwrap_or_default().to_string_lossy();
+    let unshaped = unshaped_warning(arm, &file);
     let told = groups.iter().take(MAX_WARNINGS).map(|(text, owners)| format!("{file}: {}: {text}", named(owners)));
     let more = (n_more > 0).then(|| format!("{file}: {n_more} further kinds of problems were skipped"));
-    told.chain(more).map(|text| Warning::new(Code::UrdfSkipped, text)).collect()
+    told.chain(more).chain(unshaped).map(|text| Warning::new(Code::UrdfSkipped, text)).collect()
+}
+
+/// Returns a warning about moving links that are drawn and have no collision shape, where others have one.
+fn unshaped_warning(arm: &UrdfChain<'_>, file: &str) -> Option<String> {
+    let moving = MovingLinks::of(arm);
+    let unshaped = moving.unshaped();
+    if unshaped.is_empty() || moving.are_all_unshaped() {
+        return None;
+    }
+    let names = unshaped.iter().take(MAX_NAMED).map(|link| format!("`{link}`")).collect::<Vec<_>>().join(", ");
+    let more = unshaped.len().saturating_sub(MAX_NAMED);
+    let more = if more == 0 { String::new() } else { format!(" and {more} more") };
+    Some(format!(
+        "{file}: links {names}{more}: they have a <visual> and no <collision>, so nothing keeps paths clear of them. \
+         Draw boxes, cylinders or spheres, or name meshes"
+    ))
+}
+
+/// Links that the joints of the chain move, each with all that is fixed to it.
+struct MovingLinks<'a> {
+    links: Vec<MovingLink<'a>>,
+}
+
+struct MovingLink<'a> {
+    name: &'a str,
+    is_drawn: bool,
+    has_shape: bool,
+}
+
+impl<'a> MovingLinks<'a> {
+    fn of(arm: &'a UrdfChain<'_>) -> Self {
+        let moved = |joint: &'a ChainJoint| MovingLink { name: &joint.child_link, is_drawn: false, has_shape: false };
+        let mut links: Vec<MovingLink<'a>> = arm.chain.joints().iter().map(moved).collect();
+        for link in arm.links() {
+            let body = arm.attachment(&link.name).ok().and_then(|attachment| attachment.n_joints.checked_sub(1));
+            let Some(body) = body.and_then(|body| links.get_mut(body)) else { continue };
+            body.is_drawn |= !link.visual.is_empty();
+            body.has_shape |= !link.collision.is_empty() || link.lost.is_some();
+        }
+        Self { links }
+    }
+
+    /// Returns the names of those that are drawn and have no collision shape.
+    fn unshaped(&self) -> Vec<&'a str> {
+        let is_unshaped = |link: &&MovingLink<'a>| link.is_drawn && !link.has_shape;
+        self.links.iter().filter(is_unshaped).map(|link| link.name).collect()
+    }
+
+    /// True if none of them has a collision shape.
+    fn are_all_unshaped(&self) -> bool {
+        self.links.iter().all(|link| !link.has_shape)
+    }
 }
 
 fn named(owners: &[&Skipped]) -> String {
@@ -80,4 +134,12 @@ pub fn planning_issues(arm: &UrdfChain<'_>) -> Vec<FileIssue> {
         issues.push(FileIssue::new(Code::ValueCount, file, "collision", problem));
     }
     issues
+}
+
+/// Returns the issue of an arm none of whose moving links has a collision shape: any path would count as clear.
+pub fn unshaped_issue(arm: &UrdfChain<'_>) -> Option<FileIssue> {
+    let problem = "none that the joints move has a <collision>, so no clearance can be certified. Draw boxes, \
+                   cylinders or spheres for them, or name meshes";
+    let is_unshaped = MovingLinks::of(arm).are_all_unshaped();
+    is_unshaped.then(|| FileIssue::new(Code::KeyMissing, &arm.urdf.file, "links", problem))
 }
