@@ -60,9 +60,10 @@ const RESULTS: [&str; 6] =
     ["tagmap.toml", "calibration.covariance.toml", "calibration.toml", "report.html", "summary.json", "replay.rrd"];
 
 impl CalibrateArgs {
-    /// Refuses, before minutes of work, a folder in which a result overwrites an input.
+    /// Refuses, before minutes of work, a folder in which a result overwrites an input. A prior may be replaced by a
+    /// better result.
     fn check_outputs(&self) -> Result<(), UsageError> {
-        let options = [self.input.as_ref(), self.tag_map.as_ref(), self.prior.as_ref(), self.task.as_ref()];
+        let options = [self.input.as_ref(), self.tag_map.as_ref(), self.task.as_ref()];
         for name in RESULTS {
             let inputs = self.recordings.iter().chain(options.into_iter().flatten());
             spare_inputs(&self.out.join(name), inputs.map(PathBuf::as_path))?;
