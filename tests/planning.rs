@@ -12,7 +12,7 @@ use armcal::streams::JointAngles;
 use rand::RngExt;
 
 use crate::support::texts::Texts;
-use crate::support::{Answer, ShortRoutine, answer, edit, program, read, shared_run, temp, write};
+use crate::support::{Answer, ShortRoutine, answer, edit, program, read, robot_copy, shared_run, temp, write};
 
 fn plan(routine: &Path, out: &Path, more: &[&str]) -> Answer {
     answer(program().arg("plan").arg(routine).arg("--out").arg(out).args(more))
@@ -83,6 +83,33 @@ fn counts_belong_to_their_angles() {
         let before = if n == 0 { &file.start_rad } else { &file.pose[n - 1].angles_rad };
         assert_eq!(path.waypoints_rad.first(), Some(before), "and begins at the one before");
     }
+}
+
+/// An arm whose counts are radians gets set-points in radians, with their sign and as many digits as the angles have.
+#[test]
+fn set_points_in_radians_are_neither_wrapped_nor_rounded_to_whole_numbers() {
+    let folder = temp();
+    let robot = robot_copy(folder.path());
+    let in_radians = |line: &str| match line.split_once(" = ").map(|(key, _)| key) {
+        Some("offset_counts") => "offset_counts = 0.0".to_owned(),
+        Some("scale_counts_per_deg") => "scale_counts_per_deg = 0.017453292519943295".to_owned(),
+        Some("wrap_counts") => "wrap_counts = 1e6".to_owned(),
+        Some("noise_std_counts") => "noise_std_counts = 1e-4".to_owned(),
+        _ => line.to_owned(),
+    };
+    let lines: Vec<String> = read(&robot.join("robot.toml")).lines().map(in_radians).collect();
+    write(&robot.join("robot.toml"), &lines.join("\n"));
+    let routine = ShortRoutine { robot, ..ShortRoutine::default() }.write(folder.path());
+    let file = planned(&routine, &folder.path().join("plan"), &[]);
+    let mut shown = 0;
+    let table = read(&folder.path().join("plan/plan.md"));
+    for pose in &file.pose {
+        for (counts, angle) in pose.raw_counts.iter().zip(&pose.angles_rad) {
+            assert!((counts - angle).abs() < 2e-6, "pose {}: {counts} for {angle} rad", pose.number);
+            shown += usize::from(table.contains(&format!("{counts:.3}")));
+        }
+    }
+    assert_eq!(shown, file.pose.len() * file.joints.len(), "{table}");
 }
 
 #[test]
