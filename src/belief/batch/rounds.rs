@@ -383,7 +383,7 @@ impl<'a> BundleCalibration<'a> {
     }
 
     fn nothing_observable(&self) -> CalibError {
-        CalibError::NothingObservable { recording: self.data.name.clone() }
+        CalibError::nothing_observable(&self.data.name, &self.data.robot)
     }
 
     fn check_observable(&self, setup: &BundleSetup, declared: &[Failure]) -> Result<(), CalibError> {

@@ -20,7 +20,9 @@ use crate::solve::estimate::Estimate;
 use crate::solve::input::HyperparameterMode;
 use crate::solve::model_for_views::model_for;
 use crate::views::calibration_data::{CalibrationData, HeldOut};
+use crate::views::error::CalibError;
 use crate::views::view::{CaptureData, View};
+use armcal_core::codes::{Code, Coded};
 use armcal_core::input::TagNoise;
 use armcal_core::kinematics::Attachment;
 use armcal_core::robot::{FailedJoint, FailedKind, Robot};
@@ -57,6 +59,10 @@ fn calibrated_for(robot: Robot, views: Vec<View>, task: Option<ReachTask>) -> Ca
 }
 
 fn calibrated_by(robot: Robot, data: CaptureData) -> Calibration {
+    tried_by(robot, data).expect("a result")
+}
+
+fn tried_by(robot: Robot, data: CaptureData) -> Result<Calibration, CalibError> {
     let data = CalibrationData {
         name: "synthetic".to_owned(),
         messages_hash: String::new(),
@@ -66,7 +72,7 @@ fn calibrated_by(robot: Robot, data: CaptureData) -> Calibration {
         robot,
         identified: Vec::new(),
     };
-    calibrate_data(data, CalibrationMethod::Bundle, None).expect("a result")
+    calibrate_data(data, CalibrationMethod::Bundle, None)
 }
 
 /// An arm without faults; `locked`: a joint that stands still.
@@ -334,6 +340,25 @@ fn what_is_declared_is_believed_and_not_looked_for() {
     }
     let declared = [Failure::without_sensor(2, FailedKind::Dead, FailureSource::Declared, N_VIEWS)];
     assert_eq!(found_failures(&case, &declared), declared);
+}
+
+#[test]
+fn sensors_that_robot_toml_holds_are_the_reason_why_nothing_is_calibrated() {
+    let mut case = case(34, None);
+    for sensor in &mut case.robot.sensors {
+        (sensor.gain_std, sensor.offset_std_rad) = (0.0, 0.0);
+    }
+    let fit = |views: &[View]| CaptureData { fit: views.to_vec(), ..CaptureData::default() };
+    let error = tried_by(case.robot.clone(), fit(&case.views)).expect_err("nothing is left");
+    assert!(matches!(error, CalibError::AllHeld { .. }), "{error}");
+    assert_eq!(error.code(), Code::NothingObservable);
+    assert!(
+        ["gain_std", "offset_std_rad", "robot.toml"].iter().all(|word| error.to_string().contains(word)),
+        "{error}"
+    );
+    case.robot.sensors[0].offset_std_rad = 0.01;
+    let with_one = tried_by(case.robot, fit(&case.views));
+    assert!(!matches!(with_one, Err(CalibError::AllHeld { .. })), "one offset is left");
 }
 
 /// The tool point lies on the last axis before the camera, so that a task of positions does not need this joint's
