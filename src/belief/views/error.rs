@@ -38,6 +38,11 @@ pub enum CalibError {
          `gain_std` up to 10 or `offset_std_rad` up to 6.3"
     )]
     AllHeld { robot: String },
+    #[error(
+        "{recording}: {joint} is declared locked, but its readings move by {moved} over the views, and so does the \
+         joint in the camera's sight; take the declaration back, or declare its sensor (dead, stuck or jumps)"
+    )]
+    DeclaredLocked { recording: String, joint: String, moved: String },
     #[error("{recording}: no joint can be calibrated by its end stops: {problem}")]
     NoStops { recording: String, problem: String },
     #[error("{recording}: no map of the tags can be made from its views: {problem}")]
@@ -116,6 +121,7 @@ impl Coded for CalibError {
             Self::NothingObservable { .. } | Self::AllHeld { .. } | Self::NoStops { .. } => Code::NothingObservable,
             Self::Map { .. } => Code::MapFailed,
             Self::Identify { .. } => Code::ScaleUnmeasured,
+            Self::DeclaredLocked { .. } => Code::ValueInvalid,
             Self::OnePose { .. } => Code::ArmNotMoved,
             Self::Twice { .. } => Code::RecordingDuplicate,
             Self::Surveys { .. } => Code::SurveysConflict,

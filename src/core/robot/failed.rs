@@ -83,4 +83,33 @@ impl FailedJoint {
         };
         Ok(Self { joint: index, kind })
     }
+
+    /// Checks that no joint is declared with two kinds.
+    ///
+    /// # Errors
+    /// The joint and both kinds.
+    pub fn check_kinds(declared: &[Self], names: &[String]) -> Result<(), String> {
+        let other = |one: &Self| declared.iter().find(|other| other.joint == one.joint && other.kind != one.kind);
+        let twice = declared.iter().find_map(|one| Some((one, other(one)?)));
+        twice.map_or(Ok(()), |(one, other)| {
+            let (name, kinds) = (&names[one.joint], [one.kind.name(), other.kind.name()]);
+            Err(format!("`{name}` is declared {} and {}; declare it once, with one of the two", kinds[0], kinds[1]))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_joint_has_one_kind_of_failure() {
+        let names = ["shoulder".to_owned(), "elbow".to_owned()];
+        let of = |joint: usize, kind: FailedKind| FailedJoint { joint, kind };
+        let [locked, dead] = [FailedKind::Locked, FailedKind::Dead];
+        let fine = [of(0, locked), of(1, dead), of(0, locked)];
+        assert_eq!(FailedJoint::check_kinds(&fine, &names), Ok(()));
+        let told = FailedJoint::check_kinds(&[of(1, dead), of(0, locked), of(1, locked)], &names).expect_err("two");
+        assert!(["elbow", "dead", "locked"].iter().all(|word| told.contains(word)), "{told}");
+    }
 }

@@ -343,6 +343,25 @@ fn what_is_declared_is_believed_and_not_looked_for() {
 }
 
 #[test]
+fn a_joint_that_moves_is_not_locked_by_declaration() {
+    for seed in [31, 33] {
+        let joint = (seed % 5) as usize;
+        let locked = |robot: &Robot| robot.clone().with_failed(&[FailedJoint { joint, kind: FailedKind::Locked }]);
+        let of = |fit: Vec<View>| CaptureData { fit, ..CaptureData::default() };
+        let moving = case(seed, None);
+        let name = moving.robot.sensors[joint].joint.clone();
+        let error = tried_by(locked(&moving.robot), of(moving.views)).expect_err("it moves");
+        assert!(matches!(&error, CalibError::DeclaredLocked { joint, .. } if *joint == name), "seed {seed}: {error}");
+        assert_eq!(error.code(), Code::ValueInvalid);
+        // The readings of a locked joint mean nothing.
+        let mut still = case(seed, Some(joint));
+        random_words(&mut still, joint, seed);
+        let result = tried_by(locked(&still.robot), of(still.views)).expect("it is locked");
+        assert_eq!(result.failed_joint[0].kind, FailedKind::Locked, "seed {seed}");
+    }
+}
+
+#[test]
 fn sensors_that_robot_toml_holds_are_the_reason_why_nothing_is_calibrated() {
     let mut case = case(34, None);
     for sensor in &mut case.robot.sensors {
