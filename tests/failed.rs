@@ -127,10 +127,31 @@ fn a_joint_is_declared_on_the_command_line() {
     assert_ne!(declared.code, 0, "{declared:?}");
     let text = read(&folder.path().join("calibration.toml"));
     assert!(text.contains("found = \"declared\"") && text.contains("kind = \"dead\""), "{text}");
+    let beyond = with("wrist_rotate=dead");
+    assert!(beyond.stderr.contains("wrist_rotate") && beyond.stderr.contains("[key_ignored]"), "{beyond:?}");
+    assert!(!declared.stderr.contains("[key_ignored]"), "{declared:?}");
     for (wrong, word) in [("nose=dead", "wrist_pitch"), ("wrist_pitch=odd", "stuck"), ("wrist_pitch", "locked")] {
         let refused = with(wrong);
         assert!(refused.code != 0 && refused.stderr.contains(word), "{refused:?}");
     }
+}
+
+/// A joint whose readings move is not locked, and a joint has one failure.
+#[test]
+fn a_declaration_that_the_readings_contradict_is_the_error() {
+    let run = shared_run().file("run.mcap");
+    let folder = temp();
+    let with = |failed: &[&str]| {
+        let mut command = program();
+        command.arg("calibrate").arg(&run).arg("--robot").arg(robot_folder()).arg("--out").arg(folder.path());
+        failed.iter().for_each(|one| {
+            command.arg("--failed").arg(one);
+        });
+        answer(&mut command)
+    };
+    with(&["forearm_pitch=locked"]).expect("it moves", 2, &["forearm_pitch", " deg", "dead", "[value_invalid]"]);
+    let twice = with(&["forearm_pitch=locked", "forearm_pitch=dead"]);
+    twice.expect("two kinds", 2, &["forearm_pitch", "locked", "dead", "[usage_invalid]"]);
 }
 
 /// A sensor sticks after the first calibration: the joint is held, and the script continues without it. The finished
@@ -149,7 +170,9 @@ fn an_arm_whose_sensor_sticks_goes_on_without_that_joint() {
     let [held] = &summary.held_joints[..] else { panic!("{:?}", summary.held_joints) };
     assert_eq!((held.joint.as_str(), held.kind), ("forearm_pitch", FailedKind::Stuck));
     let [failed] = &calibration.failed_joint[..] else { panic!("{:?}", calibration.failed_joint) };
-    assert_eq!((failed.joint.as_str(), failed.kind), ("forearm_pitch", FailedKind::Locked));
+    // The sensor is stuck, and the joint is held at the angle that the camera shows.
+    assert_eq!((failed.joint.as_str(), failed.kind), ("forearm_pitch", FailedKind::Stuck));
+    assert!(failed.angle_rad.is_some() && failed.camera_std_rad.is_none(), "{failed:?}");
     let prior = calibration.prior.as_ref().expect("it starts from the first");
     assert!(prior.chi_square < 5.0 * prior.degrees_of_freedom as f64, "{prior:?}");
     let still = summary.still_reachable.as_ref().expect("a reach after it");

@@ -85,6 +85,33 @@ fn counts_belong_to_their_angles() {
     }
 }
 
+/// An arm whose counts are radians gets set-points in radians, with their sign and as many digits as the angles have.
+#[test]
+fn set_points_in_radians_are_neither_wrapped_nor_rounded_to_whole_numbers() {
+    let folder = temp();
+    let robot = robot_copy(folder.path());
+    let in_radians = |line: &str| match line.split_once(" = ").map(|(key, _)| key) {
+        Some("offset_counts") => "offset_counts = 0.0".to_owned(),
+        Some("scale_counts_per_deg") => "scale_counts_per_deg = 0.017453292519943295".to_owned(),
+        Some("wrap_counts") => "wrap_counts = 1e6".to_owned(),
+        Some("noise_std_counts") => "noise_std_counts = 1e-4".to_owned(),
+        _ => line.to_owned(),
+    };
+    let lines: Vec<String> = read(&robot.join("robot.toml")).lines().map(in_radians).collect();
+    write(&robot.join("robot.toml"), &lines.join("\n"));
+    let routine = ShortRoutine { robot, ..ShortRoutine::default() }.write(folder.path());
+    let file = planned(&routine, &folder.path().join("plan"), &[]);
+    let mut shown = 0;
+    let table = read(&folder.path().join("plan/plan.md"));
+    for pose in &file.pose {
+        for (counts, angle) in pose.raw_counts.iter().zip(&pose.angles_rad) {
+            assert!((counts - angle).abs() < 2e-6, "pose {}: {counts} for {angle} rad", pose.number);
+            shown += usize::from(table.contains(&format!("{counts:.3}")));
+        }
+    }
+    assert_eq!(shown, file.pose.len() * file.joints.len(), "{table}");
+}
+
 #[test]
 fn totals_that_contradict_their_poses_are_refused() {
     let folder = temp();
@@ -136,22 +163,13 @@ fn a_prior_narrows_the_bounds_and_renames_the_angles() {
 
 /// A routine of the name of a result, and a prior that is the result of an earlier calibration, stay as they are.
 #[test]
-fn plans_and_calibrations_overwrite_no_file_that_they_read() {
+fn plans_overwrite_no_file_that_they_read() {
     let folder = temp();
     let routine = folder.path().join("plan.toml");
     std::fs::rename(short(folder.path(), ""), &routine).expect("renamed");
     let before = read(&routine);
     plan(&routine, folder.path(), &[]).expect("plan", 2, &["plan.toml", "[file_exists]"]);
     assert_eq!(read(&routine), before);
-    for name in ["calibration.toml", "calibration.covariance.toml"] {
-        std::fs::copy(shared_run().file(name), folder.path().join(name)).expect("copied");
-    }
-    let prior = folder.path().join("calibration.toml");
-    let mut command = program();
-    command.arg("calibrate").arg(shared_run().file("run.mcap")).arg("--robot").arg(crate::support::robot_folder());
-    command.arg("--prior").arg(&prior).arg("--out").arg(folder.path());
-    answer(&mut command).expect("calibrate", 2, &["calibration.toml", "[file_exists]"]);
-    assert_eq!(read(&prior), read(&shared_run().file("calibration.toml")));
 }
 
 /// Angles of a true arm within the error box about the believed ones. Each joint is at an end of its interval with

@@ -4,6 +4,7 @@ use armcal_core::codes::Code;
 use armcal_core::kind::Kind;
 #[cfg(feature = "images")]
 use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
@@ -392,7 +393,22 @@ pub(super) fn load_robot(folder: &Path, failed: &[String]) -> Result<Robot> {
             .map_err(|problem| UsageError::new(Code::UsageInvalid, format!("--failed {text}: {problem}")))
     };
     let failed = failed.iter().map(failed_joint).collect::<Result<Vec<FailedJoint>, _>>()?;
+    FailedJoint::check_kinds(&failed, &robot.joint_names())
+        .map_err(|problem| UsageError::new(Code::UsageInvalid, format!("--failed: {problem}")))?;
+    warn_of_unseen(&robot, &failed);
     Ok(robot.with_failed(&failed))
+}
+
+/// Warns of declared joints that do not move the camera.
+fn warn_of_unseen(robot: &Robot, failed: &[FailedJoint]) {
+    let unseen: BTreeSet<usize> =
+        failed.iter().map(|failed| failed.joint).filter(|joint| *joint >= robot.n_seen_joints()).collect();
+    let names: Vec<&str> = unseen.iter().map(|&joint| robot.sensors[joint].joint.as_str()).collect();
+    if !names.is_empty() {
+        let names = names.join(", ");
+        let why = "beyond the camera, so that the calibration has no part of it";
+        warn(Code::KeyIgnored, format_args!("--failed has no effect on {names}: {why}"));
+    }
 }
 
 /// Reads an accepted calibration of this robot.

@@ -21,7 +21,7 @@ use crate::output;
 use crate::report::fit_columns;
 use armcal_belief::calib::Calibration;
 use armcal_belief::plan::{
-    ArmBelief, ClearanceModel, ItineraryRequest, PlanFile, PlanHeader, PoseTable, SetName, plan_itinerary,
+    ArmBelief, ClearanceModel, ItineraryRequest, PlanFile, PlanHeader, PoseTable, SetName, count_digits, plan_itinerary,
 };
 use armcal_core::files::{self, FileKind as Size};
 use armcal_core::robot::{Robot, Vehicle};
@@ -78,7 +78,7 @@ pub(super) fn plan(args: &PlanArgs) -> Result<Exit> {
         warn(Code::PoseSkipped, format_args!("a pose is left out: {}", left.reason));
     }
     output::make_folder(&out)?;
-    let (toml, markdown) = (file.to_toml(), markdown(&file));
+    let (toml, markdown) = (file.to_toml(), markdown(&file, &robot));
     let (toml_path, markdown_path) = (out.join("plan.toml"), out.join("plan.md"));
     #[cfg(feature = "viewer")]
     let rrd = (out.join("plan.rrd"), picture(&routine, (&robot, &vehicle), &file, &markdown)?);
@@ -88,7 +88,7 @@ pub(super) fn plan(args: &PlanArgs) -> Result<Exit> {
         (&markdown_path, markdown.as_bytes()),
         (&toml_path, toml.as_bytes()),
     ])?;
-    say_plan(args, &file, &out)?;
+    say_plan(args, (&file, &robot), &out)?;
     Ok(Exit::Ok)
 }
 
@@ -135,7 +135,7 @@ fn plan_of(
     planned(routine, (robot, vehicle), &belief, header)
 }
 
-fn say_plan(args: &PlanArgs, file: &PlanFile, out: &Path) -> Result<()> {
+fn say_plan(args: &PlanArgs, (file, robot): (&PlanFile, &Robot), out: &Path) -> Result<()> {
     if args.json {
         return say(&serde_json::to_string_pretty(file).context("the plan has no JSON form")?);
     }
@@ -147,7 +147,7 @@ fn say_plan(args: &PlanArgs, file: &PlanFile, out: &Path) -> Result<()> {
     let next =
         format!("written      {out}\nnext         {out}/plan.md for the operator, {out}/plan.rrd for the viewer");
     if args.details {
-        say_closing(&format!("{}\n{totals}\n{next}", table(file, UTF8_FULL_CONDENSED, terminal_width())))
+        say_closing(&format!("{}\n{totals}\n{next}", table((file, robot), UTF8_FULL_CONDENSED, terminal_width())))
     } else {
         say_closing(&format!("{totals}\n{next}; print each pose with --details"))
     }
@@ -213,7 +213,7 @@ fn inputs_hash(
 }
 
 /// Table of the plan for people, in degrees and millimetres.
-fn table(file: &PlanFile, preset: &str, width: Option<usize>) -> String {
+fn table((file, robot): (&PlanFile, &Robot), preset: &str, width: Option<usize>) -> String {
     let mut table = Table::new();
     table.load_preset(preset);
     table.set_header([
@@ -227,7 +227,7 @@ fn table(file: &PlanFile, preset: &str, width: Option<usize>) -> String {
         "at, s",
     ]);
     for pose in &file.pose {
-        table.add_row(row(pose));
+        table.add_row(row(pose, robot));
     }
     for column in [0, 5, 6, 7] {
         if let Some(column) = table.column_mut(column) {
@@ -238,11 +238,12 @@ fn table(file: &PlanFile, preset: &str, width: Option<usize>) -> String {
     table.to_string()
 }
 
-fn row(pose: &PoseTable) -> [String; 8] {
-    let list = |values: &[f64], digits: usize| {
-        values.iter().map(|value| format!("{value:.digits$}")).collect::<Vec<_>>().join(" ")
-    };
-    let degrees: Vec<f64> = pose.angles_rad.iter().map(|angle| angle.to_degrees()).collect();
+fn row(pose: &PoseTable, robot: &Robot) -> [String; 8] {
+    let degrees: Vec<String> = pose.angles_rad.iter().map(|angle| format!("{:.1}", angle.to_degrees())).collect();
+    let with_digits = pose.raw_counts.iter().zip(&robot.sensors);
+    let counts: Vec<String> = with_digits
+        .map(|(value, sensor)| format!("{value:.digits$}", digits = count_digits(sensor.counts_per_rad)))
+        .collect();
     let tags = pose.tags.iter().map(|tag| match tag.probability {
         certain if certain > 0.995 => tag.id.to_string(),
         share => format!("{} ({:.0} %)", tag.id, 100.0 * share),
@@ -253,8 +254,8 @@ fn row(pose: &PoseTable) -> [String; 8] {
             SetName::Fit => "fit".to_owned(),
             SetName::HeldOut => "check".to_owned(),
         },
-        list(&degrees, 1),
-        list(&pose.raw_counts, 0),
+        degrees.join(" "),
+        counts.join(" "),
         tags.collect::<Vec<_>>().join(" "),
         format!("{:.0} of {:.0}", 1e3 * pose.proven_clearance_m, 1e3 * pose.clearance_m),
         pose.predicted_tool_error_m.map_or_else(|| "-".to_owned(), |m| format!("{:.2}", 1e3 * m)),
@@ -281,14 +282,14 @@ fn totals(file: &PlanFile) -> String {
     )
 }
 
-fn markdown(file: &PlanFile) -> String {
+fn markdown(file: &PlanFile, robot: &Robot) -> String {
     let warnings = file.warnings.iter().map(|warning| format!("- warning: {warning}"));
     let lines: Vec<String> = totals(file).lines().map(|line| format!("- {line}")).chain(warnings).collect();
     format!(
         "# Plan of `{}` for `{}`\n\n{}\n\n{}\n",
         file.routine,
         file.robot,
-        table(file, ASCII_MARKDOWN, None),
+        table((file, robot), ASCII_MARKDOWN, None),
         lines.join("\n")
     )
 }

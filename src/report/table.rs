@@ -356,13 +356,14 @@ fn stop_reason_line(why: &str, renewals: &[RenewalSummary]) -> String {
     )
 }
 
-/// Relative change below which a gain counts as almost unchanged: that of an encoder, whose scale is its line count.
-const LITTLE: f64 = 0.005;
+/// Sigmas of a gain below which its change may be chance.
+const CHANCE_SIGMAS: f64 = 3.0;
 
 fn gain_line(largest: &GainChange) -> String {
     let GainChange { joint, change, std } = largest;
-    let how = if change.abs() < LITTLE { "almost unchanged, at most" } else { "changed by up to" };
-    format!("gains        {how} {:+.2} % ({joint}), sigma {:.2} %", 100.0 * change, 100.0 * std)
+    let [change_percent, std_percent] = [change, std].map(|share| 100.0 * share);
+    let within = if change.abs() < CHANCE_SIGMAS * std { ", no more than chance" } else { "" };
+    format!("gains        changed by up to {change_percent:+.2} % ({joint}), sigma {std_percent:.2} %{within}")
 }
 
 /// Delay of the joint sensors' stamps behind the camera's and its standard deviation, both in s.
@@ -506,6 +507,16 @@ mod tests {
         let both: Vec<_> = [(1, 50.0), (3, 6.0), (1, 3.04), (7, 1.96)].iter().map(renewal).collect();
         let lines = [&both[..], &both[..2], &[]].map(|renewals| stop_reason_line("so", renewals));
         insta::assert_snapshot!("stop_reasons", lines.join("\n"));
+    }
+
+    #[test]
+    fn a_change_of_a_gain_is_told_by_its_sigmas() {
+        let line = |change: f64, std: f64| gain_line(&GainChange { joint: "lift".to_owned(), change, std });
+        let [clear, large, small] = [line(0.0038, 0.0004), line(-0.0436, 0.0036), line(0.0038, 0.002)];
+        assert!(clear.contains("+0.38 %") && clear.ends_with("0.04 %"), "{clear}");
+        assert!(large.contains("-4.36 %") && large.ends_with("0.36 %"), "{large}");
+        // A change within three sigmas may be chance, and the line says so.
+        assert!(small.contains("+0.38 %") && !small.ends_with("0.20 %"), "{small}");
     }
 
     #[test]

@@ -196,6 +196,7 @@ impl<'a> BundleCalibration<'a> {
         let setup = |failures: &[Failure]| self.setup(&views, failures);
         let first = setup(&declared);
         self.check_observable(&first, &declared)?;
+        self.check_declared(&views, &declared)?;
         let estimated = self.first_estimate(&first);
         let found = estimated.as_ref().map(|(estimate, _)| estimate);
         let unpaired = found.and_then(|found| self.find_unpaired(found, &views));
@@ -383,13 +384,26 @@ impl<'a> BundleCalibration<'a> {
     }
 
     fn nothing_observable(&self) -> CalibError {
-        CalibError::NothingObservable { recording: self.data.name.clone() }
+        CalibError::nothing_observable(&self.data.name, &self.data.robot)
     }
 
     fn check_observable(&self, setup: &BundleSetup, declared: &[Failure]) -> Result<(), CalibError> {
         let n = self.data.robot.n_seen_joints();
         let has_columns = setup.input().model.joints.iter().take(n).any(|kinds| !kinds.is_empty());
         if has_columns || !declared.is_empty() { Ok(()) } else { Err(self.nothing_observable()) }
+    }
+
+    /// Checks that no joint is declared locked which the views show in motion.
+    fn check_declared(&self, views: &[View], declared: &[Failure]) -> Result<(), CalibError> {
+        let (robot, prior, drawing) = (&self.data.robot, self.prior, &self.drawing);
+        let search = FailureSearch { robot, views, prior, drawing };
+        let is_final = self.purpose == EstimatePurpose::Final;
+        let found = is_final.then(|| search.moves_though_locked(declared)).flatten();
+        found.map_or(Ok(()), |(joint, moved_rad)| {
+            let sensor = &robot.sensors[joint];
+            let (recording, joint) = (self.data.name.clone(), sensor.joint.clone());
+            Err(CalibError::DeclaredLocked { recording, joint, moved: sensor.unit().shown(moved_rad, 0) })
+        })
     }
 
     fn first_estimate<'b>(&self, setup: &'b BundleSetup) -> Option<(Estimate<'b>, Vec<Selection>)> {

@@ -9,7 +9,7 @@ use crate::checks::constants::consistency::{
 pub(crate) use crate::checks::constants::consistency::{MAX_OUTLIERS, MAX_SIGMAS_OFF};
 use crate::checks::innovations::{Innovations, JointInnovation};
 use crate::checks::marginal::FromDatasheet;
-use crate::checks::observability::{Observability, observability};
+use crate::checks::observability::{NullDirection, Observability, observability};
 use crate::explain::constants::tags_departure::TAILS;
 use crate::explain::failure_detection::most_unsteady_rad;
 use crate::explain::score_test::{GeometryElement, ScoreTestResult};
@@ -88,7 +88,9 @@ impl VerdictInput<'_> {
         }
         calibration.verdict = Some(table);
         if let Some(found) = observability(self.input) {
-            let wanted = found.null_space.iter().filter(|direction| !direction.is_of_terms);
+            let shares = self.shares_of_priors();
+            let is_open = |direction: &&NullDirection| !direction.is_of_terms && !direction.is_determined(&shares);
+            let wanted = found.null_space.iter().filter(is_open);
             calibration.unobservable.extend(wanted.map(|direction| direction.words.clone()));
             calibration.observability = Some(self.table(&found));
         }
@@ -412,12 +414,19 @@ impl VerdictInput<'_> {
         robot.tool.mount.n_joints > robot.n_seen_joints() && !self.input.model.has(Block::GripperTag)
     }
 
+    /// Standard deviation of each joint parameter over its prior's.
+    fn shares_of_priors(&self) -> Vec<(Parameter, f64)> {
+        let (covariance, sensors) = (self.found.joint_covariance(), &self.input.robot.sensors);
+        let share = |(k, p): (usize, &Parameter)| {
+            let prior_std = self.found.scales().prior_std(&sensors[p.joint], p.joint, p.kind);
+            (*p, covariance[(k, k)].max(0.0).sqrt() / prior_std)
+        };
+        self.found.joint_parameters().iter().enumerate().map(share).collect()
+    }
+
     fn table(&self, found: &Observability) -> ObservabilityTable {
-        let covariance = self.found.joint_covariance();
         let robot = self.input.robot;
-        let held = self.found.joint_parameters().iter().enumerate().filter_map(|(k, p)| {
-            let prior_std = self.found.scales().prior_std(&robot.sensors[p.joint], p.joint, p.kind);
-            let share = covariance[(k, k)].max(0.0).sqrt() / prior_std;
+        let held = self.shares_of_priors().into_iter().filter_map(|(p, share)| {
             let is_named = !matches!(p.kind, ParameterKind::Shape(_)) && !p.is_past();
             (is_named && share > HELD)
                 .then(|| format!("{}: {:.0} % of its prior's standard deviation remain", p.name(robot), 100.0 * share))

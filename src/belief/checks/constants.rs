@@ -60,6 +60,9 @@ pub(crate) mod observability {
     pub(crate) const WALL: f64 = 1e-9;
     /// Share of a null direction's largest entry below which an entry is not named.
     pub(crate) const NAMED: f64 = 0.3;
+    /// Estimated standard deviation over the prior's below which a parameter is determined: the datasheet's scales,
+    /// which the null space is of, were larger than the estimated ones.
+    pub(crate) const DETERMINED: f64 = 0.5;
 }
 
 pub(crate) mod refusal_conditions {

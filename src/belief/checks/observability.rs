@@ -10,12 +10,12 @@
 //! 1990), O3 = s_L and O4 = s_L^2 / s_1 (Nahvi, Hollerbach and Hayward 1994; Nahvi and Hollerbach 1996), O5 = 1 / sum(1
 //! / s) (Sun and Hollerbach 2008).
 
-use crate::checks::constants::observability::{NAMED, UNKNOWN, WALL};
+use crate::checks::constants::observability::{DETERMINED, NAMED, UNKNOWN, WALL};
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
 use crate::model::blocks::Block;
 use crate::model::layout::Layout;
-use crate::model::parameters::ParameterKind;
+use crate::model::parameters::{Parameter, ParameterKind};
 use crate::model::prior::{Prior, at_least};
 use crate::solve::input::BundleInput;
 use crate::solve::linearize::NormalEquations;
@@ -43,13 +43,25 @@ pub struct Observability {
 #[derive(Clone, Debug)]
 pub struct NullDirection {
     pub words: String,
+    /// Gains and offsets that are named; absent where a block such as the mount takes part.
+    pub parameters: Option<Vec<Parameter>>,
     /// True if only the sensors' terms take part: temperature, pressure, drift, backlash.
     pub is_of_terms: bool,
+}
+
+impl NullDirection {
+    /// Returns true if the estimate knows each parameter of this direction much better than its prior does. `shares`:
+    /// the standard deviation of each parameter over its prior's.
+    pub(crate) fn is_determined(&self, shares: &[(Parameter, f64)]) -> bool {
+        let is_known = |p: &Parameter| shares.iter().any(|(of, share)| of == p && *share < DETERMINED);
+        self.parameters.as_ref().is_some_and(|parameters| parameters.iter().all(is_known))
+    }
 }
 
 /// Column as it is named in texts.
 struct Name {
     text: String,
+    parameter: Option<Parameter>,
     /// Prior standard deviation, in the parameter's unit.
     sigma: f64,
     is_term: bool,
@@ -96,6 +108,7 @@ pub fn observability(input: &BundleInput<'_>) -> Option<Observability> {
     };
     let named = |&column: &usize| Name {
         text: name(input.robot, &layout, column),
+        parameter: layout.parameters.get(column).copied(),
         sigma: sigma[column],
         is_term: is_term(column),
         is_angle: is_angle(column),
@@ -200,7 +213,8 @@ fn spoken(direction: &DVector<f64>, names: &[Name]) -> NullDirection {
         }
         _ => format!("{}: not each by itself", list.join(", ")),
     };
-    NullDirection { words, is_of_terms: named.iter().all(|&k| names[k].is_term) }
+    let parameters = named.iter().map(|&k| names[k].parameter).collect();
+    NullDirection { words, parameters, is_of_terms: named.iter().all(|&k| names[k].is_term) }
 }
 
 /// Row and column of the largest entry from column `from` on.
@@ -221,4 +235,21 @@ fn name(robot: &Robot, layout: &Layout, column: usize) -> String {
         return parameter.name(robot);
     }
     layout.block_of(column).map_or_else(String::new, |(block, k)| block.name(robot, k))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_the_estimate_knows_well_is_determined() {
+        let gain = |joint: usize| Parameter { joint, kind: ParameterKind::Gain };
+        let shares = [(gain(0), 0.19), (gain(1), 0.13), (gain(2), 0.98)];
+        let of = |parameters: Option<Vec<Parameter>>| {
+            NullDirection { words: String::new(), parameters, is_of_terms: false }.is_determined(&shares)
+        };
+        assert!(of(Some(vec![gain(0)])) && of(Some(vec![gain(0), gain(1)])));
+        assert!(!of(Some(vec![gain(2)])) && !of(Some(vec![gain(0), gain(2)])) && !of(Some(vec![gain(3)])));
+        assert!(!of(None), "a mount takes part");
+    }
 }

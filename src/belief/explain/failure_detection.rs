@@ -62,6 +62,16 @@ impl FailureSearch<'_> {
         self.failures_beside(known.clone(), self.setup(&known).estimate().as_ref().map(|(found, _)| found))
     }
 
+    /// Returns a joint that is declared locked although its readings and the camera show it move, and the range of the
+    /// readings, rad.
+    pub(crate) fn moves_though_locked(&self, declared: &[Failure]) -> Option<(usize, f64)> {
+        let locked = declared.iter().filter(|failure| failure.kind == FailedKind::Locked);
+        locked.map(|failure| failure.joint).find_map(|joint| {
+            let readings = self.shown_with_free(declared, joint, f64::INFINITY)?;
+            Some((joint, readings.moved_rad()?))
+        })
+    }
+
     /// Adds to `known` the failures that the estimate under them shows: slips, then sensors without a reading, one at a
     /// time, then two at once.
     fn failures_beside(&self, known: Vec<Failure>, found: Option<&Estimate<'_>>) -> Vec<Failure> {
@@ -207,24 +217,35 @@ impl FailureSearch<'_> {
 
     /// Failure as by `hypothesis`; `None` if no failure of that joint scores below `most`.
     fn hypothesis_below(&self, known: &[Failure], joint: usize, source: FailureSource, most: f64) -> Option<Failure> {
+        self.failure_by(&self.shown_with_free(known, joint, most)?, source)
+    }
+
+    /// Readings of a joint and the angles that the camera shows with its sensor ignored; `None` if no failure of it
+    /// scores below `most`.
+    fn shown_with_free(&self, known: &[Failure], joint: usize, most: f64) -> Option<Readings> {
         let mut freed: Vec<Failure> = known.iter().filter(|failure| failure.joint != joint).cloned().collect();
         freed.push(Failure::without_sensor(joint, FailedKind::Dead, FailureSource::Detected, self.views.len()));
         let applied = self.applied(&freed);
         let found = self.estimate(&applied).filter(|found| self.may_score(found, 1, most))?;
-        self.failure_of(joint, &found, source)
+        Some(Readings::new(self.robot, self.views, joint, &found))
     }
 
     /// Failure of a joint's sensor by an estimate in which the joint is free.
     fn failure_of(&self, joint: usize, found: &Estimate<'_>, source: FailureSource) -> Option<Failure> {
-        let readings = Readings::new(self.robot, self.views, joint, found);
+        self.failure_by(&Readings::new(self.robot, self.views, joint, found), source)
+    }
+
+    /// Failure that readings and angles of a joint show, if enough views do.
+    fn failure_by(&self, readings: &Readings, source: FailureSource) -> Option<Failure> {
         if readings.len() < MIN_VIEWS {
             return None;
         }
         let pattern = readings.pattern(self.robot)?;
-        Some(self.failure(joint, &pattern, source, &readings))
+        Some(self.failure(&pattern, source, readings))
     }
 
-    fn failure(&self, joint: usize, pattern: &FailurePattern, found: FailureSource, readings: &Readings) -> Failure {
+    fn failure(&self, pattern: &FailurePattern, found: FailureSource, readings: &Readings) -> Failure {
+        let joint = readings.joint();
         let all = Failure::without_sensor(joint, FailedKind::Dead, found, self.views.len());
         let evidence = readings.in_words(&self.robot.sensors[joint], pattern, self.views);
         match pattern {

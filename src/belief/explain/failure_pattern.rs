@@ -3,8 +3,8 @@
 pub(crate) use crate::explain::constants::failure_pattern::MIN_STILL_VIEWS;
 use crate::explain::constants::failure_pattern::{
     ALL_ALIKE, FLOOR_RAD, FOLLOWS, LEAST_GAIN_STD, LOCKED_RAD, LOCKED_SIGMAS, LOST_SHARE, MAX_SINGLE, MIN_BACK,
-    MIN_LOST, MIN_SIDE, REFITS, RIGHT_SIGMAS, ROUNDS, STEP_LEAVES, STEP_SIGMAS, STILL_SIGMAS, STRAIGHT, STUCK_SIGMAS,
-    WHOLE_TURN_RAD,
+    MIN_LOST, MIN_SIDE, MOVED_RAD, REFITS, RIGHT_SIGMAS, ROUNDS, STEP_LEAVES, STEP_SIGMAS, STILL_SIGMAS, STRAIGHT,
+    STUCK_SIGMAS, WHOLE_TURN_RAD,
 };
 use std::f64::consts::{PI, TAU};
 
@@ -77,6 +77,10 @@ impl Readings {
         Self { joint, travel_rad, angle_rad, std_rad: angles.iter().map(|(_, std)| *std).collect(), view_idx: seen }
     }
 
+    pub(crate) fn joint(&self) -> usize {
+        self.joint
+    }
+
     pub(crate) fn len(&self) -> usize {
         self.view_idx.len()
     }
@@ -121,6 +125,13 @@ impl Readings {
             return Some(FailurePattern::Dead);
         }
         self.single(&self.are_far(&off_rad, &all), spec.center_rad)
+    }
+
+    /// Range of the readings, if they move as no locked joint's do and the camera shows that the joint does, too.
+    pub(crate) fn moved_rad(&self) -> Option<f64> {
+        let least_rad = MOVED_RAD.max(LOCKED_SIGMAS * rms(&self.std_rad));
+        let moves = robust_deviation(&self.angle_rad) > least_rad && robust_deviation(&self.travel_rad) > MOVED_RAD;
+        moves.then(|| range(&self.travel_rad))
     }
 
     /// Returns true for each distance that is large against those of the `usual` views.
@@ -231,13 +242,8 @@ impl Readings {
     /// Evidence of the pattern, in words.
     pub(crate) fn in_words(&self, spec: &JointSensorSpec, pattern: &FailurePattern, views: &[View]) -> String {
         let unit = spec.unit();
-        let range = |values: &[f64], digits: usize| {
-            let (low, high) =
-                values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
-            unit.shown(high - low, digits)
-        };
-        let read = |digits: usize| range(&self.travel_rad, digits);
-        let shown = |digits: usize| range(&self.angle_rad, digits);
+        let read = |digits: usize| unit.shown(range(&self.travel_rad), digits);
+        let shown = |digits: usize| unit.shown(range(&self.angle_rad), digits);
         let n = self.len();
         let number = |k: usize| views[k].pose_idx + 1;
         match pattern {
@@ -252,7 +258,7 @@ impl Readings {
                 )
             }
             FailurePattern::Stuck(n_still) => {
-                let shown = range(&self.angle_rad[n - n_still..], 1);
+                let shown = unit.shown(range(&self.angle_rad[n - n_still..]), 1);
                 let since = if *n_still < n { "the last " } else { "" };
                 format!("the reading stands still over {since}{n_still} views while the camera shows {shown} of motion")
             }
@@ -305,6 +311,18 @@ fn on_one_turn(angles_rad: &mut [f64]) {
     for angle_rad in angles_rad {
         *angle_rad = first_rad + wrap_symmetric(*angle_rad - first_rad, TAU);
     }
+}
+
+fn range(values: &[f64]) -> f64 {
+    let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+    high - low
+}
+
+/// Standard deviation by the median distance from the median, which a few wrong values leave alone.
+fn robust_deviation(values: &[f64]) -> f64 {
+    let middle = quantile(values, 0.5).unwrap_or(0.0);
+    let off: Vec<f64> = values.iter().map(|value| (value - middle).abs()).collect();
+    SIGMA_OF_MEDIAN * quantile(&off, 0.5).unwrap_or(0.0)
 }
 
 /// Root mean square about the mean.

@@ -19,9 +19,9 @@ impl Calibration {
         let of_joint = |(joint, angle_rad): (&JointResult, &f64)| {
             let [low, high] = ordered(joint.covered_rad);
             let by_rad = past(*angle_rad, [low, high]);
-            (by_rad > MARGIN_RAD).then(|| {
-                format!("{} at {angle_rad:.2} rad is {by_rad:.2} rad beyond {low:.2} .. {high:.2}", joint.name)
-            })
+            let (name, unit) = (&joint.name, joint.moves.si());
+            (by_rad > MARGIN_RAD)
+                .then(|| format!("{name} at {angle_rad:.2} {unit} is {by_rad:.2} {unit} beyond {low:.2} .. {high:.2}"))
         };
         let mut beyond: Vec<String> = joints.filter_map(of_joint).collect();
         beyond.extend(self.valid.beyond(conditions));
@@ -34,7 +34,7 @@ impl Calibration {
         let joints = self.joint.iter().filter(|joint| joint.gain_estimated || joint.offset_estimated);
         let one = |joint: &JointResult| {
             let [low, high] = ordered(joint.covered_rad);
-            format!("{} {low:.2} .. {high:.2} rad", joint.name)
+            format!("{} {low:.2} .. {high:.2} {}", joint.name, joint.moves.si())
         };
         joints.map(one).chain(self.valid.in_words()).collect()
     }

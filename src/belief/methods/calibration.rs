@@ -48,7 +48,7 @@ pub(crate) fn calibrate_positions(
     let n_camera_joints = start.robot.n_seen_joints();
     let n_parameters = free.len() + unobservable.iter().filter(|u| u.parameter.joint < n_camera_joints).count();
     unobservable.retain(|u| !start.determined.contains(&u.parameter));
-    let nothing = || CalibError::NothingObservable { recording: data.name.clone() };
+    let nothing = || CalibError::nothing_observable(&data.name, &data.robot);
     if free.is_empty() {
         return Err(nothing());
     }

@@ -91,7 +91,10 @@ pub(crate) mod clearance_sight {
 pub(crate) mod file {
     /// Digits of plan.toml: a millionth of a radian is a few micrometres at the tool.
     pub(crate) const RAD_DIGITS: f64 = 1e6;
-    pub(crate) const COUNT_DIGITS: f64 = 1e3;
+    /// Least and most digits of a count: few where it is a small part of a radian.
+    pub(crate) const COUNT_DIGITS: [usize; 2] = [LEFT_OUT_DIGITS, 9];
+    /// Digits of a count that the table for people leaves out: it shows angles to a tenth of a degree.
+    pub(crate) const LEFT_OUT_DIGITS: usize = 3;
     pub(crate) const LENGTH_DIGITS: f64 = 1e5;
     pub(crate) const TIME_DIGITS: f64 = 1e3;
 }

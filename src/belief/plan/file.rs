@@ -1,6 +1,6 @@
 //! plan.toml: a plan for operators, checks and renderings.
 
-use crate::plan::constants::file::{COUNT_DIGITS, LENGTH_DIGITS, RAD_DIGITS, TIME_DIGITS};
+use crate::plan::constants::file::{COUNT_DIGITS, LEFT_OUT_DIGITS, LENGTH_DIGITS, RAD_DIGITS, TIME_DIGITS};
 use armcal_core::codes::Code;
 use armcal_core::codes::Warning;
 use std::path::Path as FilePath;
@@ -338,7 +338,12 @@ struct Writer<'a> {
 
 impl Writer<'_> {
     fn counts(&self, angles: &JointAngles) -> Vec<f64> {
-        self.belief.sensors.counts(angles).iter().map(|&counts| rounded(counts, COUNT_DIGITS)).collect()
+        let counts = self.belief.sensors.counts(angles);
+        let with_digits = |(joint, &counts): (usize, &f64)| {
+            let digits = digits_in_file(self.robot.sensors[joint].counts_per_rad);
+            rounded(counts, 10f64.powi(digits as i32))
+        };
+        counts.iter().enumerate().map(with_digits).collect()
     }
 
     fn pose(&self, number: usize, visit: &PlannedVisit) -> PoseTable {
@@ -382,6 +387,19 @@ impl Writer<'_> {
             edge_durations_s: edges_s.map(|duration_s| rounded(duration_s, TIME_DIGITS)).collect(),
         }
     }
+}
+
+/// Returns the digits after the point of a set-point in the table for people.
+#[must_use]
+pub fn count_digits(counts_per_rad: f64) -> usize {
+    digits_in_file(counts_per_rad) - LEFT_OUT_DIGITS
+}
+
+/// Digits after the point that a set-point needs for a millionth of a radian, at least those left out for people.
+fn digits_in_file(counts_per_rad: f64) -> usize {
+    let [least, most] = COUNT_DIGITS;
+    let digits = (RAD_DIGITS / counts_per_rad.abs()).log10().ceil().max(0.0);
+    (digits as usize).clamp(least, most)
 }
 
 fn predicted(visit: &PlannedVisit) -> Option<f64> {

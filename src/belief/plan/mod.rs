@@ -31,7 +31,9 @@ pub use clearance::{
     ClearanceModel, ClosestPair, SELF_MARGIN_REDUCTION_M, always_near, clear_angles, sample_self_pairs,
 };
 pub use error::PlanError;
-pub use file::{LeftOutTable, PathTable, PlanFile, PlanHeader, PlanTotals, PoseTable, SetName, TagTable, plan_schema};
+pub use file::{
+    LeftOutTable, PathTable, PlanFile, PlanHeader, PlanTotals, PoseTable, SetName, TagTable, count_digits, plan_schema,
+};
 pub use motion::{Edge, Path, Timing, TrackingErrorBound};
 pub use path::{PathError, PathPlanner};
 pub use scene_check::{SceneCheck, SceneIssues};

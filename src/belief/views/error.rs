@@ -2,6 +2,7 @@
 
 use armcal_core::codes::{Code, Coded};
 use armcal_core::log::StampRegression;
+use armcal_core::robot::{JointSensorSpec, Robot};
 
 /// Reason why there is no calibration at all; a poor calibration is refused instead.
 #[derive(Debug, thiserror::Error)]
@@ -31,6 +32,17 @@ pub enum CalibError {
     TooFewViews { recording: String, views: usize, needed: usize },
     #[error("{recording}: no joint lies between the base and the camera with a sensor that the views determine")]
     NothingObservable { recording: String },
+    #[error(
+        "{robot}: `gain_std` and `offset_std_rad` (of a slide `offset_std_m`) are 0 for every joint before the camera, \
+         which holds all their sensors at the datasheet, so nothing is left to calibrate; state one above 0, \
+         `gain_std` up to 10 or `offset_std_rad` up to 6.3"
+    )]
+    AllHeld { robot: String },
+    #[error(
+        "{recording}: {joint} is declared locked, but its readings move by {moved} over the views, and so does the \
+         joint in the camera's sight; take the declaration back, or declare its sensor (dead, stuck or jumps)"
+    )]
+    DeclaredLocked { recording: String, joint: String, moved: String },
     #[error("{recording}: no joint can be calibrated by its end stops: {problem}")]
     NoStops { recording: String, problem: String },
     #[error("{recording}: no map of the tags can be made from its views: {problem}")]
@@ -71,6 +83,18 @@ pub enum CalibError {
     Disorder { recording: String, topic: String, disorder: StampRegression },
 }
 
+impl CalibError {
+    /// Returns the error of a recording that determines no sensor of `robot`, or that of a robot whose file holds all.
+    pub(crate) fn nothing_observable(recording: &str, robot: &Robot) -> Self {
+        let seen = &robot.sensors[..robot.n_seen_joints()];
+        let is_held = |sensor: &JointSensorSpec| sensor.gain_std <= 0.0 && sensor.offset_std_rad <= 0.0;
+        if !seen.is_empty() && seen.iter().all(is_held) {
+            return Self::AllHeld { robot: robot.folder.join("robot.toml").display().to_string() };
+        }
+        Self::NothingObservable { recording: recording.to_owned() }
+    }
+}
+
 /// Returns the known tags, the detected tags, and the remedy, in words.
 fn no_tags(robot: &str, known: &[u32], seen: &[u32]) -> String {
     let todo = if seen.is_empty() {
@@ -94,9 +118,10 @@ impl Coded for CalibError {
             | Self::NoInterimEstimate { .. } => Code::ViewsMissing,
             Self::NoTags { .. } => Code::TagsNotSeen,
             Self::CornerOrder { .. } => Code::InputCornerOrder,
-            Self::NothingObservable { .. } | Self::NoStops { .. } => Code::NothingObservable,
+            Self::NothingObservable { .. } | Self::AllHeld { .. } | Self::NoStops { .. } => Code::NothingObservable,
             Self::Map { .. } => Code::MapFailed,
             Self::Identify { .. } => Code::ScaleUnmeasured,
+            Self::DeclaredLocked { .. } => Code::ValueInvalid,
             Self::OnePose { .. } => Code::ArmNotMoved,
             Self::Twice { .. } => Code::RecordingDuplicate,
             Self::Surveys { .. } => Code::SurveysConflict,

@@ -24,6 +24,9 @@ pub enum SensorKind {
     Resolver,
 }
 
+/// Ranges of a joint in one word above which the word stands for readings that never repeat, such as radians.
+const NEVER_REPEATS: f64 = 1e3;
+
 /// Datasheet of a joint sensor: `angle = center + wrap(counts - counts(center)) / counts_per_rad`.
 ///
 /// For a slide, figures are in metres although their names say rad: `counts_per_rad` are counts per metre.
@@ -78,6 +81,13 @@ impl JointSensorSpec {
     #[must_use]
     pub fn is_limited(&self) -> bool {
         self.moves.is_slide() || self.half_range_rad < 0.999 * std::f64::consts::PI
+    }
+
+    /// Returns true if the word is so much longer than the joint's range that its reading never repeats: such a reading
+    /// keeps its sign.
+    #[must_use]
+    pub fn never_repeats(&self) -> bool {
+        self.wrap_counts > NEVER_REPEATS * 2.0 * self.half_range_rad * self.counts_per_rad.abs()
     }
 
     /// Returns the recorded number at an angle, before it wraps: counts, or in the unit of stated angles.

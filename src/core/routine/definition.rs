@@ -98,7 +98,10 @@ impl Routine {
                 FileIssue::new(Code::NameUnknown, &self.file, format!("failed_joint.{index}"), problem).into()
             })
         };
-        self.failed_joints.iter().enumerate().map(of).collect()
+        let failed = self.failed_joints.iter().enumerate().map(of).collect::<Result<Vec<_>, RoutineError>>()?;
+        FailedJoint::check_kinds(&failed, &robot.joint_names())
+            .map_err(|problem| FileIssue::new(Code::ValueDuplicate, &self.file, "failed_joint", problem))?;
+        Ok(failed)
     }
 
     /// Checks that the steps fit robot and vehicle.

@@ -218,7 +218,8 @@ impl SensorModel {
         self.correction.angle_rad(&self.spec, self.nominal_travel_rad(counts), departure, 0.0)
     }
 
-    /// Returns the reading at `angle_rad`, 0..wrap, not rounded: the inverse of [`Self::angle_rad`].
+    /// Returns the reading at `angle_rad`, not rounded: the inverse of [`Self::angle_rad`]. It is in 0..wrap, except of
+    /// a word that never repeats.
     #[must_use]
     pub fn counts(&self, angle_rad: f64) -> f64 {
         self.counts_under(angle_rad, &ConditionChange::default())
@@ -230,7 +231,7 @@ impl SensorModel {
         let spec = &self.spec;
         let travel = self.travel_under_rad(angle_rad, departure);
         let counts = spec.offset_counts + spec.counts_per_rad * (spec.center_rad + travel);
-        counts.rem_euclid(spec.wrap_counts)
+        if spec.never_repeats() { counts } else { counts.rem_euclid(spec.wrap_counts) }
     }
 
     /// Returns the datasheet's travel at `angle_rad`, rad: the inverse of [`Correction::angle_rad`] with the approach

@@ -20,7 +20,9 @@ use crate::solve::estimate::Estimate;
 use crate::solve::input::HyperparameterMode;
 use crate::solve::model_for_views::model_for;
 use crate::views::calibration_data::{CalibrationData, HeldOut};
+use crate::views::error::CalibError;
 use crate::views::view::{CaptureData, View};
+use armcal_core::codes::{Code, Coded};
 use armcal_core::input::TagNoise;
 use armcal_core::kinematics::Attachment;
 use armcal_core::robot::{FailedJoint, FailedKind, Robot};
@@ -57,6 +59,10 @@ fn calibrated_for(robot: Robot, views: Vec<View>, task: Option<ReachTask>) -> Ca
 }
 
 fn calibrated_by(robot: Robot, data: CaptureData) -> Calibration {
+    tried_by(robot, data).expect("a result")
+}
+
+fn tried_by(robot: Robot, data: CaptureData) -> Result<Calibration, CalibError> {
     let data = CalibrationData {
         name: "synthetic".to_owned(),
         messages_hash: String::new(),
@@ -66,7 +72,7 @@ fn calibrated_by(robot: Robot, data: CaptureData) -> Calibration {
         robot,
         identified: Vec::new(),
     };
-    calibrate_data(data, CalibrationMethod::Bundle, None).expect("a result")
+    calibrate_data(data, CalibrationMethod::Bundle, None)
 }
 
 /// An arm without faults; `locked`: a joint that stands still.
@@ -334,6 +340,65 @@ fn what_is_declared_is_believed_and_not_looked_for() {
     }
     let declared = [Failure::without_sensor(2, FailedKind::Dead, FailureSource::Declared, N_VIEWS)];
     assert_eq!(found_failures(&case, &declared), declared);
+}
+
+/// A joint is held because its sensor is dead: the sensor is named, and the joint's one angle is estimated.
+#[test]
+fn a_dead_sensor_of_a_held_joint_is_dead_and_not_locked() {
+    for seed in [30, 32] {
+        let joint = (seed % 5) as usize;
+        let mut case = case(seed, Some(joint));
+        let at_rad = case.truth.angles(&case.robot, &case.views[0])[joint];
+        random_words(&mut case, joint, seed);
+        let marks = [FailedKind::Dead, FailedKind::Locked].map(|kind| FailedJoint { joint, kind });
+        let result = calibrated(case.robot.with_failed(&marks), case.views);
+        let [failed] = &result.failed_joint[..] else { panic!("seed {seed}: {:?}", result.failed_joint) };
+        assert_eq!((failed.kind, failed.found.as_str()), (FailedKind::Dead, "declared"), "seed {seed}");
+        let (angle_rad, std_rad) = failed.angle_rad.zip(failed.angle_std_rad).expect("one angle");
+        assert!((angle_rad - at_rad).abs() < 5.0 * std_rad + 1e-3, "seed {seed}: {angle_rad} {at_rad} {std_rad}");
+        let told = failed.told();
+        assert!(told.held && told.evidence.contains(" deg") && !told.remedy().contains("free"), "{}", told.remedy());
+        let is_needed = |refusal: &Refusal| matches!(refusal, Refusal::SensorFailed { .. });
+        assert!(!result.refusals.iter().any(is_needed), "seed {seed}: {:?}", result.refusals);
+    }
+}
+
+#[test]
+fn a_joint_that_moves_is_not_locked_by_declaration() {
+    for seed in [31, 33] {
+        let joint = (seed % 5) as usize;
+        let locked = |robot: &Robot| robot.clone().with_failed(&[FailedJoint { joint, kind: FailedKind::Locked }]);
+        let of = |fit: Vec<View>| CaptureData { fit, ..CaptureData::default() };
+        let moving = case(seed, None);
+        let name = moving.robot.sensors[joint].joint.clone();
+        let error = tried_by(locked(&moving.robot), of(moving.views)).expect_err("it moves");
+        assert!(matches!(&error, CalibError::DeclaredLocked { joint, .. } if *joint == name), "seed {seed}: {error}");
+        assert_eq!(error.code(), Code::ValueInvalid);
+        // The readings of a locked joint mean nothing.
+        let mut still = case(seed, Some(joint));
+        random_words(&mut still, joint, seed);
+        let result = tried_by(locked(&still.robot), of(still.views)).expect("it is locked");
+        assert_eq!(result.failed_joint[0].kind, FailedKind::Locked, "seed {seed}");
+    }
+}
+
+#[test]
+fn sensors_that_robot_toml_holds_are_the_reason_why_nothing_is_calibrated() {
+    let mut case = case(34, None);
+    for sensor in &mut case.robot.sensors {
+        (sensor.gain_std, sensor.offset_std_rad) = (0.0, 0.0);
+    }
+    let fit = |views: &[View]| CaptureData { fit: views.to_vec(), ..CaptureData::default() };
+    let error = tried_by(case.robot.clone(), fit(&case.views)).expect_err("nothing is left");
+    assert!(matches!(error, CalibError::AllHeld { .. }), "{error}");
+    assert_eq!(error.code(), Code::NothingObservable);
+    assert!(
+        ["gain_std", "offset_std_rad", "robot.toml"].iter().all(|word| error.to_string().contains(word)),
+        "{error}"
+    );
+    case.robot.sensors[0].offset_std_rad = 0.01;
+    let with_one = tried_by(case.robot, fit(&case.views));
+    assert!(!matches!(with_one, Err(CalibError::AllHeld { .. })), "one offset is left");
 }
 
 /// The tool point lies on the last axis before the camera, so that a task of positions does not need this joint's

@@ -156,6 +156,21 @@ fn what_lies_beyond_is_named_and_what_lies_within_is_not() {
     insta::assert_snapshot!("validity", words.join("\n"));
 }
 
+#[test]
+fn ranges_of_slides_are_in_metres() {
+    let mut calibration = sample();
+    let in_rad = calibration.valid_for();
+    assert!(in_rad[0].ends_with(" rad"), "{in_rad:?}");
+    calibration.joint[0].moves = armcal_core::kinematics::JointKind::Prismatic;
+    let in_metres = calibration.valid_for();
+    assert_eq!(in_metres[0], in_rad[0].replace(" rad", " m"));
+    assert_eq!(in_metres[1..], in_rad[1..]);
+    let mut angles = JointAngles::from_fn(6, |j| calibration.joint[j].covered_rad[0]);
+    angles[0] = calibration.joint[0].covered_rad[0].max(calibration.joint[0].covered_rad[1]) + 0.5;
+    let told = calibration.beyond(&angles, &Conditions::default());
+    assert!(told.len() == 1 && told[0].contains("0.50 m") && !told[0].contains("rad"), "{told:?}");
+}
+
 /// A refused result stays refused when its status alone is edited, and an accepted one with its reasons of none reads.
 #[test]
 fn a_refused_calibration_is_not_accepted_by_an_edited_status() {

@@ -126,6 +126,18 @@ fn the_shape_prior_is_a_squared_exponential_process() {
     }
 }
 
+/// A word of radians keeps its sign; one of a few turns lies in 0..wrap.
+#[test]
+fn readings_that_never_repeat_are_not_wrapped() {
+    let centered = JointSensorSpec { offset_counts: 0.0, center_rad: 0.0, ..spec() };
+    let radians = JointSensorSpec { counts_per_rad: 1.0, wrap_counts: 1e6, ..centered.clone() };
+    let model = SensorModel::nominal(&radians);
+    assert!((model.counts(-0.781) + 0.781).abs() < 1e-12, "{}", model.counts(-0.781));
+    assert!((model.angle_rad(model.counts(-0.781)) + 0.781).abs() < 1e-9);
+    let word = SensorModel::nominal(&centered);
+    assert!((word.counts(-0.781) - (65536.0 - 0.781 * centered.counts_per_rad)).abs() < 1e-6);
+}
+
 #[test]
 fn the_nominal_model_is_the_datasheet_formula() {
     let model = SensorModel::nominal(&spec());
