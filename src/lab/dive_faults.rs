@@ -14,7 +14,7 @@ use armcal_belief::calib::online::{
 use armcal_belief::model::WornSpot;
 use armcal_belief::say::FindingKind;
 use armcal_core::log::Recording;
-use armcal_core::robot::{FailedJoint, Robot};
+use armcal_core::robot::{FailedJoint, FailedKind, Robot};
 use armcal_core::stats::{chi_square_above, stream_rng};
 use armcal_core::streams::{Mark, MarkKind, Message, Thermometer};
 use armcal_core::time::{SIMULATION_EPOCH, Stamp};
@@ -339,7 +339,14 @@ impl<'a> Followed<'a> {
                 self.stream = ViewStream::new(self.follower.estimator().robot().clone());
                 return;
             }
-            (Message::Mark(Mark { kind: MarkKind::Failed(FailedJoint { joint, .. }), end, .. }), _) => {
+            (
+                Message::Mark(Mark {
+                    kind: MarkKind::Failed(FailedJoint { joint, kind: FailedKind::Locked }),
+                    end,
+                    ..
+                }),
+                _,
+            ) => {
                 let name = &self.follower.estimator().robot().sensors[*joint].joint;
                 let line = format!("{name} was given up");
                 self.tell(Fault::Failed(*joint), *end, line);

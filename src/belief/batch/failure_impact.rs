@@ -77,7 +77,7 @@ impl FailureImpact<'_> {
     fn table(&self, failure: &Failure) -> FailedJointTable {
         let joint = failure.joint;
         let pose = |&view_idx: &usize| self.views[view_idx].pose_idx;
-        let is_locked = failure.kind.stands_still();
+        let is_locked = failure.stands_still();
         let has_no_sensor = failure.has_no_sensor_now();
         let angle = self.locked_angle(failure);
         FailedJointTable {
@@ -111,13 +111,16 @@ impl FailureImpact<'_> {
         let unit = self.robot.sensors[failure.joint].unit();
         match step {
             Some((since, (step_rad, _))) => slip_in_words(unit.shown(step_rad, 2), self.views, since),
-            None => failure.evidence.clone(),
+            None => match self.locked_angle(failure).filter(|_| failure.is_held) {
+                Some((angle_rad, _)) => format!("the joint is held at {}", unit.shown(angle_rad, 1)),
+                None => failure.evidence.clone(),
+            },
         }
     }
 
     /// Mean angle of a locked joint over the views and its sigma, rad; all views show the same angle.
     fn locked_angle(&self, failure: &Failure) -> Option<(f64, f64)> {
-        if !failure.kind.stands_still() {
+        if !failure.stands_still() {
             return None;
         }
         let joint = failure.joint;
@@ -133,7 +136,7 @@ impl FailureImpact<'_> {
         let freed: Vec<f64> = failure
             .views
             .iter()
-            .filter(|&&k| !failure.kind.stands_still() && self.found.uses(k))
+            .filter(|&&k| !failure.stands_still() && self.found.uses(k))
             .map(|&k| self.found.angle(k, failure.joint).1.powi(2))
             .collect();
         (!freed.is_empty()).then(|| (freed.iter().sum::<f64>() / freed.len() as f64).sqrt())
@@ -157,7 +160,7 @@ impl FailureImpact<'_> {
             let (j, known) = (failure.joint, source(failure));
             let spec = &mut robot.sensors[j];
             match known {
-                AngleSource::AsItIs if failure.kind.stands_still() => {
+                AngleSource::AsItIs if failure.stands_still() => {
                     let declared = FailedJoint { joint: j, kind: FailedKind::Locked };
                     if let Some((angle_rad, _)) = self.locked_angle(failure) {
                         robot.stowed[j] = angle_rad;
@@ -255,7 +258,7 @@ impl FailureImpact<'_> {
             return Some(Refusal::TooFewViewsSinceSlip { joint, evidence: self.evidence(failure), views });
         }
         let is_needed = failure.joint < self.robot.tool.mount.n_joints;
-        if !failure.has_no_sensor_now() || failure.kind.stands_still() || !is_needed {
+        if !failure.has_no_sensor_now() || failure.stands_still() || !is_needed {
             return None;
         }
         let tolerance_m = self.task.map(|task| task.task.tolerance_m);
@@ -295,7 +298,7 @@ impl FailureImpact<'_> {
     /// Returns true if the decision rule accepts all targets that can be judged without that sensor. The camera
     /// determines the angles of other joints without a sensor.
     fn is_within_tolerance_without(&self, failure: &Failure) -> bool {
-        let is_told = |other: &Failure| other.has_no_sensor_now() && !other.kind.stands_still();
+        let is_told = |other: &Failure| other.has_no_sensor_now() && !other.stands_still();
         let source = |other: &Failure| {
             if other.joint != failure.joint && is_told(other) { AngleSource::ByCamera } else { AngleSource::AsItIs }
         };

@@ -114,7 +114,7 @@ impl CalibrationPrior {
             guess.reference = reference(views);
         }
         // The prior knows the sensor of a locked joint, not where the joint stands.
-        let is_locked = |failure: &&Failure| failure.kind.stands_still() && failure.leaves_no_sensor();
+        let is_locked = |failure: &&Failure| failure.stands_still() && failure.leaves_no_sensor();
         let locked: Vec<usize> = applied.failures.iter().filter(is_locked).map(|failure| failure.joint).collect();
         for &joint in &locked {
             for parameter in ParameterKind::all().map(|kind| Parameter { joint, kind }) {

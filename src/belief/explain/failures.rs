@@ -69,6 +69,8 @@ pub struct Failure {
     pub line: Option<SensorLine>,
     /// Evidence of the failure, in words.
     pub evidence: String,
+    /// True if the joint is held at one angle because its sensor says nothing.
+    pub is_held: bool,
 }
 
 impl Failure {
@@ -86,6 +88,7 @@ impl Failure {
             lost_since: None,
             line: None,
             evidence: String::new(),
+            is_held: false,
         }
     }
 
@@ -108,6 +111,11 @@ impl Failure {
             evidence: slip_in_words(unit.shown(step_rad, 2), views, since),
             ..Self::without_sensor(joint, FailedKind::Jumps, FailureSource::Detected, 0)
         }
+    }
+
+    /// Returns true if the joint has one angle in all views.
+    pub fn stands_still(&self) -> bool {
+        self.kind.stands_still() || self.is_held
     }
 
     /// Returns true if the sensor slipped once for good.
@@ -164,7 +172,7 @@ impl FailureAdjusted {
         for view in &mut applied.views {
             set_by_camera(robot, view, at);
         }
-        for failure in failures.iter().filter(|f| f.kind.stands_still() && f.leaves_no_sensor()) {
+        for failure in failures.iter().filter(|f| f.stands_still() && f.leaves_no_sensor()) {
             applied.lock(failure.joint);
         }
         for failure in failures.iter().filter(|failure| failure.line.is_some() && !failure.leaves_no_sensor()) {
@@ -199,7 +207,7 @@ impl FailureAdjusted {
     /// Removes the columns of failed sensors from `model`.
     pub fn restrict(&self, model: &mut Model) {
         for failure in self.failures.iter().filter(|failure| failure.leaves_no_sensor()) {
-            let is_locked = failure.kind.stands_still();
+            let is_locked = failure.stands_still();
             model.joints[failure.joint] = if is_locked { vec![ParameterKind::Offset] } else { Vec::new() };
         }
         for (failure, since) in self.failures.iter().filter_map(|failure| Some((failure, failure.since?))) {

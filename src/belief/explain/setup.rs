@@ -12,7 +12,7 @@ use crate::solve::covariance::ParameterCovariance;
 use crate::solve::estimate::Estimate;
 use crate::solve::input::{BundleInput, HyperparameterMode};
 use crate::views::view::View;
-use armcal_core::robot::{FailedKind, Robot};
+use armcal_core::robot::{FailedJoint, FailedKind, Robot};
 
 /// Views under one hypothesis of failed joints.
 pub(crate) struct BundleSetup {
@@ -31,10 +31,15 @@ pub(crate) enum Clocks {
     Aligned,
 }
 
-/// Declared failures of `robot`.
+/// Declared failures of `robot`, one a joint: a locked joint whose sensor is lost is held.
 pub(crate) fn declared(robot: &Robot, views: &[View]) -> Vec<Failure> {
-    let before_camera = robot.failed.iter().filter(|failed| failed.joint < robot.n_seen_joints());
-    before_camera.map(|&failed| Failure::declared(failed, views.len())).collect()
+    let of_joint = |of_one: &[FailedJoint]| {
+        let all = of_one.iter().filter(|failed| failed.joint < robot.n_seen_joints());
+        let lost = all.clone().find(|failed| failed.kind != FailedKind::Locked);
+        let failure = Failure::declared(*lost.or(all.clone().next())?, views.len());
+        Some(Failure { is_held: lost.is_some() && robot.is_locked(failure.joint), ..failure })
+    };
+    robot.failed.chunk_by(|a, b| a.joint == b.joint).filter_map(of_joint).collect()
 }
 
 impl BundleSetup {
@@ -91,7 +96,7 @@ impl BundleSetup {
             .failures
             .iter()
             .filter(|failure| failure.leaves_no_sensor())
-            .map(|failure| if failure.kind.stands_still() { 1 } else { 2 });
+            .map(|failure| if failure.stands_still() { 1 } else { 2 });
         let cold = per_joint.saturating_sub(lost.sum());
         self.usable_prior().map_or(cold, |prior| prior.n_unknown(robot).min(cold))
     }

@@ -26,7 +26,7 @@ pub struct FailedJointTable {
     /// First pose after a slip that lasts. The calibration is that of the sensor since then.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub since_pose: Option<u32>,
-    /// Angle of a locked joint, rad; m for a slide.
+    /// Angle of a joint that is locked or held, rad; m for a slide.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub angle_rad: Option<f64>,
     /// Standard deviation of `angle_rad`; absent with it.
@@ -51,8 +51,9 @@ impl FailedJointTable {
     /// Returns the failure in the form that sentences use.
     #[must_use]
     pub fn told(&self) -> FailedJoint<'_> {
-        let Self { joint, kind, evidence, since_pose, .. } = self;
-        FailedJoint { joint, kind: *kind, evidence, slipped: since_pose.is_some() }
+        let Self { joint, kind, evidence, since_pose, angle_rad, .. } = self;
+        let held = !kind.stands_still() && angle_rad.is_some();
+        FailedJoint { joint, kind: *kind, evidence, slipped: since_pose.is_some(), held }
     }
 }
 

@@ -16,6 +16,8 @@ pub struct FailedJoint<'a> {
     pub evidence: &'a str,
     /// True if the sensor slipped and is calibrated as it is since the slip.
     pub slipped: bool,
+    /// True if the joint is held at one angle because its sensor says nothing.
+    pub held: bool,
 }
 
 /// An error of the arm or its survey that the result corrects.
@@ -175,7 +177,7 @@ fn by(found: &Finding) -> String {
 }
 
 fn of_joint(failed: &FailedJoint<'_>) -> Repair {
-    let FailedJoint { joint, kind, evidence, slipped } = *failed;
+    let FailedJoint { joint, kind, evidence, slipped, .. } = *failed;
     let colon = if evidence.is_empty() { "" } else { ": " };
     let cause = match evidence.strip_prefix("the sensor ").filter(|_| slipped) {
         Some(slipped) => format!("the sensor of {joint} {slipped}"),
@@ -193,6 +195,9 @@ impl FailedJoint<'_> {
         let joint = self.joint;
         match (self.kind, self.slipped) {
             (_, true) => format!("fasten the sensor of {joint}: the result holds since the slip"),
+            _ if self.held => {
+                format!("replace the sensor of {joint}; targets that need {joint} are out of reach while it is held")
+            }
             (FailedKind::Locked, _) => format!("targets that need {joint} are out of reach; free it"),
             (FailedKind::NotMoved, _) => {
                 format!("capture views that move {joint}; it is calibrated at this angle only")
@@ -208,7 +213,7 @@ mod tests {
     use crate::say::finding::FindingUnit;
 
     fn failed(kind: FailedKind, evidence: &str) -> FailedJoint<'_> {
-        FailedJoint { joint: "elbow", kind, evidence, slipped: false }
+        FailedJoint { joint: "elbow", kind, evidence, slipped: false, held: false }
     }
 
     fn after_slip(evidence: &str) -> FailedJoint<'_> {
@@ -224,6 +229,14 @@ mod tests {
         ];
         let told = told.map(|failed| of_joint(&failed)).map(|one| format!("{}\n  {}\n", one.cause, one.remedy));
         insta::assert_snapshot!("failed_joints", told.concat());
+    }
+
+    #[test]
+    fn a_dead_sensor_of_a_held_joint_is_replaced_and_the_joint_not_freed() {
+        let held = FailedJoint { held: true, ..failed(FailedKind::Dead, "the joint is held at 3.0 deg") };
+        let [told, locked] = [held, failed(FailedKind::Locked, "")].map(|failed| of_joint(&failed));
+        assert!(told.cause.contains("sensor") && !told.cause.contains("locked"), "{}", told.cause);
+        assert!(!told.remedy.contains("free") && locked.remedy.contains("free"), "{}", told.remedy);
     }
 
     #[test]

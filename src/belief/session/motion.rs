@@ -196,8 +196,11 @@ impl<'b> Driver<'b> {
         self.held.push(HeldJoint { joint, kind, since, counts, angle_rad, bound_rad: astray_rad, is_located });
         self.believe(self.sensors.clone());
         self.command()?;
-        // Regardless of its sensor, the joint stands at one angle from now on.
-        self.record_failed(&[FailedJoint { joint, kind: FailedKind::Locked }])?;
+        // A lost sensor is one thing; that the joint stands at one angle from now on is another.
+        let lost = Some(kind).filter(|kind| matches!(kind, FailedKind::Dead | FailedKind::Stuck));
+        let marks: Vec<FailedJoint> =
+            lost.into_iter().chain([FailedKind::Locked]).map(|kind| FailedJoint { joint, kind }).collect();
+        self.record_failed(&marks)?;
         let what = match kind {
             FailedKind::Stuck => "its reading stands still to the count while its set-point moves",
             FailedKind::Dead => "its reading jumped farther than a joint can move, and stayed there",

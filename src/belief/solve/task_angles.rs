@@ -12,7 +12,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::views::view::{TaskRests, View};
 use armcal_core::kinematics::{IkGoal, IkSettings, JointLimits, solve_position};
-use armcal_core::robot::{FailedJoint, FailedKind, Robot};
+use armcal_core::robot::Robot;
 use armcal_core::stats::stream_rng;
 use armcal_core::streams::JointAngles;
 
@@ -48,7 +48,7 @@ impl<'a> TargetSearch<'a> {
         let open = JointLimits { lower_rad: -std::f64::consts::TAU, upper_rad: std::f64::consts::TAU };
         let settings = IkSettings {
             limits: robot.chain.joints().iter().map(|joint| joint.limits.unwrap_or(open)).collect(),
-            locked: (0..robot.n_joints()).map(|j| j >= robot.tool.mount.n_joints || is_locked(robot, j)).collect(),
+            locked: (0..robot.n_joints()).map(|j| j >= robot.tool.mount.n_joints || robot.is_locked(j)).collect(),
             tolerance_m: TOLERANCE_M,
             max_iterations: 200,
         };
@@ -111,14 +111,11 @@ impl<'a> TargetSearch<'a> {
     }
 }
 
-fn is_locked(robot: &Robot, joint: usize) -> bool {
-    robot.failed.contains(&FailedJoint { joint, kind: FailedKind::Locked })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::fixture::titan;
+    use armcal_core::robot::{FailedJoint, FailedKind};
     use armcal_core::streams::ReachTask;
     use armcal_core::time::SIMULATION_EPOCH;
     use std::collections::BTreeMap;

@@ -53,6 +53,12 @@ impl FailedKind {
         matches!(self, Self::Locked | Self::NotMoved)
     }
 
+    /// Returns true if the two go together: a joint whose sensor is lost may be held still, which is marked as locked.
+    fn goes_with(self, other: Self) -> bool {
+        let is_lost = |kind: Self| matches!(kind, Self::Dead | Self::Stuck);
+        self == Self::Locked && is_lost(other) || is_lost(self) && other == Self::Locked
+    }
+
     /// Returns the kind of that name.
     #[must_use]
     pub fn of_name(name: &str) -> Option<Self> {
@@ -84,6 +90,17 @@ impl FailedJoint {
         Ok(Self { joint: index, kind })
     }
 
+    /// Returns `known` with the `later` declarations. A later one of a joint replaces an earlier one, except that a
+    /// joint with a lost sensor may be locked, too.
+    pub(super) fn joined(mut known: Vec<Self>, later: &[Self]) -> Vec<Self> {
+        for one in later {
+            known.retain(|other| other.joint != one.joint || other.kind.goes_with(one.kind));
+            known.push(*one);
+        }
+        known.sort_unstable();
+        known
+    }
+
     /// Checks that no joint is declared with two kinds.
     ///
     /// # Errors
@@ -101,6 +118,20 @@ impl FailedJoint {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_held_joint_keeps_the_failure_of_its_sensor() {
+        let of = |kind: FailedKind| FailedJoint { joint: 1, kind };
+        let after = |first: FailedKind, later: &[FailedKind]| -> Vec<FailedKind> {
+            let later: Vec<FailedJoint> = later.iter().map(|&kind| of(kind)).collect();
+            FailedJoint::joined(vec![of(first)], &later).into_iter().map(|failed| failed.kind).collect()
+        };
+        let [locked, dead, stuck] = [FailedKind::Locked, FailedKind::Dead, FailedKind::Stuck];
+        assert_eq!(after(dead, &[locked]), [locked, dead]);
+        assert_eq!(after(locked, &[dead, locked]), [locked, dead]);
+        assert_eq!(after(dead, &[locked, stuck]), [locked, stuck]);
+        assert_eq!(after(FailedKind::Jumps, &[locked]), [locked]);
+    }
 
     #[test]
     fn a_joint_has_one_kind_of_failure() {

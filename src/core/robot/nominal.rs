@@ -11,7 +11,7 @@ use super::body::LinkBody;
 use super::camera::{CameraSpec, LENS_KEYS};
 use super::drive::DriveSpec;
 use super::error::{FileIssue, RobotError};
-use super::failed::FailedJoint;
+use super::failed::{FailedJoint, FailedKind};
 use super::geometry::GeometryPriors;
 use super::gripper::GripperSpec;
 use super::gripper_tag::GripperTag;
@@ -354,15 +354,17 @@ impl Robot {
     }
 
     /// Returns the arm with these joints declared to have failed. A later declaration of a joint replaces an earlier
-    /// one.
+    /// one, except that a joint with a dead or stuck sensor may be locked, too.
     #[must_use]
     pub fn with_failed(mut self, failed: &[FailedJoint]) -> Self {
-        for declared in failed {
-            self.failed.retain(|known| known.joint != declared.joint);
-            self.failed.push(*declared);
-        }
-        self.failed.sort_unstable();
+        self.failed = FailedJoint::joined(self.failed, failed);
         self
+    }
+
+    /// Returns true if the joint is declared to have one fixed angle.
+    #[must_use]
+    pub fn is_locked(&self, joint: usize) -> bool {
+        self.failed.contains(&FailedJoint { joint, kind: FailedKind::Locked })
     }
 }
 

@@ -342,6 +342,27 @@ fn what_is_declared_is_believed_and_not_looked_for() {
     assert_eq!(found_failures(&case, &declared), declared);
 }
 
+/// A joint is held because its sensor is dead: the sensor is named, and the joint's one angle is estimated.
+#[test]
+fn a_dead_sensor_of_a_held_joint_is_dead_and_not_locked() {
+    for seed in [30, 32] {
+        let joint = (seed % 5) as usize;
+        let mut case = case(seed, Some(joint));
+        let at_rad = case.truth.angles(&case.robot, &case.views[0])[joint];
+        random_words(&mut case, joint, seed);
+        let marks = [FailedKind::Dead, FailedKind::Locked].map(|kind| FailedJoint { joint, kind });
+        let result = calibrated(case.robot.with_failed(&marks), case.views);
+        let [failed] = &result.failed_joint[..] else { panic!("seed {seed}: {:?}", result.failed_joint) };
+        assert_eq!((failed.kind, failed.found.as_str()), (FailedKind::Dead, "declared"), "seed {seed}");
+        let (angle_rad, std_rad) = failed.angle_rad.zip(failed.angle_std_rad).expect("one angle");
+        assert!((angle_rad - at_rad).abs() < 5.0 * std_rad + 1e-3, "seed {seed}: {angle_rad} {at_rad} {std_rad}");
+        let told = failed.told();
+        assert!(told.held && told.evidence.contains(" deg") && !told.remedy().contains("free"), "{}", told.remedy());
+        let is_needed = |refusal: &Refusal| matches!(refusal, Refusal::SensorFailed { .. });
+        assert!(!result.refusals.iter().any(is_needed), "seed {seed}: {:?}", result.refusals);
+    }
+}
+
 #[test]
 fn a_joint_that_moves_is_not_locked_by_declaration() {
     for seed in [31, 33] {

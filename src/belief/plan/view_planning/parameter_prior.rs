@@ -14,7 +14,7 @@ use crate::file::calibration::Calibration;
 use crate::model::{Hyperparameters, Parameter, ParameterKind};
 use crate::plan::view_planning::request::PoseRequest;
 use crate::solve::covariance::ParameterCovariance;
-use armcal_core::robot::{FailedKind, Robot};
+use armcal_core::robot::Robot;
 use armcal_core::sensor::{N_SHAPE, nonlinearity_basis};
 use armcal_core::spatial::adjoint;
 use armcal_core::streams::MAX_JOINTS;
@@ -62,7 +62,7 @@ impl ParameterPrior {
         }
         covariance.fixed_view_mut::<6, 6>(at + 6, at + 6).copy_from(&survey_covariance(robot));
         let mut joint_std_rad = scales.joint_std_rad;
-        for failed in robot.failed.iter().filter(|failed| failed.kind != FailedKind::Locked) {
+        for failed in robot.failed.iter().filter(|failed| !robot.is_locked(failed.joint)) {
             joint_std_rad[failed.joint] = scales.free_joint_std_rad;
         }
         Self { n_joints, covariance, joint_std_rad, noise: scales.noise }
