@@ -80,7 +80,7 @@ pub(crate) mod failure_pattern {
     pub(crate) const LOCKED_SIGMAS: f64 = 3.0;
     pub(crate) const LOCKED_RAD: f64 = 0.2 * std::f64::consts::PI / 180.0;
     /// Spread of an angle that no locked joint has, with the creep of its brake or valve, rad; m of a slide.
-    pub(crate) const MOVED_RAD: f64 = 1.0 * std::f64::consts::PI / 180.0;
+    pub(crate) const MOVED_RAD: f64 = std::f64::consts::PI / 180.0;
     /// Largest distance of a working sensor from the angle, as a share of the angle's spread, with about the
     /// datasheet's slope.
     pub(crate) const FOLLOWS: f64 = 0.3;
