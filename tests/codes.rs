@@ -153,11 +153,6 @@ const CASES: &[Case] = &[
         },
     },
     Case {
-        code: Code::ReadingsMissing,
-        exit: 2,
-        call: |f| calibrate(f, &sample("truth.mcap"), &["--robot", &titan()]),
-    },
-    Case {
         code: Code::RecordingDuplicate,
         exit: 2,
         call: |f| {

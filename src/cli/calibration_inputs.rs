@@ -227,10 +227,10 @@ impl CalibrationInputs<'_> {
             if recording.joint_names.is_empty() {
                 expect_no_truth(path)?;
             }
+            lost |= warn_of_losses(&recording);
             // A missing input map comes before a missing lens: the map may name the lens.
             check_joints(&recording, self.robot)?;
             tracing::info!("{}: {} messages about its marks", path.display(), recording.messages.len());
-            lost |= warn_of_losses(&recording);
             recordings.push(recording);
         }
         self.robot.require_lens()?;

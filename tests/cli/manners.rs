@@ -158,6 +158,7 @@ fn a_forgotten_input_map_comes_before_a_missing_lens() {
     for key in ["center_px = [633.605, 510.9]\n", "distortion = [0.02268, -0.01345, 0.01296, -0.00418]\n"] {
         edit(&robot.join("robot.toml"), key, "");
     }
+    edit(&robot.join("robot.toml"), "max_view_angle_rad = 1.4\n", "");
     let mut command = program();
     command.arg("calibrate").arg(&file).arg("--robot").arg(&robot).arg("--out").arg(folder.path().join("out"));
     answer(&mut command).expect("no map", 2, &["--input", "[joints_mismatch]"]);

@@ -131,7 +131,7 @@ fn sensors_that_cannot_be_wrong_leave_nothing_to_fit() {
         .replace("offset_std_rad = 0.05", "offset_std_rad = 0.0");
     write(&file, &exact);
     let recording = shared_run().file("run.mcap");
-    calibrate(&recording, &robot, &folder.path().join("out")).expect("exact sensors", 2, &["run.mcap"]);
+    calibrate(&recording, &robot, &folder.path().join("out")).expect("exact sensors", 2, &["robot.toml"]);
 }
 
 /// An arm that never comes to rest is distinguished from a recording without marks.

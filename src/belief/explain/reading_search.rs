@@ -257,6 +257,12 @@ impl ReadingSearch<'_> {
         })
     }
 
+    fn named_scale(&self, factor: f64) -> ReadingError {
+        let is_in_pixels = self.views.iter().flat_map(|view| &view.tags).any(TagObservation::is_in_pixels);
+        let hint = margin_hint(self.robot.tag_family, factor).filter(|_| is_in_pixels);
+        ReadingError::MapScale { factor, is_in_pixels, hint }
+    }
+
     fn named(&self, tried: &Tried) -> ReadingError {
         let name = |joint: usize| self.name(joint);
         match &tried.hypothesis {
@@ -310,11 +316,7 @@ impl ReadingSearch<'_> {
                     turn: [turn.w, turn.i, turn.j, turn.k],
                 }
             }
-            Hypothesis::MapScale(factor) => {
-                let is_in_pixels = self.views.iter().flat_map(|view| &view.tags).any(TagObservation::is_in_pixels);
-                let hint = margin_hint(self.robot.tag_family, *factor).filter(|_| is_in_pixels);
-                ReadingError::MapScale { factor: *factor, is_in_pixels, hint }
-            }
+            Hypothesis::MapScale(factor) => self.named_scale(*factor),
             Hypothesis::Camera { n_joints, turn } => {
                 let is_here = *n_joints == self.robot.camera.mount.n_joints;
                 let link = || self.robot.chain.joints()[n_joints - 1].child_link.clone();

@@ -228,6 +228,8 @@ impl fmt::Display for ReadingError {
     }
 }
 
+const MEASURE_TAGS: &str = "measure the border square of one tag (of tag36h11 the black one), correct size_m, and make \
+                            the tag map again";
 const BY_ARM: &str = "by the way that the arm moves the camera, ";
 
 fn fmt_size(f: &mut fmt::Formatter<'_>, factor: f64, hint: Option<&str>) -> fmt::Result {
@@ -381,11 +383,7 @@ impl MisreadReadings {
                  the rows, and how joints and tags were put together"
                     .to_owned()
             }
-            ReadingError::MapScale { is_in_pixels: true, .. } => {
-                "measure the border square of one tag (of tag36h11 the black one), correct size_m, and make the tag \
-                 map again"
-                    .to_owned()
-            }
+            ReadingError::MapScale { is_in_pixels: true, .. } => MEASURE_TAGS.to_owned(),
             ReadingError::MapScale { factor, .. } => {
                 format!("multiply the recorded positions of tags and position_m of the tag map by {factor:.5}")
             }

@@ -195,7 +195,7 @@ fn agreement(travels: &TravelSeries<'_>, pairs: &[Pair], shift_s: f64, robot: &R
     if n_moved.iter().any(|n| *n < MIN_MOVED) || of_all.n < MIN_SHARE * pairs.len() as f64 {
         return None;
     }
-    let sizes = of_sizes.correlation().filter(|_| of_sizes.n > 3.0);
+    let sizes = of_sizes.correlation().filter(|_| of_sizes.n >= MIN_MOVED as f64);
     let sizes = sizes.map_or(0.0, |found| found.clamp(-MOST, MOST).atanh() * (of_sizes.n - 3.0).sqrt());
     Some(Agreement { shift_s, correlation: of_all.correlation()?, sizes })
 }

@@ -14,6 +14,12 @@ struct Arm {
     poses: Vec<JointAngles>,
 }
 
+#[derive(Clone, Copy, PartialEq)]
+enum Images {
+    AtRest,
+    Always,
+}
+
 const PERIOD_S: f64 = 2.0;
 const MOTION_S: f64 = 0.7;
 
@@ -55,10 +61,10 @@ impl Arm {
     }
 
     /// Images by a clock that is `late_s` behind; only those at rest, or all.
-    fn frames(&self, late_s: f64, at_rest: bool, seed: u64) -> Vec<TagFrame> {
+    fn frames(&self, late_s: f64, images: Images, seed: u64) -> Vec<TagFrame> {
         let mut rng = stream_rng(seed, "tags");
         let times_s = (1..(self.duration_s() / 0.15) as usize).map(|k| 0.15 * k as f64);
-        let is_used = |time_s: &f64| !at_rest || time_s.rem_euclid(PERIOD_S) > MOTION_S + 0.1;
+        let is_used = |time_s: &f64| images == Images::Always || time_s.rem_euclid(PERIOD_S) > MOTION_S + 0.1;
         let mut frame = |time_s: f64| {
             let camera_from_tags = self.robot.tags_from_camera(&self.angles_at(time_s)).inverse();
             let mut tag = |id: u32, at_m: [f64; 3]| {
@@ -80,13 +86,13 @@ fn shift(readings: &[Reading], frames: &[TagFrame], robot: &Robot) -> Option<Clo
 
 #[test]
 fn clocks_that_differ_are_found_by_the_motions() {
-    for (seed, at_rest) in [(1, true), (2, false), (3, true), (4, false)] {
+    for (seed, images) in [(1, Images::AtRest), (2, Images::Always), (3, Images::AtRest), (4, Images::Always)] {
         let arm = Arm::new(seed, 40);
         let readings = arm.readings(None);
         // Less than a rest does no harm to an arm that rests for its images.
-        let least_s = if at_rest { 1.5 } else { 0.4 };
+        let least_s = if images == Images::AtRest { 1.5 } else { 0.4 };
         for late_s in [3.2, -least_s, 17.0, least_s, -11.3] {
-            let found = shift(&readings, &arm.frames(late_s, at_rest, seed), &arm.robot).expect("a shift");
+            let found = shift(&readings, &arm.frames(late_s, images, seed), &arm.robot).expect("a shift");
             assert!((found.offset_s - late_s).abs() < 0.2, "{} of {late_s}", found.offset_s);
         }
     }
@@ -104,7 +110,7 @@ fn tags_that_no_two_poses_share_show_the_offset_by_the_map() {
             SurveyedTag { id: k as u32, base_from_tag, ..arm.robot.tags[0].clone() }
         };
         arm.robot.tags = (0..40).map(&mut tag).collect();
-        let frames = arm.frames(0.0, true, seed).into_iter().map(|frame| {
+        let frames = arm.frames(0.0, Images::AtRest, seed).into_iter().map(|frame| {
             let time_s = frame.stamp.since_s(Stamp::default());
             let tag = &arm.robot.tags[(time_s / PERIOD_S) as usize];
             let camera_from_tags = arm.robot.tags_from_camera(&arm.angles_at(time_s)).inverse();
@@ -127,11 +133,11 @@ fn the_words_name_the_side_and_the_key() {
 fn clocks_that_agree_and_motions_that_have_nothing_in_common_show_no_offset() {
     for seed in 1..=6 {
         let (arm, other) = (Arm::new(seed, 30), Arm::new(seed + 100, 30));
-        for at_rest in [true, false] {
+        for images in [Images::AtRest, Images::Always] {
             for late_s in [0.0, 0.1, -0.15] {
-                assert_eq!(shift(&arm.readings(None), &arm.frames(late_s, at_rest, seed), &arm.robot), None);
+                assert_eq!(shift(&arm.readings(None), &arm.frames(late_s, images, seed), &arm.robot), None);
             }
-            let frames = arm.frames(0.0, at_rest, seed);
+            let frames = arm.frames(0.0, images, seed);
             assert_eq!(shift(&arm.readings(Some(1)), &frames, &arm.robot), None);
             // The sizes of the motions differ, and so do their times.
             let mut unrelated = other.readings(None);
