@@ -29,7 +29,7 @@ pub(crate) struct Candidate {
     pub tags: Vec<(usize, f64)>,
     /// True if it shows a tag with a known pose to most arms within the bounds.
     pub shows_known_tag: bool,
-    /// True if the configuration was drawn uniformly over the joint ranges.
+    /// True for a configuration that was drawn uniformly over the joint ranges.
     pub is_even: bool,
 }
 

@@ -23,7 +23,7 @@ pub(crate) struct ClockShift {
     pub offset_s: f64,
     /// Correlation of the motions with the offset.
     correlation: f64,
-    /// The same with the stamps as they are.
+    /// Correlation with the stamps as they are.
     as_stamped: f64,
     n_pairs: usize,
 }
@@ -59,7 +59,7 @@ struct Pair {
     mapped_m: Vec<(Point3<f64>, Point3<f64>)>,
 }
 
-/// How the motions of tags and joints agree under one offset.
+/// Agreement of the motions of tags and joints under one offset.
 #[derive(Clone, Copy, Debug)]
 struct Agreement {
     shift_s: f64,
@@ -101,7 +101,7 @@ pub(crate) fn clock_shift(travels: &TravelSeries<'_>, frames: &[TagFrame], robot
 
 /// Returns offset and correlation of the highest score, if all others but its neighbours are lower by `margin`.
 ///
-/// Of an arm that rests for each image, a range of offsets is as good: its middle is farthest from a motion.
+/// An arm that rests for each image fits a range of offsets: their middle is farthest from a motion.
 fn unrivalled(scored: &[(Agreement, f64)], margin: f64) -> Option<(f64, f64)> {
     let (surest, most) = scored.iter().filter(|(_, score)| score.is_finite()).max_by(|a, b| a.1.total_cmp(&b.1))?;
     let (near, far): (Vec<_>, Vec<_>) =
